@@ -40,7 +40,8 @@ from phone_host.measure.trouble import trouble_of
 from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
 from phone_host.output.rig_yaml import read_rig
 from phone_host.report.run_json import build
-from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted

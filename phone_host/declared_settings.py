@@ -38,6 +38,11 @@ class PhoneHostSettings:
     fifo: str = setting(
         "1:drop-oldest", "length of the queue before the matcher and what happens when it is full, DEPTH:POLICY"
     )
+    budget: float = setting(
+        0.0,
+        "time for each pair, ms: working size, search range and matcher are chosen, and chosen again, to hold it; 0: no budget",
+        milliseconds,
+    )
     align_phase: str = setting(
         "", "which camera may be shifted until both expose together: either, board or host; empty: none"
     )

@@ -18,6 +18,9 @@ from phone_host.sync.fifo import FifoSettings
 
 ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
 
+_MOST_BUDGET_MS: Final = 60_000
+"""The largest photographs take half a minute (docs/depth.md)."""
+
 _MOST_MEGAPIXELS: Final = 1024
 """OpenCV's own limit, 2^30 pixels (CV_IO_MAX_IMAGE_PIXELS)."""
 
@@ -49,6 +52,10 @@ def check(settings: PhoneHostSettings) -> None:
         raise SettingsError(f"align_phase is {settings.align_phase!r}", "give either, board or host, or nothing")
     if not (math.isfinite(settings.tolerance) and settings.tolerance >= 0):
         raise SettingsError(f"tolerance is {settings.tolerance:g}", "give 0 or more milliseconds")
+    if settings.budget and not 1 <= settings.budget <= _MOST_BUDGET_MS:  # NaN is not
+        raise SettingsError(
+            f"budget is {settings.budget:g} ms", f"give 1 to {_MOST_BUDGET_MS} ms for each pair, for example 30ms"
+        )
 
 
 def key_folder(keys: str) -> KeyFolder:

@@ -26,7 +26,8 @@ from phone_host.children.board_process import BoardAccount
 from phone_host.demo.demonstration import NEAR_M
 from phone_host.measure.accounts import LinkAccount
 from phone_host.model import CameraModel, PairCounts, Result, Rig, StereoGeometry
-from phone_host.run.host import Host, HostSettings
+from phone_host.run.host import Host
+from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import JPEG_QUALITY, Film, render_films
 from phone_host.scene.scene import DEMO_PERIOD_S, WEBCAM_LOOK, demo_scene, matched_rig

@@ -17,7 +17,8 @@ from phone_host.children.board_process import board_process
 from phone_host.model import CloudImage, Processed, Result, Rig
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import disparity_picture, write_png
-from phone_host.run.host import Host, HostSettings
+from phone_host.run.host import Host
+from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import Film
 from phone_host.scene.scene import RectifiedView, Scene, rig_poses, truth

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from phone_host.measure.budget_words import narrowed_words
 from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.doubt_history import past, past_seconds
 from phone_host.measure.gone import GONE
@@ -127,7 +128,7 @@ def headline(run: RunSnapshot) -> Answer:
     if run.images.wants_depth:
         gone = [concern for concern in found if concern.doubt in GONE]
         of_depth = (concern for concern in found if concern.doubt not in GONE and not concern.spares_depth)
-        said = _with_lone(_of_images(run, tuple(of_depth)), found)
+        said = _with_range(_with_lone(_of_images(run, tuple(of_depth)), found), run)
         return said if not gone or said.grade is Grade.BAD else _while_it_was_there(gone[0], said)
     if found:
         sentence = f"{_capital(found[0].sentence)}. Remedy: {found[0].remedy}."
@@ -141,6 +142,12 @@ def _with_lone(said: Answer, found: tuple[Concern, ...]) -> Answer:
     if said.grade is not Grade.GOOD or not lone:
         return said
     return Answer(said.grade, f"{said.sentence} {_capital(lone[0])}.")
+
+
+def _with_range(said: Answer, run: RunSnapshot) -> Answer:
+    """Add that near things are not looked for, if a time budget has narrowed the search."""
+    narrowed = narrowed_words(run.budget)
+    return replace(said, sentence=f"{said.sentence} {_capital(narrowed)}, to hold --budget.") if narrowed else said
 
 
 def _without_pairs(run: RunSnapshot) -> str:

@@ -1,7 +1,7 @@
 """Judges from the evidence in the images whether depth can be right, for one pair or over a run. Pure.
 
 `phone_host.stereo.evidence` measures the evidence. Where the images hold too little, nothing is named. `arrangement_doubts`,
-`light_doubts` and `search_doubts` know one kind each. Figures behind the limits: `tests/bench/bench_trust.py` and decision 0029.
+`geometry_doubts`, `light_doubts` and `search_doubts` know one kind each. Figures behind the limits: `tests/bench/bench_trust.py` and decision 0029.
 """
 
 from dataclasses import replace
@@ -9,10 +9,11 @@ from typing import Final
 
 from phone_host.measure.arrangement_doubts import LEAST_SUPPORT, arrangement_doubts
 from phone_host.measure.file_remedies import ImageSource
+from phone_host.measure.geometry_doubts import behind, off_middle
 from phone_host.measure.image_trust import ImageFigures, median_figures
 from phone_host.measure.light_doubts import covered_doubts, dark_doubts, unfocused_doubts
 from phone_host.measure.search_doubts import ambiguous, is_pattern, too_short
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.measure.trust import Concern, Doubt, gravest_first
 from phone_host.model import Arrangement, Evidence
 
 _STRANGERS: Final = 6
@@ -41,9 +42,6 @@ _MOST_SKEW_PX: Final = 0.9
 _MOVED: Final = "check that both images are of one moment; else the calibration does not fit these cameras any more, or never did: calibrate the rig again"
 _NOT_RECTIFIED: Final = "these images are not rectified: calibrate your cameras and give --calibration rig.yaml"
 
-_BEHIND_SHARE: Final = 0.05
-"""False matches put fewer points there; a sky may put more, where doffs is large and negative."""
-
 _EDGE_TO_EDGE: Final = 3.5
 """The full height of a ramp relative to its root mean square."""
 
@@ -58,6 +56,14 @@ def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) 
         evidence: of the pair; without supports (an unrectified pair) only brightness is judged.
         source: where the images come from: remedies name the options of a camera's address, or those for files.
     """
+    foreign, seen = off_middle(evidence), _seen(evidence, source)
+    if foreign:  # doffs is then that of other images, too: one doubt of a kind is enough
+        seen = (*foreign, *(item for item in seen if item.doubt is not Doubt.GEOMETRY))
+    return gravest_first(seen)
+
+
+def _seen(evidence: Evidence, source: ImageSource) -> tuple[Concern, ...]:
+    """Say what the images themselves make doubtful."""
     support = {item.arrangement: item.features for item in evidence.supports}
     sees = max(support.values(), default=0) >= LEAST_SUPPORT
     covered = () if sees else covered_doubts(evidence.left, evidence.right)
@@ -107,19 +113,7 @@ def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Conce
     cropped = (_CROPPED,) if evidence.is_cropped else ()
     if evidence.is_cropped:
         rows = tuple(replace(item, remedy=_CROPPED.remedy) for item in rows)
-    return (*_behind(evidence), *rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
-
-
-def _behind(evidence: Evidence) -> tuple[Concern, ...]:
-    if not evidence.behind_share > _BEHIND_SHARE:
-        return ()
-    return (
-        Concern(
-            Doubt.GEOMETRY,
-            f"{evidence.behind_share:.0%} of the points would lie at infinity or behind it: doffs may be that of other images",
-            "give the calib.txt that was published with these images, or --doffs: cx of the right camera minus cx of the left one, px",
-        ),
-    )
+    return (*behind(evidence), *rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
 
 
 def _skewed(evidence: Evidence) -> tuple[Concern, ...]:

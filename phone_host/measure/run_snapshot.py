@@ -11,6 +11,7 @@ from common.protocol.message import DropReason
 from common.words import counted
 from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount
+from phone_host.measure.budget_words import with_budget
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.doubt_history import Episode
@@ -34,7 +35,7 @@ from phone_host.measure.trust import (
     timing_concerns,
     unbelieved_concerns,
 )
-from phone_host.model import DepthAccount, PairCounts, TimeOffset, Unwritten
+from phone_host.model import BudgetAccount, DepthAccount, PairCounts, TimeOffset, Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.phase import Alignment, Phase
@@ -76,6 +77,7 @@ class RunSnapshot:
         save_every: every Nth pair was saved, beginning with the first; 0: none.
         last_s: when the last pair was done, counted from the start of the run, s.
         orientations: what the left and the right camera have been given to be upright.
+        budget: how the time budget for each pair was held; None: there is none, or no pair yet.
     """
 
     ended: str
@@ -122,6 +124,7 @@ class RunSnapshot:
     save_every: int = 0
     last_s: float = 0.0
     orientations: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+    budget: BudgetAccount | None = None
 
     @property
     def shortfall(self) -> str:
@@ -257,7 +260,9 @@ def history(run: RunSnapshot) -> tuple[Episode, ...]:
 
 def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     """Return what the images of a run make doubtful, gravest first. While it runs, pairs without depth may yet get some."""
-    found = tuple(with_final_options(concern, run.orientations) for concern in run.images.concerns)
+    found = tuple(
+        with_budget(with_final_options(concern, run.orientations), run.budget) for concern in run.images.concerns
+    )
     if run.ended == "running" or not lacks_depth(run) or not run.processed:
         return found  # without any pair there is another reason
     if any(concern.is_certain for concern in found):

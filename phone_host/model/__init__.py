@@ -4,10 +4,12 @@ Conventions: camera axes x right, y down, z forward; pixel centres are integers 
     measurement.
 """
 
+from phone_host.model.budget import BudgetAccount, BudgetChange, BudgetReason, BudgetStep
 from phone_host.model.evidence import (
     Arrangement,
     Evidence,
     Exposure,
+    OffMiddle,
     Support,
 )
 from phone_host.model.images import (
@@ -44,6 +46,10 @@ __all__ = [
     "UNMEASURED_NS",
     "Arrangement",
     "BoardFrame",
+    "BudgetAccount",
+    "BudgetChange",
+    "BudgetReason",
+    "BudgetStep",
     "CameraModel",
     "CloudImage",
     "Crop",
@@ -56,6 +62,7 @@ __all__ = [
     "Exposure",
     "FramePair",
     "Image",
+    "OffMiddle",
     "PairCounts",
     "Processed",
     "Rectification",

@@ -55,6 +55,23 @@ class Exposure:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OffMiddle:
+    """A principal point that lies far from its image's middle.
+
+    Attributes:
+        cx_px: its x, px.
+        cy_px: its y, px.
+        width_px: width of the image, px.
+        height_px: height of the image, px.
+    """
+
+    cx_px: float
+    cy_px: float
+    width_px: int
+    height_px: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """What a pair's images say about its depth; NaN = not measured.
 
@@ -76,6 +93,7 @@ class Evidence:
         skew_px: how unevenly rows are off over the image once the common offset is taken away, px of the matched images.
         from_rig: whether a rig has rectified the pair.
         is_cropped: whether the pair was taken for the middle of the images that the rig was calibrated with.
+        off_middle: the given principal point, if it lies far from the middle; None: it does not, or a rig brought its own.
         matched_scale: size of the images that were matched, as a share of the full size in whose px all this is.
     """
 
@@ -96,4 +114,5 @@ class Evidence:
     skew_px: float = float("nan")
     from_rig: bool = True
     is_cropped: bool = False
+    off_middle: OffMiddle | None = None
     matched_scale: float = 1.0

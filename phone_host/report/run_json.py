@@ -17,6 +17,7 @@ from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
+from phone_host.report.budget_report import budget_values
 from phone_host.sync.fifo import Overflow
 
 _MS: Final = 1e6
@@ -56,6 +57,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "frames": _frames(run),
         "host_frames": _host_frames(run),
         "depth": _depth(run.depth),
+        "budget": budget_values(run.budget),
         "regime": _regime(judge(figures(run))),
         "image_motion_px_per_s": _number(run.motion_px_s),
         "trust": _trust(run),

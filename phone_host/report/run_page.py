@@ -11,6 +11,7 @@ from common.ledger import PairLedger
 from common.words import counted, times
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
+from phone_host.measure.budget_words import budget_lines, missed_words
 from phone_host.measure.doubt_history import saved_pairs
 from phone_host.measure.headline import headline
 from phone_host.measure.numbers import pairing_words
@@ -18,6 +19,7 @@ from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
+from phone_host.report.budget_report import budget_tables
 from phone_host.report.cut_words import cut_sentence, pixels_text
 from phone_host.report.depth_data import density, photograph
 from phone_host.report.depth_view import cloud_view, depth_view
@@ -65,7 +67,7 @@ def run_page(
             ),
             pictures=pictures(last, board_side),
             delays=delay_series(ledgers, timeless=run.timeless, after_gap_ns=run.after_gap_ns, statistics=run.delays),
-            tables=(*links_tables(run), unused_table(run), camera_table(run.camera)),
+            tables=(*links_tables(run), *budget_tables(run.budget), unused_table(run), camera_table(run.camera)),
             steps=steps(run),
             notes=notes(run),
             files=files(saved, doubtful_pairs(run)),
@@ -88,8 +90,10 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         *([f"Not measured: when results were exposed: {TIMELESS}."] if run.timeless else []),
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
         *([f"Warning: {run.shortfall}."] if run.shortfall else []),
+        *([f"Warning: {missed}."] if (missed := missed_words(run.budget)) else []),
         *(f"Warning: {item.sentence}." for item in concerns(run)),
         *(f"Warning: {line}." for line in past_lines(run)),
+        *(_sentence(line) for line in budget_lines(run.budget)),
         *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 

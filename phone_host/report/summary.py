@@ -7,6 +7,7 @@ from common.camera.base import CameraHealth
 from common.words import counted, times
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
+from phone_host.measure.budget_words import budget_lines, missed_words
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.doubt_history import history_lines
 from phone_host.measure.headline import headline
@@ -51,10 +52,12 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines.append(judge(figures(run)).sentence)
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {run.shortfall}"] if run.shortfall else []
+    lines += [f"warning: {missed}"] if (missed := missed_words(run.budget)) else []
     lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
     lines += [f"warning: {line}" for line in past_lines(run)]
     lines += depth_lines(run.images)
     lines += cut_lines(run.depth)
+    lines += budget_lines(run.budget)
     lines += camera_troubles(run.camera)
     lines += [*rung_lines(run.link), *_links(run.link, width), *_unused_lines(run)]
     return "\n".join(lines)

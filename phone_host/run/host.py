@@ -1,17 +1,13 @@
 """The host's composition root: receiver and host camera -> pair queue -> worker -> sinks, each in its own thread."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
-from enum import Enum
-from pathlib import Path
 from typing import Final
 
 from common import now
 from common.camera.base import Camera
 from common.camera.image_numbers import ShowsFiles
 from common.errors import AbsentBoardError
-from common.imagesize.head import MOST_PIXELS
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.orientation import UPRIGHT, Orientation
@@ -21,11 +17,13 @@ from phone_host.measure.image_motion import MotionMeter
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
-from phone_host.model import Processed, Result, Side, TimeOffset
-from phone_host.output.axes import Axes
+from phone_host.model import Processed, Result, Side
 from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.file_sink import FileSink
+from phone_host.run.freed_memory import keep_freed_memory
+from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.ledgerer import Ledgerer
+from phone_host.run.pair_budget import PairBudget
 from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.rig_cameras import RigCameras
@@ -42,8 +40,6 @@ from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
 from phone_host.stream.refusals import BoardRefusal, refusal_text
-from phone_host.sync.fifo import FifoSettings
-from phone_host.sync.phase import Whose
 from phone_host.sync.stills import Stills
 
 _STEP_S: Final = 0.05
@@ -56,52 +52,6 @@ _STOP_S: Final = 0.4
 
 _RECENT: Final = 60
 """While it runs, the latest 60 pairs are judged: two seconds at 30 pairs per second."""
-
-
-class EndReason(Enum):
-    """Why a run ended."""
-
-    PAIRS_REACHED = "pairs_reached"
-    STREAM_ENDED = "stream_ended"
-    SECONDS_OVER = "seconds_over"
-    STOPPED = "stopped"
-
-
-@dataclass(frozen=True, slots=True)
-class HostSettings:
-    """The settings of a run, apart from its camera, links and core.
-
-    Attributes:
-        board_side: which view the board's camera is.
-        tolerance_ns: greatest time skew of a pair; None for half of the longer frame period.
-        fifo: depth and overflow policy.
-        pairs: end after this many processed pairs; 0 for no limit.
-        seconds_ns: end this long after the first pair; 0 for no limit.
-        wait_ns: how long to wait for an absent board; None for ever.
-        out: folder for results; None to write none.
-        save_every: save every Nth pair; 0 for none.
-        time_offset: time offset between the two cameras' stamps.
-        interpolate: whether the decoded board image is first interpolated to the moment of the host's.
-        steered: the cameras that may be steered until both expose together; empty: the phase stays as it is.
-        most_pixels: largest accepted image size of either camera, pixels.
-        resolved: the settings of the run with their origins, for settings.json; None: not saved.
-        axes: of the points in saved clouds.
-    """
-
-    board_side: Side = Side.LEFT
-    tolerance_ns: int | None = None
-    fifo: FifoSettings = field(default_factory=FifoSettings)
-    pairs: int = 0
-    seconds_ns: int = 0
-    wait_ns: int | None = None
-    out: Path | None = None
-    save_every: int = 30
-    time_offset: TimeOffset = field(default_factory=TimeOffset)
-    interpolate: bool = False
-    steered: frozenset[Whose] = frozenset()
-    most_pixels: int = MOST_PIXELS
-    resolved: Mapping[str, object] | None = None
-    axes: Axes = Axes.CAMERA
 
 
 class Host:
@@ -153,12 +103,15 @@ class Host:
         self._rig_rejected = rig is not None and rig.is_rejected
         self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
         interpolator = Interpolator() if settings.interpolate else None
+        wanted = settings.budget
+        self._budget = None if core is None or wanted is None else PairBudget(wanted, core)
         pipeline = Pipeline(
             core,
             settings.board_side,
             now.monotonic_ns,
             interpolator,
             settings.most_pixels,
+            budget=self._budget,
             host_orientation=self._own.orientation,
         )
         self._ledgerer = Ledgerer(self._receiver.account.was_away, lambda: demand.is_timeless)
@@ -190,6 +143,7 @@ class Host:
             UnavailableError: no board came in time, or it does not talk to this host.
             DataError: the streams' images or the cameras do not fit the rig.
         """
+        keep_freed_memory()
         try:
             self._worker.start()
             self._receiver.start()
@@ -326,6 +280,7 @@ class Host:
             save_every=0 if self._settings.out is None else self._settings.save_every,
             last_s=max(0, books.last_done_ns - self.started_ns) / 1e9,
             orientations=self._orientations,
+            budget=None if self._budget is None else self._budget.account,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:

@@ -4,7 +4,7 @@ This module alone defines the order of the stages.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from common.errors import DataError
@@ -13,11 +13,27 @@ from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
+from phone_host.run.pair_budget import PairBudget
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.images import WHOLE
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
 
 T = TypeVar("T")
+Size = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """How the images of a pair are decoded, the board's and the host's.
+
+    Attributes:
+        whole_px: width and height of both upright images as they are stored, px.
+        reductions: by how much each may be decoded smaller.
+    """
+
+    whole_px: tuple[Size, Size]
+    reductions: tuple[int, int]
 
 
 class Pipeline:
@@ -29,6 +45,7 @@ class Pipeline:
         clock: returns CLOCK_MONOTONIC, ns.
         interpolator: interpolates the board's image to the moment of the host's; None to leave it unchanged.
         most_pixels: largest accepted image size of either camera, pixels.
+        budget: holds a time budget for each pair; None: there is none.
         host_orientation: how the host camera's images become upright; a board's frame says that itself.
     """
 
@@ -40,8 +57,10 @@ class Pipeline:
         interpolator: Interpolator | None = None,
         most_pixels: int = MOST_PIXELS,
         *,
+        budget: PairBudget | None = None,
         host_orientation: Orientation = UPRIGHT,
     ) -> None:
+        self._budget = budget
         self._host_orientation = host_orientation
         self._most_pixels = most_pixels
         self._interpolator = interpolator
@@ -64,16 +83,28 @@ class Pipeline:
         """
         board, host = _of_board(pair.board), self._of_host(pair.host)
         start_ns = self._clock()
-        board_image, host_image = decode_frames(board, host, self._most_pixels, self._check_sizes)
+        planned: list[_Plan] = []
+
+        def plan(board_px: Size, host_px: Size) -> tuple[int, int]:
+            planned.append(self._plan(board_px, host_px))
+            return planned[0].reductions
+
+        board_image, host_image = decode_frames(board, host, self._most_pixels, plan)
+        [decoding] = planned
         decoded_ns = self._clock()
-        board_image = self._at_host_time(pair, board_image)
+        board_image = self._at_host_time(pair, board_image, decoding.reductions[0])
         interpolated_ns = self._clock()
         left, right = self._in_sides(board_image, host_image)
         if self._core is None:
             processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
         else:
-            processed = self._core.compute(left, right, self._clock)
+            sizes = self._in_sides(*decoding.whole_px)
+            choice = None if self._budget is None else self._budget.choice(*sizes)
+            processed = self._core.compute(left, right, self._clock, whole_px=sizes, choice=choice)
         stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
+        if self._budget is not None:
+            end_ns = self._clock()
+            self._budget.add(end_ns - start_ns, stages.match, end_ns)
         return replace(processed, stages=stages)
 
     def _of_host(self, frame: Frame) -> EncodedImage:
@@ -90,11 +121,14 @@ class Pipeline:
         """Return (left, right). Only this function knows which camera is which."""
         return (board, host) if self._board_side is Side.LEFT else (host, board)
 
-    def _check_sizes(self, board_px: tuple[int, int], host_px: tuple[int, int]) -> None:
-        if self._core is not None:
-            self._core.require_sizes(*self._in_sides(board_px, host_px))
+    def _plan(self, board_px: Size, host_px: Size) -> "_Plan":
+        """Check both sizes before anything is decoded; return how to decode."""
+        both = board_px, host_px
+        if self._core is None:
+            return _Plan(both, WHOLE)
+        return _Plan(both, self._in_sides(*self._core.reductions(*self._in_sides(*both))))
 
-    def _at_host_time(self, pair: FramePair, image: Image) -> Image:
+    def _at_host_time(self, pair: FramePair, image: Image, reduction: int) -> Image:
         """Return the board's image as it would look at the host's exposure.
 
         If the previous frame is missing, too far away in time or spoiled, return the image unchanged.
@@ -105,7 +139,7 @@ class Pipeline:
         if abs(fraction) > LARGEST_FRACTION:
             return image
         try:
-            earlier = decode_frame(_of_board(pair.before), self._most_pixels)
+            earlier = decode_frame(_of_board(pair.before), self._most_pixels, reduction)
         except DataError:
             return image
         return self._interpolator.back(earlier, image, fraction) if earlier.shape == image.shape else image

@@ -32,6 +32,7 @@ from phone_host.report.stereo_report import (
     Size,
     alone_remarks,
 )
+from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
@@ -98,6 +99,7 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         UnavailableError: a file in the results folder was not written by this program.
         OSError: the results cannot be written.
     """
+    keep_freed_memory()
     with StereoResults(job.out) as results:
         work = _Work(job, results, watcher)
         if len(job.files.pairs) == 1:
@@ -225,10 +227,11 @@ class _Work:
         opened = open_image(left, limit, of_left), open_image(right, limit, of_right)
         core = self._core_for(*opened)
         watch.lap("prepare")
-        images = decode_files(*opened)
+        sizes_px = opened[0].size_px, opened[1].size_px
+        images = decode_files(*opened, core.reductions(*sizes_px))
         self._results.open()
         watch.lap("read")
-        processed = core.compute(*images, _StageClock(self._watcher, about))
+        processed = core.compute(*images, _StageClock(self._watcher, about), whole_px=sizes_px)
         watch.take_over(processed.stages)
         self._watcher.say(f"checking{about}")
         trust = judge_pair(core, processed, self._job.mounted)

@@ -10,13 +10,12 @@ from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.image_trust import median_figures
 from phone_host.measure.no_depth import no_depth
 from phone_host.measure.orient_words import with_final_options
-from phone_host.measure.trust import REJECTED_RIG, Concern, Doubt, gravest_first
+from phone_host.measure.trust import REJECTED_RIG, Doubt, gravest_first
 from phone_host.model import Processed
 from phone_host.report.depth_data import density
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
-from phone_host.stereo.plausible import is_off_the_middle
 
 _UNMATCHED: Final = no_depth(None, None)
 _OF_FILES: Final = "check that the scene has texture, and that --calibration or --rectified fits the images"
@@ -45,8 +44,6 @@ def judge_pair(
         found = gravest_first((replace(why, sentence=sentence, remedy=remedy), *further))
     if core.rig is not None and core.rig.is_rejected:
         found = gravest_first((REJECTED_RIG, *found))
-    if core.rig is None:
-        found = gravest_first((*_foreign_geometry(processed), *found))
     figures = median_figures((evidence,))
     error_px = float("nan") if processed.limits is None else processed.limits.disparity_error_px
     # The headline counts the pixels that have a point, where metres are known. What the user has cut away is no loss.
@@ -54,18 +51,3 @@ def judge_pair(
     is_own_cut = limits is not None and (not limits.from_rig or limits.near_m > 0)
     shown = figures if is_own_cut else replace(figures, density=density(processed))
     return PairTrust(figures, found, answer(shown, found, processed.geometry, error_px))
-
-
-def _foreign_geometry(processed: Processed) -> tuple[Concern, ...]:
-    """Say that the geometry of images that came rectified may be that of other images."""
-    geometry, (height_px, width_px) = processed.geometry, processed.pair.left.shape[:2]
-    if geometry is None or not is_off_the_middle(geometry, (width_px, height_px)):
-        return ()
-    return (
-        Concern(
-            Doubt.GEOMETRY,
-            f"calib.txt or --center may belong to other images: the principal point {geometry.cx_px:.0f},{geometry.cy_px:.0f}"
-            f" lies far from the middle of {width_px}x{height_px} px, and metres are wrong then",
-            "give the calib.txt that was published with these images",
-        ),
-    )

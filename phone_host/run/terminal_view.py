@@ -19,6 +19,7 @@ from common.program import logs
 from common.words import counted
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
+from phone_host.measure.budget_words import budget_lines
 from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, IDLE_STAGE_NS, STAGES, Spread
 from phone_host.measure.headline import headline
 from phone_host.measure.regime import judge
@@ -123,7 +124,7 @@ class LiveTable:
         return (
             *(_Part(0, line) for line in _warnings(run)),
             *(_Part(3, line) for line in _cameras(run)),
-            *(_Part(5, Text(line)) for line in depth_lines(run.images)),
+            *(_Part(5, Text(line)) for line in (*depth_lines(run.images), *budget_lines(run.budget))),
             _Part(2, _table(run, self._rate, width)),
             _Part(6, _stages(run)),
             _Part(7, Text(judge(figures(run)).sentence, style="dim")),

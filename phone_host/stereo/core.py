@@ -26,6 +26,7 @@ from phone_host.model import (
     Search,
     StereoGeometry,
 )
+from phone_host.stereo.budget_ladder import Choice, Extent
 from phone_host.stereo.depth_limits import (
     DepthWanted,
     above_zero,
@@ -33,7 +34,7 @@ from phone_host.stereo.depth_limits import (
     depth_limits,
     disparity_error_px,
 )
-from phone_host.stereo.images import require_same_size, size_px
+from phone_host.stereo.images import WHOLE, require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.points import points_of
@@ -44,8 +45,9 @@ from phone_host.stereo.stacked import lying_pair, upright_again
 from phone_host.stereo.working import MARGIN_PX, Part, chosen_scale, part_for, reduced, to_full_size
 
 _Sizes = tuple[tuple[int, int], tuple[int, int]]
+_Key = tuple[tuple[int, int], tuple[int, int], Choice | None]
 _MOST_KEPT: Final = 4
-"""Pairs of image sizes that are kept ready. Cameras change their size rarely."""
+"""Pairs of image sizes and choices that are kept ready. Cameras change their size rarely, a time budget its choice every few seconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -95,17 +97,28 @@ class StereoCore:
         self.rectification = None if rectifier is None else rectifier.rectification
         self.geometry = geometry if rectifier is None else rectifier.geometry
         self.wanted = wanted
-        self._kept: dict[_Sizes, _Ready] = {}
+        self._kept: dict[_Key, _Ready] = {}
         if isinstance(matcher, MatchSettings):
             create_matcher(matcher)  # a name or a number that is wrong is told before the first pair comes
 
-    def compute(self, left: Image, right: Image, clock: Callable[[], int]) -> Processed:
+    def compute(
+        self,
+        left: Image,
+        right: Image,
+        clock: Callable[[], int],
+        *,
+        whole_px: _Sizes | None = None,
+        choice: Choice | None = None,
+    ) -> Processed:
         """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
 
         Args:
             left: (H, W) grey or (H, W, 3) BGR, uint8.
             right: the same; it may have another size only with a rectifier.
             clock: monotonic, ns.
+            whole_px: width and height of left and right image before they were decoded smaller by `reductions`, px;
+                None: they were not.
+            choice: how to match this pair; None: as the core was built. Only for a core that was built from settings.
 
         Returns:
             The rectified pair, its disparity, its cloud (None without geometry), how they were found, and the times of
@@ -115,7 +128,7 @@ class StereoCore:
             DataError: a size does not fit the rig, the sizes differ and there is no rig, or the crop lies outside.
         """
         start_ns = clock()
-        ready = self._ready(size_px(left), size_px(right))
+        ready = self._ready(*(whole_px or (size_px(left), size_px(right))), choice)
         pair = RectifiedPair(left, right) if ready.rectifier is None else ready.rectifier.rectify(left, right)
         rectified_ns = clock()
         matched = _match(pair, ready)
@@ -127,6 +140,36 @@ class StereoCore:
         return Processed(
             pair, disparity, cloud, times, geometry=ready.geometry, limits=ready.limits, cut=cut, search=ready.search
         )
+
+    def reductions(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> tuple[int, int]:
+        """Return by how much images of these sizes may be decoded smaller, left and right; see `Rectifier.reductions`.
+
+        Args:
+            left_px: width and height of the left image, px.
+            right_px: width and height of the right image, px.
+
+        Raises:
+            DataError: as `require_sizes`.
+        """
+        if self._rectifier is None:
+            self.require_sizes(left_px, right_px)
+            return WHOLE
+        rectifier = self._ready(left_px, right_px).rectifier
+        return WHOLE if rectifier is None else rectifier.reductions
+
+    def extent(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> Extent:
+        """Return what is matched of images of these sizes if nothing is chosen.
+
+        Args:
+            left_px: width and height of the left image, px.
+            right_px: width and height of the right image, px.
+
+        Raises:
+            DataError: as `compute`.
+        """
+        ready = self._ready(left_px, right_px)
+        width_px, height_px = (ready.width_px, ready.height_px) if ready.part is None else ready.part.size_px
+        return Extent(width_px=width_px, height_px=height_px, search=ready.search, geometry=ready.geometry)
 
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
         """Check that images of these sizes can be rectified and hold the crop, before they are decoded.
@@ -158,30 +201,40 @@ class StereoCore:
         made = [ready.rectifier for ready in list(self._kept.values()) if (ready.width_px, ready.height_px) == size_px]
         return made[-1] if made else self._rectifier
 
-    def _ready(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> _Ready:
+    def _ready(self, left_px: tuple[int, int], right_px: tuple[int, int], choice: Choice | None = None) -> _Ready:
         """Return what these image sizes need; make it if they are new."""
-        ready = self._kept.get((left_px, right_px))
+        ready = self._kept.get((left_px, right_px, choice))
         if ready is None:
             self._require_fit(left_px, right_px)
-            ready = self._made_for(left_px, right_px)
+            ready = self._made_for(left_px, right_px, choice)
             while len(self._kept) >= _MOST_KEPT:
                 del self._kept[next(iter(self._kept))]
-            self._kept[left_px, right_px] = ready
+            self._kept[left_px, right_px, choice] = ready
         return ready
 
-    def _made_for(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> _Ready:
+    def _fitting(self, rectifier: Rectifier, left_px: tuple[int, int], right_px: tuple[int, int]) -> Rectifier:
+        """Return the rectifier for images of these sizes. Its maps are dear: another choice may have made it."""
+        for (left, right, _), ready in self._kept.items():
+            if (left, right) == (left_px, right_px) and ready.rectifier is not None:
+                return ready.rectifier
+        rig = scaled_rig(rectifier.rig, left_px, right_px)
+        return rectifier if rig is rectifier.rig else Rectifier(rig)
+
+    def _made_for(self, left_px: tuple[int, int], right_px: tuple[int, int], choice: Choice | None = None) -> _Ready:
         rectifier, geometry, wanted = self._rectifier, self.geometry, self.wanted
         size, epipolar, zero_sigma_px = left_px, Epipolar.LEFT, math.nan
         if rectifier is not None:
-            rig = scaled_rig(rectifier.rig, left_px, right_px)
-            rectifier = rectifier if rig is rectifier.rig else Rectifier(rig)
+            rectifier = self._fitting(rectifier, left_px, right_px)
             geometry, made = rectifier.geometry, rectifier.rectification
-            size, epipolar, zero_sigma_px = (made.width_px, made.height_px), made.epipolar, rig.zero_sigma_px
+            size, epipolar = (made.width_px, made.height_px), made.epipolar
+            zero_sigma_px = rectifier.rig.zero_sigma_px
         disparities = self._disparities(geometry, size[1] if epipolar.is_vertical else size[0])
         crop = None if wanted.crop is None else crop_inside(wanted.crop, *size)
         part = None if crop is None else part_for(crop, size, disparities, epipolar=epipolar)
         scale = wanted.scale
-        if math.isnan(scale):
+        if choice is not None:
+            scale, disparities = choice.scale, min(choice.disparities, disparities)
+        elif math.isnan(scale):
             matched = size if part is None else part.size_px
             along, across = matched[::-1] if epipolar.is_vertical else matched
             scale = chosen_scale(along, across, disparities) if disparities else 1.0
@@ -194,7 +247,7 @@ class StereoCore:
             geometry=geometry,
             width_px=size[0],
             height_px=size[1],
-            matcher=self._matcher_for(max(1, math.ceil(disparities * scale))),
+            matcher=self._matcher_for(max(1, math.ceil(disparities * scale)), choice),
             search=Search(scale=scale, disparities=disparities),
             part=part,
             error_px=error_px,
@@ -209,9 +262,10 @@ class StereoCore:
             return min(self._matcher.disparities, along_px)  # no point lies farther left than the image's edge
         return disparities_for_near(geometry, self.wanted.search_from_m, along_px)
 
-    def _matcher_for(self, disparities: int) -> Matcher:
+    def _matcher_for(self, disparities: int, choice: Choice | None) -> Matcher:
         if isinstance(self._matcher, MatchSettings):
-            return create_matcher(replace(self._matcher, disparities=disparities))
+            name = self._matcher.matcher if choice is None else choice.matcher
+            return create_matcher(replace(self._matcher, matcher=name, disparities=disparities))
         return self._matcher
 
 

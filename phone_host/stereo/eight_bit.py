@@ -40,8 +40,9 @@ def to_8_bit(images: tuple[AnyImage, ...]) -> tuple[Image, ...]:
     deep = [image for image in images if image.dtype != np.uint8]
     if not deep:
         return images
-    low, high = _ends_of_counts(deep) if all(image.dtype == np.uint16 for image in deep) else _ends(deep)
-    if all(image.dtype == np.uint16 for image in deep):
+    are_counts = all(image.dtype == np.uint16 for image in deep)
+    low, high = _ends_of_counts(deep) if are_counts else _ends(deep)
+    if are_counts:
         full = next(2**bits - 1 for bits in _SENSOR_BITS if high <= 2**bits - 1)
         if high - low >= full * _NARROW_SHARE or high <= 255:
             low, high = 0.0, float(full)

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Disparity, Evidence, Image, Processed, Search
+from phone_host.model import Disparity, Evidence, Image, OffMiddle, Processed, Search
 from phone_host.stereo import filters
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
@@ -20,6 +20,7 @@ from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
 from phone_host.stereo.evidence_sample import sampled_places
 from phone_host.stereo.evidence_search import ambiguity, measure_fit
 from phone_host.stereo.match_align import with_levels_of
+from phone_host.stereo.plausible import is_off_the_middle
 from phone_host.stereo.stacked import lying, lying_pair
 
 _FEATURE_PX: Final = 48_000
@@ -136,6 +137,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         ),
         from_rig=from_rig,
         is_cropped=is_cropped,
+        off_middle=None if from_rig else _off_middle(processed),
         matched_scale=1.0 if processed.search is None else processed.search.scale,
     )
 
@@ -158,6 +160,14 @@ def _behind(processed: Processed) -> float:
     if cut is None or geometry is None or geometry.doffs_px > -_BEHIND_PX:
         return 0.0
     return cut.at_zero / max(1, cut.inside - cut.unmatched)
+
+
+def _off_middle(processed: Processed) -> OffMiddle | None:
+    """Return the principal point, if it lies far from the middle of images that came rectified."""
+    geometry, (height_px, width_px) = processed.geometry, processed.pair.left.shape[:2]
+    if geometry is None or not is_off_the_middle(geometry, (width_px, height_px)):
+        return None
+    return OffMiddle(cx_px=geometry.cx_px, cy_px=geometry.cy_px, width_px=width_px, height_px=height_px)
 
 
 def _scattered(disparity: Disparity) -> float:

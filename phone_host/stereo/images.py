@@ -12,7 +12,6 @@ Rules:
 
 import logging
 import re
-import threading
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,6 +32,7 @@ from phone_host.model import Image
 from phone_host.stereo.eight_bit import AnyImage, to_8_bit
 from phone_host.stereo.orient import upright
 from phone_host.stereo.overheard import overhear
+from phone_host.stereo.two_threads import in_two_threads
 
 _LOG = logging.getLogger(__name__)
 
@@ -49,6 +49,20 @@ _BEHIND_DATA: Final = frozenset({0xC4, 0xD9, 0xDA, 0xDD, *range(0xD0, 0xD8)})
 _BYTES_A_PIXEL: Final = 8
 _MORE_BYTES: Final = 64 << 20
 """No image file is longer than four channels of 16 bit plus this; phones append films and depth maps to a JPEG."""
+
+WHOLE: Final = (1, 1)
+"""Neither image of a pair is decoded smaller than it is stored."""
+
+_REDUCED: Final = {
+    factor: flag | cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    for factor, flag in (
+        (2, cv2.IMREAD_REDUCED_GRAYSCALE_2),
+        (4, cv2.IMREAD_REDUCED_GRAYSCALE_4),
+        (8, cv2.IMREAD_REDUCED_GRAYSCALE_8),
+    )
+}
+"""How OpenCV is told to decode a JPEG smaller: its blocks of 8 x 8 values become 4 x 4, 2 x 2 or 1, so most of the work
+is never done. With ANYCOLOR, "grey" in the flag's name does not hold: coloured images stay so."""
 
 _END: Final = 0xD9
 _HARMLESS_BYTES: Final = 16
@@ -124,14 +138,21 @@ def decode_pair(
     return decode_files(examine(left, left_name, most_pixels), examine(right, right_name, most_pixels))
 
 
-def decode_file(image: EncodedFile) -> Image:
-    """Decode one examined image, like `decode`."""
-    return _upright(to_8_bit((_decoded(image),))[0], image)
+def decode_file(image: EncodedFile, reduction: int = 1) -> Image:
+    """Decode one examined image, like `decode`; smaller like `decode_files`."""
+    return _upright(to_8_bit((_decoded(image, reduction),))[0], image)
 
 
-def decode_files(left: EncodedFile, right: EncodedFile) -> tuple[Image, Image]:
-    """Decode the two examined images of a pair, like `decode_pair`."""
-    both = _decoded_at_once(left, right) or (_decoded(left), _decoded(right))
+def decode_files(left: EncodedFile, right: EncodedFile, reductions: tuple[int, int] = WHOLE) -> tuple[Image, Image]:
+    """Decode the two examined images of a pair, like `decode_pair`.
+
+    Args:
+        left: the left image.
+        right: the right image.
+        reductions: by how much each may be smaller than it is stored, as `Rectifier.reductions` gives them. Images that
+            cannot be decoded smaller are decoded whole.
+    """
+    both = _decoded_at_once(left, right, reductions) or (_decoded(left, reductions[0]), _decoded(right, reductions[1]))
     first, second = to_8_bit(both)
     return _upright(first, left), _upright(second, right)
 
@@ -240,7 +261,16 @@ def to_grey(image: Image) -> Image:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
-def _decoded_at_once(left: EncodedFile, right: EncodedFile) -> tuple[AnyImage, AnyImage] | None:
+def _scaled_by(image: EncodedFile, reduction: int) -> int:
+    """Return by how much an image is decoded smaller: JPEG only, and where no block of pixels is cut at an edge."""
+    width, height = image.head.size_px
+    fits = image.head.kind is ImageKind.JPEG and reduction in _REDUCED and not (width % reduction or height % reduction)
+    return reduction if fits else 1
+
+
+def _decoded_at_once(
+    left: EncodedFile, right: EncodedFile, reductions: tuple[int, int]
+) -> tuple[AnyImage, AnyImage] | None:
     """Decode two images in two threads: OpenCV lets go of Python's lock meanwhile.
 
     Returns:
@@ -248,31 +278,28 @@ def _decoded_at_once(left: EncodedFile, right: EncodedFile) -> tuple[AnyImage, A
         comes from: libraries print without a name.
     """
     payloads = tuple(whole_image(image.payload, image.head, image.name) for image in (left, right))
+    scales = _scaled_by(left, reductions[0]), _scaled_by(right, reductions[1])
     found: list[AnyImage | None] = [None, None]
 
     def decode_one(side: int) -> None:
         with suppress(cv2.error):
-            found[side] = cv2.imdecode(np.frombuffer(payloads[side], dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+            payload = np.frombuffer(payloads[side], dtype=np.uint8)
+            found[side] = cv2.imdecode(payload, _REDUCED.get(scales[side], cv2.IMREAD_UNCHANGED))
 
-    def decode_both() -> None:
-        other = threading.Thread(target=decode_one, args=(1,), name="decode")
-        other.start()
-        decode_one(0)
-        other.join()
-
-    said = overhear(decode_both)
+    said = overhear(lambda: in_two_threads(lambda: decode_one(0), lambda: decode_one(1)))
     first, second = found
     if said or first is None or second is None:
         return None
-    return _checked(first, left), _checked(second, right)
+    return _checked(first, left, scales[0]), _checked(second, right, scales[1])
 
 
-def _decoded(image: EncodedFile) -> AnyImage:
-    name, kind = image.name, image.head.kind
+def _decoded(image: EncodedFile, reduction: int) -> AnyImage:
+    name, kind, scale = image.name, image.head.kind, _scaled_by(image, reduction)
+    flags = _REDUCED.get(scale, cv2.IMREAD_UNCHANGED)
     payload = np.frombuffer(whole_image(image.payload, image.head, name), dtype=np.uint8)
     found: list[AnyImage | None] = []
     try:
-        said = overhear(lambda: found.append(cv2.imdecode(payload, cv2.IMREAD_UNCHANGED)))
+        said = overhear(lambda: found.append(cv2.imdecode(payload, flags)))
     except cv2.error as error:
         raise SpoiledImageError(FrameFault.CORRUPT, f"{name} cannot be decoded ({error.err})", _REPLACE) from error
     [decoded] = found
@@ -281,12 +308,13 @@ def _decoded(image: EncodedFile) -> AnyImage:
     complaint = _complaint(said.splitlines())
     if kind is ImageKind.JPEG and complaint:
         raise SpoiledImageError(FrameFault.CORRUPT, f"{name} is spoiled ({complaint})", _REPLACE)
-    return _checked(decoded, image)
+    return _checked(decoded, image, scale)
 
 
-def _checked(decoded: AnyImage, image: EncodedFile) -> AnyImage:
-    """Return a decoded image as grey or BGR, of the size that its header claims."""
-    if size_px(decoded) != image.head.size_px:
+def _checked(decoded: AnyImage, image: EncodedFile, scale: int) -> AnyImage:
+    """Return a decoded image as grey or BGR, of the size that its header claims, divided by `scale`."""
+    width, height = size_px(decoded)
+    if (width * scale, height * scale) != image.head.size_px:
         raise ImageSizeError(
             FrameFault.OTHER_SIZE,
             f"{image.name} is {size_text(decoded)} px, its header says {px_text(image.head.size_px)}",

@@ -1,6 +1,6 @@
 """Matchers: from a rectified pair to a disparity map. One protocol, one factory; each algorithm has its own module.
 
-Rules that every matcher keeps (tests/contract/test_matcher.py):
+Rules that every matcher keeps (tests/contract/test_matcher.py, test_matcher_inputs.py):
 
 - disparity d = left x - right x, px, float32, the left image's size; NaN where it cannot be trusted; every value in [0,
   N);
@@ -21,9 +21,11 @@ from common.errors import SettingsError
 from common.program.extensions import make_registered
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_checked import CheckedMatcher
+from phone_host.stereo.match_onnx import OnnxMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher
 from phone_host.stereo.matcher_protocol import Matcher
+from phone_host.stereo.network_name import NetworkMatcher
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +61,9 @@ def create_matcher(settings: MatchSettings) -> Matcher:
         The matcher.
 
     Raises:
-        SettingsError: another package's matcher cannot be loaded or does not fit.
+        SettingsError: another package's matcher cannot be loaded or does not fit, or a network's file is not there.
+        UnavailableError: onnxruntime, which a network needs, is not installed.
+        DataError: the file is no network that matches two images.
     """
     match settings.matcher:
         case MatcherName.BLOCK:
@@ -69,5 +73,7 @@ def create_matcher(settings: MatchSettings) -> Matcher:
         case RegisteredMatcher(name):
             registered: Matcher = make_registered(MATCHERS, name, Matcher, settings.disparities)
             return CheckedMatcher(registered, name, settings.disparities)
+        case NetworkMatcher():
+            return OnnxMatcher(settings.matcher, settings.disparities)
         case _:
             assert_never(settings.matcher)

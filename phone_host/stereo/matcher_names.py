@@ -6,6 +6,7 @@ from typing import Final
 
 from common.errors import SettingsError
 from common.program.extensions import registered_names
+from phone_host.stereo.network_name import PREFIX, NetworkMatcher, network_named
 
 MATCHERS: Final = "tandemscan.matchers"
 """Entry points of other packages' matchers; see `match`."""
@@ -32,22 +33,51 @@ class RegisteredMatcher:
     value: str
 
 
-AnyMatcher = MatcherName | RegisteredMatcher
+AnyMatcher = MatcherName | RegisteredMatcher | NetworkMatcher
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UsualCost:
+    """What a matcher takes on a usual machine: a first guess, which a run with a time budget corrects by what it measures.
+
+    Attributes:
+        step_ns: for each pixel and disparity, ns.
+        pixel_ns: for each pixel besides, ns.
+    """
+
+    step_ns: float
+    pixel_ns: float
+
+
+BEST_FIRST: Final = {
+    MatcherName.SGBM: UsualCost(step_ns=1.1, pixel_ns=140.0),
+    MatcherName.BLOCK: UsualCost(step_ns=2.2, pixel_ns=10.0),
+}
+"""Our matchers, those with the best depth first (decision 0002). Costs: two cores of a server, 640x480, 32 to 128 disparities."""
+
+_UNKNOWN_COST: Final = UsualCost(step_ns=1.0, pixel_ns=100.0)
+
+
+def usual_cost(matcher: AnyMatcher) -> UsualCost:
+    """Return what a matcher may cost; of other packages' matchers nothing is known."""
+    return BEST_FIRST.get(matcher, _UNKNOWN_COST) if isinstance(matcher, MatcherName) else _UNKNOWN_COST
 
 
 def matcher_named(text: str) -> AnyMatcher:
-    """Find the matcher that a user names, without loading it.
+    """Find the matcher that a user names, without loading it: ours, another package's, or a network's file.
 
     Args:
         text: the name.
 
     Raises:
-        SettingsError: no matcher has that name.
+        SettingsError: no matcher has that name, or an option of a network makes no sense.
     """
+    if text.startswith(PREFIX):
+        return network_named(text)
     own = [name.value for name in MatcherName]
     if text in own:
         return MatcherName(text)
     registered = registered_names(MATCHERS)
     if text in registered:
         return RegisteredMatcher(text)
-    raise SettingsError(f"matcher {text!r} is unknown", f"give {' or '.join((*own, *registered))}")
+    raise SettingsError(f"matcher {text!r} is unknown", f"give {' or '.join((*own, *registered))}, or onnx:PATH")

@@ -11,7 +11,15 @@ from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageEr
 from common.imagesize.head import MOST_PIXELS, ImageKind, require_pixels, size_text
 from common.orientation import UPRIGHT, Orientation
 from phone_host.model import Image
-from phone_host.stereo.images import EncodedFile, decode_file, decode_files, enlarged, examine, require_same_shape
+from phone_host.stereo.images import (
+    WHOLE,
+    EncodedFile,
+    decode_file,
+    decode_files,
+    enlarged,
+    examine,
+    require_same_shape,
+)
 from phone_host.stereo.orient import upright
 
 _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.PNG}
@@ -56,7 +64,7 @@ def decode_frames(
     first: EncodedImage,
     second: EncodedImage,
     most_pixels: int = MOST_PIXELS,
-    check: Callable[[tuple[int, int], tuple[int, int]], None] | None = None,
+    plan: Callable[[tuple[int, int], tuple[int, int]], tuple[int, int]] | None = None,
 ) -> tuple[Image, Image]:
     """Decode the two frames of a pair.
 
@@ -64,8 +72,8 @@ def decode_frames(
         first: the frame of one camera.
         second: the frame of the other, in the same encoding or another one.
         most_pixels: the limit for both camera and frame.
-        check: called with the whole sizes of both upright images, px, before either is decoded; raises if they are of
-            no use.
+        plan: called with the whole sizes of both upright images, px, before either is decoded: returns by how much each
+            may be decoded smaller, or raises if they are of no use.
 
     Returns:
         Both in that order, each (H, W) grey or (H, W, 3) BGR, uint8, upright as its EXIF header and then its camera's
@@ -75,21 +83,22 @@ def decode_frames(
         SpoiledImageError: one of the two is spoiled, or its size cannot be believed.
     """
     one, other = _examined(first, most_pixels), _examined(second, most_pixels)
-    if check is not None:
-        check(_turned(one, first.whole_px), _turned(other, second.whole_px))
+    asked = WHOLE if plan is None else plan(_turned(one, first.whole_px), _turned(other, second.whole_px))
+    by = _reduction(first, asked[0]), _reduction(second, asked[1])
     if isinstance(one, EncodedFile) and isinstance(other, EncodedFile):
-        images = decode_files(one, other)
+        images = decode_files(one, other, by)
     else:
-        images = _decoded(one), _decoded(other)
-    return _whole(images[0], first, one), _whole(images[1], second, other)
+        images = _decoded(one, by[0]), _decoded(other, by[1])
+    return _whole(images[0], first, one, by[0]), _whole(images[1], second, other, by[1])
 
 
-def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
+def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS, reduction: int = 1) -> Image:
     """Decode one frame.
 
     Args:
         image: of any encoding.
         most_pixels: the limit for both its camera and the frame.
+        reduction: by how much it may be decoded smaller.
 
     Returns:
         (H, W) grey or (H, W, 3) BGR, uint8, upright and as large as `decode_frames` gives it.
@@ -98,12 +107,20 @@ def decode_frame(image: EncodedImage, most_pixels: int = MOST_PIXELS) -> Image:
         SpoiledImageError: it is spoiled, or its size cannot be believed.
     """
     examined = _examined(image, most_pixels)
-    return _whole(_decoded(examined), image, examined)
+    by = _reduction(image, reduction)
+    return _whole(_decoded(examined, by), image, examined, by)
 
 
-def _whole(decoded: Image, image: EncodedImage, examined: EncodedImage | EncodedFile) -> Image:
+def _reduction(image: EncodedImage, asked: int) -> int:
+    """Return by how much a frame may be decoded smaller: one that is to be enlarged, not at all."""
+    return asked if image.whole_px == image.size_px else 1
+
+
+def _whole(decoded: Image, image: EncodedImage, examined: EncodedImage | EncodedFile, reduction: int) -> Image:
     """Enlarge an image to the size that its camera was asked for, because rig, matcher and geometry need that size."""
-    return enlarged(decoded, _turned(examined, image.asked_px), image.name) if any(image.asked_px) else decoded
+    if not any(image.asked_px) or (reduction > 1 and image.whole_px == image.size_px):
+        return decoded
+    return enlarged(decoded, _turned(examined, image.asked_px), image.name)
 
 
 def _turned(image: EncodedImage | EncodedFile, size_px: tuple[int, int]) -> tuple[int, int]:
@@ -113,8 +130,10 @@ def _turned(image: EncodedImage | EncodedFile, size_px: tuple[int, int]) -> tupl
     return image.orientation.turned_size(size_px)
 
 
-def _decoded(image: EncodedImage | EncodedFile) -> Image:
-    return upright(decode_raw(image), image.orientation) if isinstance(image, EncodedImage) else decode_file(image)
+def _decoded(image: EncodedImage | EncodedFile, reduction: int) -> Image:
+    if isinstance(image, EncodedImage):
+        return upright(decode_raw(image), image.orientation)
+    return decode_file(image, reduction)
 
 
 def _examined(image: EncodedImage, most_pixels: int) -> EncodedImage | EncodedFile:

@@ -28,9 +28,10 @@ from common.errors import DataError
 from common.imagesize.head import size_text
 from phone_host.model import CameraModel, Epipolar, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_px
+from phone_host.stereo.remap import Maps, remap
+from phone_host.stereo.two_threads import in_two_threads
 
 Matrix = NDArray[np.float64]
-Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
 
 _LEAST_BASELINE_M = 5e-4
 """No two cameras stand nearer to each other."""
@@ -172,6 +173,11 @@ class Rectifier:
         self._left = _Remap(rig.left, self.rectification.R_left, self.rectification)
         self._right = _Remap(rig.right, self.rectification.R_right, self.rectification)
 
+    @property
+    def reductions(self) -> tuple[int, int]:
+        """By how much the left and the right image may be smaller, 1, 2, 4 or 8: a finer camera's image is averaged down first, which a decoder of JPEG does for less."""
+        return self._left.reduction, self._right.reduction
+
     def require_sizes(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> None:
         """Check that the images have their cameras' sizes.
 
@@ -194,8 +200,8 @@ class Rectifier:
         """Rectify a pair of images as the cameras sent them.
 
         Args:
-            left: (H, W) grey or (H, W, 3) BGR, uint8, the left camera's size.
-            right: the same, the right camera's size.
+            left: (H, W) grey or (H, W, 3) BGR, uint8, the left camera's size, or that divided by its reduction.
+            right: the same of the right camera.
 
         Returns:
             The pair, both of the rectification's size, every pixel filled.
@@ -203,8 +209,9 @@ class Rectifier:
         Raises:
             DataError: an image's size differs from that of its camera in the rig.
         """
-        self.require_sizes(size_px(left), size_px(right))
-        return RectifiedPair(self._left.apply(left), self._right.apply(right), self.rectification.epipolar)
+        self.require_sizes(self._left.whole_px(size_px(left)), self._right.whole_px(size_px(right)))
+        first, second = in_two_threads(lambda: self._left.apply(left), lambda: self._right.apply(right))
+        return RectifiedPair(first, second, self.rectification.epipolar)
 
 
 class _Remap:
@@ -222,17 +229,29 @@ class _Remap:
         self._shrink = max(1, int(_mean_focal_px(model) / rectification.geometry.focal_px + 1e-6))
         self._kept = self._maps(0, self._height) if self._width * self._height <= _MOST_KEPT_PIXELS else None
 
+    @property
+    def reduction(self) -> int:
+        """The largest power of 2, up to 8, that divides the factor by which images are averaged down."""
+        return min(self._shrink & -self._shrink, 8)
+
+    def whole_px(self, size_px: tuple[int, int]) -> tuple[int, int]:
+        """Return the size of the image that was decoded to this size, px; the size itself if it was not reduced."""
+        width, height = (length * self.reduction for length in size_px)
+        return (width, height) if (width, height) == (self._model.width_px, self._model.height_px) else size_px
+
     def apply(self, image: Image) -> Image:
-        if self._shrink > 1:
-            height, width = (length // self._shrink for length in image.shape[:2])
-            whole_blocks = image[: height * self._shrink, : width * self._shrink]
+        shrink = self._shrink if image.shape[1] == self._model.width_px else self._shrink // self.reduction
+        if shrink > 1:
+            height, width = (length // shrink for length in image.shape[:2])
+            whole_blocks = image[: height * shrink, : width * shrink]
             image = np.asarray(cv2.resize(whole_blocks, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        # The maps stay inside the image, but the last half block of a reduced one may lie 0.5 px outside.
         if self._kept is not None:
-            return self._remapped(image, self._kept)
+            return remap(image, self._kept)
         result = np.empty((self._height, self._width, *image.shape[2:]), np.uint8)
         for top in range(0, self._height, _STRIP_ROWS):
             bottom = min(top + _STRIP_ROWS, self._height)
-            result[top:bottom] = self._remapped(image, self._maps(top, bottom))
+            result[top:bottom] = remap(image, self._maps(top, bottom))
         return result
 
     def _maps(self, top: int, bottom: int) -> Maps:
@@ -249,12 +268,6 @@ class _Remap:
         if self._shrink > 1:
             x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
         return cv2.convertMaps(x, y, cv2.CV_16SC2)  # half the time of float maps, the same 1/32 px
-
-    @staticmethod
-    def _remapped(image: Image, maps: Maps) -> Image:
-        # Replicate: the maps stay inside, but the last half block of a reduced image may lie 0.5 px outside.
-        remapped = cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray(remapped, dtype=np.uint8)
 
 
 def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float, Epipolar]:

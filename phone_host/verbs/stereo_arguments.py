@@ -61,5 +61,7 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--center", metavar="CX,CY", help="principal point of the left rectified image")
     own = " or ".join(name.value for name in MatcherName)
     parser.add_argument(
-        "--matcher", metavar="NAME", help=f"stereo matcher: {own}, or one from an installed package (default sgbm)"
+        "--matcher",
+        metavar="NAME",
+        help=f"stereo matcher: {own}, onnx:PATH for a network, or one from an installed package (default sgbm)",
     )

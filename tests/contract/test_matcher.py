@@ -1,4 +1,4 @@
-"""What every matcher must do. A new matcher adds one line to MATCHERS."""
+"""What every matcher must do. A new matcher adds one line to MATCHERS. Hard inputs: test_matcher_inputs."""
 
 import cv2
 import numpy as np

@@ -1,6 +1,7 @@
 """Sees when OpenCV decodes an image, with OpenCV left as it is: the interpreter reports its calls into C (sys.setprofile)."""
 
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -10,15 +11,17 @@ import cv2
 
 @contextmanager
 def watched_decoder(on_decoding: Callable[[], None]) -> Iterator[None]:
-    """Call `on_decoding` whenever this thread is about to enter `cv2.imdecode`, for the length of a block."""
+    """Call `on_decoding` whenever this thread, or one started meanwhile, is about to enter `cv2.imdecode`, for the length of a block."""
 
     def watch(_frame: FrameType, event: str, called: object) -> None:
         if event == "c_call" and called is cv2.imdecode:
             on_decoding()
 
-    before = sys.getprofile()
+    before, before_in_threads = sys.getprofile(), threading.getprofile()
     sys.setprofile(watch)
+    threading.setprofile(watch)
     try:
         yield
     finally:
+        threading.setprofile(before_in_threads)
         sys.setprofile(before)

@@ -23,7 +23,8 @@ from phone_host.model import CameraModel, Rig
 from phone_host.output.cameras_json import read_cameras
 from phone_host.output.pfm import read_pfm
 from phone_host.output.rig_yaml import write_rig
-from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName

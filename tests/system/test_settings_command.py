@@ -20,7 +20,7 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
     given = {
         "link": "serial:/dev/ttyACM0", "camera": "replay:right", "calibration": "rig.yaml", "matcher": "block",
         "tolerance": "5", "fifo": "2:block", "align_phase": "board", "keys": "my-keys", "log_level": "info",
-        "max_megapixels": "12",
+        "max_megapixels": "12", "budget": "40",
     }  # fmt: skip
     words = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", value)]
     words += ["--link", "tcp://board:5555", "--interpolate"]
@@ -29,6 +29,7 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
     read = given | {
         "interpolate": True,
         "tolerance": 5.0,
+        "budget": 40.0,
         "max_megapixels": 12,
         "link": ["serial:/dev/ttyACM0", "tcp://board:5555"],
     }
@@ -43,6 +44,7 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
         ("phone_host.cli", "PHONE_HOST_FIFO", "2:sometimes"),
         ("phone_host.cli", "PHONE_HOST_MATCHER", "magic"),
         ("phone_host.cli", "PHONE_HOST_TOLERANCE", "nan"),
+        ("phone_host.cli", "PHONE_HOST_BUDGET", "0.5"),
         ("phone_host.cli", "PHONE_HOST_MAX_MEGAPIXELS", "0"),
         ("phone_host.cli", "PHONE_HOST_LINK", "carrier-pigeon://x"),
         ("phone_host.cli", "PHONE_HOST_CAMERA", "replay:x?fps=0"),

@@ -12,7 +12,8 @@ from common.stamp import HOST_CLOCK
 from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import figures
 from phone_host.model import Result
-from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings

@@ -4,29 +4,19 @@ import dataclasses
 import html
 import json
 import math
-import re
-import xml.etree.ElementTree as ET
-from dataclasses import replace
-from html.parser import HTMLParser
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
-from common.protocol.message import BoardCounts
+from common.ledger import BoardMarks
 from phone_host.bench.analysis import Analysis, WhatIf, analyse
-from phone_host.bench.cases import (
-    Case,
-    Interface,
-    Size,
-)
 from phone_host.bench.changes import parse_changes
-from phone_host.bench.page import figure, page
+from phone_host.bench.page import page
 from phone_host.bench.prediction import Figures, Unknown
-from phone_host.bench.report import Conditions, as_json, losses
-from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up
+from phone_host.bench.report import as_json, losses
+from phone_host.bench.runs import WARM_UP_S, after_warm_up
 from phone_host.bench.tables import (
     checked_rows,
     fit_lines,
@@ -39,71 +29,11 @@ from phone_host.bench.tables import (
     summary_line,
     what_if_rows,
 )
-from phone_host.children.board_process import BoardAccount
-from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.measure.delays import DELAYS, STAGES
 from phone_host.model import PairCounts
-from phone_host.sync.fifo import FifoSettings
-from tests.support.samples import LEDGER
+from tests.support.bench_results import UNDER, analysed, ledger, result, slower
 
-UNDER = Conditions(
-    machine="a machine",
-    date="a date",
-    matcher="sgbm",
-    fifo=FifoSettings(),
-    seconds=4.0,
-    not_run=((Interface("rfcomm"), "no radio"),),
-)
 UNITS = ("_ms", "_us", "_ns", "_s", "_hz", "_px", "_bytes", "_frames", "_pairs", "_runs", "_percent", "stalls")
-
-
-def ledger(number: int, period_ns: int = 33_000_000) -> PairLedger:
-    """A pair whose delays are 1, 2, 3, 4, 5 and 15 ms."""
-    exposed_ns = number * period_ns
-    marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=exposed_ns + 1_000_000, sent_ns=exposed_ns + 3_000_000)
-    return replace(
-        LEDGER,
-        sequence=number,
-        host_sequence=number,
-        bytes=50_000,
-        board=marks,
-        received_ns=exposed_ns + 6_000_000,
-        paired_ns=exposed_ns + 10_000_000,
-        queued_ns=exposed_ns + 10_000_000,
-        dequeued_ns=exposed_ns + 15_000_000,
-        done_ns=exposed_ns + 30_000_000,
-        previous_done_ns=exposed_ns + 9_000_000,
-        stages=StageTimes(decode=1_000_000, match=14_000_000),
-        time_skew_ns=-5_000,
-        uncertainty_ns=40_000,
-        host=HostMarks(exposed_ns=exposed_ns + 5_000, grabbed_ns=exposed_ns + 1_000_000),
-    )
-
-
-def result(pairs: int = 100, link: str = "tcp") -> CaseResult:
-    """A run of 108 frames: 3 dropped on the board, 1 under way, 2 lost, 1 orphaned; the FIFO dropped one pair."""
-    counts = BoardCounts()
-    account = SessionAccount("s", counts, counts, received=102, lost=2)
-    host = PairCounts(received=102, paired=101, dropped=1, taken=100, board_orphans=(("no_partner", 1),))
-    kept, measured_s = after_warm_up([ledger(number) for number in range(pairs)])
-    board = BoardAccount(108, 105, (("no_host", 3),))
-    case = Case(interface=Interface(link), size=Size(640, 480), quality_percent=80, rate_hz=30)
-    return CaseResult(
-        case=case,
-        ledgers=kept,
-        measured_s=measured_s,
-        uncertainty_ns=45e3,
-        bound_ns=70e3,
-        board=board,
-        link=LinkAccount([account]),
-        counts=host,
-        processed=100,
-        undecodable=0,
-    )
-
-
-def analysed(*results: CaseResult) -> Analysis:
-    return analyse(results, UNDER.fifo)
 
 
 def keys_of_numbers(value: Any, key: str = "") -> list[str]:
@@ -251,16 +181,6 @@ def test_a_run_without_pairs_is_reported_without_numbers() -> None:
     assert "No pair was processed" in page([empty], UNDER, analysed(empty))
 
 
-def slower(link: str, factor: float) -> CaseResult:
-    """The usual run over another link; there, the board's frames are exposed earlier, so that everything takes longer by a factor."""
-    usual = result(link=link)
-    early_ns = round(30_000_000 * (factor - 1))
-    ledgers = tuple(
-        replace(one, board=replace(one.board, exposed_ns=one.board.exposed_ns - early_ns)) for one in usual.ledgers
-    )
-    return dataclasses.replace(usual, ledgers=ledgers)
-
-
 def test_one_sentence_says_which_link_is_fastest_and_what_takes_longest() -> None:
     """The fastest link is named with its median and its largest part; links within 5 % are equally fast; nothing measured makes no sentence."""
     assert result_sentence([slower("ipc", 2.0), result()]).replace("\u202f", " ") == (
@@ -270,35 +190,6 @@ def test_one_sentence_says_which_link_is_fastest_and_what_takes_longest() -> Non
     assert result_sentence([result()]).startswith("tcp takes 30.0")
     assert "the largest part is capturing on the board" in result_sentence([slower("ipc", 3.0)])
     assert not result_sentence([result(pairs=0)])
-
-
-def test_a_run_of_few_pairs_is_doubted_and_says_how_long_to_run() -> None:
-    """16 pairs at 30.3 per second: 10 s are enough for 50; the page then has no green tick. 50 pairs are enough."""
-    short = dataclasses.replace(result(), ledgers=result().ledgers[:16], measured_s=0.528)
-    sentence = result_sentence([result(link="ipc"), short])
-    assert "from only 16 pairs: run it longer (--seconds 10)" in sentence
-    text = page([short], UNDER, analysed(short))
-    assert 'class="verdict warning"' in text
-    assert 'class="verdict good"' in page([result()], UNDER, analysed(result()))
-    assert "run it longer" not in result_sentence([dataclasses.replace(result(), ledgers=result().ledgers[:50])])
-
-
-def test_the_page_begins_with_the_result_and_ends_with_the_fits() -> None:
-    """Sentence, stacked bars, then how it was measured, the model and the fits; what was not measured has no card."""
-    results = [result(), slower("ipc", 2.0)]
-    text = page(results, UNDER, analysed(*results))
-    places = [
-        text.index(words)
-        for words in (
-            "is the fastest link",
-            "shares of the delays",
-            "How this was measured",
-            "The interfaces",
-            "Delay against bytes",
-        )
-    ]
-    assert places == sorted(places)
-    assert "The model beside" not in page(results[:1], UNDER, analysed(*results[:1]))
 
 
 def test_a_profile_that_loses_bytes_is_predicted_without_and_says_so() -> None:
@@ -321,44 +212,6 @@ def test_the_table_has_a_line_for_each_stage_and_link() -> None:
     assert all(len(row) == 6 for row in table)
 
 
-def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
-    """All elements are closed, each link has its plots, and nothing is loaded from elsewhere."""
-
-    class Checker(HTMLParser):
-        open_tags: list[str]
-        plots = 0
-
-        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-            assert not [value for name, value in attrs if name in {"src", "href"} and value and "://" in value]
-            self.plots += tag == "svg" and ("class", "plot") in attrs
-            if tag not in {"meta", "br", "path", "line", "rect", "circle", "polygon"}:
-                self.open_tags.append(tag)
-
-        def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-            pass
-
-        def handle_endtag(self, tag: str) -> None:
-            if tag in self.open_tags:
-                while self.open_tags.pop() != tag:
-                    pass
-
-    checker = Checker()
-    checker.open_tags = []
-    small = dataclasses.replace(
-        result(), case=Case(interface=Interface("tcp"), size=Size(320, 240), quality_percent=80, rate_hz=15)
-    )
-    results = [result(), result(link="ipc"), small]
-    text = page(results, UNDER, analysed(*results))
-    checker.feed(text)
-    assert checker.open_tags == []
-    assert not re.search(r"<script|<link|<iframe|<object|@import|url\(|<image", text)
-    # Each in two widths: four for both kinds of images, one for both interfaces, one for the model.
-    assert checker.plots == 2 * (4 * 2 + 2 + 1)
-    assert "rfcomm was not run: no radio" in text
-    assert "640x480 JPEG 80 at 30" in text
-    assert "320x240 JPEG 80 at 15" in text
-
-
 @pytest.mark.parametrize(
     ("bytes_per_s", "text"),
     [(1.044e9, "1.04 GB/s"), (999.6e6, "1 GB/s"), (4.45e6, "4.45 MB/s"), (669e3, "669 kB/s"), (20.0, "0.02 kB/s")],
@@ -366,17 +219,6 @@ def test_page_is_whole_html_and_refers_to_nothing_outside() -> None:
 def test_a_rate_has_the_unit_that_keeps_it_short(bytes_per_s: float, text: str) -> None:
     """Rates are given with three digits in kB/s, MB/s or GB/s."""
     assert rate_text(bytes_per_s) == text
-
-
-def test_figure_is_an_svg_file_of_its_own() -> None:
-    """The picture for a README parses as XML, names every interface and delay, carries its colours and refers to nothing outside."""
-    text = figure([result(), result(link="ipc")], UNDER)
-    root = ET.fromstring(text)
-    assert root.tag == "{http://www.w3.org/2000/svg}svg"
-    words = {element.text for element in root.iter("{http://www.w3.org/2000/svg}text")}
-    assert {"tcp", "ipc", "capture", "processing"} <= words
-    assert "prefers-color-scheme:dark" in text
-    assert "href" not in text
 
 
 def test_predictions_stand_in_terminal_and_tables_with_reasons_where_there_are_none() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.emulate import PROFILES
 from phone_host.bench.tables import fit_lines
-from tests.unit.test_bench_report import analysed, result
+from tests.support.bench_results import analysed, result
 
 
 def test_frames_of_one_size_tell_no_rate() -> None:

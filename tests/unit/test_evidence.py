@@ -284,6 +284,21 @@ def test_a_doffs_of_other_images_is_told(good: Pair) -> None:
         assert [concern.doubt for concern in found] == ([Doubt.GEOMETRY] if told else [])
 
 
+def test_a_principal_point_of_other_images_is_told(good: Pair) -> None:
+    """35,119 of 320x240 px lies at an eleventh of the width: told live and of files alike, once, though doffs is doubtful too. A rig's own is not looked at."""
+    for cx_px, doffs_px, told in ((159.5, 0.0, False), (35.0, 0.0, True), (35.0, -20.0, True)):
+        geometry = StereoGeometry(focal_px=260.0, baseline_m=0.1, cx_px=cx_px, cy_px=119.5, doffs_px=doffs_px)
+        core = StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, 64)), geometry=geometry)
+        processed = core.compute(*good, lambda: 0)
+        live = image_doubts(measure_evidence(processed, maps_of(core, processed)))
+        assert live == judge_pair(core, processed).concerns
+        said = [concern for concern in live if "the principal point 35,120 lies far" in concern.sentence]
+        assert [concern.doubt for concern in said] == ([Doubt.GEOMETRY] if told else [])
+        assert len(live) == len(said)
+        rig = measure_evidence(processed, ThroughRig(_rig(), Rectifier(_rig()).rectification))
+        assert rig.off_middle is None
+
+
 def test_the_middle_of_the_scene_is_that_of_what_is_kept() -> None:
     """Left half 40 px, right half 10 px, and everything farther than 1 m cut away (f b = 26 px m): the middle is 40 px."""
     disparity = np.full((60, 80), 10.0, np.float32)

@@ -70,10 +70,15 @@ def test_files_and_frames_are_turned_alike(tmp_path: Path) -> None:
     content = oriented(".jpg", picture(48, 32), 6)
     (tmp_path / "a.jpg").write_bytes(content)
     checked: list[tuple[tuple[int, int], tuple[int, int]]] = []
+
+    def plan(first_px: tuple[int, int], second_px: tuple[int, int]) -> tuple[int, int]:
+        checked.append((first_px, second_px))
+        return 1, 1
+
     frame = EncodedImage(
         payload=content, pixel_format=PixelFormat.MJPEG, width_px=48, height_px=32, name="frame", asked_px=(48, 32)
     )
-    left, right = decode_frames(frame, frame, check=lambda *sizes: checked.append(sizes))
+    left, right = decode_frames(frame, frame, plan=plan)
     assert checked == [((32, 48), (32, 48))]
     np.testing.assert_array_equal(left, read_image(tmp_path / "a.jpg"))
     np.testing.assert_array_equal(right, left)

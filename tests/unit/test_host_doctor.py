@@ -6,12 +6,14 @@ from pathlib import Path
 import pytest
 
 from common.doctor.finding import Grade
+from common.errors import SettingsError
 from phone_host.doctor.host_checks import (
     Answer,
     BoardReadings,
     Package,
     RigReadings,
     check_board,
+    check_native,
     check_out,
     check_package,
     check_ports,
@@ -20,6 +22,7 @@ from phone_host.doctor.host_checks import (
 )
 from phone_host.doctor.vision_checks import read_rig_readings
 from phone_host.output.rig_yaml import write_rig
+from phone_host.stereo.native.library import Missing, native
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 
@@ -130,3 +133,14 @@ def test_a_rig_files_verdict_reaches_the_doctor(tmp_path: Path) -> None:
         judged = replace(rig, verdict=verdict)
         write_rig(tmp_path / "rig.yaml", judged, rectify_rig(judged))
         assert check_rig(read_rig_readings(str(tmp_path / "rig.yaml"), "")).verdict is grade
+
+
+def test_a_missing_native_library_is_a_warning_with_its_reason() -> None:
+    """Everything works without it; a wrong TANDEMSCAN_SIMD stops every command, so that fails; the library's instructions are named."""
+    missing = check_native(Missing(reason="not built: no C compiler", remedy="install gcc"))
+    assert (missing.verdict, missing.remedy) == (WARN, "install gcc")
+    assert missing.text == "own matcher not built: no C compiler; sgbm is used"
+    assert check_native(SettingsError("TANDEMSCAN_SIMD=mmx is no instruction set", "give scalar")).verdict is FAIL
+    found = check_native(native())
+    assert found.verdict is OK
+    assert found.text.startswith("own matcher: ")

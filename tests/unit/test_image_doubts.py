@@ -23,13 +23,14 @@ from phone_host.model import (
     DepthLimits,
     Evidence,
     Exposure,
+    OffMiddle,
     StereoGeometry,
     Support,
 )
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
-from tests.unit.test_run_report import run
+from tests.support.run_snapshots import run
 
 SHARP: Final = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
 GEOMETRY: Final = StereoGeometry(focal_px=500, baseline_m=0.1, cx_px=320, cy_px=240)
@@ -53,6 +54,7 @@ def doubts(found: Evidence) -> list[Doubt]:
 COVERED: Final = Exposure(mean_level=3, bright_level=5, structure=0.3, blur_px=math.nan)
 GOOD: Final = evidence()
 SWAPPED: Final = replace(evidence(right=0, swapped=150, both_turned=150, both_mirrored=150), density=0.05)
+FOREIGN: Final = OffMiddle(cx_px=602.0, cy_px=183.0, width_px=741, height_px=500)
 BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
 
 
@@ -95,6 +97,9 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (replace(GOOD, vertical_px=4.2, matched_scale=0.22), []),  # 48 megapixels: 0.9 px where they are matched
         (replace(GOOD, vertical_px=9.5, matched_scale=0.22), [Doubt.VERTICAL_ERROR]),
         (replace(evidence(), is_cropped=True), [Doubt.CROPPED_RIG]),
+        (replace(GOOD, behind_share=0.1), [Doubt.GEOMETRY]),
+        (replace(GOOD, behind_share=0.1, off_middle=FOREIGN), [Doubt.GEOMETRY]),
+        (replace(BLIND, off_middle=FOREIGN), [Doubt.COVERED, Doubt.GEOMETRY]),  # what blocks comes first
         (evidence(right=50), [Doubt.VERTICAL_ERROR]),  # most features are on tilted rows
     ],
 )  # fmt: skip

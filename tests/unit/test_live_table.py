@@ -18,8 +18,8 @@ from common.program.terminal import headed, rows
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.run.terminal_view import LiveTable
+from tests.support.run_snapshots import run
 from tests.support.screen import Screen
-from tests.unit.test_run_report import run
 
 SENTENCE = "the left image is covered: 97% of it is dark in 12 of 12 judged pairs, and no depth comes from what is dark"
 _LOG = logging.getLogger("phone_host.test")

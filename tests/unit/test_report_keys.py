@@ -23,8 +23,9 @@ from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Suspects
 from tests.docs.commands import ROOT
+from tests.support import bench_results, budget_accounts, run_snapshots
 from tests.support.pictures import encoded
-from tests.unit import test_bench_report, test_calibrate_verb, test_run_report, test_stereo_report
+from tests.unit import test_calibrate_verb, test_stereo_report
 
 _TEXT: Final = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
 
@@ -62,7 +63,7 @@ def _eventful_run() -> RunSnapshot:
     account = SessionAccount("s", BoardCounts(), BoardCounts(40, 35, ((DropReason.REPLACED, 5),)), received=31)
     link = LinkAccount([account], links=(LinkTally("tcp", frames=31),), clock_steps=1)
     link.suspects.append(Suspects(session="s", first=11, last=17, frames=7))
-    usual = test_run_report.run(31)
+    usual = run_snapshots.run(31)
     return replace(
         usual,
         estimate=estimate,
@@ -77,6 +78,7 @@ def _eventful_run() -> RunSnapshot:
             ),
         ),
         own_future=4,
+        budget=budget_accounts.ACCOUNT,
         depth=DepthAccount(
             cut=CutCounts(kept=5),
             limits=DepthLimits(near_m=0.0, far_m=9.0, disparity_error_px=0.25, from_rig=True),
@@ -113,8 +115,8 @@ def test_every_key_of_a_report_of_calibrate_is_described(tmp_path: Path, capsys:
 
 def test_every_key_of_delay_bench_json_is_described() -> None:
     """Two interfaces and the predictions that follow from them."""
-    results = [test_bench_report.result(), test_bench_report.result(link="ipc")]
-    report = as_json(results, test_bench_report.UNDER, test_bench_report.analysed(*results))
+    results = [bench_results.result(), bench_results.result(link="ipc")]
+    report = as_json(results, bench_results.UNDER, bench_results.analysed(*results))
     keys = _keys(report)
     assert len(keys) >= 70
     assert keys <= _described("What `--json` prints", "delay-bench.json")

@@ -22,9 +22,9 @@ from phone_host.model import Arrangement, Evidence, Side
 from phone_host.report.run_json import build
 from phone_host.report.run_page import doubtful_pairs, run_page
 from phone_host.report.summary import summary
+from tests.support.run_snapshots import run
 from tests.unit.test_image_doubts import BLIND, GEOMETRY, GOOD, SWAPPED, evidence
 from tests.unit.test_numbers import SERIES, SHORT
-from tests.unit.test_run_report import run
 
 LOW = replace(BLIND, density=0.0)
 TURN_90 = Orientation(90)

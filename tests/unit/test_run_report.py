@@ -1,84 +1,35 @@
 """A run's summary and page: what was not measured is called so, and never shown as a number."""
 
-import html
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
 from common.camera.image_numbers import ImageNumbers
 from common.frame import FrameFault
-from common.ledger import BoardMarks, HostMarks
 from common.protocol.message import BoardCounts, DropReason
 from phone_host.measure.absence import Absence, away_of, away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.delays import DelayStatistics, Series
 from phone_host.measure.headline import headline
 from phone_host.measure.image_trust import ImageFigures, ImageTrust
-from phone_host.measure.numbers import ImageEvidence, pairing_words
-from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.numbers import ImageEvidence
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.unused import Unused, unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
 from phone_host.report.report_page import delay_series
 from phone_host.report.run_json import age_bound, build
-from phone_host.report.run_page import camera_table, run_page
+from phone_host.report.run_page import run_page
 from phone_host.report.summary import phase_lines, summary
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Disbelief, Suspects
 from phone_host.sync.stills import PairedBy, WhyOrder
-from tests.support.html import Page
+from tests.support.run_snapshots import MS, run
 from tests.support.samples import LEDGER
-from tests.support.stereo_pages import processed
-
-NAN = float("nan")
-MS = 1_000_000
-
-
-def run(pairs: int) -> RunSnapshot:
-    """A run of some pairs, 50 ms apart, without a measurement of image motion."""
-    delays = DelayStatistics()
-    for number in range(pairs):
-        at = number * 50 * MS
-        board = BoardMarks(exposed_ns=at, grabbed_ns=at + MS, sent_ns=at + 2 * MS)
-        delays.add(
-            replace(
-                LEDGER,
-                sequence=number,
-                host_sequence=number,
-                board=board,
-                received_ns=at + 3 * MS,
-                paired_ns=at + 4 * MS,
-                queued_ns=at + 4 * MS,
-                dequeued_ns=at + 5 * MS,
-                done_ns=at + 15 * MS,
-                previous_done_ns=at,
-                uncertainty_ns=50,
-                host=HostMarks(exposed_ns=at, grabbed_ns=at + MS),
-            )
-        )
-    counts = PairCounts(received=pairs, paired=pairs, taken=pairs)
-    seconds = max(0, pairs - 1) * 0.05
-    return RunSnapshot(
-        ended="stopped",
-        processed=pairs,
-        undecodable=0,
-        seconds=seconds,
-        delays=delays,
-        counts=counts,
-        link=LinkAccount([]),
-        estimate=None,
-        tolerance_ns=25 * MS,
-        fifo=FifoSettings(),
-        unwritten=Unwritten(),
-        camera=CameraHealth(CameraState.RUNNING),
-        period_ns=50 * MS,
-    )
 
 
 @pytest.mark.parametrize("pairs", [0, 1, 30])
@@ -321,32 +272,6 @@ def test_one_that_was_not_used_is_singular(place: str, reason: str, count: int, 
     assert Unused(place, reason, count).told == told
 
 
-def test_what_did_not_happen_has_no_row() -> None:
-    """A camera without troubles has no row of zeros on the page; one of which nothing at all is known has no card."""
-    assert camera_table(CameraHealth(CameraState.RUNNING)).rows == ()
-    health = CameraHealth(CameraState.RUNNING, stalls=2, period_ns=50 * MS)
-    assert camera_table(health).rows == (("measured rate", "20.00 frames/s"), ("stalled", "2"))
-    page = run_page(run(5), None, Side.LEFT, ())
-    assert "This machine's camera" not in page
-    assert "not used" not in page
-
-
-def test_a_runs_page_shows_the_last_pair_and_leads_to_the_saved_ones() -> None:
-    """The page shows which pair it is, its density and its depth under the pointer, and has a link to each saved cloud; many are cut short in words."""
-    saved = [f"pair-{number:06d}/cloud.ply" for number in range(0, 500, 10)]
-    page = Page(run_page(run(31), processed(), Side.RIGHT, (), saved))
-    assert not page.open
-    share = 100 * np.isfinite(processed().cloud[..., 2]).mean()  # type: ignore[index]
-    for words in ("number 30 of this run", f"{share:.0f} % of the pixels have a depth", "15 % farther than 4 m"):
-        assert words in page.words
-    assert "left: the host's camera, rectified" in page.words
-    links = [one["href"] for one in page.every("a")]
-    assert links[:2] == ["pair-000000/cloud.ply", "pair-000010/cloud.ply"]
-    assert "and 10 more" in page.words
-    assert {"report.json", "delays.jsonl"} <= set(links)
-    assert len(page.every("canvas")) == 1
-
-
 def test_a_frame_that_waited_when_the_host_came_belongs_to_the_account() -> None:
     """The board had grabbed 8 and sent 5, dropped 2, so one waited; it was sent since: nothing waits, and never -1."""
     before = BoardCounts(grabbed=8, sent=5, dropped=((DropReason.NO_HOST, 2),))
@@ -435,15 +360,3 @@ def test_images_without_a_partner_do_not_make_the_depth_of_the_pairs_doubtful() 
     by_order = replace(by_number, paired_by=PairedBy.ORDER, why_order=WhyOrder.UNKNOWN)
     said = headline(replace(seen, replayed=by_order))
     assert said.sentence.startswith("Depth may be wrong: the board shows 24 images, 0 to 23, this machine 23 images")
-
-
-@pytest.mark.parametrize("why", [None, *WhyOrder])
-def test_page_and_terminal_say_alike_what_paired_the_stills(why: WhyOrder | None) -> None:
-    """The line that says that images are paired in their order, and why, is on the page too."""
-    images = ImageNumbers(count=30, first=0, last=29)
-    by = PairedBy.NUMBER if why is None else PairedBy.ORDER
-    evidence = ImageEvidence(paired_by=by, why_order=why, board=images, own=images, pairs=30)
-    seen = replace(run(30), replayed=evidence, timeless=True, period_ns=0)
-    words = pairing_words(evidence)
-    assert words in summary(seen).splitlines()
-    assert words.removeprefix("s") in html.unescape(run_page(seen, None, Side.LEFT, ()))

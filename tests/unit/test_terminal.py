@@ -21,10 +21,10 @@ from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.report.summary import summary
 from phone_host.run.terminal_view import LiveTable
 from phone_host.verbs.calibrate.figures import rejections
+from tests.support.bench_results import result
+from tests.support.run_snapshots import MS, run
 from tests.support.samples import LEDGER
 from tests.support.terminal import in_terminal
-from tests.unit.test_bench_report import result
-from tests.unit.test_run_report import MS, run
 
 ROOT = Path(__file__).resolve().parents[2]
 PHONE = 50
@@ -112,7 +112,7 @@ sys.path.insert(0, {root!r})
 from phone_host.bench.analysis import analyse
 from phone_host.bench.changes import parse_changes
 from phone_host.bench.command import _print
-from tests.unit.test_bench_report import UNDER, result
+from tests.support.bench_results import UNDER, result
 results = [result(link=link) for link in ("tcp", "ipc", "tcp://192.168.107.222:55555?a=1&b=2&c=3&d=4")]
 _print(results, UNDER, analyse(results, UNDER.fifo, parse_changes(["fps=60,link=bluetooth"])))
 """

@@ -23,9 +23,9 @@ from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.time_limit import patience_s
 from phone_host.run.waiting_note import WaitingNote
 from phone_host.svg.plots import Percentiles
+from tests.support.run_snapshots import run
 from tests.unit.test_ledgerer import enter
 from tests.unit.test_pair_queue import MS
-from tests.unit.test_run_report import run
 
 SIDE = DataError("the right image is 370x1226 px: it lies on its side", "turn it upright: --rotate-right 90")
 BUSY = Trouble("the board is busy with another host", "stop that one first")

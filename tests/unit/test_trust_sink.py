@@ -13,7 +13,7 @@ import pytest
 from common import now
 from phone_host.measure.headline import Grade, answer
 from phone_host.measure.trust import Doubt
-from phone_host.model import Epipolar, Image, Processed, RectifiedPair, Result, Rig
+from phone_host.model import Epipolar, Image, Processed, RectifiedPair, Result, Rig, StereoGeometry
 from phone_host.run.sinks import SinkQueue
 from phone_host.run.trust_sink import TrustSink
 from phone_host.scene.scene import demo_scene, render, rig_poses, unlike_rig
@@ -92,6 +92,16 @@ def test_of_ten_pairs_a_second_two_are_judged(run: _Run, good: Processed) -> Non
     run.sink.finish()
     assert run.sink.trust.judged == 6
     assert run.sink.accounts[0].dropped == 0
+
+
+def test_a_run_of_rectified_images_says_that_its_geometry_is_foreign(good: Processed) -> None:
+    """KITTI's principal point 602,183 given for images of 287x209 px: the run's trust names it with the first judged pair."""
+    geometry = StereoGeometry(focal_px=707.0, baseline_m=0.54, cx_px=602.0, cy_px=183.0)
+    run = _Run(StereoCore(MatchSettings(disparities=48), geometry=geometry))
+    run.pair(replace(good, geometry=geometry), 0)
+    run.sink.finish()
+    [told] = [concern for concern in run.sink.trust.concerns if concern.doubt is Doubt.GEOMETRY]
+    assert "602,183 lies far from the middle of 287x209 px" in told.sentence
 
 
 class _Gated(StereoCore):

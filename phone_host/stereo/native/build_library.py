@@ -28,7 +28,14 @@ LIBRARY_FILE: Final = "_tandem.so"
 REASON_FILE: Final = "_not_built.txt"
 SOURCES: Final = Path(__file__).resolve().parent / "src"
 
-PER_ISA: Final = ("isa_table.c", "reproject_kernel.c", "pack_kernel.c", "sweep_kernel.c", "finish_kernel.c")
+PER_ISA: Final = (
+    "isa_table.c",
+    "reproject_kernel.c",
+    "pack_kernel.c",
+    "remap_kernel.c",
+    "sweep_kernel.c",
+    "finish_kernel.c",
+)
 """Compiled once per instruction set."""
 
 ONCE: Final = ("dispatch.c", "match.c", "crew.c")

@@ -114,6 +114,21 @@ class MatchJob(ctypes.Structure):
     )
 
 
+class RemapJob(ctypes.Structure):
+    """`struct tandem_remap_job`."""
+
+    _fields_ = (
+        ("image", ctypes.c_void_p),
+        ("places", ctypes.c_void_p),
+        ("fractions", ctypes.c_void_p),
+        ("out", ctypes.c_void_p),
+        ("image_stride", ctypes.c_int64),
+        ("out_pixels", ctypes.c_int64),
+        ("image_width", ctypes.c_int32),
+        ("image_height", ctypes.c_int32),
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Missing:
     """There is no library to use.
@@ -160,14 +175,17 @@ class Library:
         Raises:
             SettingsError: it is not built or this processor lacks it.
         """
-        state = self.state_of(simd)
-        if state is not IsaState.USABLE:
-            lacks = (
-                "the library was built without it"
-                if state is IsaState.NOT_BUILT
-                else f"this processor has no {simd.text}"
+        state, choices = self.state_of(simd), _choices(self)
+        if state is IsaState.NOT_BUILT:
+            raise SettingsError(
+                f"TANDEMSCAN_SIMD={simd.value} cannot be used: the native library was built without it",
+                f"give {choices}, or leave it empty for the fastest",
             )
-            raise SettingsError(f"{VARIABLE}={simd.value} cannot be used ({lacks})", _choices(self))
+        if state is IsaState.NOT_SUPPORTED:
+            raise SettingsError(
+                f"TANDEMSCAN_SIMD={simd.value} cannot be used: this processor has no {simd.text}",
+                f"give {choices}, or leave it empty for the fastest",
+            )
         return Library(handle=self.handle, simd=simd, path=self.path)
 
     def sources(self) -> str:
@@ -189,6 +207,10 @@ class Library:
     def pack(self, job: PackJob) -> None:
         """Pack finite points with their colours; see pack_kernel.c."""
         _require_done(self.handle.tandem_pack(self.isa, ctypes.byref(job)))
+
+    def remap(self, job: RemapJob) -> None:
+        """See a coloured image through a map; see remap_kernel.c."""
+        _require_done(self.handle.tandem_remap(self.isa, ctypes.byref(job)))
 
 
 @cache
@@ -227,13 +249,11 @@ def load(folder: Path, wanted: str = "") -> Library | Missing:
     if not wanted:
         return library
     if wanted not in [simd.value for simd in Simd]:
-        raise SettingsError(f"{VARIABLE}={wanted} is no instruction set", _choices(library))
+        choices = _choices(library)
+        raise SettingsError(
+            f"TANDEMSCAN_SIMD={wanted} is no instruction set", f"give {choices}, or leave it empty for the fastest"
+        )
     return library.using(Simd(wanted))
-
-
-def described(found: Library | Missing) -> str:
-    """Return in a few words what computes: for `doctor` and reports."""
-    return found.simd.text if isinstance(found, Library) else f"{found.reason}; {found.remedy}"
 
 
 def fallback_note(found: Library | Missing) -> str:
@@ -256,7 +276,7 @@ def _missing(folder: Path, error: Exception) -> Missing:
 
 
 def _choices(library: Library) -> str:
-    return f"give {' or '.join(simd.value for simd in library.usable_sets())}, or nothing for the fastest"
+    return " or ".join(simd.value for simd in library.usable_sets())
 
 
 def _declare(handle: ctypes.CDLL) -> None:
@@ -268,8 +288,12 @@ def _declare(handle: ctypes.CDLL) -> None:
     handle.tandem_isa_best.argtypes, handle.tandem_isa_best.restype = [], ctypes.c_int32
     handle.tandem_match_bytes.argtypes = [ctypes.c_int32, ctypes.POINTER(MatchJob)]
     handle.tandem_match_bytes.restype = ctypes.c_int64
-    jobs = ((handle.tandem_reproject, ReprojectJob), (handle.tandem_pack, PackJob), (handle.tandem_match, MatchJob))
-    for function, job in jobs:
+    for function, job in (
+        (handle.tandem_reproject, ReprojectJob),
+        (handle.tandem_pack, PackJob),
+        (handle.tandem_remap, RemapJob),
+        (handle.tandem_match, MatchJob),
+    ):
         function.argtypes, function.restype = [ctypes.c_int32, ctypes.POINTER(job)], ctypes.c_int32
 
 

@@ -16,6 +16,7 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
   phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
   phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase    # both cameras expose together
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --budget 30ms    # coarser depth rather than slower
   phone-host run --camera 'replay:right?loop=1' --pairs 300 --json    # no depth: pairs and delays only
 """
 
@@ -64,6 +65,12 @@ def _add_pairing(parser: argparse.ArgumentParser) -> None:
         "--fifo",
         metavar="DEPTH:POLICY",
         help="length of the queue before the matcher, and what happens when it is full: drop-oldest, drop-newest or block (default 1:drop-oldest)",
+    )
+    parser.add_argument(
+        "--budget",
+        type=reading(milliseconds, "--budget"),
+        metavar="MS",
+        help="time for each pair: choose working size, search range and matcher to hold it, and follow when the machine slows down; --scale, --matcher, --disparities and --near stay as given (default: no budget)",
     )
     parser.add_argument(
         "--align-phase",

@@ -32,7 +32,8 @@ from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
-from phone_host.run.host import EndReason, Host, HostSettings
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.terminal_view import LiveTable
 from phone_host.run.time_limit import patience_s
 from phone_host.run.waiting_note import WaitingNote
@@ -41,6 +42,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
+from phone_host.verbs.run.budget import budget_wanted
 from phone_host.verbs.stereo_options import build_core, output_options
 
 _CHECK_FAILED = 4
@@ -68,6 +70,7 @@ def run(options: argparse.Namespace) -> int:
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
     core, board_side = _core(options, settings, upright_px(camera))
+    budget = budget_wanted(options, resolved, core)
     keys = key_folder(settings.keys)
     named = settings.link or (find_board_and_say(keys.path, patience_s(options.wait, options.seconds)),)
     uris = [parse_link(uri, listens_by_default=False) for uri in named]
@@ -77,7 +80,8 @@ def run(options: argparse.Namespace) -> int:
     signals = StopSignals()
     if options.out is not None:
         keep_other_report(options.out, "run")
-    host = Host(_host_settings(options, resolved, fifo, board_side, core), camera, links, core)
+    host_settings = replace(_host_settings(options, resolved, fifo, board_side, core), budget=budget)
+    host = Host(host_settings, camera, links, core)
     on_terminal = sys.stderr.isatty()
     live = LiveTable(host.snapshot, pairs=options.pairs, seconds=options.seconds) if on_terminal else None
     note = WaitingNote(
@@ -92,6 +96,11 @@ def run(options: argparse.Namespace) -> int:
         raise
     if host.has_met_board and len(named) == 1 and "?" not in named[0] and named[0].startswith("tcp://"):
         remember(keys.path, named[0])
+    return _finish(options, host, signals, ended, board_side)
+
+
+def _finish(options: argparse.Namespace, host: Host, signals: StopSignals, ended: EndReason, board_side: Side) -> int:
+    """Write and print the report of a run; return its exit code."""
     snapshot = host.snapshot(ended.value)
     report = build(snapshot)
     page = _page(host, snapshot, board_side, options.out) if options.out else ""
@@ -207,6 +216,8 @@ def _check_numbers(options: argparse.Namespace) -> None:
     for name, value in (("--pairs", options.pairs), ("--save-every", options.save_every)):
         if value < 0:
             raise SettingsError(f"{name} {value}", "give 0 or more")
+    if options.budget == 0:
+        raise SettingsError("--budget is 0 ms", "give the time for each pair, for example 30ms, or leave it out")
     if not 0 <= options.seconds <= _MOST_SECONDS:
         raise SettingsError(f"--seconds is {options.seconds:g}", f"give 0 (no limit) to {_MOST_SECONDS} seconds")
     if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):

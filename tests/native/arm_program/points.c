@@ -1,4 +1,4 @@
-/* Cases of tandem_reproject and tandem_pack.
+/* Cases of tandem_reproject, tandem_pack and tandem_remap.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -69,5 +69,31 @@ int check_records(int32_t isa, const struct one_case *asked)
     }
     const int right = same_bytes(records, (uint64_t)job.count * 15, &field[4]);
     free(records);
+    return right ? -1 : 4;
+}
+
+/* Fields: [image_width image_height] i32; image; places; fractions; then what must come out: the pixels. */
+int check_remap(int32_t isa, const struct one_case *asked)
+{
+    const struct field *field = asked->field;
+    int32_t size[2];
+    memcpy(size, field[0].bytes, sizeof size);
+    uint8_t *out = malloc((size_t)field[4].size + 1);
+    struct tandem_remap_job job = {
+        .image = field[1].bytes,
+        .places = (const int16_t *)(const void *)field[2].bytes,
+        .fractions = (const uint16_t *)(const void *)field[3].bytes,
+        .out = out,
+        .image_stride = 3 * (int64_t)size[0],
+        .out_pixels = (int64_t)(field[3].size / sizeof(uint16_t)),
+        .image_width = size[0],
+        .image_height = size[1],
+    };
+    if (out == NULL || tandem_remap(isa, &job) != TANDEM_DONE) {
+        free(out);
+        return 0;
+    }
+    const int right = same_bytes(out, field[4].size, &field[4]);
+    free(out);
     return right ? -1 : 4;
 }

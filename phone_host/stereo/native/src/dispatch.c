@@ -144,3 +144,13 @@ int32_t tandem_pack(int32_t isa, struct tandem_pack_job *job)
     kernels->pack(job);
     return TANDEM_DONE;
 }
+
+int32_t tandem_remap(int32_t isa, struct tandem_remap_job *job)
+{
+    const struct tandem_kernels *kernels = tandem_kernels_of(isa);
+    if (kernels == NULL) {
+        return TANDEM_NO_SUCH_ISA;
+    }
+    kernels->remap(job);
+    return TANDEM_DONE;
+}

@@ -8,66 +8,81 @@
 
 #include "kernels.h"
 #include "match.h"
+#include "word_lanes.h"
 
 enum {
     AGREEMENT = 24, /* 1/16 px: each view rounds on its own, so less than 1.5 px would drop good slanted surfaces */
-    MEDIAN = 25,
-    COLUMNS = 256 /* worked on at a time, so that the window of the median stays in the first-level cache */
+    COLUMNS = 256,  /* worked on at a time, so that what they need stays in the first-level cache */
+    WINDOW = 5,     /* edge of the median's window, px */
+    HELD = (WINDOW * WINDOW + 1) / 2 + 1
 };
 
-static inline int16_t less(int16_t a, int16_t b) { return a < b ? a : b; }
-static inline int16_t more(int16_t a, int16_t b) { return a < b ? b : a; }
-
-/* Sort two rows of values, value by value. */
-static inline void sort_two(int16_t *restrict a, int16_t *restrict b, int count)
+WORDS_INLINE void sort_two(words *a, words *b)
 {
-    for (int i = 0; i < count; i++) {
-        const int16_t low = less(a[i], b[i]), high = more(a[i], b[i]);
-        a[i] = low;
-        b[i] = high;
+    const words low = words_min(*a, *b);
+    *b = words_max(*a, *b);
+    *a = low;
+}
+
+/* Bring the least value to the front and the greatest to the back. */
+WORDS_INLINE void find_ends(words *value, const int count)
+{
+#pragma GCC unroll 16
+    for (int i = 0; i < count / 2; i++) {
+        sort_two(&value[i], &value[count - 1 - i]);
+    }
+#pragma GCC unroll 16
+    for (int i = 1; i < (count + 1) / 2; i++) {
+        sort_two(&value[0], &value[i]);
+    }
+#pragma GCC unroll 16
+    for (int i = count / 2; i < count - 1; i++) {
+        sort_two(&value[i], &value[count - 1]);
     }
 }
 
-/* Median of the 5 x 5 window around each pixel of a row; the borders are repeated. Forgetful selection: of any 14 of 25 values neither the
- * least nor the greatest is the median; drop both and take in one more. */
+/* Medians of 5 x 5 windows; `corner` is the first window's. Of any 14 of the 25 values neither the least nor the greatest is the median: drop both,
+ * take in one more, and so on. */
+WORDS_INLINE words median_of_window(const int16_t *corner, ptrdiff_t pitch)
+{
+    words value[HELD];
+#pragma GCC unroll 16
+    for (int i = 0; i < HELD; i++) {
+        value[i] = words_load(corner + (i / WINDOW) * pitch + i % WINDOW);
+    }
+#pragma GCC unroll 16
+    for (int next = HELD; next <= WINDOW * WINDOW; next++) {
+        const int count = 2 * HELD - next;
+        find_ends(value, count);
+        if (next < WINDOW * WINDOW) {
+            value[0] = words_load(corner + (next / WINDOW) * pitch + next % WINDOW);
+        }
+    }
+    return value[1];
+}
+
+/* Median of the 5 x 5 window around each pixel of a row; the borders are repeated. */
 static void median_row(const int16_t *plane, int width, int height, int y, int16_t *median)
 {
-    int16_t window[MEDIAN][COLUMNS];
+    enum { PITCH = COLUMNS + WINDOW - 1 + WORDS };
+    int16_t tile[WINDOW][PITCH], found[COLUMNS + WORDS];
+    memset(tile, 0, sizeof tile);
     for (int from = 0; from < width; from += COLUMNS) {
         const int count = width - from < COLUMNS ? width - from : COLUMNS;
-        for (int i = 0; i < MEDIAN; i++) {
-            const int dy = i / 5 - 2, dx = i % 5 - 2;
-            const int line = y + dy < 0 ? 0 : y + dy > height - 1 ? height - 1 : y + dy;
+        for (int i = 0; i < WINDOW; i++) {
+            const int line = y + i - 2 < 0 ? 0 : y + i - 2 > height - 1 ? height - 1 : y + i - 2;
             const int16_t *row = plane + (ptrdiff_t)line * width;
-            for (int x = 0; x < count; x++) {
-                const int column = from + x + dx;
-                window[i][x] = row[column < 0 ? 0 : column > width - 1 ? width - 1 : column];
+            for (int x = 0; x < 2; x++) {
+                const int right = from + count + x;
+                tile[i][x] = row[from + x < 2 ? 0 : from + x - 2];
+                tile[i][count + 2 + x] = row[right > width - 1 ? width - 1 : right];
             }
+            memcpy(tile[i] + 2, row + from, (size_t)count * sizeof *row);
         }
-        int held = 14, next = 14;
-        while (held > 1) {
-            /* the least to the front, the greatest to the back */
-            for (int i = 0; i < held / 2; i++) {
-                sort_two(window[i], window[held - 1 - i], count);
-            }
-            for (int i = 1; i < (held + 1) / 2; i++) {
-                sort_two(window[0], window[i], count);
-            }
-            for (int i = held / 2; i < held - 1; i++) {
-                sort_two(window[i], window[held - 1], count);
-            }
-            if (next < MEDIAN) {
-                memcpy(window[0], window[next], (size_t)count * sizeof window[0][0]);
-                next++;
-                held--;
-            } else {
-                for (int i = 1; i < held - 1; i++) {
-                    memcpy(window[i - 1], window[i], (size_t)count * sizeof window[0][0]);
-                }
-                held -= 2;
-            }
+        for (int x = 0; x < count; x += WORDS) {
+            words_store(found + x, median_of_window(tile[0] + x, PITCH));
         }
-        memcpy(median + from, window[0], (size_t)count * sizeof *median);
+        memcpy(median + from, found, (size_t)count * sizeof *median);
     }
 }
 

@@ -25,6 +25,7 @@
 
 typedef void tandem_reproject_fn(struct tandem_reproject_job *job);
 typedef void tandem_pack_fn(struct tandem_pack_job *job);
+typedef void tandem_remap_fn(struct tandem_remap_job *job);
 typedef void tandem_sweep_fn(const struct sweep *job);
 typedef size_t tandem_sweep_scratch_fn(int width, int disparities);
 typedef void tandem_check_rows_fn(const struct finish *job, int from, int to);
@@ -32,10 +33,11 @@ typedef void tandem_smooth_rows_fn(const struct finish *job, int from, int to);
 
 #define TANDEM_KERNELS(KERNEL) \
     KERNEL(reproject)          \
-    KERNEL(pack)           \
-    KERNEL(sweep)          \
-    KERNEL(sweep_scratch)  \
-    KERNEL(check_rows)     \
+    KERNEL(pack)               \
+    KERNEL(remap)              \
+    KERNEL(sweep)              \
+    KERNEL(sweep_scratch)      \
+    KERNEL(check_rows)         \
     KERNEL(smooth_rows)
 
 struct tandem_kernels {

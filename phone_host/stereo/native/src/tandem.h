@@ -83,6 +83,20 @@ struct tandem_pack_job {
 
 TANDEM_API int32_t tandem_pack(int32_t isa, struct tandem_pack_job *job);
 
+/* A coloured image through a map of OpenCV's kind; see remap_kernel.c. */
+struct tandem_remap_job {
+    const uint8_t *image;      /* (image_height, image_width, 3), rows `image_stride` bytes apart */
+    const int16_t *places;     /* (out_pixels, 2): x and y of the upper left of 2 x 2 pixels, px */
+    const uint16_t *fractions; /* (out_pixels,): 32 fy + fx, 1/32 px */
+    uint8_t *out;              /* (out_pixels, 3); written */
+    int64_t image_stride;
+    int64_t out_pixels;
+    int32_t image_width;       /* at least 1, at most 32767 */
+    int32_t image_height;
+};
+
+TANDEM_API int32_t tandem_remap(int32_t isa, struct tandem_remap_job *job);
+
 /* Disparities of a rectified pair; see match.c. */
 struct tandem_match_job {
     const uint8_t *left;     /* (height, width) grey, rows `left_stride` bytes apart (it may be negative) */
