@@ -22,6 +22,11 @@ from phone_host.model.images import (
     Search,
     StereoGeometry,
 )
+from phone_host.model.matching import (
+    Confidence,
+    Matched,
+    MatchReport,
+)
 from phone_host.model.rig import (
     UNMEASURED_NS,
     CameraModel,
@@ -46,6 +51,7 @@ __all__ = [
     "BoardFrame",
     "CameraModel",
     "CloudImage",
+    "Confidence",
     "Crop",
     "CutCounts",
     "DepthAccount",
@@ -56,6 +62,8 @@ __all__ = [
     "Exposure",
     "FramePair",
     "Image",
+    "MatchReport",
+    "Matched",
     "PairCounts",
     "Processed",
     "Rectification",

@@ -22,7 +22,7 @@ from common.program.extensions import make_registered
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
-from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher
+from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
 
 
@@ -71,3 +71,19 @@ def create_matcher(settings: MatchSettings) -> Matcher:
             return CheckedMatcher(registered, name, settings.disparities)
         case _:
             assert_never(settings.matcher)
+
+
+def make_matcher(name: str, disparities: int) -> Matcher:
+    """Build a matcher by the name that a user types; see `create_matcher`.
+
+    Args:
+        name: one of ours, or one that an installed package registers.
+        disparities: N >= 1, px: 0 <= d < N is searched.
+
+    Returns:
+        The matcher.
+
+    Raises:
+        SettingsError: no matcher has that name, or disparities is below 1.
+    """
+    return create_matcher(MatchSettings(matcher_named(name), disparities))

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 
 from common.errors import SettingsError
-from phone_host.model import Disparity, Image, RectifiedPair
+from phone_host.model import Disparity, Image, Matched, MatchReport, RectifiedPair
 from phone_host.stereo import filters
-from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_offset_px, with_levels_of
+from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, overall_levels, vertical_offset_px
 from phone_host.stereo.match_input import check_pair, grey
 
 COST_STEP, COST_JUMP = 12, 26
@@ -83,9 +83,22 @@ class SgbmMatcher:
         Raises:
             SettingsError: more than 2032 disparities are asked for on an image at least that wide.
         """
+        return self.matched(pair).disparity
+
+    def matched(self, pair: RectifiedPair) -> Matched:
+        """Match one pair and tell what was corrected; see `ReportingMatcher.matched`."""
         check_pair(pair)
-        left = grey(pair.left)
-        right = self._aligned(left, with_levels_of(left, grey(pair.right)))
+        left, right = grey(pair.left), grey(pair.right)
+        levels = overall_levels(left, right)
+        right = levels.of(right)
+        vertical_px = self._vertical_px(left, right)
+        right = right if vertical_px == 0 else moved_up(right, vertical_px)
+        disparity = self._disparity(left, right)
+        report = MatchReport(vertical_px=vertical_px, gain=levels.gain, offset_levels=levels.offset_levels)
+        return Matched(disparity=disparity, report=report)
+
+    def _disparity(self, left: Image, right: Image) -> Disparity:
+        """Match two images that are aligned."""
         left_steps = np.asarray(cv2.medianBlur(self._compute(self._fine, left, right), MEDIAN_PX), np.int16)
         # The right view is the left view of the mirrored and swapped pair.
         right_steps = self._compute(self._fine, _mirrored(right), _mirrored(left))[:, ::-1]
@@ -98,8 +111,8 @@ class SgbmMatcher:
         disparity = filters.unlocked(disparity, LOCKING_PX)
         return filters.smoothed(disparity, SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX)
 
-    def _aligned(self, left: Image, right: Image) -> Image:
-        """Return the right image, moved vertically if a rough match at half size shows that it has to be."""
+    def _vertical_px(self, left: Image, right: Image) -> float:
+        """Measure with a rough match at half size how far too low the right image lies; 0: too little to be worth a correction."""
         height, width = left.shape
         half = (max(width // 2, 1), max(height // 2, 1))
         small_left, small_right = (
@@ -107,7 +120,7 @@ class SgbmMatcher:
         )
         rough = filters.to_px(self._compute(self._rough, small_left, small_right, scale=2))
         offset_px = vertical_offset_px(small_left, small_right, rough) * height / half[1]
-        return right if abs(offset_px) < LEAST_OFFSET_PX else moved_up(right, offset_px)
+        return 0.0 if abs(offset_px) < LEAST_OFFSET_PX else offset_px
 
     def _compute(self, engine: cv2.StereoSGBM, left: Image, right: Image, scale: int = 1) -> filters.Steps:
         """Run OpenCV's matcher on images reduced by scale, with the left border extended."""
