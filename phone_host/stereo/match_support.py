@@ -158,6 +158,6 @@ def _unsupported_regions(
     pixels = np.bincount(label, minlength=count)
     own_mean, other_mean = mean(own), mean(other)
     doubtful = (mean(inside) > INSIDE_SHARE) | (mean(apart) > FAR_PX)
-    goes = (doubtful & (other_mean < WORSE * own_mean)) | (other_mean < MUCH_WORSE * own_mean)
+    goes = (doubtful & (other_mean <= WORSE * own_mean)) | (other_mean < MUCH_WORSE * own_mean)
     goes[0] = False
     return np.asarray(goes[np.asarray(region, np.int32)], np.bool_)
