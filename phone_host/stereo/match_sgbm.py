@@ -21,7 +21,7 @@ from phone_host.stereo import filters
 from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_offset_px
 from phone_host.stereo.match_input import check_pair, grey
 from phone_host.stereo.match_levels import LevelField, levels_between, without_levels
-from phone_host.stereo.match_support import supported
+from phone_host.stereo.match_support import supported, without_doubtful_bridges
 
 COST_STEP, COST_JUMP = 12, 26
 """P1 and P2, the costs of a change of disparity by one and by more, relative to a single pixel's cost of 0 .. 125."""
@@ -135,8 +135,10 @@ class SgbmMatcher:
         factor = 2
         while left.size * min(self._disparities, left.shape[1]) > GUIDE_STEPS * factor**3:
             factor *= 2
-        disparity = supported(left, right, found, self._guiding(left, right, factor), factor / 2)
-        disparity = filters.bridged(disparity, GAP_PX, GAP_STEP_PX)
+        guide, grain = self._guiding(left, right, factor), factor / 2
+        kept = supported(left, right, found, guide, grain)
+        bridged = filters.bridged(kept, GAP_PX, GAP_STEP_PX)
+        disparity = without_doubtful_bridges(bridged, kept, guide, grain)
         disparity = filters.unlocked(disparity, LOCKING_PX)
         return filters.smoothed(disparity, SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX)
 

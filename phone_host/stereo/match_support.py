@@ -31,6 +31,9 @@ APART_PX: Final = 2.0
 NEAR_PX: Final = 0.75
 """Values between this and APART_PX from the guide are judged one by one: what drifts on a plain area."""
 
+NEAR_WORSE: Final = 1.0
+"""Such a value stays if the guide costs more."""
+
 FAR_PX: Final = 16.0
 """A region this far from the guide is one period off, or an object that stands clear of everything: both can be told by cost."""
 
@@ -130,11 +133,27 @@ def supported(left: Image, right: Image, disparity: Disparity, guide: Disparity,
     to_left, to_right, to_top, to_bottom = sides(confirmed, guide)
     inside = (to_left & to_right) | (to_top & to_bottom)
     dropped = _unsupported_regions(apart, inside, own, other, grain)
-    dropped |= inside & (apart > NEAR_PX * grain) & (apart <= APART_PX * grain) & (other < own)
+    dropped |= inside & (apart > NEAR_PX * grain) & (apart <= APART_PX * grain) & (other < NEAR_WORSE * own)
     kept = np.where(dropped, np.float32(np.nan), disparity)
     around = np.logical_and.reduce(sides(kept, guide))
     missing = around & np.isnan(kept) & (other < FILL_COST)
     return np.where(missing, guide, kept)
+
+
+def without_doubtful_bridges(bridged: Disparity, before: Disparity, guide: Disparity, grain: float = 1.0) -> Disparity:
+    """Open those bridged gaps again whose bridge is not where the guide is. What has no guide stays bridged.
+
+    Args:
+        bridged: (H, W) float32, px, NaN = none: `before` with gaps closed.
+        before: the same before gaps were closed.
+        guide: a smooth match of the same pair.
+        grain: as for `supported`.
+
+    Returns:
+        A new array.
+    """
+    doubtful = np.isnan(before) & (np.abs(bridged - guide) > AGREE_PX * grain)
+    return np.where(doubtful, np.float32(np.nan), bridged)
 
 
 def _unsupported_regions(

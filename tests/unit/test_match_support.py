@@ -5,7 +5,7 @@ import numpy as np
 
 from phone_host.model import Image, RectifiedPair
 from phone_host.stereo.match_sgbm import SgbmMatcher
-from phone_host.stereo.match_support import cost_of, sides, supported
+from phone_host.stereo.match_support import cost_of, sides, supported, without_doubtful_bridges
 from tests.support.planes import noise
 
 TRUE_PX, PERIOD_PX = 10, 24
@@ -62,6 +62,15 @@ def test_a_hole_is_completed_only_where_values_on_all_sides_confirm_the_guide() 
     completed = supported(left, right, holed, guide)
     assert (completed[40:60, 80:110] == TRUE_PX).all()
     assert np.isnan(completed[:, 170:]).all()
+
+
+def test_a_bridge_that_leaves_the_guide_is_opened_again() -> None:
+    """Of two bridged gaps, the one 3 px beside the guide is opened; measured values stay wherever they are."""
+    before = np.array([[10, np.nan, 10, 13, np.nan, 13]], np.float32)
+    bridged = np.array([[10, 10, 10, 13, 13, 13]], np.float32)
+    guide = np.full((1, 6), 10, np.float32)
+    opened = without_doubtful_bridges(bridged, before, guide)
+    assert np.array_equal(opened, np.array([[10, 10, 10, 13, np.nan, 13]], np.float32), equal_nan=True)
 
 
 def test_a_break_of_the_guide_ends_its_surface() -> None:
