@@ -24,6 +24,11 @@ from phone_host.model.images import (
     Search,
     StereoGeometry,
 )
+from phone_host.model.matching import (
+    Confidence,
+    Matched,
+    MatchReport,
+)
 from phone_host.model.rig import (
     UNMEASURED_NS,
     CameraModel,
@@ -52,6 +57,7 @@ __all__ = [
     "BudgetStep",
     "CameraModel",
     "CloudImage",
+    "Confidence",
     "Crop",
     "CutCounts",
     "DepthAccount",
@@ -62,6 +68,8 @@ __all__ = [
     "Exposure",
     "FramePair",
     "Image",
+    "MatchReport",
+    "Matched",
     "OffMiddle",
     "PairCounts",
     "Processed",

@@ -7,6 +7,7 @@ from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
 from phone_host.model.images import CloudImage, CutCounts, DepthLimits, Disparity, RectifiedPair, Search, StereoGeometry
+from phone_host.model.matching import Confidence, MatchReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +70,8 @@ class Processed:
         limits: to which the cloud was cut; None without a cloud.
         cut: what became of the pixels; None without a core. Without geometry, `kept` counts disparities.
         search: how the pair was matched; None without a core.
+        confidence: of each disparity; None without a core, or if the matcher has none.
+        match_report: what the matcher corrected, in px of the rectified images; None without a core.
     """
 
     pair: RectifiedPair
@@ -79,6 +82,8 @@ class Processed:
     limits: DepthLimits | None = None
     cut: CutCounts | None = None
     search: Search | None = None
+    confidence: Confidence | None = None
+    match_report: MatchReport | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +111,13 @@ class DepthAccount:
         cut: the counts of all pairs together; None without a core.
         limits: of the newest pair; None without a cloud.
         search: how the newest pair was matched; None without a core.
+        match_report: what the matcher corrected in the newest pair; None without a core.
     """
 
     cut: CutCounts | None = None
     limits: DepthLimits | None = None
     search: Search | None = None
+    match_report: MatchReport | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.budget_report import budget_values
+from phone_host.report.match_words import corrected_values
 from phone_host.sync.fifo import Overflow
 
 _MS: Final = 1e6
@@ -150,6 +151,7 @@ def _depth(depth: DepthAccount) -> dict[str, object] | None:
     return {
         "scale": None if depth.search is None else round(depth.search.scale, 4),
         "disparities": None if depth.search is None else depth.search.disparities or None,
+        "corrected": corrected_values(depth.match_report),
         "limits": None if depth.limits is None else asdict(depth.limits),
         "cut": asdict(depth.cut),
     }

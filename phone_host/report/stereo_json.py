@@ -9,6 +9,7 @@ from typing import Any
 
 from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
+from phone_host.report.match_words import corrected_values
 from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
 from phone_host.report.stereo_trust import trust_values
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
@@ -30,6 +31,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
         "disparities": search.disparities or None if search else None,
         "searched_from_m": None if math.isnan(report.searched_from_m) else round(report.searched_from_m, 4),
         "scale": round(search.scale, 4) if search else None,
+        "corrected": corrected_values(report.match_report),
         "geometry": None if report.geometry is None else asdict(report.geometry),
         "limits": None if report.limits is None else asdict(report.limits),
         "cut": None if report.cut is None else asdict(report.cut),

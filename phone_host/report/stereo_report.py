@@ -10,7 +10,7 @@ from typing import Final
 
 from common.words import counted
 from phone_host.measure.trust import Doubt
-from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
+from phone_host.model import CutCounts, DepthLimits, MatchReport, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report.cut_words import searched_from_m
@@ -66,6 +66,7 @@ class PairReport:
         rectified_px: size of the rectified images, and so of the disparity.
         matcher: its name.
         search: how the pair was matched.
+        match_report: what the matcher corrected before; None: not known.
         geometry: None: unknown, so there is no cloud.
         limits: of the cloud; None without one.
         cut: what became of the pixels; None: not counted.
@@ -94,6 +95,7 @@ class PairReport:
     stages_ms: tuple[tuple[str, float], ...]
     trust: PairTrust
     remarks: tuple[Remark, ...] = ()
+    match_report: MatchReport | None = None
 
     @property
     def share(self) -> float:

@@ -176,5 +176,8 @@ def _with(depth: DepthAccount, processed: Processed) -> DepthAccount:
     if processed.cut is None:
         return depth
     return DepthAccount(
-        cut=(depth.cut or CutCounts()) + processed.cut, limits=processed.limits, search=processed.search
+        cut=(depth.cut or CutCounts()) + processed.cut,
+        limits=processed.limits,
+        search=processed.search,
+        match_report=processed.match_report,
     )

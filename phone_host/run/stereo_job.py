@@ -265,6 +265,7 @@ class _Work:
                 rectified_px=size_px(processed.pair.left),
                 matcher=self._job.matcher,
                 search=processed.search,
+                match_report=processed.match_report,
                 geometry=processed.geometry,
                 limits=processed.limits,
                 cut=processed.cut,

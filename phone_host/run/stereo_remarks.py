@@ -5,6 +5,7 @@ from common.words import distance_text
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
 from phone_host.report.cut_words import searched_from_m
+from phone_host.report.match_words import corrected_words
 from phone_host.report.stereo_report import Remark
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.images import EncodedFile
@@ -48,6 +49,8 @@ def pair_remarks(processed: Processed, trust: PairTrust, near_m: float) -> tuple
                 "give --focal PX --baseline MM",
             )
         )
+    if corrected := corrected_words(processed.match_report, processed.pair.epipolar):
+        remarks.append(Remark(corrected, is_note=True))
     return tuple(remarks)
 
 

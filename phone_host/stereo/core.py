@@ -21,6 +21,7 @@ from phone_host.model import (
     Disparity,
     Epipolar,
     Image,
+    Matched,
     Processed,
     RectifiedPair,
     Search,
@@ -36,13 +37,21 @@ from phone_host.stereo.depth_limits import (
 )
 from phone_host.stereo.images import WHOLE, require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.matcher_protocol import Matcher
+from phone_host.stereo.matcher_protocol import Matcher, matched_by
 from phone_host.stereo.points import points_of
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.stereo.stacked import lying_pair, upright_again
-from phone_host.stereo.working import MARGIN_PX, Part, chosen_scale, part_for, reduced, to_full_size
+from phone_host.stereo.working import (
+    MARGIN_PX,
+    Part,
+    chosen_scale,
+    confidence_to_full_size,
+    part_for,
+    reduced,
+    to_full_size,
+)
 
 _Sizes = tuple[tuple[int, int], tuple[int, int]]
 _Key = tuple[tuple[int, int], tuple[int, int], Choice | None]
@@ -133,12 +142,24 @@ class StereoCore:
         rectified_ns = clock()
         matched = _match(pair, ready)
         matched_ns = clock()
-        disparity, cloud, cut = _reproject(matched, ready)
+        disparity, cloud, cut = _reproject(matched.disparity, ready)
+        confidence = matched.confidence
+        if confidence is not None:
+            confidence = np.where(np.isfinite(disparity), confidence, np.uint8(0))
         times = StageTimes(
             rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
         )
         return Processed(
-            pair, disparity, cloud, times, geometry=ready.geometry, limits=ready.limits, cut=cut, search=ready.search
+            pair,
+            disparity,
+            cloud,
+            times,
+            geometry=ready.geometry,
+            limits=ready.limits,
+            cut=cut,
+            search=ready.search,
+            confidence=confidence,
+            match_report=matched.report,
         )
 
     def reductions(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> tuple[int, int]:
@@ -269,18 +290,26 @@ class StereoCore:
         return self._matcher
 
 
-def _match(pair: RectifiedPair, ready: _Ready) -> Disparity:
+def _match(pair: RectifiedPair, ready: _Ready) -> Matched:
     """Match the part that is wanted, at the working size, turned if need be; the result has the rectified images' size."""
     part, scale, epipolar = ready.part, ready.search.scale, pair.epipolar
     seen = pair if part is None else part.of(pair)
     small = RectifiedPair(reduced(seen.left, scale), reduced(seen.right, scale), epipolar)
-    found = upright_again(ready.matcher.match(lying_pair(small)), epipolar)
+    found = matched_by(ready.matcher, lying_pair(small))
     height, width = seen.left.shape[:2]
-    disparity = to_full_size(found, width, height, epipolar)
+    disparity = to_full_size(upright_again(found.disparity, epipolar), width, height, epipolar)
     if scale < 1 and ready.search.disparities:
         # N was rounded up to whole pixels of the working size.
         disparity[disparity >= ready.search.disparities] = np.nan
-    return disparity if part is None else part.placed(disparity, ready.width_px, ready.height_px)
+    confidence = found.confidence
+    if confidence is not None:
+        confidence = confidence_to_full_size(upright_again(confidence, epipolar), width, height)
+    if part is not None:
+        disparity = part.placed(disparity, ready.width_px, ready.height_px)
+        if confidence is not None:
+            confidence = part.placed(confidence, ready.width_px, ready.height_px)
+    report = replace(found.report, vertical_px=found.report.vertical_px / scale)
+    return Matched(disparity=disparity, confidence=confidence, report=report)
 
 
 def _reproject(matched: Disparity, ready: _Ready) -> tuple[Disparity, CloudImage | None, CutCounts]:

@@ -23,7 +23,7 @@ from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
-from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher
+from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.network_name import NetworkMatcher
 
@@ -77,3 +77,19 @@ def create_matcher(settings: MatchSettings) -> Matcher:
             return OnnxMatcher(settings.matcher, settings.disparities)
         case _:
             assert_never(settings.matcher)
+
+
+def make_matcher(name: str, disparities: int) -> Matcher:
+    """Build a matcher by the name that a user types; see `create_matcher`.
+
+    Args:
+        name: one of ours, or one that an installed package registers.
+        disparities: N >= 1, px: 0 <= d < N is searched.
+
+    Returns:
+        The matcher.
+
+    Raises:
+        SettingsError: no matcher has that name, or disparities is below 1.
+    """
+    return create_matcher(MatchSettings(matcher_named(name), disparities))

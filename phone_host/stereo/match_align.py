@@ -6,6 +6,9 @@ are measured from the pair itself, without memory, and left alone where the evid
 calibration; the matcher cannot fix them.
 """
 
+from dataclasses import dataclass
+from typing import Final
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +37,31 @@ NEWTON_STEPS = 2
 """The first step brings 0.5 px to within 0.1; the second reaches the noise."""
 
 
-def with_levels_of(left: Image, right: Image) -> Image:
-    """Give the right image the left one's mean and standard deviation.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Levels:
+    """A linear change of grey levels: gain * level + offset_levels.
+
+    Attributes:
+        gain: above 0.
+        offset_levels: grey levels of 0 .. 255.
+    """
+
+    gain: float = 1.0
+    offset_levels: float = 0.0
+
+    def of(self, image: Image) -> Image:
+        """Return the image with changed levels, (H, W) uint8; the image itself if nothing changes."""
+        if self == UNCHANGED:
+            return image
+        levels = np.arange(256) * self.gain + self.offset_levels
+        return np.asarray(cv2.LUT(image, np.clip(np.rint(levels), 0, 255).astype(np.uint8)), np.uint8)
+
+
+UNCHANGED: Final = Levels()
+
+
+def overall_levels(left: Image, right: Image) -> Levels:
+    """Find the change that gives the right image the left one's mean and standard deviation.
 
     Both see nearly the same scene, so a linear change of levels comes from the cameras (exposure, gain, black level).
     Pixels that are black in either image are not measured: rectification paints black what no camera saw.
@@ -45,7 +71,7 @@ def with_levels_of(left: Image, right: Image) -> Image:
         right: the same size.
 
     Returns:
-        The right image, (H, W) uint8; unchanged if either image has too little contrast to measure.
+        The change; none if either image has too little contrast to measure.
     """
     seen = ((left > 0) & (right > 0)).astype(np.uint8)
     (mean_left, spread_left), (mean_right, spread_right) = (
@@ -53,9 +79,14 @@ def with_levels_of(left: Image, right: Image) -> Image:
         for mean, spread in (cv2.meanStdDev(i, mask=seen) for i in (left, right))
     )
     if min(spread_left, spread_right) < LEAST_CONTRAST:
-        return right
-    levels = (np.arange(256) - mean_right) * (spread_left / spread_right) + mean_left
-    return np.asarray(cv2.LUT(right, np.clip(np.rint(levels), 0, 255).astype(np.uint8)), np.uint8)
+        return UNCHANGED
+    gain = spread_left / spread_right
+    return Levels(gain=gain, offset_levels=mean_left - gain * mean_right)
+
+
+def with_levels_of(left: Image, right: Image) -> Image:
+    """Give the right image the left one's mean and standard deviation; see `overall_levels`."""
+    return overall_levels(left, right).of(right)
 
 
 def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float:

@@ -2,23 +2,26 @@
 
 docs/decisions/0002-sgbm-tuning.md says what each step gains:
 
-1. the right image gets the left one's levels, and is moved vertically if it is measurably too high or low
-   (match_align);
+1. the right image gets the left one's levels (match_levels), and is moved vertically if it is measurably too high or low
+   (match_align); both are measured along a rough match at half size that needs no equal levels;
 2. StereoSGBM, 3-way mode, single-pixel cost, once for the left and once for the right view, with OpenCV's own checks
    off; the left border is extended by N pixels, without which the first N columns would get no value;
-3. median of the left view, left-right check, speckles dropped, rows dropped whose texture says nothing: what is left is
-   trusted, the rest is NaN;
-4. narrow gaps within one surface bridged, pixel locking undone, the rest of the noise averaged (filters).
+3. median of the left view, left-right check, speckles dropped, rows dropped whose texture says nothing: the rest is NaN;
+4. the same at half size with eight paths and high penalties: the guide. Where the two disagree, the images decide; what is
+   missing inside a surface is completed (match_support, docs/decisions/0031-levels-and-support.md);
+5. narrow gaps within one surface bridged, pixel locking undone, the rest of the noise averaged (filters).
 """
 
 import cv2
 import numpy as np
 
 from common.errors import SettingsError
-from phone_host.model import Disparity, Image, RectifiedPair
+from phone_host.model import Disparity, Image, Matched, MatchReport, RectifiedPair
 from phone_host.stereo import filters
-from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_offset_px, with_levels_of
+from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_offset_px
 from phone_host.stereo.match_input import check_pair, grey
+from phone_host.stereo.match_levels import LevelField, levels_between, without_levels
+from phone_host.stereo.match_support import supported, without_doubtful_bridges
 
 COST_STEP, COST_JUMP = 12, 26
 """P1 and P2, the costs of a change of disparity by one and by more, relative to a single pixel's cost of 0 .. 125."""
@@ -51,15 +54,27 @@ GREATEST_SEARCH = 2032
 """The largest multiple of 16 that fits OpenCV's int16 in sixteenths."""
 
 
-def _engine(**checks: int) -> cv2.StereoSGBM:
+GUIDE_STEP, GUIDE_JUMP = 24, 240
+"""P1 and P2 of the guide: smooth enough that plain areas take the depth of their edges, and that a whole board stays on one surface."""
+
+GUIDE_AGREEMENT_PX, GUIDE_SPECKLE_PX = 1.0, 100
+"""Left-right check and largest island dropped, px of the guide's size."""
+
+GUIDE_STEPS = 40_000_000
+"""Width x height x disparities of the guide at most: its eight paths keep about 4 bytes for each, so 160 MB."""
+
+
+def _engine(
+    step: int = COST_STEP, jump: int = COST_JUMP, mode: int = cv2.StereoSGBM_MODE_SGBM_3WAY, **checks: int
+) -> cv2.StereoSGBM:
     return cv2.StereoSGBM.create(
         minDisparity=0,
         numDisparities=DISPARITY_BLOCK,
         blockSize=1,
-        P1=COST_STEP,
-        P2=COST_JUMP,
+        P1=step,
+        P2=jump,
         preFilterCap=COST_CAP,
-        mode=cv2.StereoSGBM_MODE_SGBM_3WAY,
+        mode=mode,
         **checks,
     )
 
@@ -74,6 +89,9 @@ class SgbmMatcher:
     def __init__(self, disparities: int) -> None:
         self._disparities = disparities
         self._fine = _engine(disp12MaxDiff=-1, uniquenessRatio=0, speckleWindowSize=0)
+        self._guide = _engine(
+            GUIDE_STEP, GUIDE_JUMP, cv2.StereoSGBM_MODE_HH, disp12MaxDiff=-1, uniquenessRatio=0, speckleWindowSize=0
+        )
         # The rough pass only has to be right where it has a value, so OpenCV's own cheap checks are enough.
         self._rough = _engine(disp12MaxDiff=1, uniquenessRatio=10, speckleWindowSize=100, speckleRange=2)
 
@@ -83,31 +101,68 @@ class SgbmMatcher:
         Raises:
             SettingsError: more than 2032 disparities are asked for on an image at least that wide.
         """
+        return self.matched(pair).disparity
+
+    def matched(self, pair: RectifiedPair) -> Matched:
+        """Match one pair and tell what was corrected; see `ReportingMatcher.matched`."""
         check_pair(pair)
-        left = grey(pair.left)
-        right = self._aligned(left, with_levels_of(left, grey(pair.right)))
-        left_steps = np.asarray(cv2.medianBlur(self._compute(self._fine, left, right), MEDIAN_PX), np.int16)
-        # The right view is the left view of the mirrored and swapped pair.
-        right_steps = self._compute(self._fine, _mirrored(right), _mirrored(left))[:, ::-1]
-        trusted = filters.confirmed(left_steps, right_steps, AGREEMENT_PX)
-        trusted &= left_steps <= (self._disparities - 1) * filters.STEPS_PER_PX
-        trusted &= (filters.told_rows(left) & filters.told_rows(right))[:, np.newaxis]
-        steps = np.where(trusted, left_steps, np.int16(filters.NO_STEPS))
-        disparity = filters.to_px(filters.without_speckles(steps, SPECKLE_AREA_PX, SPECKLE_STEP_PX))
-        disparity = filters.bridged(disparity, GAP_PX, GAP_STEP_PX)
+        left, right = grey(pair.left), grey(pair.right)
+        levels, vertical_px = self._differences(left, right)
+        right = levels.of(right)
+        right = right if vertical_px == 0 else moved_up(right, vertical_px)
+        disparity = self._disparity(left, right)
+        report = MatchReport(vertical_px=vertical_px, gain=levels.gain, offset_levels=levels.offset_levels)
+        return Matched(disparity=disparity, report=report)
+
+    def _differences(self, left: Image, right: Image) -> tuple[LevelField, float]:
+        """Measure with a rough match at half size how the right image's levels differ, and how far too low it lies, px.
+
+        A vertical error too small to be worth a correction is 0.
+        """
+        small_left, small_right = reduced(left, 2), reduced(right, 2)
+        rough = filters.to_px(
+            self._compute(self._rough, without_levels(small_left), without_levels(small_right), scale=2)
+        )
+        levels = levels_between(small_left, small_right, rough)
+        small_px = vertical_offset_px(small_left, levels.of(small_right), rough)
+        vertical_px = small_px * left.shape[0] / small_left.shape[0]
+        return levels, 0.0 if abs(vertical_px) < LEAST_OFFSET_PX else vertical_px
+
+    def _disparity(self, left: Image, right: Image) -> Disparity:
+        """Match two images that are aligned."""
+        steps = self._trusted(self._fine, left, right, 1, AGREEMENT_PX)
+        found = filters.to_px(filters.without_speckles(steps, SPECKLE_AREA_PX, SPECKLE_STEP_PX))
+        factor = 2
+        while left.size * min(self._disparities, left.shape[1]) > GUIDE_STEPS * factor**3:
+            factor *= 2
+        guide, grain = self._guiding(left, right, factor), factor / 2
+        kept = supported(left, right, found, guide, grain)
+        bridged = filters.bridged(kept, GAP_PX, GAP_STEP_PX)
+        disparity = without_doubtful_bridges(bridged, kept, guide, grain)
         disparity = filters.unlocked(disparity, LOCKING_PX)
         return filters.smoothed(disparity, SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX)
 
-    def _aligned(self, left: Image, right: Image) -> Image:
-        """Return the right image, moved vertically if a rough match at half size shows that it has to be."""
+    def _guiding(self, left: Image, right: Image, factor: int) -> Disparity:
+        """Match smaller images smoothly; the result has the full size."""
+        small_left, small_right = reduced(left, factor), reduced(right, factor)
+        steps = self._trusted(self._guide, small_left, small_right, factor, GUIDE_AGREEMENT_PX)
+        small = filters.to_px(filters.without_speckles(steps, GUIDE_SPECKLE_PX, SPECKLE_STEP_PX))
         height, width = left.shape
-        half = (max(width // 2, 1), max(height // 2, 1))
-        small_left, small_right = (
-            np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8) for image in (left, right)
-        )
-        rough = filters.to_px(self._compute(self._rough, small_left, small_right, scale=2))
-        offset_px = vertical_offset_px(small_left, small_right, rough) * height / half[1]
-        return right if abs(offset_px) < LEAST_OFFSET_PX else moved_up(right, offset_px)
+        full = cv2.resize(small, (width, height), interpolation=cv2.INTER_NEAREST)
+        guide = np.asarray(full, np.float32) * np.float32(width / small.shape[1])
+        return np.where(guide <= self._disparities - 1, guide, np.float32(np.nan))
+
+    def _trusted(
+        self, engine: cv2.StereoSGBM, left: Image, right: Image, scale: int, agreement_px: float
+    ) -> filters.Steps:
+        """Match both views; keep what both agree on, within the range, in rows that say something."""
+        left_steps = np.asarray(cv2.medianBlur(self._compute(engine, left, right, scale), MEDIAN_PX), np.int16)
+        # The right view is the left view of the mirrored and swapped pair.
+        right_steps = self._compute(engine, _mirrored(right), _mirrored(left), scale)[:, ::-1]
+        trusted = filters.confirmed(left_steps, right_steps, agreement_px)
+        trusted &= left_steps <= (self._disparities - 1) * filters.STEPS_PER_PX
+        trusted &= (filters.told_rows(left) & filters.told_rows(right))[:, np.newaxis]
+        return np.where(trusted, left_steps, np.int16(filters.NO_STEPS))
 
     def _compute(self, engine: cv2.StereoSGBM, left: Image, right: Image, scale: int = 1) -> filters.Steps:
         """Run OpenCV's matcher on images reduced by scale, with the left border extended."""
@@ -126,3 +181,10 @@ class SgbmMatcher:
 
 def _mirrored(image: Image) -> Image:
     return np.asarray(cv2.flip(image, 1), np.uint8)
+
+
+def reduced(image: Image, factor: int) -> Image:
+    """Return the image at a fraction of its size, at least one pixel wide and high; each pixel is the mean of what it covers."""
+    height, width = image.shape
+    size = (max(width // factor, 1), max(height // factor, 1))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)

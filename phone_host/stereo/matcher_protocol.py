@@ -1,8 +1,8 @@
-"""What every matcher is: from a rectified pair to a disparity map."""
+"""What every matcher is: from a rectified pair to a disparity map. What some matchers tell beside it."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from phone_host.model import Disparity, RectifiedPair
+from phone_host.model import Disparity, Matched, MatchReport, RectifiedPair
 
 
 class Matcher(Protocol):
@@ -21,3 +21,37 @@ class Matcher(Protocol):
             DataError: the two images differ in size, or are not uint8 images.
         """
         ...
+
+
+@runtime_checkable
+class ReportingMatcher(Matcher, Protocol):
+    """A matcher that also tells how certain its values are and what it corrected."""
+
+    def matched(self, pair: RectifiedPair) -> Matched:
+        """Match one pair as `match` does, and tell more of it.
+
+        Args:
+            pair: as for `match`.
+
+        Returns:
+            The same disparity as `match` gives, and what is known beside it.
+
+        Raises:
+            DataError: as `match` does.
+        """
+        ...
+
+
+def matched_by(matcher: Matcher, pair: RectifiedPair) -> Matched:
+    """Match one pair, with all that this matcher tells.
+
+    Args:
+        matcher: one that reports, or one that does not.
+        pair: rectified.
+
+    Returns:
+        The matched pair; without confidence and with an empty report if the matcher has none.
+    """
+    if isinstance(matcher, ReportingMatcher):
+        return matcher.matched(pair)
+    return Matched(disparity=matcher.match(pair), report=MatchReport())

@@ -10,9 +10,11 @@ from typing import Final
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from phone_host.model import Crop, Disparity, Epipolar, Image, RectifiedPair
+from phone_host.model import Confidence, Crop, Disparity, Epipolar, Image, RectifiedPair
 from phone_host.stereo.match_sgbm import GREATEST_SEARCH
+from phone_host.stereo.stacked import Values
 
 MOST_STEPS: Final = 1_200_000_000
 """Width x height x disparities of the matched images. `sgbm` takes about 2 ns for each on two cores, so 2 to 3 s."""
@@ -100,6 +102,23 @@ def to_full_size(disparity: Disparity, width_px: int, height_px: int, epipolar: 
     return full
 
 
+def confidence_to_full_size(confidence: Confidence, width_px: int, height_px: int) -> Confidence:
+    """Bring the confidence of smaller images back to the size of the rectified ones: each pixel takes the nearest one's.
+
+    Args:
+        confidence: (h, w) uint8.
+        width_px: of the rectified images, px.
+        height_px: the same.
+
+    Returns:
+        (height_px, width_px) uint8; the same array if the size is the same.
+    """
+    height, width = confidence.shape
+    if (width, height) == (width_px, height_px):
+        return confidence
+    return np.asarray(cv2.resize(confidence, (width_px, height_px), interpolation=cv2.INTER_NEAREST_EXACT), np.uint8)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
     """What is matched of the rectified images, and where the crop lies in it.
@@ -124,15 +143,14 @@ class Part:
         left, right = (np.ascontiguousarray(image[self.rows, self.columns]) for image in (pair.left, pair.right))
         return RectifiedPair(left, right, pair.epipolar)
 
-    def placed(self, disparity: Disparity, width_px: int, height_px: int) -> Disparity:
-        """Put this part's disparity into an otherwise empty map of the rectified images' size, cut to the crop."""
-        placed = np.full((height_px, width_px), np.nan, np.float32)
+    def placed(self, values: NDArray[Values], width_px: int, height_px: int) -> NDArray[Values]:
+        """Put this part's disparity or confidence into an otherwise empty map of the rectified images' size, cut to the crop."""
+        empty = np.nan if values.dtype == np.float32 else 0
+        placed = np.full((height_px, width_px), empty, values.dtype)
         crop = self.crop
         rows, columns = slice(crop.y_px, crop.y_px + crop.height_px), slice(crop.x_px, crop.x_px + crop.width_px)
         top, left = self.rows.start, self.columns.start
-        placed[rows, columns] = disparity[
-            rows.start - top : rows.stop - top, columns.start - left : columns.stop - left
-        ]
+        placed[rows, columns] = values[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
         return placed
 
 

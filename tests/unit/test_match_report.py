@@ -1,0 +1,87 @@
+"""What a matcher corrected reaches the report, in px of the rectified images, and is told in plain words."""
+
+import numpy as np
+import pytest
+
+from common.errors import SettingsError
+from phone_host.model import Crop, Epipolar, Matched, MatchReport, RectifiedPair
+from phone_host.report.match_words import corrected_words
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.match import MatchSettings, create_matcher, make_matcher
+from phone_host.stereo.match_block import BlockMatcher
+from phone_host.stereo.match_sgbm import SgbmMatcher
+from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_protocol import ReportingMatcher, matched_by
+from tests.support.planes import plane
+
+
+class _Confident:
+    """A matcher that is certain of one disparity, and says that it moved the right image up by 0.5 px."""
+
+    def match(self, pair: RectifiedPair) -> np.ndarray:
+        return self.matched(pair).disparity
+
+    def matched(self, pair: RectifiedPair) -> Matched:
+        shape = pair.left.shape[:2]
+        return Matched(
+            disparity=np.full(shape, 10, np.float32),
+            confidence=np.full(shape, 200, np.uint8),
+            report=MatchReport(vertical_px=0.5, confidence_histogram=(0, shape[0] * shape[1])),
+        )
+
+
+def test_a_name_as_typed_makes_a_matcher() -> None:
+    """`make_matcher` takes the name that a user types, and refuses an unknown one."""
+    assert isinstance(make_matcher("block", 16), BlockMatcher)
+    assert isinstance(make_matcher("sgbm", 16), SgbmMatcher)
+    with pytest.raises(SettingsError, match="magic"):
+        make_matcher("magic", 16)
+
+
+def test_sgbm_reports_the_vertical_error_and_the_levels() -> None:
+    """A right image 0.8 px too low and of 0.7 times the levels plus 20 is reported so; its gain within 5 %, position within 0.3 px."""
+    scene = plane(vertical_px=0.8, shortest_px=8)
+    right = np.rint(scene.pair.right * 0.7 + 20).astype(np.uint8)
+    matcher = SgbmMatcher(64)
+    assert isinstance(matcher, ReportingMatcher)
+    matched = matcher.matched(RectifiedPair(scene.pair.left, right))
+    assert matched.report.vertical_px == pytest.approx(0.8, abs=0.3)
+    assert matched.report.gain == pytest.approx(1 / 0.7, rel=0.05)
+    assert matched.report.offset_levels == pytest.approx(-20 / 0.7, abs=8)
+    assert matched.disparity.tobytes() == matcher.match(RectifiedPair(scene.pair.left, right)).tobytes()
+
+
+def test_a_matcher_that_reports_nothing_corrected_nothing() -> None:
+    """`block` has no confidence, and its report says that nothing was changed."""
+    matched = matched_by(create_matcher(MatchSettings(MatcherName.BLOCK, 32)), plane().pair)
+    assert matched.confidence is None
+    assert matched.report == MatchReport()
+
+
+def test_the_core_gives_confidence_and_report_at_the_size_of_the_rectified_images() -> None:
+    """At half the size 0.5 px are 1 px of the rectified images; confidence fills them, and is 0 outside the crop."""
+    pair = plane(width_px=200, height_px=100).pair
+    crop = Crop(x_px=60, y_px=20, width_px=50, height_px=40)
+    processed = StereoCore(_Confident(), wanted=DepthWanted(scale=0.5, crop=crop)).compute(
+        pair.left, pair.right, lambda: 0
+    )
+    assert processed.match_report is not None
+    assert processed.match_report.vertical_px == pytest.approx(1.0)
+    assert processed.confidence is not None
+    assert processed.confidence.shape == pair.left.shape
+    assert (processed.confidence[20:60, 60:110] == 200).all()
+    assert np.count_nonzero(processed.confidence) == 40 * 50
+
+
+def test_what_was_corrected_is_told_in_plain_words() -> None:
+    """A darker image that lies too low is told as such; 2 % of gain and 0.1 px are not worth a word."""
+    both = corrected_words(MatchReport(vertical_px=0.6, gain=1 / 0.7))
+    assert both == "the right image lay 0.6 px too low and was 30% darker; both were corrected before matching"
+    assert corrected_words(MatchReport(vertical_px=-0.6)) == (
+        "the right image lay 0.6 px too high; this was corrected before matching"
+    )
+    assert "off to one side" in corrected_words(MatchReport(vertical_px=0.6), Epipolar.UP)
+    assert "had 30% less contrast" in corrected_words(MatchReport(gain=1 / 0.7, offset_levels=-50))
+    assert corrected_words(MatchReport(vertical_px=0.1, gain=1.02)) == ""
+    assert corrected_words(None) == ""
