@@ -46,7 +46,9 @@ class TandemMatcher:
 
     def _computed(self, left: Image, right: Image) -> tuple[Disparity, NDArray[np.uint8]]:
         height, width = left.shape
-        searched = min(self._disparities, width)  # d <= x < width: a wider search could only find places outside the right image
+        searched = min(
+            self._disparities, width
+        )  # d <= x < width: a wider search could only find places outside the right image
         if searched > GREATEST_SEARCH or width > GREATEST_WIDTH:
             raise SettingsError(
                 f"disparities = {self._disparities} at {width} px is more than tandem can hold ({GREATEST_SEARCH})",
