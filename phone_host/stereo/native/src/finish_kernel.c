@@ -92,8 +92,6 @@ void ISA_NAME(check_rows)(const struct finish *job, int from, int to)
     for (int y = from; y < to; y++) {
         int16_t *checked = job->checked + (ptrdiff_t)y * width;
         const int16_t *right = job->right + (ptrdiff_t)y * width;
-        const uint8_t *margin = job->margin + (ptrdiff_t)y * width;
-        uint8_t *trust = job->trust + (ptrdiff_t)y * width;
         median_row(job->left, width, job->height, y, checked);
         for (int x = 0; x < width; x++) {
             const int steps = checked[x], there = (x * STEPS_PER_PX - steps + STEPS_PER_PX / 2) >> 4;
@@ -101,7 +99,6 @@ void ISA_NAME(check_rows)(const struct finish *job, int from, int to)
             const int apart = right[back] < steps ? steps - right[back] : right[back] - steps;
             const int is_good = there >= 0 && apart <= AGREEMENT && job->told[y];
             checked[x] = (int16_t)(is_good ? steps : NO_STEPS);
-            trust[x] = margin[x];
         }
     }
 }
@@ -137,11 +134,10 @@ void ISA_NAME(smooth_rows)(const struct finish *job, int from, int to)
                 disparity[start + x] = here[x] < 0.0f ? NAN : value;
             }
         }
-        const uint8_t *restrict trust = job->trust + (ptrdiff_t)y * width;
         uint8_t *restrict confidence = job->confidence + (ptrdiff_t)y * width;
         const float *restrict rough = job->rough + (size_t)(y + GUARD) * pitch + GUARD;
         for (int x = 0; x < width; x++) {
-            const uint8_t least = trust[x] > 0 ? trust[x] : 1;
+            const uint8_t least = confidence[x] > 0 ? confidence[x] : 1;
             confidence[x] = rough[x] < 0.0f ? 0 : least;
         }
     }

@@ -26,12 +26,6 @@ static const float UNLOCKED_PX[STEPS_PER_PX] = {
     0.0f,  0.04592201f,  0.08485281f,  0.11086554f,  0.12f,  0.11086554f,  0.08485281f,  0.04592201f,
     0.0f, -0.04592201f, -0.08485281f, -0.11086554f, -0.12f, -0.11086554f, -0.08485281f, -0.04592201f};
 
-struct run { /* of pixels of one row that hang together */
-    int32_t parent, size;
-    int32_t row;
-    int16_t from, to;
-};
-
 struct work {
     const struct tandem_kernels *kernels;
     struct tandem_match_job *job;
@@ -41,8 +35,8 @@ struct work {
     uint8_t *scratch; /* one for each thread */
     int16_t *left, *right;
     uint8_t *told;
-    struct run *runs;
-    int32_t *run_of; /* two rows */
+    int32_t *parent, *size; /* of the runs of pixels that hang together; a run has the number of its first pixel */
+    int32_t *run_of;        /* two rows */
 };
 
 static uint8_t *taken(uint8_t **at, size_t size)
@@ -54,34 +48,38 @@ static uint8_t *taken(uint8_t **at, size_t size)
 
 static int strips_of(int height) { return (height + STRIP - 1) / STRIP; }
 
-/* Lay the workspace out. Returns its size. The planes that are not needed at the same time share memory. */
+/* Lay the workspace out. Returns its size. What is not needed at the same time shares memory, the results' own planes included:
+ *
+ *     sweeps       raw disparities left, right | scratch      | margins: in `confidence`
+ *     check        raw disparities left, right | checked      | margins
+ *     speckles     parents                     | checked      | sizes: in `disparity`
+ *     px, bridges  rough                       | checked      |
+ *     smooth       rough                                      | disparity, confidence
+ */
 static size_t laid_out(struct work *work, uint8_t *memory)
 {
-    const struct tandem_match_job *job = work->job;
+    struct tandem_match_job *job = work->job;
     const size_t width = (size_t)job->width, height = (size_t)job->height, pixels = width * height;
     uint8_t *at = memory;
     work->strips = strips_of(job->height);
-    const int tasks = 2 * work->strips;
-    work->threads = job->threads < 1 ? 1 : job->threads;
+    const int tasks = 2 * work->strips, threads = job->threads < 1 ? 1 : job->threads;
+    work->threads = threads < MOST_THREADS ? threads : MOST_THREADS;
     const int sweepers = work->threads < tasks ? work->threads : tasks;
     work->scratch_bytes = (work->kernels->sweep_scratch(job->width, job->disparities) + 127) / 64 * 64;
-    work->left = (int16_t *)(void *)taken(&at, pixels * 2);
-    work->right = (int16_t *)(void *)taken(&at, pixels * 2);
-    work->finish.margin = taken(&at, pixels);
-    work->finish.trust = taken(&at, pixels);
-    work->finish.checked = (int16_t *)(void *)taken(&at, pixels * 2);
+    const size_t guarded = rough_pitch(job->width) * (height + 2 * GUARD) * sizeof(float);
+    work->finish.rough = (float *)(void *)taken(&at, guarded);
+    work->left = (int16_t *)(void *)work->finish.rough;
+    work->right = work->left + pixels;
+    work->parent = (int32_t *)(void *)work->finish.rough;
+    work->size = (int32_t *)(void *)job->disparity;
+    const size_t scratch = (size_t)sweepers * work->scratch_bytes, checked = pixels * sizeof(int16_t);
+    work->scratch = taken(&at, scratch > checked ? scratch : checked);
+    work->finish.checked = (int16_t *)(void *)work->scratch;
+    work->finish.disparity = job->disparity;
+    work->finish.confidence = job->confidence;
     work->told = taken(&at, height);
     work->run_of = (int32_t *)(void *)taken(&at, 2 * width * sizeof(int32_t));
-    uint8_t *shared = at;
-    work->scratch = taken(&at, (size_t)sweepers * work->scratch_bytes);
-    uint8_t *end = at;
-    at = shared; /* the sweeps are over when these are needed */
-    work->runs = (struct run *)(void *)taken(&at, pixels * sizeof(struct run));
-    end = at > end ? at : end;
-    at = shared; /* and so are the runs */
-    work->finish.rough = (float *)(void *)taken(&at, rough_pitch(job->width) * (height + 2 * GUARD) * sizeof(float));
-    end = at > end ? at : end;
-    return (size_t)(end - memory);
+    return (size_t)(at - memory);
 }
 
 /* ---- the steps, each a number of tasks ---- */
@@ -103,7 +101,7 @@ static void sweep_task(struct work *work, int task, int thread)
         .begin = strip * job->height / work->strips,
         .end = (strip + 1) * job->height / work->strips,
         .steps = is_right ? work->right : work->left,
-        .margin = (uint8_t *)(uintptr_t)work->finish.margin,
+        .margin = work->finish.confidence,
         .scratch = work->scratch + (size_t)thread * work->scratch_bytes,
     };
     sweep.first = sweep.begin > WARM_UP ? sweep.begin - WARM_UP : 0;
@@ -125,69 +123,78 @@ static void find_told_rows(struct work *work)
     }
 }
 
-static int32_t root_of(struct run *runs, int32_t run)
+static inline int32_t root_of(int32_t *parent, int32_t run)
 {
-    while (runs[run].parent != run) {
-        runs[run].parent = runs[runs[run].parent].parent;
-        run = runs[run].parent;
+    while (parent[run] != run) {
+        parent[run] = parent[parent[run]];
+        run = parent[run];
     }
     return run;
 }
 
-static void join(struct run *runs, int32_t one, int32_t other)
+static void join(struct work *work, int32_t one, int32_t other)
 {
-    int32_t a = root_of(runs, one), b = root_of(runs, other);
-    if (a != b) {
-        if (runs[a].size < runs[b].size) {
-            const int32_t swap = a;
-            a = b;
-            b = swap;
-        }
-        runs[b].parent = a;
-        runs[a].size += runs[b].size;
+    const int32_t a = root_of(work->parent, one), b = root_of(work->parent, other);
+    if (a != b) { /* the earlier run leads, so that chains stay short */
+        const int32_t first = a < b ? a : b, second = a < b ? b : a;
+        work->parent[second] = first;
+        work->size[first] += work->size[second];
     }
 }
 
 static inline int near(int a, int b) { return a - b <= SPECKLE_STEP && b - a <= SPECKLE_STEP; }
+
+/* Where the run that begins at x ends. */
+static inline int end_of_run(const int16_t *row, int x, int width)
+{
+    x++;
+    while (x < width && row[x] >= 0 && near(row[x], row[x - 1])) {
+        x++;
+    }
+    return x;
+}
 
 /* Drop connected areas, with at most SPECKLE_STEP between neighbours, that are too small to be an object. */
 static void drop_speckles(struct work *work)
 {
     const int width = work->job->width, height = work->job->height;
     int16_t *plane = work->finish.checked;
-    struct run *runs = work->runs;
-    int32_t count = 0;
     for (int y = 0; y < height; y++) {
-        int16_t *row = plane + (ptrdiff_t)y * width;
-        const int16_t *above = row - width;
+        const int16_t *row = plane + (ptrdiff_t)y * width, *above = row - width;
         int32_t *here = work->run_of + (y & 1 ? width : 0), *there = work->run_of + (y & 1 ? 0 : width);
-        int32_t last_here = -1, last_there = -1;
-        for (int x = 0; x < width; x++) {
+        for (int x = 0; x < width;) {
             if (row[x] < 0) {
-                here[x] = -1;
+                here[x++] = -1;
                 continue;
             }
-            if (x > 0 && row[x - 1] >= 0 && near(row[x], row[x - 1])) {
-                here[x] = here[x - 1];
-                runs[here[x]].to = (int16_t)(x + 1);
-            } else {
-                runs[count] = (struct run){.parent = count, .size = 0, .row = y, .from = (int16_t)x, .to = (int16_t)(x + 1)};
-                here[x] = count++;
-            }
-            runs[root_of(runs, here[x])].size++;
-            if (y > 0 && there[x] >= 0 && near(row[x], above[x]) && !(last_here == here[x] && last_there == there[x])) {
-                join(runs, here[x], there[x]);
-                last_here = here[x];
-                last_there = there[x];
+            const int32_t run = y * width + x;
+            const int end = end_of_run(row, x, width);
+            work->parent[run] = run;
+            work->size[run] = end - x;
+            int32_t last = -1;
+            for (; x < end; x++) {
+                here[x] = run;
+                if (y > 0 && there[x] >= 0 && there[x] != last && near(row[x], above[x])) {
+                    last = there[x];
+                    join(work, run, last);
+                }
             }
         }
     }
-    for (int32_t i = 0; i < count; i++) {
-        if (runs[root_of(runs, i)].size <= SPECKLE_AREA) {
-            int16_t *row = plane + (ptrdiff_t)runs[i].row * width;
-            for (int x = runs[i].from; x < runs[i].to; x++) {
-                row[x] = NO_STEPS;
+    for (int y = 0; y < height; y++) {
+        int16_t *row = plane + (ptrdiff_t)y * width;
+        for (int x = 0; x < width;) {
+            if (row[x] < 0) {
+                x++;
+                continue;
             }
+            const int end = end_of_run(row, x, width);
+            if (work->size[root_of(work->parent, y * width + x)] <= SPECKLE_AREA) {
+                for (; x < end; x++) {
+                    row[x] = NO_STEPS;
+                }
+            }
+            x = end;
         }
     }
 }
@@ -345,8 +352,6 @@ int32_t tandem_match(int32_t isa, struct tandem_match_job *job)
     work.finish.left = work.left;
     work.finish.right = work.right;
     work.finish.told = work.told;
-    work.finish.disparity = job->disparity;
-    work.finish.confidence = job->confidence;
     find_told_rows(&work);
     crew_works(&work, STEPS, work.threads, tasks_of, do_task);
     return TANDEM_DONE;
