@@ -103,6 +103,40 @@ void ISA_NAME(check_rows)(const struct finish *job, int from, int to)
     }
 }
 
+/* How sure a row's values are: the mean margin of the confirmed pixels in a 9 x 9 window, the others counting as 0. A margin alone is
+ * noisy; a value amid doubtful ones is doubtful itself. */
+static void confidence_row(const struct finish *job, int y)
+{
+    enum { REACH = 4, SIDE = 2 * REACH + 1 };
+    const int width = job->width, top = y > REACH ? y - REACH : 0;
+    const int bottom = y + REACH < job->height - 1 ? y + REACH : job->height - 1;
+    const float *rough = job->rough + (size_t)(y + GUARD) * rough_pitch(width) + GUARD;
+    uint8_t *confidence = job->confidence + (ptrdiff_t)y * width;
+    int16_t column[COLUMNS + 2 * REACH];
+    for (int from = 0; from < width; from += COLUMNS) {
+        const int count = width - from < COLUMNS ? width - from : COLUMNS;
+        const int first = from > REACH ? from - REACH : 0, last = from + count + REACH < width ? from + count + REACH : width;
+        memset(column, 0, sizeof column);
+        int16_t *restrict sums = column + (first - from + REACH);
+        for (int line = top; line <= bottom; line++) {
+            const int16_t *restrict margins = job->checked + (ptrdiff_t)line * width + first;
+            for (int x = 0; x < last - first; x++) {
+                sums[x] = (int16_t)(sums[x] + margins[x]);
+            }
+        }
+        int sum = 0;
+        for (int i = 0; i < SIDE - 1; i++) {
+            sum += column[i];
+        }
+        for (int x = 0; x < count; x++) {
+            sum += column[x + SIDE - 1];
+            const int sure = sum * 255 / (SIDE * SIDE * MARGIN_CAP);
+            confidence[from + x] = (uint8_t)(rough[from + x] < 0.0f ? 0 : sure > 0 ? sure : 1);
+            sum -= column[x];
+        }
+    }
+}
+
 /* Average each value with its neighbours of similar disparity (bilateral filter: Tomasi and Manduchi, ICCV 1998), with weights that fall
  * linearly to 0 at REACH_PX. Every second neighbour of a 9 x 9 window says as much as all. */
 void ISA_NAME(smooth_rows)(const struct finish *job, int from, int to)
@@ -134,11 +168,6 @@ void ISA_NAME(smooth_rows)(const struct finish *job, int from, int to)
                 disparity[start + x] = here[x] < 0.0f ? NAN : value;
             }
         }
-        uint8_t *restrict confidence = job->confidence + (ptrdiff_t)y * width;
-        const float *restrict rough = job->rough + (size_t)(y + GUARD) * pitch + GUARD;
-        for (int x = 0; x < width; x++) {
-            const uint8_t least = confidence[x] > 0 ? confidence[x] : 1;
-            confidence[x] = rough[x] < 0.0f ? 0 : least;
-        }
+        confidence_row(job, y);
     }
 }

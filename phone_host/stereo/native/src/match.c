@@ -53,8 +53,8 @@ static int strips_of(int height) { return (height + STRIP - 1) / STRIP; }
  *     sweeps       raw disparities left, right | scratch      | margins: in `confidence`
  *     check        raw disparities left, right | checked      | margins
  *     speckles     parents                     | checked      | sizes: in `disparity`
- *     px, bridges  rough                       | checked      |
- *     smooth       rough                                      | disparity, confidence
+ *     px, bridges  rough                       | checked: margins
+ *     smooth       rough                       | margins      | disparity, confidence
  */
 static size_t laid_out(struct work *work, uint8_t *memory)
 {
@@ -214,14 +214,15 @@ static inline void bridge(float *values, ptrdiff_t stride, int before, int after
     }
 }
 
-/* Rows of steps become px, and their gaps are bridged. */
+/* Rows of steps become px, and their gaps are bridged; their margins take their place. */
 static void band_to_px(struct work *work, int task)
 {
     const int width = work->job->width, height = work->job->height;
     const size_t pitch = rough_pitch(width);
     const int from = task * BAND, to = from + BAND < height ? from + BAND : height;
     for (int y = from; y < to; y++) {
-        const int16_t *steps = work->finish.checked + (ptrdiff_t)y * width;
+        int16_t *steps = work->finish.checked + (ptrdiff_t)y * width;
+        const uint8_t *margin = work->finish.confidence + (ptrdiff_t)y * width;
         float *row = work->finish.rough + (size_t)(y + GUARD) * pitch;
         for (int x = 0; x < GUARD; x++) {
             row[x] = row[(size_t)x + GUARD + (size_t)width] = NONE_PX;
@@ -239,6 +240,7 @@ static void band_to_px(struct work *work, int task)
                 }
                 known = x;
             }
+            steps[x] = (int16_t)(steps[x] < 0 ? 0 : margin[x] < MARGIN_CAP ? margin[x] : MARGIN_CAP);
         }
     }
 }
