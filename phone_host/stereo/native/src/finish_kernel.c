@@ -41,8 +41,8 @@ WORDS_INLINE void find_ends(words *value, const int count)
     }
 }
 
-/* Medians of 5 x 5 windows; `corner` is the first window's. Of any 14 of the 25 values neither the least nor the greatest is the median: drop both,
- * take in one more, and so on. */
+/* Medians of 5 x 5 windows; `corner` is the first window's. Of any 14 of the 25 values neither the least nor the greatest is the
+ * median: drop both, take in one more, and so on. */
 WORDS_INLINE words median_of_window(const int16_t *corner, ptrdiff_t pitch)
 {
     words value[HELD];

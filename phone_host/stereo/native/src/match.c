@@ -108,8 +108,8 @@ static void sweep_task(struct work *work, int task, int thread)
     work->kernels->sweep(&sweep);
 }
 
-/* Rows that matching can say anything about: the row, or one above it, changes somewhere from left to right in both images. On any other
- * row every disparity costs the same, and 0 would win only because it comes first. */
+/* Rows that matching can say anything about: the row, or one above it, changes somewhere from left to right in both images. On any
+ * other row every disparity costs the same, and 0 would win only because it comes first. */
 static void find_told_rows(struct work *work)
 {
     const struct tandem_match_job *job = work->job;
