@@ -36,7 +36,7 @@ struct work {
     int16_t *left, *right;
     uint8_t *told;
     int32_t *parent, *size; /* of the runs of pixels that hang together; a run has the number of its first pixel */
-    int32_t *run_of;        /* two rows */
+    int32_t *run_of;        /* two rows for each thread */
 };
 
 static uint8_t *taken(uint8_t **at, size_t size)
@@ -78,7 +78,7 @@ static size_t laid_out(struct work *work, uint8_t *memory)
     work->finish.disparity = job->disparity;
     work->finish.confidence = job->confidence;
     work->told = taken(&at, height);
-    work->run_of = (int32_t *)(void *)taken(&at, 2 * width * sizeof(int32_t));
+    work->run_of = (int32_t *)(void *)taken(&at, (size_t)work->threads * 2 * width * sizeof(int32_t));
     return (size_t)(at - memory);
 }
 
@@ -154,42 +154,88 @@ static inline int end_of_run(const int16_t *row, int x, int width)
     return x;
 }
 
-/* Drop connected areas, with at most SPECKLE_STEP between neighbours, that are too small to be an object. */
-static void drop_speckles(struct work *work)
+/* Write for each pixel of row y the run that it belongs to, -1 for none; new runs hang together with nothing yet. */
+static void number_runs(struct work *work, int y, int is_new, int32_t *run_of)
 {
-    const int width = work->job->width, height = work->job->height;
-    int16_t *plane = work->finish.checked;
-    for (int y = 0; y < height; y++) {
-        const int16_t *row = plane + (ptrdiff_t)y * width, *above = row - width;
-        int32_t *here = work->run_of + (y & 1 ? width : 0), *there = work->run_of + (y & 1 ? 0 : width);
-        for (int x = 0; x < width;) {
-            if (row[x] < 0) {
-                here[x++] = -1;
-                continue;
-            }
-            const int32_t run = y * width + x;
-            const int end = end_of_run(row, x, width);
+    const int width = work->job->width;
+    const int16_t *row = work->finish.checked + (ptrdiff_t)y * width;
+    for (int x = 0; x < width;) {
+        if (row[x] < 0) {
+            run_of[x++] = -1;
+            continue;
+        }
+        const int32_t run = y * width + x;
+        const int end = end_of_run(row, x, width);
+        if (is_new) {
             work->parent[run] = run;
             work->size[run] = end - x;
-            int32_t last = -1;
-            for (; x < end; x++) {
-                here[x] = run;
-                if (y > 0 && there[x] >= 0 && there[x] != last && near(row[x], above[x])) {
-                    last = there[x];
-                    join(work, run, last);
-                }
-            }
+        }
+        for (; x < end; x++) {
+            run_of[x] = run;
         }
     }
-    for (int y = 0; y < height; y++) {
-        int16_t *row = plane + (ptrdiff_t)y * width;
+}
+
+/* Join the runs of row y with those of the row above that they touch. */
+static void join_rows(struct work *work, int y, const int32_t *here, const int32_t *there)
+{
+    const int width = work->job->width;
+    const int16_t *row = work->finish.checked + (ptrdiff_t)y * width, *above = row - width;
+    int32_t last_here = -1, last_there = -1;
+    for (int x = 0; x < width; x++) {
+        if (here[x] >= 0 && there[x] >= 0 && (here[x] != last_here || there[x] != last_there) && near(row[x], above[x])) {
+            last_here = here[x];
+            last_there = there[x];
+            join(work, last_here, last_there);
+        }
+    }
+}
+
+/* Connected areas, with at most SPECKLE_STEP between neighbours: within a band of rows, ... */
+static void label_band(struct work *work, int from, int to, int thread)
+{
+    const int width = work->job->width;
+    int32_t *here = work->run_of + 2 * (size_t)thread * (size_t)width, *there = here + width;
+    for (int y = from; y < to; y++) {
+        number_runs(work, y, 1, here);
+        if (y > from) {
+            join_rows(work, y, here, there);
+        }
+        int32_t *const swap = here;
+        here = there;
+        there = swap;
+    }
+}
+
+/* ... across the bands' borders, ... */
+static void join_bands(struct work *work)
+{
+    const int width = work->job->width;
+    int32_t *here = work->run_of, *there = here + width;
+    for (int y = BAND; y < work->job->height; y += BAND) {
+        number_runs(work, y - 1, 0, there);
+        number_runs(work, y, 0, here);
+        join_rows(work, y, here, there);
+    }
+}
+
+/* ... and what is too small to be an object goes. */
+static void drop_speckles(struct work *work, int from, int to)
+{
+    const int width = work->job->width;
+    for (int y = from; y < to; y++) {
+        int16_t *row = work->finish.checked + (ptrdiff_t)y * width;
         for (int x = 0; x < width;) {
             if (row[x] < 0) {
                 x++;
                 continue;
             }
             const int end = end_of_run(row, x, width);
-            if (work->size[root_of(work->parent, y * width + x)] <= SPECKLE_AREA) {
+            int32_t root = y * width + x;
+            while (work->parent[root] != root) { /* other bands read, too: nothing is shortened here */
+                root = work->parent[root];
+            }
+            if (work->size[root] <= SPECKLE_AREA) {
                 for (; x < end; x++) {
                     row[x] = NO_STEPS;
                 }
@@ -284,7 +330,7 @@ static void clear_guards(struct work *work)
     }
 }
 
-enum step { SWEEP, CHECK, SPECKLES, TO_PX, COLUMNS_BRIDGED, SMOOTH, STEPS };
+enum step { SWEEP, CHECK, LABEL, JOIN, SPECKLES, TO_PX, COLUMNS_BRIDGED, SMOOTH, STEPS };
 
 static int tasks_of(void *context, int step)
 {
@@ -293,7 +339,7 @@ static int tasks_of(void *context, int step)
     switch (step) {
     case SWEEP:
         return 2 * work->strips;
-    case SPECKLES:
+    case JOIN:
         return 1;
     case COLUMNS_BRIDGED:
         return (work->job->width + SLAB - 1) / SLAB;
@@ -313,11 +359,19 @@ static void do_task(void *context, int step, int task, int thread)
     case CHECK:
         work->kernels->check_rows(&work->finish, from, to);
         break;
+    case LABEL:
+        label_band(work, from, to, thread);
+        break;
+    case JOIN:
+        join_bands(work);
+        break;
     case SPECKLES:
-        drop_speckles(work);
-        clear_guards(work);
+        drop_speckles(work, from, to);
         break;
     case TO_PX:
+        if (task == 0) {
+            clear_guards(work);
+        }
         band_to_px(work, task);
         break;
     case COLUMNS_BRIDGED:
