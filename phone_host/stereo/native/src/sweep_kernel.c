@@ -11,6 +11,11 @@
 #include "match.h"
 #include "prefilter.h"
 
+/* Plain C takes long to compile with everything unrolled, and so does what is sanitized. */
+#if defined(__SANITIZE_ADDRESS__) || defined(TANDEM_IS_SCALAR)
+#define FEW_VARIANTS
+#endif
+
 enum { MOST_CHUNKS = MOST_DISPARITIES / BYTES, MOST_ROWS = 4 };
 
 /* Where the scratch memory's parts lie. */
@@ -45,7 +50,15 @@ static uint8_t *taken(uint8_t **free_from, size_t size)
 }
 
 /* How many rows are worked on together: four are faster (two need one third of the cache). */
-static int rows_together(size_t row_bytes) { return 9 * row_bytes <= 1536u * 1024u ? 4 : 2; }
+static int rows_together(size_t row_bytes)
+{
+#if defined(FEW_VARIANTS)
+    (void)row_bytes;
+    return 2;
+#else
+    return 9 * row_bytes <= 1536u * 1024u ? 4 : 2;
+#endif
+}
 
 static size_t laid_out(struct room *room, int width, int disparities, uint8_t *scratch)
 {
@@ -392,14 +405,13 @@ BYTES_INLINE void sweep_rows(const struct sweep *job, const struct room *memory,
     {                                                                                                                     \
         sweep_rows(job, room, n, rows, chunks);                                                                           \
     }
-SWEEP(4, 1, 1)
-SWEEP(2, 1, 1)
-SWEEP(4, 2, 2)
-SWEEP(2, 2, 2)
-SWEEP(4, 4, 4)
-SWEEP(2, 4, 4)
-SWEEP(4, n, room->chunks)
 SWEEP(2, n, room->chunks)
+#if !defined(FEW_VARIANTS)
+enum { FEW = BYTES >= 64 ? 1 : 64 / BYTES, MANY = 2 * FEW }; /* 64 and 128 disparities */
+SWEEP(4, few, FEW)
+SWEEP(4, many, MANY)
+SWEEP(4, n, room->chunks)
+#endif
 
 void ISA_NAME(sweep)(const struct sweep *job)
 {
@@ -410,16 +422,13 @@ void ISA_NAME(sweep)(const struct sweep *job)
     memset(room.around, 0, 2 * (size_t)room.lanes + BYTES);
     memset(room.around + room.lanes - 1, 255, 3);
     memset(room.total - 64, 255, 4 * room.total_pitch + 64);
-    const int chunks = room.chunks, is_few = room.rows == 2;
     for (int n = job->first; n < job->end; n += room.rows) {
-        if (chunks == 1) {
-            (is_few ? sweep_2_1 : sweep_4_1)(job, &room, n);
-        } else if (chunks == 2) {
-            (is_few ? sweep_2_2 : sweep_4_2)(job, &room, n);
-        } else if (chunks == 4) {
-            (is_few ? sweep_2_4 : sweep_4_4)(job, &room, n);
-        } else {
-            (is_few ? sweep_2_n : sweep_4_n)(job, &room, n);
+#if !defined(FEW_VARIANTS)
+        if (room.rows == 4) {
+            (room.chunks == FEW ? sweep_4_few : room.chunks == MANY ? sweep_4_many : sweep_4_n)(job, &room, n);
+            continue;
         }
+#endif
+        sweep_2_n(job, &room, n);
     }
 }
