@@ -23,8 +23,10 @@ from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
+from phone_host.stereo.match_tandem import TandemMatcher
 from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
+from phone_host.stereo.native.library import require_native
 from phone_host.stereo.network_name import NetworkMatcher
 
 
@@ -62,7 +64,8 @@ def create_matcher(settings: MatchSettings) -> Matcher:
 
     Raises:
         SettingsError: another package's matcher cannot be loaded or does not fit, or a network's file is not there.
-        UnavailableError: onnxruntime, which a network needs, is not installed.
+        UnavailableError: onnxruntime, which a network needs, is not installed; or the native library, which tandem needs,
+            is not built.
         DataError: the file is no network that matches two images.
     """
     match settings.matcher:
@@ -70,6 +73,8 @@ def create_matcher(settings: MatchSettings) -> Matcher:
             return BlockMatcher(settings.disparities)
         case MatcherName.SGBM:
             return SgbmMatcher(settings.disparities)
+        case MatcherName.TANDEM:
+            return TandemMatcher(settings.disparities, require_native())
         case RegisteredMatcher(name):
             registered: Matcher = make_registered(MATCHERS, name, Matcher, settings.disparities)
             return CheckedMatcher(registered, name, settings.disparities)

@@ -15,11 +15,13 @@ MATCHERS: Final = "tandemscan.matchers"
 class MatcherName(Enum):
     """The matchers by the name a user types.
 
-    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is semi-global matching, the default.
+    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is OpenCV's semi-global matching with
+    checks of our own. TANDEM is our own semi-global matching, in the native library.
     """
 
     BLOCK = "block"
     SGBM = "sgbm"
+    TANDEM = "tandem"
 
 
 @dataclass(frozen=True, slots=True)
