@@ -14,11 +14,12 @@ user types. The entry point is a callable that takes the number of disparities (
 `Matcher`, which keeps the rules above.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import assert_never
 
 from common.errors import SettingsError
 from common.program.extensions import make_registered
+from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
@@ -35,14 +36,14 @@ class MatchSettings:
     """Settings from which a matcher is built.
 
     Attributes:
-        matcher: the algorithm.
+        matcher: the algorithm; by default that of this machine.
         disparities: N, px: 0 <= d < N is searched. Any number from 1; far above the image's width it costs no more.
 
     Raises:
         SettingsError: disparities below 1.
     """
 
-    matcher: AnyMatcher = MatcherName.SGBM
+    matcher: AnyMatcher = field(default_factory=default_matcher)
     disparities: int = 64
 
     def __post_init__(self) -> None:

@@ -192,6 +192,4 @@ def moved_up(image: Image, offset_px: float) -> Image:
     first, last = min(whole - 1, 0), max(whole + 2, 0)
     taps = np.zeros((last - first + 1, 1), np.float32)
     taps[whole - 1 - first : whole + 3 - first, 0] = before, near, far, after
-    return np.asarray(
-        cv2.filter2D(image, -1, taps, anchor=(0, -first), borderType=cv2.BORDER_REPLICATE), np.uint8
-    )
+    return np.asarray(cv2.filter2D(image, -1, taps, anchor=(0, -first), borderType=cv2.BORDER_REPLICATE), np.uint8)

@@ -149,7 +149,8 @@ def _local_means(image: Image) -> NDArray[np.float32]:
 
 
 def _seen_at(image: NDArray[np.float32], x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.asarray(cv2.remap(image, x[np.newaxis], y[np.newaxis], cv2.INTER_LINEAR), np.float32)[0]
+    seen = cv2.remap(image, x[np.newaxis], y[np.newaxis], cv2.INTER_LINEAR)
+    return np.asarray(seen, np.float32).reshape(-1)
 
 
 def _weights(residuals: Values) -> Values:

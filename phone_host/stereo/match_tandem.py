@@ -58,7 +58,9 @@ class TandemMatcher:
         check_pair(pair)
         left, right = grey(pair.left), grey(pair.right)
         self._whole.require_room(*left.shape)  # before the rough match, which needs less
-        found = differences(left, right, lambda small_left, small_right: self._rough.computed(small_left, small_right)[0])
+        found = differences(
+            left, right, lambda small_left, small_right: self._rough.computed(small_left, small_right)[0]
+        )
         disparity, confidence = self._whole.computed(left, found.undone(right))
         report = found.report(confidence_histogram(confidence))
         return Matched(disparity=disparity, confidence=confidence, report=report)
