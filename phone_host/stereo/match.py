@@ -27,7 +27,7 @@ from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.match_tandem import TandemMatcher
 from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
-from phone_host.stereo.native.library import require_native
+from phone_host.stereo.native.library import native, required
 from phone_host.stereo.network_name import NetworkMatcher
 
 
@@ -75,7 +75,7 @@ def create_matcher(settings: MatchSettings) -> Matcher:
         case MatcherName.SGBM:
             return SgbmMatcher(settings.disparities)
         case MatcherName.TANDEM:
-            return TandemMatcher(settings.disparities, require_native())
+            return TandemMatcher(settings.disparities, required(native()))
         case RegisteredMatcher(name):
             registered: Matcher = make_registered(MATCHERS, name, Matcher, settings.disparities)
             return CheckedMatcher(registered, name, settings.disparities)

@@ -223,14 +223,12 @@ def native() -> Library | Missing:
     return load(_HERE, os.environ.get(VARIABLE, ""))
 
 
-def require_native() -> Library:
-    """Return the library of this installation.
+def required(found: Library | Missing) -> Library:
+    """Return the library that the matcher `tandem` needs.
 
     Raises:
-        UnavailableError: it is not built, or cannot be loaded.
-        SettingsError: as `native` does.
+        UnavailableError: there is none.
     """
-    found = native()
     if isinstance(found, Missing):
         raise UnavailableError(f"matcher tandem is {found.reason}", f"{found.remedy}; or use --matcher sgbm")
     return found
