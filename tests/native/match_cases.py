@@ -93,7 +93,7 @@ def random_case(random: np.random.Generator) -> MatchCase:
     left, right = (
         stored(image, width + int(random.integers(0, 9)), upside_down=bool(random.integers(0, 2))) for image in images
     )
-    disparities, threads = int(random.integers(1, 81)), int(random.choice((-1, 0, 1, 2, 3, 64)))
+    disparities, threads = int(random.integers(1, 81)), int(random.choice((-1, 0, 1, 2, 3, 8)))
     return MatchCase(left=left, right=right, width=width, height=height, disparities=disparities, threads=threads)
 
 
