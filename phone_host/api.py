@@ -44,6 +44,7 @@ from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import matcher_named
@@ -62,7 +63,7 @@ def open_scanner(
     camera: str,
     rig: str | Path | Rig | None = None,
     geometry: StereoGeometry | None = None,
-    matcher: str | Matcher = "sgbm",
+    matcher: str | Matcher | None = None,
     disparities: int | None = None,
     near_m: float = NEAR_M,
     board_side: str | None = None,
@@ -84,6 +85,7 @@ def open_scanner(
             otherwise no depth is computed, only pairs and delays.
         geometry: geometry of images that arrive rectified. None: disparities are not converted to metres.
         matcher: name of a matcher, or any object with `match(pair) -> disparity` (`phone_host.stereo.matcher_protocol.Matcher`).
+            None: the default of this machine.
         disparities: the matcher searches 0 <= d < disparities, px. None with a rig: computed from `near_m`.
         near_m: nearest depth to search for, m.
         board_side: which view the board's camera is, `left` or `right`. None: as in the rig; without a rig, left.
@@ -122,6 +124,7 @@ def open_scanner(
         save_every=save_every,
         time_offset=TimeOffset() if known is None else known.time_offset,
         resolved=_shown(given),
+        matcher_note="" if core is None or matcher is not None else default_note(),
     )
     with ExitStack() as opened:  # if one part cannot be opened, close those that were
         own = opened.enter_context(closing(open_camera(camera, HOST_CLOCK, now.monotonic_ns())))
@@ -348,19 +351,25 @@ def _side(asked: str | None, rig: Rig | None) -> Side:
 
 
 def _core(
-    rig: Rig | None, geometry: StereoGeometry | None, matcher: str | Matcher, disparities: int | None, near_m: float
+    rig: Rig | None,
+    geometry: StereoGeometry | None,
+    matcher: str | Matcher | None,
+    disparities: int | None,
+    near_m: float,
 ) -> StereoCore | None:
-    if rig is None and geometry is None and disparities is None and isinstance(matcher, str):
+    if rig is None and geometry is None and disparities is None and (matcher is None or isinstance(matcher, str)):
         return None
     rectifier = None if rig is None else Rectifier(rig)
     wanted = DepthWanted(search_from_m=near_m if disparities is None else math.nan)
     return StereoCore(_matcher(matcher, disparities, rectifier), rectifier, geometry, wanted)
 
 
-def _matcher(matcher: str | Matcher, disparities: int | None, rectifier: Rectifier | None) -> Matcher | MatchSettings:
-    if not isinstance(matcher, str):
+def _matcher(
+    matcher: str | Matcher | None, disparities: int | None, rectifier: Rectifier | None
+) -> Matcher | MatchSettings:
+    if not (matcher is None or isinstance(matcher, str)):
         return matcher
-    chosen = matcher_named(matcher)
+    chosen = default_matcher() if matcher is None else matcher_named(matcher)
     if disparities is not None:
         return MatchSettings(chosen, disparities)
     if rectifier is None:

@@ -29,7 +29,7 @@ class PhoneHostSettings:
     )
     camera: str = setting("", "camera of this machine, for example v4l2:/dev/video0")
     calibration: str = setting("", "rig.yaml of the two cameras")
-    matcher: str = setting("sgbm", "stereo matcher")
+    matcher: str = setting("", "stereo matcher; by default the best that works on this machine")
     tolerance: float = setting(
         0.0,
         "greatest difference of the two exposure times in a pair, ms; 0: half of the longer frame period",

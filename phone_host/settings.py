@@ -3,16 +3,17 @@
 import argparse
 import math
 import os
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.program.settings import Resolved, log_level, resolve
+from common.program.settings import DEFAULT, Resolved, log_level, resolve
 from phone_host.camera.factory import check_camera
 from phone_host.declared_settings import PhoneHostSettings
+from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.sync.fifo import FifoSettings
 
@@ -29,7 +30,15 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
     """Resolve the settings from file, environment and a verb's options. Options named like a setting are used."""
     given = {item.name: getattr(options, item.name, None) for item in fields(PhoneHostSettings)}
     given["link"] = tuple(given["link"]) if given["link"] else None
-    return resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
+    resolved = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
+    if matcher_is_given(resolved):
+        return resolved
+    return replace(resolved, values=replace(resolved.values, matcher=default_matcher().value))
+
+
+def matcher_is_given(resolved: Resolved[PhoneHostSettings]) -> bool:
+    """Return whether a user named the matcher."""
+    return dict(resolved.origins)["matcher"] != DEFAULT
 
 
 def check(settings: PhoneHostSettings) -> None:

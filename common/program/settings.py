@@ -21,6 +21,9 @@ from common.program.quantities import decimal_number, whole_number
 
 T = TypeVar("T")
 
+DEFAULT: Final = "default"
+"""The origin of a setting that nobody gave."""
+
 
 @dataclass(frozen=True, slots=True)
 class Resolved(Generic[T]):
@@ -55,7 +58,7 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
     values: dict[str, Any] = {}
     origins = []
     for item in fields(kind):  # type: ignore[arg-type]  # T is always a dataclass
-        origin, variable = "default", f"{prefix}_{item.name.upper()}"
+        origin, variable = DEFAULT, f"{prefix}_{item.name.upper()}"
         value: Any = item.default
         read: Any = item.metadata.get("read")
         if item.name in in_file:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from common.program.quantities import reading, seconds
+from phone_host.stereo.matcher_names import default_words
 
 NEXT_STEPS = """delay-bench measures every delay of each link between board and host. It runs both itself and needs no camera.
 
@@ -66,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CHANGES",
         help="predict the delays of a setting without running it, for example fps=60,size=640x480,kB=40,fifo=4:block,processing=0.5,link=wifi",
     )
-    parser.add_argument("--matcher", default="sgbm", metavar="NAME", help="stereo matcher (default sgbm)")
+    parser.add_argument("--matcher", metavar="NAME", help=f"stereo matcher ({default_words()})")
     parser.add_argument(
         "--fifo",
         default="1:drop-oldest",

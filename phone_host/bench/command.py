@@ -37,6 +37,7 @@ from phone_host.bench.tables import (
 from phone_host.bench.trace import TracedRun, trace_json
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import claim
+from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.sync.fifo import FifoSettings
 
@@ -116,7 +117,11 @@ def _tell(options: argparse.Namespace, results: Sequence[CaseResult], under: Con
 def _settings(options: argparse.Namespace) -> RunSettings:
     if not 0.5 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds is {options.seconds:g}", "give 0.5 to 3600 seconds")
-    return RunSettings(matcher_named(options.matcher), FifoSettings.parse(options.fifo), options.seconds)
+    return RunSettings(
+        matcher_named(options.matcher) if options.matcher else default_matcher(),
+        FifoSettings.parse(options.fifo),
+        options.seconds,
+    )
 
 
 def _make_folder(folder: Path) -> None:

@@ -77,6 +77,7 @@ class RunSnapshot:
         save_every: every Nth pair was saved, beginning with the first; 0: none.
         last_s: when the last pair was done, counted from the start of the run, s.
         orientations: what the left and the right camera have been given to be upright.
+        matcher_note: what is to be said of the choice of the matcher; empty: nothing.
         budget: how the time budget for each pair was held; None: there is none, or no pair yet.
     """
 
@@ -124,6 +125,7 @@ class RunSnapshot:
     save_every: int = 0
     last_s: float = 0.0
     orientations: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+    matcher_note: str = ""
     budget: BudgetAccount | None = None
 
     @property

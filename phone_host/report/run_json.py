@@ -58,6 +58,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "frames": _frames(run),
         "host_frames": _host_frames(run),
         "depth": _depth(run.depth),
+        "matcher_note": run.matcher_note or None,
         "budget": budget_values(run.budget),
         "regime": _regime(judge(figures(run))),
         "image_motion_px_per_s": _number(run.motion_px_s),

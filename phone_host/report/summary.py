@@ -57,6 +57,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += [f"warning: {line}" for line in past_lines(run)]
     lines += depth_lines(run.images)
     lines += cut_lines(run.depth)
+    lines += [f"note: {run.matcher_note}"] if run.matcher_note else []
     lines += budget_lines(run.budget)
     lines += camera_troubles(run.camera)
     lines += [*rung_lines(run.link), *_links(run.link, width), *_unused_lines(run)]

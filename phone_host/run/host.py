@@ -280,6 +280,7 @@ class Host:
             save_every=0 if self._settings.out is None else self._settings.save_every,
             last_s=max(0, books.last_done_ns - self.started_ns) / 1e9,
             orientations=self._orientations,
+            matcher_note=self._settings.matcher_note,
             budget=None if self._budget is None else self._budget.account,
         )
 

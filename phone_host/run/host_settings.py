@@ -41,6 +41,7 @@ class HostSettings:
         most_pixels: largest accepted image size of either camera, pixels.
         resolved: the settings of the run with their origins, for settings.json; None: not saved.
         axes: of the points in saved clouds.
+        matcher_note: what the summary says of the choice of the matcher; empty: nothing.
         budget: time budget for each pair; None: there is none. Only with a core that was built from settings.
     """
 
@@ -58,4 +59,5 @@ class HostSettings:
     most_pixels: int = MOST_PIXELS
     resolved: Mapping[str, object] | None = None
     axes: Axes = Axes.CAMERA
+    matcher_note: str = ""
     budget: BudgetWanted | None = None

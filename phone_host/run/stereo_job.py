@@ -67,6 +67,7 @@ class StereoJob:
         out: the results folder.
         make_core: makes the stereo core for images of this size (width and height of the left one, px).
         matcher: its name, for the report.
+        matcher_note: what is to be said of the choice of the matcher; empty: nothing.
         axes: of cloud.ply and xyz.pfm.
         most_pixels: an image that claims more is refused.
         mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
@@ -77,6 +78,7 @@ class StereoJob:
     out: Path
     make_core: Callable[[Size], StereoCore]
     matcher: str
+    matcher_note: str = ""
     axes: Axes = Axes.CAMERA
     most_pixels: int = MOST_PIXELS
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
@@ -155,8 +157,13 @@ def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetRepor
         by_name=job.files.by_name,
         left_alone=left,
         right_alone=right,
-        remarks=() if len(pairs) == 1 else _alone(job),
+        remarks=() if len(pairs) == 1 else _of_the_job(job),
     )
+
+
+def _of_the_job(job: StereoJob) -> tuple[Remark, ...]:
+    """Return what is told once: of images without a partner, and of the matcher."""
+    return (*_alone(job), *([Remark(job.matcher_note, is_note=True)] if job.matcher_note else []))
 
 
 def _alone(job: StereoJob) -> tuple[Remark, ...]:
@@ -254,7 +261,7 @@ class _Work:
             remarks = [
                 *turned_remarks(*opened),
                 *pair_remarks(processed, trust, core.wanted.search_from_m),
-                *(() if folder else _alone(self._job)),
+                *(() if folder else _of_the_job(self._job)),
             ]
             report = PairReport(
                 name=folder,

@@ -38,6 +38,7 @@ from phone_host.stereo.depth_limits import (
 from phone_host.stereo.images import WHOLE, require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_protocol import Matcher, matched_by
+from phone_host.stereo.native.library import native
 from phone_host.stereo.points import points_of
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
@@ -107,8 +108,9 @@ class StereoCore:
         self.geometry = geometry if rectifier is None else rectifier.geometry
         self.wanted = wanted
         self._kept: dict[_Key, _Ready] = {}
+        native()  # a wrong TANDEMSCAN_SIMD is told before the first pair comes
         if isinstance(matcher, MatchSettings):
-            create_matcher(matcher)  # a name or a number that is wrong is told before the first pair comes
+            create_matcher(matcher)  # so is a name or a number that is wrong is told before the first pair comes
 
     def compute(
         self,

@@ -14,17 +14,20 @@ user types. The entry point is a callable that takes the number of disparities (
 `Matcher`, which keeps the rules above.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import assert_never
 
 from common.errors import SettingsError
 from common.program.extensions import make_registered
+from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
+from phone_host.stereo.match_tandem import TandemMatcher
 from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
+from phone_host.stereo.native.library import native, required
 from phone_host.stereo.network_name import NetworkMatcher
 
 
@@ -33,14 +36,14 @@ class MatchSettings:
     """Settings from which a matcher is built.
 
     Attributes:
-        matcher: the algorithm.
+        matcher: the algorithm; by default that of this machine.
         disparities: N, px: 0 <= d < N is searched. Any number from 1; far above the image's width it costs no more.
 
     Raises:
         SettingsError: disparities below 1.
     """
 
-    matcher: AnyMatcher = MatcherName.SGBM
+    matcher: AnyMatcher = field(default_factory=default_matcher)
     disparities: int = 64
 
     def __post_init__(self) -> None:
@@ -62,7 +65,8 @@ def create_matcher(settings: MatchSettings) -> Matcher:
 
     Raises:
         SettingsError: another package's matcher cannot be loaded or does not fit, or a network's file is not there.
-        UnavailableError: onnxruntime, which a network needs, is not installed.
+        UnavailableError: onnxruntime, which a network needs, is not installed; or the native library, which tandem needs,
+            is not built.
         DataError: the file is no network that matches two images.
     """
     match settings.matcher:
@@ -70,6 +74,8 @@ def create_matcher(settings: MatchSettings) -> Matcher:
             return BlockMatcher(settings.disparities)
         case MatcherName.SGBM:
             return SgbmMatcher(settings.disparities)
+        case MatcherName.TANDEM:
+            return TandemMatcher(settings.disparities, required(native()))
         case RegisteredMatcher(name):
             registered: Matcher = make_registered(MATCHERS, name, Matcher, settings.disparities)
             return CheckedMatcher(registered, name, settings.disparities)

@@ -6,6 +6,7 @@ are measured from the pair itself, without memory, and left alone where the evid
 calibration; the matcher cannot fix them.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,12 +20,15 @@ LEAST_CONTRAST = 2.0
 """Grey levels. An image with a lower standard deviation holds little but its own rounding; its contrast can't be measured."""
 
 WINDOW_PX = 9
-"""Edge of the windows in which the offset is measured: the smallest odd window at which the estimate stopped changing."""
+"""Edge of the squares in which the offset is measured: the smallest odd one at which the estimate stopped changing."""
 
 LEAST_INFORMATION = 4.0
 """A window counts from this mean squared vertical gradient (grey levels^2 per px^2) on: a gradient of two levels a pixel."""
 
-LEAST_WINDOWS = 100
+LEAST_SHARE = 0.5
+"""Of a window's pixels that must have a disparity."""
+
+LEAST_WINDOWS = 20
 """Fewer windows than this are too few for a median."""
 
 GREATEST_OFFSET_PX = 2.0
@@ -35,6 +39,12 @@ LEAST_OFFSET_PX = 0.1
 
 NEWTON_STEPS = 2
 """The first step brings 0.5 px to within 0.1; the second reaches the noise."""
+
+CUBIC = -0.75
+"""Keys's parameter of cubic interpolation (IEEE ASSP 29(6), 1981), as OpenCV has it."""
+
+SETTLED_PX = 0.03
+"""After a first step so small a second one changes nothing that matters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,44 +116,52 @@ def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float
         windows have texture, if less than three quarters of the evidence agrees on the direction, or if the offset
         exceeds GREATEST_OFFSET_PX.
     """
-    height, width = left.shape
-    column, row = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-    column -= np.nan_to_num(disparity)
-    used = np.isfinite(disparity) & (column >= 0)
+    height, width = (size // WINDOW_PX * WINDOW_PX for size in left.shape)  # whole windows
+    if height == 0 or width == 0:
+        return 0.0
+    place = np.arange(width, dtype=np.float32) - disparity[:height, :width]
+    used = place >= 0  # not where it is NaN
+    column = np.where(used, place, np.float32(0))
     low = offset = high = 0.0
     for _ in range(NEWTON_STEPS):
-        guesses, weights = _window_offsets(left, right, column=column, row=row + np.float32(offset), used=used)
+        row = np.broadcast_to(np.arange(height, dtype=np.float32)[:, np.newaxis] + np.float32(offset), column.shape)
+        there = cv2.remap(right, column, row.copy(), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        guesses, weights = _window_offsets(left[:height, :width], np.asarray(there, np.uint8), used)
         if guesses.size < LEAST_WINDOWS:
             return 0.0
-        low, offset, high = (offset + quartile for quartile in _weighted_quartiles(guesses, weights))
+        step = _weighted_quartiles(guesses, weights)
+        low, offset, high = (offset + quartile for quartile in step)
+        if abs(step[1]) < SETTLED_PX:
+            break
     return offset if low * high > 0 and abs(offset) <= GREATEST_OFFSET_PX else 0.0
 
 
 def _window_offsets(
-    left: Image, right: Image, *, column: NDArray[np.float32], row: NDArray[np.float32], used: NDArray[np.bool_]
+    here: Image, there: Image, used: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the remaining offset of each window with texture, px, and its weight; the right image is read at (column, row)."""
-    there = np.asarray(cv2.remap(right, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
-    here = left.astype(np.float32)
-    middle = (here + there) / 2
+    """Return the remaining offset of each window with texture, px, and its weight; `there` is the right image, seen from the left."""
     mask = used.astype(np.float32)
-    # Sobel's weights add up to 8 for a slope of one level a pixel.
-    across = cv2.Sobel(middle, cv2.CV_32F, 1, 0, scale=1 / 8) * mask
-    down = cv2.Sobel(middle, cv2.CV_32F, 0, 1, scale=1 / 8) * mask
-    difference = here - there
-    difference -= cv2.blur(difference, (WINDOW_PX, WINDOW_PX))  # removes the local rest of unequal exposure
+    total = cv2.add(here, there, dtype=cv2.CV_32F)
+    # Sobel's weights add up to 8 for a slope of one level a pixel; the total is twice the mean.
+    across = cv2.multiply(cv2.Sobel(total, cv2.CV_32F, 1, 0, scale=1 / 16), mask)
+    down = cv2.multiply(cv2.Sobel(total, cv2.CV_32F, 0, 1, scale=1 / 16), mask)
+    difference = cv2.subtract(here, there, dtype=cv2.CV_32F)
+    size = (mask.shape[1] // WINDOW_PX, mask.shape[0] // WINDOW_PX)
 
     def window_mean(values: cv2.typing.MatLike) -> NDArray[np.float32]:
-        # Windows overlap; every fourth one in each direction holds the same information as all of them.
-        return np.asarray(cv2.blur(values, (WINDOW_PX, WINDOW_PX))[::4, ::4], np.float32)
+        return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA), np.float32)
 
+    share = window_mean(mask)
+    # Of the difference counts what is not the window's mean, which is the rest of unequal exposure.
+    shift = window_mean(cv2.multiply(difference, mask)) / np.maximum(share, np.float32(1e-3))
     xx = (
-        window_mean(across * across) + 1
+        window_mean(cv2.multiply(across, across)) + 1
     )  # one level^2 of noise keeps the division meaningful where nothing varies in x
-    xy, yy = window_mean(across * down), window_mean(down * down)
-    xt, yt = window_mean(across * difference), window_mean(down * difference)
+    xy, yy = window_mean(cv2.multiply(across, down)), window_mean(cv2.multiply(down, down))
+    xt = window_mean(cv2.multiply(across, difference)) - window_mean(across) * shift
+    yt = window_mean(cv2.multiply(down, difference)) - window_mean(down) * shift
     information = yy - xy * xy / xx
-    counted = used[::4, ::4] & (information > LEAST_INFORMATION)
+    counted = (share > LEAST_SHARE) & (information > LEAST_INFORMATION)
     guesses = (yt - xy / xx * xt) / np.maximum(information, np.float32(1))
     return np.asarray(guesses[counted], np.float32), np.asarray(information[counted], np.float32)
 
@@ -166,9 +184,12 @@ def moved_up(image: Image, offset_px: float) -> Image:
     Returns:
         (H, W) uint8.
     """
-    height, width = image.shape
-    shift = np.array([[1, 0, 0], [0, 1, offset_px]], np.float64)
-    flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
-    return np.asarray(
-        cv2.warpAffine(image, shift, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE), np.uint8
-    )
+    whole = math.floor(offset_px)
+    t = offset_px - whole
+    a = CUBIC
+    near, far = ((a + 2) * x**3 - (a + 3) * x**2 + 1 for x in (t, 1 - t))
+    before, after = (a * (x**3 - 5 * x**2 + 8 * x - 4) for x in (t + 1, 2 - t))
+    first, last = min(whole - 1, 0), max(whole + 2, 0)
+    taps = np.zeros((last - first + 1, 1), np.float32)
+    taps[whole - 1 - first : whole + 3 - first, 0] = before, near, far, after
+    return np.asarray(cv2.filter2D(image, -1, taps, anchor=(0, -first), borderType=cv2.BORDER_REPLICATE), np.uint8)

@@ -32,9 +32,11 @@ def check_pair(pair: RectifiedPair) -> None:
 
 
 def grey(image: Image) -> Image:
-    """Return the image as (H, W) uint8 grey; a grey one is returned as it is.
+    """Return the image as (H, W) uint8 grey; a grey one is returned as it is, or as a copy if its rows overlap in memory.
 
     Args:
         image: (H, W) grey or (H, W, 3) BGR, uint8.
     """
+    if image.shape[0] > 1 and image.strides[0] < image[0].nbytes:  # OpenCV refuses such rows
+        image = np.ascontiguousarray(image)
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)

@@ -29,14 +29,17 @@ LEAST_PIXELS: Final = 400
 LEAST_FOR_FIELD: Final = 2000
 """A gain that changes over the image has five numbers more; five times as many pixels are asked for."""
 
-MOST_PIXELS: Final = 5_000
+MOST_PIXELS: Final = 3_000
 """More pixels than this, evenly chosen, do not change the result."""
 
 LEAST_SPREAD: Final = 2.0
 """Grey levels: with a lower standard deviation a gain cannot be measured."""
 
 ROUNDS: Final = 8
-"""Of reweighting; gain and offset stand to three digits by then."""
+"""Of reweighting at most; gain and offset stand to three digits by then."""
+
+SETTLED_LEVELS: Final = 0.02
+"""Grey levels: a round that changes no level by more is the last; levels are whole numbers."""
 
 CAUCHY_SCALES: Final = 2.0
 """Residuals of two robust standard deviations count half (Cauchy's weight)."""
@@ -128,18 +131,26 @@ def levels_between(left: Image, right: Image, disparity: Disparity) -> LevelFiel
 def _corresponding(left: Image, right: Image, disparity: Disparity) -> tuple[Values, Values, Values, Values]:
     """Return levels left and right of evenly chosen corresponding pixels, and where in the right image they lie, -1 to 1."""
     height, width = left.shape
-    x, y = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-    x -= np.nan_to_num(disparity)
-    window = (WINDOW_PX, WINDOW_PX)
-    here = cv2.blur(left.astype(np.float32), window)
-    there = cv2.remap(cv2.blur(right.astype(np.float32), window), x, y, cv2.INTER_LINEAR)
-    used = np.isfinite(disparity) & (x >= 0)
-    for levels in (here, there):
-        used &= (levels > BLACKEST) & (levels < WHITEST)
-    step = max(1, int(np.count_nonzero(used)) // MOST_PIXELS)
-    chosen = np.flatnonzero(used)[::step]
-    a, b, u, v = (np.asarray(values, np.float64).reshape(-1)[chosen] for values in (here, there, x, y))
+    place = np.flatnonzero(disparity <= np.arange(width, dtype=np.float32))  # NaN is at no place
+    if place.size > MOST_PIXELS:
+        place = place[np.arange(MOST_PIXELS) * place.size // MOST_PIXELS]
+    row, column = np.divmod(place, width)
+    x, y = (column - disparity.reshape(-1)[place]).astype(np.float32), row.astype(np.float32)
+    here = _local_means(left).reshape(-1)[place]
+    there = here[:0] if place.size == 0 else _seen_at(_local_means(right), x, y)
+    used = np.minimum(here, there) > BLACKEST
+    used &= np.maximum(here, there) < WHITEST
+    a, b, u, v = (np.asarray(values[used], np.float64) for values in (here, there, x, y))
     return a, b, u / max(width - 1, 1) * 2 - 1, v / max(height - 1, 1) * 2 - 1
+
+
+def _local_means(image: Image) -> NDArray[np.float32]:
+    return np.asarray(cv2.boxFilter(image, cv2.CV_32F, (WINDOW_PX, WINDOW_PX)), np.float32)
+
+
+def _seen_at(image: NDArray[np.float32], x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+    seen = cv2.remap(image, x[np.newaxis], y[np.newaxis], cv2.INTER_LINEAR)
+    return np.asarray(seen, np.float32).reshape(-1)
 
 
 def _weights(residuals: Values) -> Values:
@@ -158,8 +169,12 @@ def _line(here: Values, there: Values) -> tuple[float, float]:
         spread_there = float(weight @ (there - middle_there) ** 2)
         if spread_there <= 0:
             break
+        before = gain * middle_there + offset, gain
         gain = float(np.sqrt(weight @ (here - middle_here) ** 2 / spread_there))
         offset = middle_here - gain * middle_there
+        # The line turns about the middle; 128 levels from there is the farthest that matters.
+        if abs(middle_here - before[0]) + 128 * abs(gain - before[1]) < SETTLED_LEVELS:
+            break
     return gain, offset
 
 

@@ -3,7 +3,7 @@
 docs/decisions/0002-sgbm-tuning.md says what each step gains:
 
 1. the right image gets the left one's levels (match_levels), and is moved vertically if it is measurably too high or low
-   (match_align); both are measured along a rough match at half size that needs no equal levels;
+   (match_align); both are measured along a rough match at half size that needs no equal levels (match_differences);
 2. StereoSGBM, 3-way mode, single-pixel cost, once for the left and once for the right view, with OpenCV's own checks
    off; the left border is extended by N pixels, without which the first N columns would get no value;
 3. median of the left view, left-right check, speckles dropped, rows dropped whose texture says nothing: the rest is NaN;
@@ -16,11 +16,10 @@ import cv2
 import numpy as np
 
 from common.errors import SettingsError
-from phone_host.model import Disparity, Image, Matched, MatchReport, RectifiedPair
+from phone_host.model import Disparity, Image, Matched, RectifiedPair
 from phone_host.stereo import filters
-from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_offset_px
+from phone_host.stereo.match_differences import ROUGH_FACTOR, differences, reduced
 from phone_host.stereo.match_input import check_pair, grey
-from phone_host.stereo.match_levels import LevelField, levels_between, without_levels
 from phone_host.stereo.match_support import supported, without_doubtful_bridges
 
 COST_STEP, COST_JUMP = 12, 26
@@ -107,26 +106,11 @@ class SgbmMatcher:
         """Match one pair and tell what was corrected; see `ReportingMatcher.matched`."""
         check_pair(pair)
         left, right = grey(pair.left), grey(pair.right)
-        levels, vertical_px = self._differences(left, right)
-        right = levels.of(right)
-        right = right if vertical_px == 0 else moved_up(right, vertical_px)
-        disparity = self._disparity(left, right)
-        report = MatchReport(vertical_px=vertical_px, gain=levels.gain, offset_levels=levels.offset_levels)
-        return Matched(disparity=disparity, report=report)
+        found = differences(left, right, self._rough_match)
+        return Matched(disparity=self._disparity(left, found.undone(right)), report=found.report())
 
-    def _differences(self, left: Image, right: Image) -> tuple[LevelField, float]:
-        """Measure with a rough match at half size how the right image's levels differ, and how far too low it lies, px.
-
-        A vertical error too small to be worth a correction is 0.
-        """
-        small_left, small_right = reduced(left, 2), reduced(right, 2)
-        rough = filters.to_px(
-            self._compute(self._rough, without_levels(small_left), without_levels(small_right), scale=2)
-        )
-        levels = levels_between(small_left, small_right, rough)
-        small_px = vertical_offset_px(small_left, levels.of(small_right), rough)
-        vertical_px = small_px * left.shape[0] / small_left.shape[0]
-        return levels, 0.0 if abs(vertical_px) < LEAST_OFFSET_PX else vertical_px
+    def _rough_match(self, left: Image, right: Image) -> Disparity:
+        return filters.to_px(self._compute(self._rough, left, right, ROUGH_FACTOR))
 
     def _disparity(self, left: Image, right: Image) -> Disparity:
         """Match two images that are aligned."""
@@ -181,10 +165,3 @@ class SgbmMatcher:
 
 def _mirrored(image: Image) -> Image:
     return np.asarray(cv2.flip(image, 1), np.uint8)
-
-
-def reduced(image: Image, factor: int) -> Image:
-    """Return the image at a fraction of its size, at least one pixel wide and high; each pixel is the mean of what it covers."""
-    height, width = image.shape
-    size = (max(width // factor, 1), max(height // factor, 1))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)

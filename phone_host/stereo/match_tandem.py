@@ -1,15 +1,19 @@
 """The own matcher: semi-global matching of both views in C (`native/src/match.c`), for two unlike cameras.
 
-docs/decisions/0032-own-matcher.md says what each step gains and what was left out.
+1. The right image gets the left one's levels and height, both measured along a rough match at half size (match_differences).
+2. The library matches: `native/src/match.c` says how. docs/decisions/0032-own-matcher.md says what each step gains and what
+   was left out.
 """
 
 import os
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import SettingsError
-from phone_host.model import Disparity, Image, RectifiedPair
+from phone_host.model import Confidence, Disparity, Image, Matched, RectifiedPair
+from phone_host.stereo.match_differences import ROUGH_FACTOR, differences
 from phone_host.stereo.match_input import check_pair, grey
 from phone_host.stereo.native.library import Library, MatchJob
 
@@ -18,6 +22,9 @@ GREATEST_SEARCH = 2048
 
 GREATEST_WIDTH = 32767
 """Columns that fit its int16."""
+
+CLASSES = 15
+"""Of the histogram of confidence: 17 levels each."""
 
 
 def matching_threads() -> int:
@@ -35,25 +42,88 @@ class TandemMatcher:
     """
 
     def __init__(self, disparities: int, library: Library, threads: int = 0) -> None:
-        self._disparities, self._library = disparities, library
-        self._threads = threads or matching_threads()
-        self._workspace: NDArray[np.uint8] = np.empty(0, np.uint8)
+        self._whole = _Engine(disparities, library, threads or matching_threads())
+        self._rough = _Engine(-(-disparities // ROUGH_FACTOR), library, threads or matching_threads())
 
     def match(self, pair: RectifiedPair) -> Disparity:
-        """Match one pair; see `Matcher.match`."""
-        check_pair(pair)
-        return self._computed(grey(pair.left), grey(pair.right))[0]
+        """Match one pair; see `Matcher.match`.
 
-    def _computed(self, left: Image, right: Image) -> tuple[Disparity, NDArray[np.uint8]]:
-        height, width = left.shape
-        searched = min(
-            self._disparities, width
-        )  # d <= x < width: a wider search could only find places outside the right image
-        if searched > GREATEST_SEARCH or width > GREATEST_WIDTH:
+        Raises:
+            SettingsError: more than 2048 disparities are asked for on an image at least that wide.
+        """
+        return self.matched(pair).disparity
+
+    def matched(self, pair: RectifiedPair) -> Matched:
+        """Match one pair and tell what was corrected; see `ReportingMatcher.matched`."""
+        check_pair(pair)
+        left, right = grey(pair.left), grey(pair.right)
+        self._whole.require_room(*left.shape)  # before the rough match, which needs less
+        found = differences(
+            left, right, lambda small_left, small_right: self._rough.computed(small_left, small_right)[0]
+        )
+        disparity, confidence = self._whole.computed(left, found.undone(right))
+        report = found.report(confidence_histogram(confidence))
+        return Matched(disparity=disparity, confidence=confidence, report=report)
+
+
+def confidence_histogram(confidence: Confidence) -> tuple[int, ...]:
+    """Count the pixels that have a value, in 15 classes of 17 levels of confidence.
+
+    Args:
+        confidence: (H, W) uint8, 0 = no value.
+    """
+    counts = np.asarray(cv2.calcHist([confidence], [0], None, [256], [0, 256])).reshape(-1)[1:]
+    return tuple(int(count) for count in counts.reshape(CLASSES, -1).sum(axis=1))
+
+
+class _Engine:
+    """The library's matcher with its workspace.
+
+    Args:
+        disparities: N >= 1.
+        library: computes.
+        threads: at least 1.
+    """
+
+    def __init__(self, disparities: int, library: Library, threads: int) -> None:
+        self._disparities, self._library, self._threads = disparities, library, threads
+        self._workspace: NDArray[np.uint8] = np.empty(0, np.uint8)
+
+    def require_room(self, height: int, width: int) -> None:
+        """Refuse images that the library cannot hold.
+
+        Args:
+            height: of the image, px.
+            width: of the image, px.
+
+        Raises:
+            SettingsError: the image is too wide, or N is too large for it.
+        """
+        if width > GREATEST_WIDTH or height > GREATEST_WIDTH:
             raise SettingsError(
-                f"disparities = {self._disparities} at {width} px is more than tandem can hold ({GREATEST_SEARCH})",
+                f"images of {width}x{height} px are larger than tandem can hold ({GREATEST_WIDTH} px a side)",
+                "use smaller images, or --matcher block",
+            )
+        if min(self._disparities, width) > GREATEST_SEARCH:
+            raise SettingsError(
+                f"disparities = {self._disparities} is more than tandem can hold ({GREATEST_SEARCH})",
                 "use smaller images, fewer disparities, or --matcher block",
             )
+
+    def computed(self, left: Image, right: Image) -> tuple[Disparity, Confidence]:
+        """Match two grey images of one size; the library itself checks neither sizes nor strides.
+
+        Args:
+            left: (H, W) uint8, with any strides.
+            right: the same size.
+
+        Returns:
+            Disparity, (H, W) float32, px, NaN = none; and confidence, (H, W) uint8, 0 = none.
+        """
+        height, width = left.shape
+        self.require_room(height, width)
+        if right.shape != left.shape or left.dtype != np.uint8 or right.dtype != np.uint8 or left.size == 0:
+            raise ValueError(f"no pair: {left.dtype} {left.shape}, {right.dtype} {right.shape}")
         left, right = (image if image.strides[1] == 1 else np.ascontiguousarray(image) for image in (left, right))
         disparity = np.empty((height, width), np.float32)
         confidence = np.empty((height, width), np.uint8)
@@ -66,7 +136,8 @@ class TandemMatcher:
             confidence=confidence.ctypes.data,
             width=width,
             height=height,
-            disparities=searched,
+            # d <= x < width: a wider search could only find places outside the right image.
+            disparities=min(self._disparities, width),
             threads=self._threads,
         )
         needed = self._library.match_bytes(job)

@@ -15,11 +15,27 @@ MATCHERS: Final = "tandemscan.matchers"
 class MatcherName(Enum):
     """The matchers by the name a user types.
 
-    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is semi-global matching, the default.
+    BLOCK is the paper's: 8 x 8 sum of absolute differences, winner takes all. SGBM is OpenCV's semi-global matching with
+    checks of our own. TANDEM is our own semi-global matching, in the native library.
     """
 
     BLOCK = "block"
     SGBM = "sgbm"
+    TANDEM = "tandem"
+
+
+FALLBACK: Final[MatcherName] = MatcherName.SGBM
+"""The matcher that works wherever OpenCV does."""
+
+PREFERRED: Final[MatcherName] = MatcherName.SGBM
+"""The default of all commands, on machines where it works; elsewhere FALLBACK (see `default_matcher`)."""
+
+
+def default_words(preferred: MatcherName = PREFERRED) -> str:
+    """Return what help texts say of the default."""
+    if preferred is FALLBACK:
+        return f"default {FALLBACK.value}"
+    return f"default {preferred.value}, or {FALLBACK.value} where the native library is not built"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +66,7 @@ class UsualCost:
 
 
 BEST_FIRST: Final = {
+    MatcherName.TANDEM: UsualCost(step_ns=0.2, pixel_ns=40.0),
     MatcherName.SGBM: UsualCost(step_ns=1.1, pixel_ns=140.0),
     MatcherName.BLOCK: UsualCost(step_ns=2.2, pixel_ns=10.0),
 }

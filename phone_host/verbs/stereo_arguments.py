@@ -4,7 +4,7 @@ import argparse
 from typing import Final
 
 from phone_host.declared_settings import NEAR_M
-from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_names import MatcherName, default_words
 
 DEFAULT_NEAR_MM: Final = NEAR_M * 1000
 """Default nearest depth, mm: the near limit of hand-held scanners (Structure Sensor 350 mm, RealSense D435 280 mm).
@@ -63,5 +63,5 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--matcher",
         metavar="NAME",
-        help=f"stereo matcher: {own}, onnx:PATH for a network, or one from an installed package (default sgbm)",
+        help=f"stereo matcher: {own}, onnx:PATH for a network, or one from an installed package ({default_words()})",
     )

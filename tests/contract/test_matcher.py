@@ -15,6 +15,7 @@ from tests.support.planes import noise, plane
 MATCHERS = [
     MatcherName.BLOCK,
     MatcherName.SGBM,
+    MatcherName.TANDEM,
 ]
 
 every_matcher = pytest.mark.parametrize("name", MATCHERS, ids=lambda name: name.value)

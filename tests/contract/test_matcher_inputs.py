@@ -211,6 +211,20 @@ def test_strides_of_colours_do_not_matter(name: MatcherName) -> None:
 
 
 @every_matcher
+def test_overlapping_rows_are_read_as_they_are(name: MatcherName) -> None:
+    """Rows that share memory (one line repeated, a window that slides over it, grey or in colour) match as their copies do."""
+    line = noise(400, 1, 3)[0]
+    sliding = np.lib.stride_tricks.sliding_window_view(line, 200)[:60]
+    same = np.broadcast_to(line[:200], (60, 200))
+    coloured = np.broadcast_to(noise(200, 3, 4).T, (60, 200, 3))
+    matcher = create_matcher(MatchSettings(name, 32))
+    for view in (sliding, same, sliding[::-1], coloured):
+        right = np.roll(view, -5, axis=1)
+        expected = matcher.match(RectifiedPair(view.copy(), right)).tobytes()
+        assert matcher.match(RectifiedPair(view, right)).tobytes() == expected
+
+
+@every_matcher
 def test_hostile_pairs_leave_no_trace(name: MatcherName) -> None:
     """After saturated, tiny, wide and refused pairs, colour and grey, a matcher gives the same bits as a fresh one."""
     pair = plane(seed=11).pair

@@ -27,9 +27,10 @@ from phone_host.stereo.native.build_library import LIBRARY_FILE, SOURCES, WARNIN
 from phone_host.stereo.native.library import Library, native
 from phone_host.stereo.points import points_of, reproject_job
 from phone_host.stereo.reproject import rays
+from tests.native.match_cases import fixed_cases, result_of
 
 PROGRAM = Path(__file__).resolve().parent / "arm_program"
-KINDS = ("points", "records", "remap")
+KINDS = ("points", "records", "remap", "match")
 """As `checks` in check.c orders them."""
 
 
@@ -130,9 +131,19 @@ def remap_cases() -> Iterator[Case]:
         yield Case("remap", (np.array([width, height], "<i4"), image, places, fractions, out))
 
 
+def match_cases(library: Library) -> Iterator[Case]:
+    """Pairs of all kinds, sizes and strides."""
+    for case in fixed_cases():
+        left, right = case.left, case.right
+        whole = [case.width, case.height, case.disparities, case.threads]
+        whole += [left.offset, left.stride, right.offset, right.stride]
+        found = result_of(library, case)
+        yield Case("match", (np.array(whole, "<i4"), left.memory, right.memory, *found))
+
+
 def every_case(library: Library) -> list[Case]:
     """All cases of all kinds."""
-    return [*point_cases(library), *record_cases(library), *remap_cases()]
+    return [*point_cases(library), *record_cases(library), *match_cases(library), *remap_cases()]
 
 
 def write_cases(path: Path, cases: list[Case]) -> None:

@@ -32,7 +32,7 @@ def real_pairs() -> dict[str, tuple[str, str, int]]:
 
 @pytest.mark.data
 @pytest.mark.skipif(not SCAN_DATA, reason="SCAN_DATA is not set: no real images here")
-@pytest.mark.parametrize("matcher", ["sgbm", "block"])
+@pytest.mark.parametrize("matcher", ["sgbm", "tandem", "block"])
 @pytest.mark.parametrize("name", real_pairs())
 def test_a_streamed_real_pair_equals_the_same_files(name: str, matcher: str, tmp_path: Path) -> None:
     """`phone-host run` over ZeroMQ and `phone-host stereo` write the same bytes to disparity.pfm, and they hold a real map."""

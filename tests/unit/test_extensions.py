@@ -128,7 +128,7 @@ def test_our_own_names_cannot_be_taken(install: Callable[[str], None]) -> None:
 def test_an_unknown_matcher_is_refused_with_all_names(install: Callable[[str], None]) -> None:
     """The error for an unknown matcher names ours and the installed ones."""
     install("[tandemscan.matchers]\nflat = somebodys:Flat\n")
-    with pytest.raises(SettingsError, match="block or sgbm or flat"):
+    with pytest.raises(SettingsError, match="block or sgbm or tandem or flat"):
         matcher_named("magic")
 
 

@@ -11,6 +11,7 @@ from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings, create_matcher, make_matcher
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
+from phone_host.stereo.match_tandem import TandemMatcher
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.matcher_protocol import ReportingMatcher, matched_by
 from tests.support.planes import plane
@@ -35,6 +36,7 @@ def test_a_name_as_typed_makes_a_matcher() -> None:
     """`make_matcher` takes the name that a user types, and refuses an unknown one."""
     assert isinstance(make_matcher("block", 16), BlockMatcher)
     assert isinstance(make_matcher("sgbm", 16), SgbmMatcher)
+    assert isinstance(make_matcher("tandem", 16), TandemMatcher)
     with pytest.raises(SettingsError, match="magic"):
         make_matcher("magic", 16)
 

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from common.errors import SettingsError
+from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
@@ -221,6 +221,17 @@ def native() -> Library | Missing:
         SettingsError: `TANDEMSCAN_SIMD` names no instruction set, or one that cannot be used here.
     """
     return load(_HERE, os.environ.get(VARIABLE, ""))
+
+
+def required(found: Library | Missing) -> Library:
+    """Return the library that the matcher `tandem` needs.
+
+    Raises:
+        UnavailableError: there is none.
+    """
+    if isinstance(found, Missing):
+        raise UnavailableError(f"matcher tandem is {found.reason}", f"{found.remedy}; or use --matcher sgbm")
+    return found
 
 
 def load(folder: Path, wanted: str = "") -> Library | Missing:

@@ -1,17 +1,15 @@
 """Reads --budget: what may change to hold it is what the user has not fixed."""
 
 import argparse
-from typing import Final
 
 from common.errors import SettingsError
 from common.program.settings import Resolved
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.run.pair_budget import usable_matchers
+from phone_host.settings import matcher_is_given
 from phone_host.stereo.budget_ladder import BudgetWanted
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.matcher_names import matcher_named
-
-_DEFAULT: Final = "default"
 
 
 def budget_wanted(
@@ -37,7 +35,7 @@ def budget_wanted(
                 "add one of them, or leave it out",
             )
         return None
-    is_named = dict(resolved.origins)["matcher"] != _DEFAULT
+    is_named = matcher_is_given(resolved)
     has_range = options.disparities is not None or options.near is not None
     wanted = BudgetWanted(
         budget_ns=round(settings.budget * 1e6),

@@ -37,8 +37,9 @@ from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.terminal_view import LiveTable
 from phone_host.run.time_limit import patience_s
 from phone_host.run.waiting_note import WaitingNote
-from phone_host.settings import check, key_folder, resolve_settings
+from phone_host.settings import check, key_folder, matcher_is_given, resolve_settings
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_note
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
@@ -191,6 +192,7 @@ def _host_settings(
 ) -> HostSettings:
     settings, wait_s = resolved.values, patience_s(options.wait, options.seconds)
     return HostSettings(
+        matcher_note="" if core is None or matcher_is_given(resolved) else default_note(),
         resolved=with_origins(
             replace(resolved, values=replace(settings, camera=without_password(settings.camera))),
             vars(options),

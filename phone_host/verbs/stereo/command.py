@@ -20,6 +20,7 @@ from phone_host.run.stereo_job import StereoJob, run_stereo
 from phone_host.run.stereo_results import NAMES, require_writable
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
@@ -27,7 +28,6 @@ from phone_host.verbs.output_folders import keep_other_report, require_folder, s
 from phone_host.verbs.stereo.next_commands import Typed, next_commands
 from phone_host.verbs.stereo_options import build_core, output_options
 
-_DEFAULT_MATCHER: Final = "sgbm"
 _CHECK_FAILED: Final = 4
 
 
@@ -38,13 +38,15 @@ def run(options: argparse.Namespace) -> int:
             "neither --calibration nor --rectified is given",
             "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N",
         )
+    matcher = options.matcher or default_matcher().value
     files = pair_files(*two_lists(options.images))
     _require_place(options.out, files)
     job = StereoJob(
         files=files,
         out=options.out,
-        make_core=lambda size_px: _core(options, size_px, files.pairs[0][1]),
-        matcher=options.matcher or _DEFAULT_MATCHER,
+        make_core=lambda size_px: _core(options, matcher, size_px, files.pairs[0][1]),
+        matcher=matcher,
+        matcher_note="" if options.matcher else default_note(),
         axes=output_options(options).axes,
         most_pixels=most_pixels(None, options.max_megapixels),
         mounted=orientations(options),
@@ -71,8 +73,8 @@ def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[s
         say(lines)
 
 
-def _core(options: argparse.Namespace, size_px: Size, image: Path) -> StereoCore:
-    core, _ = build_core(options, options.calibration or "", options.matcher or _DEFAULT_MATCHER, size_px, image)
+def _core(options: argparse.Namespace, matcher: str, size_px: Size, image: Path) -> StereoCore:
+    core, _ = build_core(options, options.calibration or "", matcher, size_px, image)
     if core is None:  # cannot happen: one of the two options was checked above
         raise SettingsError("no stereo core", "give --calibration or --rectified")
     return core

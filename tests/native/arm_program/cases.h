@@ -22,7 +22,7 @@ struct one_case {
 
 /* Each computes a case with an instruction set; returns the number of the first expected field that differs, or -1. */
 typedef int check_fn(int32_t isa, const struct one_case *asked);
-check_fn check_points, check_records, check_remap;
+check_fn check_points, check_records, check_remap, check_match;
 
 /* Whether a result is what a field says, in every bit. */
 int same_bytes(const void *result, uint64_t size, const struct field *expected);

@@ -12,7 +12,7 @@
 #include "cases.h"
 #include "tandem.h"
 
-static check_fn *const checks[] = {check_points, check_records, check_remap};
+static check_fn *const checks[] = {check_points, check_records, check_remap, check_match};
 
 int same_bytes(const void *result, uint64_t size, const struct field *expected)
 {

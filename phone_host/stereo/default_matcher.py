@@ -1,0 +1,37 @@
+"""Which matcher a command uses when nobody names one: the preferred one where it works, else the one that works everywhere."""
+
+from common.errors import SettingsError
+from phone_host.stereo.matcher_names import FALLBACK, PREFERRED, MatcherName
+from phone_host.stereo.native.library import Library, Missing, fallback_note, native
+
+
+def default_matcher(preferred: MatcherName = PREFERRED, library: Library | Missing | None = None) -> MatcherName:
+    """Return the matcher of this machine.
+
+    Args:
+        preferred: the one that is wanted.
+        library: the native library, which `tandem` needs; None: that of this installation.
+    """
+    return preferred if _lacking(preferred, library) is None else FALLBACK
+
+
+def default_note(preferred: MatcherName = PREFERRED, library: Library | Missing | None = None) -> str:
+    """Return what a summary says where the default is not the preferred matcher; empty where it is.
+
+    Args:
+        preferred: the one that is wanted.
+        library: as for `default_matcher`.
+    """
+    lacking = _lacking(preferred, library)
+    return "" if lacking is None else fallback_note(lacking)
+
+
+def _lacking(preferred: MatcherName, library: Library | Missing | None) -> Missing | None:
+    """Return why the preferred matcher does not work; None if it does."""
+    if preferred is not MatcherName.TANDEM:
+        return None
+    try:
+        found = native() if library is None else library
+    except SettingsError:  # the library is there; whoever computes with it says that TANDEMSCAN_SIMD is wrong
+        return None
+    return found if isinstance(found, Missing) else None

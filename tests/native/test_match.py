@@ -1,0 +1,56 @@
+"""The matcher's entry in the library: any pair gives the same bits on all instruction sets and threads, and nothing else is touched.
+
+With sanitizers in `test_sanitized`; for longer, `python -m tests.native.fuzz_match` (`make fuzz`).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from phone_host.stereo.native.library import Library, MatchJob, Simd
+from tests.native.match_cases import MatchCase, fixed_cases, random_case, result_of
+
+CASES = 12
+"""Random pairs for each instruction set: few, because sanitizers make them slow; fuzz_match tries more."""
+
+
+def require_sound(library: Library, case: MatchCase) -> None:
+    """Check a result: the bits of plain C with one thread, values only in [0, N), confidence just where there is a value."""
+    disparity, confidence = result_of(library, case)
+    expected = result_of(library.using(Simd.SCALAR), replace(case, threads=1))
+    assert (disparity.tobytes(), confidence.tobytes()) == tuple(array.tobytes() for array in expected), case
+    values = disparity[~np.isnan(disparity)]
+    assert ((values >= 0) & (values < case.disparities)).all(), case
+    assert ((confidence > 0) == ~np.isnan(disparity)).all(), case
+
+
+def test_fixed_cases(library: Library) -> None:
+    """Every kind of content, and sizes around those of registers, strips and tiles."""
+    for case in fixed_cases():
+        require_sound(library, case)
+
+
+def test_random_cases(library: Library) -> None:
+    """Pairs of up to 70 x 70 px and 80 disparities, with padded and turned rows, on any number of threads."""
+    random = np.random.default_rng(2)
+    for _ in range(CASES):
+        require_sound(library, random_case(random))
+
+
+def test_what_the_library_cannot_hold_is_refused(library: Library) -> None:
+    """Sizes below 1 or too large, too many disparities and too small a workspace are answered with an error, before anything is read."""
+    usual = {"width": 8, "height": 8, "disparities": 4, "threads": 1}
+    for wrong in (
+        {"width": 0},
+        {"height": 0},
+        {"width": -5},
+        {"width": 32768},
+        {"disparities": 0},
+        {"disparities": 2049},
+    ):
+        job = MatchJob(**{**usual, **wrong})
+        assert library.handle.tandem_match(library.isa, job) == 2
+    job = MatchJob(**usual)
+    job.workspace_bytes = library.match_bytes(job) - 1
+    assert library.handle.tandem_match(library.isa, job) == 3
+    assert library.handle.tandem_match(99, job) == 1
