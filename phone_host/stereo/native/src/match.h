@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Costs. A pixel's cost is the sum of three, each insensitive to what another one suffers from (decision 0032). */
+/* Costs. A pixel's cost is the sum of three, each insensitive to what another one suffers from (decision 0036). */
 enum {
     GREY_WEIGHT = 5,   /* of 16: grey levels, told apart as Birchfield and Tomasi do (PAMI 20(4), 1998) */
     SLOPE_WEIGHT = 11, /* of 16: Sobel's slope from left to right, the same way */
