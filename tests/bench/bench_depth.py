@@ -32,6 +32,7 @@ from rich.table import Table
 from phone_host.model import RectifiedPair
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
+from tests.bench.depth_accuracy import filled
 from tests.bench.depth_scenes import CASES, Image, Scene, Values, scenes
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
@@ -84,17 +85,6 @@ class Row:
     fill2: float
     ms_per_mp: float
     cpu_ms_per_mp: float
-
-
-def filled(found: Values) -> Values:
-    """Fill each pixel without a value (NaN) with the smaller of the next values to its left and right; an empty row stays as it is."""
-    columns = np.arange(found.shape[1])
-    has = np.isfinite(found)
-    before = np.maximum.accumulate(np.where(has, columns, -1), axis=1)
-    after = np.minimum.accumulate(np.where(has, columns, len(columns))[:, ::-1], axis=1)[:, ::-1]
-    sides = np.pad(found, ((0, 0), (1, 1)), constant_values=np.nan)
-    rows = np.arange(found.shape[0])[:, None]
-    return np.where(has, found, np.fmin(sides[rows, before + 1], sides[rows, after + 1]))
 
 
 def measure(scene: Scene, case: str, method: str) -> Row:

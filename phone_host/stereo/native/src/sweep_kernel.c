@@ -152,7 +152,7 @@ static void prepare_row(const struct sweep *job, const struct room *room, int k,
     room->jump_along[k][0] = room->jump_along[k][width] = JUMP_COST;
 }
 
-/* How far a value lies outside the other pixel's range: half of Birchfield and Tomasi's measure. */
+/* How far a value lies outside the other pixel's interval: one direction of Birchfield and Tomasi's measure. */
 BYTES_INLINE bytes beyond(bytes value, const uint8_t *lows, const uint8_t *highs)
 {
     return bytes_max(bytes_minus(value, bytes_load(highs)), bytes_minus(bytes_load(lows), value));
