@@ -28,6 +28,9 @@ LEAST_INFORMATION = 4.0
 LEAST_SHARE = 0.5
 """Of a window's pixels that must have a disparity."""
 
+MOST_WINDOW_ROWS = 12
+"""More rows of windows than this, evenly chosen, do not change the result."""
+
 LEAST_WINDOWS = 20
 """Fewer windows than this are too few for a median."""
 
@@ -116,17 +119,24 @@ def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float
         windows have texture, if less than three quarters of the evidence agrees on the direction, or if the offset
         exceeds GREATEST_OFFSET_PX.
     """
-    height, width = (size // WINDOW_PX * WINDOW_PX for size in left.shape)  # whole windows
-    if height == 0 or width == 0:
+    rows, columns = (size // WINDOW_PX for size in left.shape)  # whole windows
+    if rows == 0 or columns == 0:
         return 0.0
-    place = np.arange(width, dtype=np.float32) - disparity[:height, :width]
+    chosen = min(rows, MOST_WINDOW_ROWS)
+    top = (2 * np.arange(chosen) + 1) * rows // (2 * chosen) * WINDOW_PX
+    # One row more on either side of each window: slopes need it.
+    row = np.clip(top[:, np.newaxis] + np.arange(-1, WINDOW_PX + 1), 0, left.shape[0] - 1).reshape(-1)
+    width = columns * WINDOW_PX
+    here, place = left[row, :width], np.arange(width, dtype=np.float32) - disparity[row, :width]
     used = place >= 0  # not where it is NaN
     column = np.where(used, place, np.float32(0))
+    seen_row = np.broadcast_to(row[:, np.newaxis].astype(np.float32), column.shape)
     low = offset = high = 0.0
     for _ in range(NEWTON_STEPS):
-        row = np.broadcast_to(np.arange(height, dtype=np.float32)[:, np.newaxis] + np.float32(offset), column.shape)
-        there = cv2.remap(right, column, row.copy(), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        guesses, weights = _window_offsets(left[:height, :width], np.asarray(there, np.uint8), used)
+        there = cv2.remap(
+            right, column, seen_row + np.float32(offset), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        guesses, weights = _window_offsets(here, np.asarray(there, np.uint8), used)
         if guesses.size < LEAST_WINDOWS:
             return 0.0
         step = _weighted_quartiles(guesses, weights)
@@ -139,13 +149,22 @@ def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float
 def _window_offsets(
     here: Image, there: Image, used: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the remaining offset of each window with texture, px, and its weight; `there` is the right image, seen from the left."""
-    mask = used.astype(np.float32)
+    """Measure the remaining offset of each window with texture.
+
+    Args:
+        here: rows of windows of the left image, each with one row more above and below.
+        there: the right image, seen from the left.
+        used: where that is known.
+
+    Returns:
+        Offsets, px, and their weights.
+    """
     total = cv2.add(here, there, dtype=cv2.CV_32F)
+    mask = _inner(used.astype(np.float32))
     # Sobel's weights add up to 8 for a slope of one level a pixel; the total is twice the mean.
-    across = cv2.multiply(cv2.Sobel(total, cv2.CV_32F, 1, 0, scale=1 / 16), mask)
-    down = cv2.multiply(cv2.Sobel(total, cv2.CV_32F, 0, 1, scale=1 / 16), mask)
-    difference = cv2.subtract(here, there, dtype=cv2.CV_32F)
+    across = cv2.multiply(_inner(cv2.Sobel(total, cv2.CV_32F, 1, 0, scale=1 / 16)), mask)
+    down = cv2.multiply(_inner(cv2.Sobel(total, cv2.CV_32F, 0, 1, scale=1 / 16)), mask)
+    difference = cv2.multiply(_inner(cv2.subtract(here, there, dtype=cv2.CV_32F)), mask)
     size = (mask.shape[1] // WINDOW_PX, mask.shape[0] // WINDOW_PX)
 
     def window_mean(values: cv2.typing.MatLike) -> NDArray[np.float32]:
@@ -153,7 +172,7 @@ def _window_offsets(
 
     share = window_mean(mask)
     # Of the difference counts what is not the window's mean, which is the rest of unequal exposure.
-    shift = window_mean(cv2.multiply(difference, mask)) / np.maximum(share, np.float32(1e-3))
+    shift = window_mean(difference) / np.maximum(share, np.float32(1e-3))
     xx = (
         window_mean(cv2.multiply(across, across)) + 1
     )  # one level^2 of noise keeps the division meaningful where nothing varies in x
@@ -164,6 +183,13 @@ def _window_offsets(
     counted = (share > LEAST_SHARE) & (information > LEAST_INFORMATION)
     guesses = (yt - xy / xx * xt) / np.maximum(information, np.float32(1))
     return np.asarray(guesses[counted], np.float32), np.asarray(information[counted], np.float32)
+
+
+def _inner(rows: cv2.typing.MatLike) -> NDArray[np.float32]:
+    """Return the windows' rows without those above and below them."""
+    width = rows.shape[1]
+    inner = rows.reshape(-1, WINDOW_PX + 2, width)[:, 1:-1]
+    return np.asarray(inner, np.float32).reshape(-1, width)
 
 
 def _weighted_quartiles(values: NDArray[np.float32], weights: NDArray[np.float32]) -> tuple[float, float, float]:

@@ -13,11 +13,14 @@ from phone_host.model import Disparity, Image, MatchReport
 from phone_host.stereo.match_align import LEAST_OFFSET_PX, moved_up, vertical_offset_px
 from phone_host.stereo.match_levels import LevelField, levels_between, without_levels
 
-ROUGH_FACTOR = 2
-"""The rough match works at half size."""
+FACTOR = 2
+"""Levels and vertical position are measured at half size."""
 
-RoughMatch = Callable[[Image, Image], Disparity]
-"""Matches two grey images of half size; px of that size, NaN where the match is not trusted."""
+LEAST_ROUGH_PX = 25_000
+"""The rough match works at half of that size again while this many pixels are left: at a quarter it costs an eighth."""
+
+RoughMatch = Callable[[Image, Image, int], Disparity]
+"""Matches two grey images that are reduced by the given factor; px of that size, NaN where the match is not trusted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,12 +58,28 @@ def differences(left: Image, right: Image, rough_match: RoughMatch) -> Differenc
         right: the same size.
         rough_match: only has to be right where it has a value.
     """
-    small_left, small_right = reduced(left, ROUGH_FACTOR), reduced(right, ROUGH_FACTOR)
-    rough = rough_match(without_levels(small_left), without_levels(small_right))
+    small_left, small_right = halved(left), halved(right)
+    rough = _rough(small_left, small_right, rough_match)
+    height, width = rough.shape
+    small_left, small_right = small_left[:height, :width], small_right[:height, :width]
     levels = levels_between(small_left, small_right, rough)
-    small_px = vertical_offset_px(small_left, levels.of(small_right), rough)
-    vertical_px = small_px * left.shape[0] / small_left.shape[0]
+    vertical_px = FACTOR * vertical_offset_px(small_left, levels.of(small_right), rough)
     return Differences(levels=levels, vertical_px=0.0 if abs(vertical_px) < LEAST_OFFSET_PX else vertical_px)
+
+
+def _rough(left: Image, right: Image, rough_match: RoughMatch) -> Disparity:
+    """Match two images of half size, smaller where they are large; the result lacks the last column or row if those are odd."""
+    if left.size < 4 * LEAST_ROUGH_PX:
+        return rough_match(without_levels(left), without_levels(right), FACTOR)
+    rough = 2 * rough_match(without_levels(halved(left)), without_levels(halved(right)), 2 * FACTOR)
+    size = (2 * rough.shape[1], 2 * rough.shape[0])
+    return np.asarray(cv2.resize(rough, size, interpolation=cv2.INTER_NEAREST), np.float32)
+
+
+def halved(image: Image) -> Image:
+    """Return the image at half size without an odd last column or row: whole squares of four pixels are averaged, which is fast."""
+    height, width = (size // 2 * 2 or 1 for size in image.shape)
+    return reduced(image[:height, :width], 2)
 
 
 def reduced(image: Image, factor: int) -> Image:

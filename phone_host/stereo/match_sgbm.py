@@ -18,7 +18,7 @@ import numpy as np
 from common.errors import SettingsError
 from phone_host.model import Disparity, Image, Matched, RectifiedPair
 from phone_host.stereo import filters
-from phone_host.stereo.match_differences import ROUGH_FACTOR, differences, reduced
+from phone_host.stereo.match_differences import Differences, differences, reduced
 from phone_host.stereo.match_input import check_pair, grey
 from phone_host.stereo.match_support import supported, without_doubtful_bridges
 
@@ -106,11 +106,13 @@ class SgbmMatcher:
         """Match one pair and tell what was corrected; see `ReportingMatcher.matched`."""
         check_pair(pair)
         left, right = grey(pair.left), grey(pair.right)
-        found = differences(left, right, self._rough_match)
+        found = self._found(left, right)
         return Matched(disparity=self._disparity(left, found.undone(right)), report=found.report())
 
-    def _rough_match(self, left: Image, right: Image) -> Disparity:
-        return filters.to_px(self._compute(self._rough, left, right, ROUGH_FACTOR))
+    def _found(self, left: Image, right: Image) -> Differences:
+        return differences(
+            left, right, lambda here, there, factor: filters.to_px(self._compute(self._rough, here, there, factor))
+        )
 
     def _disparity(self, left: Image, right: Image) -> Disparity:
         """Match two images that are aligned."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from common.errors import SettingsError
 from phone_host.model import Confidence, Disparity, Image, Matched, RectifiedPair
-from phone_host.stereo.match_differences import ROUGH_FACTOR, differences
+from phone_host.stereo.match_differences import Differences, differences
 from phone_host.stereo.match_input import check_pair, grey
 from phone_host.stereo.native.library import Library, MatchJob
 
@@ -42,8 +42,7 @@ class TandemMatcher:
     """
 
     def __init__(self, disparities: int, library: Library, threads: int = 0) -> None:
-        self._whole = _Engine(disparities, library, threads or matching_threads())
-        self._rough = _Engine(-(-disparities // ROUGH_FACTOR), library, threads or matching_threads())
+        self._engine = _Engine(disparities, library, threads or matching_threads())
 
     def match(self, pair: RectifiedPair) -> Disparity:
         """Match one pair; see `Matcher.match`.
@@ -57,13 +56,14 @@ class TandemMatcher:
         """Match one pair and tell what was corrected; see `ReportingMatcher.matched`."""
         check_pair(pair)
         left, right = grey(pair.left), grey(pair.right)
-        self._whole.require_room(*left.shape)  # before the rough match, which needs less
-        found = differences(
-            left, right, lambda small_left, small_right: self._rough.computed(small_left, small_right)[0]
-        )
-        disparity, confidence = self._whole.computed(left, found.undone(right))
+        self._engine.require_room(*left.shape)  # before the rough match, which needs less
+        found = self._found(left, right)
+        disparity, confidence = self._engine.computed(left, found.undone(right))
         report = found.report(confidence_histogram(confidence))
         return Matched(disparity=disparity, confidence=confidence, report=report)
+
+    def _found(self, left: Image, right: Image) -> Differences:
+        return differences(left, right, lambda here, there, factor: self._engine.computed(here, there, factor)[0])
 
 
 def confidence_histogram(confidence: Confidence) -> tuple[int, ...]:
@@ -110,12 +110,13 @@ class _Engine:
                 "use smaller images, fewer disparities, or --matcher block",
             )
 
-    def computed(self, left: Image, right: Image) -> tuple[Disparity, Confidence]:
+    def computed(self, left: Image, right: Image, factor: int = 1) -> tuple[Disparity, Confidence]:
         """Match two grey images of one size; the library itself checks neither sizes nor strides.
 
         Args:
             left: (H, W) uint8, with any strides.
             right: the same size.
+            factor: by which they were reduced; the search is, too.
 
         Returns:
             Disparity, (H, W) float32, px, NaN = none; and confidence, (H, W) uint8, 0 = none.
@@ -137,7 +138,7 @@ class _Engine:
             width=width,
             height=height,
             # d <= x < width: a wider search could only find places outside the right image.
-            disparities=min(self._disparities, width),
+            disparities=min(-(-self._disparities // factor), width),
             threads=self._threads,
         )
         needed = self._library.match_bytes(job)
