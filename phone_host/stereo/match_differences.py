@@ -16,7 +16,7 @@ from phone_host.stereo.match_levels import LevelField, levels_between, without_l
 FACTOR = 2
 """Levels and vertical position are measured at half size."""
 
-LEAST_ROUGH_PX = 25_000
+LEAST_ROUGH_PX = 15_000
 """The rough match works at half of that size again while this many pixels are left: at a quarter it costs an eighth."""
 
 RoughMatch = Callable[[Image, Image, int], Disparity]

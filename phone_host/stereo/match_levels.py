@@ -40,7 +40,7 @@ LEAST_SPREAD: Final = 2.0
 ROUNDS: Final = 8
 """Of reweighting at most; gain and offset stand to three digits by then."""
 
-SETTLED_LEVELS: Final = 0.02
+SETTLED_LEVELS: Final = 0.25
 """Grey levels: a round that changes no level by more is the last; levels are whole numbers."""
 
 CAUCHY_SCALES: Final = 2.0
@@ -49,7 +49,7 @@ CAUCHY_SCALES: Final = 2.0
 FIELD_GAIN: Final = 0.85
 """The field must lower the median residual by 15 %; on pairs of one good camera it lowers it by 5 % and changes nothing."""
 
-RIDGE: Final = 0.02
+RIDGE: Final = 0.002
 """Share of the mean information that pulls the field's numbers to 0 where no pixel speaks."""
 
 MOST_CHANGE: Final = 0.4
@@ -203,22 +203,24 @@ def _with_field(linear: LevelField, here: Values, there: Values, x: Values, y: V
     Gain and offset come from the line through the evened levels, and only the shape from least squares: these take noise
     for a lower gain.
     """
-    shapes = np.stack([x, y, x * x, x * y, y * y])
+    unknowns = np.stack([x, y, x * x, x * y, y * y, np.full(x.size, OFFSET_UNIT)])
+    changes = unknowns[:5]  # a view: of the right image's levels, by one unit of each number
+    changes *= there
     change, gain, offset = np.zeros(5), linear.gain, linear.offset_levels
-    rest = before = here - (gain * there + offset)
+    rest = here - (gain * there + offset)
     at_first = float(np.median(np.abs(rest)))
     for _ in range(ROUNDS):
         weight = _weights(rest)
-        even = there * (1 + change @ shapes)
+        even = there + change @ changes
         gain, offset = _weighted_line(here, even, weight)
-        unknowns = np.vstack([shapes * (gain * there), np.full((1, x.size), OFFSET_UNIT)])
         weighted = unknowns * weight
         information = weighted @ unknowns.T
-        ridge = np.full(6, RIDGE * np.trace(information) / 6)
-        wanted = weighted @ (here - (gain * even + offset)) - ridge * [*change, 0.0]
-        change += np.linalg.solve(information + np.diag(ridge), wanted)[:5]
-        before, rest = rest, here - (gain * there * (1 + change @ shapes) + offset)
-        if float(np.abs(rest - before).max()) < SETTLED_LEVELS:
+        ridge = RIDGE * float(np.trace(information)) / 6
+        wanted = weighted @ ((here - offset) / gain - even) - ridge * np.append(change, 0.0)
+        step = np.linalg.solve(information + ridge * np.eye(6), wanted)[:5]
+        change += step
+        rest = here - (gain * (there + change @ changes) + offset)
+        if 255 * gain * float(np.abs(step).sum()) < SETTLED_LEVELS:
             break
     if float(np.median(np.abs(rest))) > FIELD_GAIN * at_first:
         return linear
