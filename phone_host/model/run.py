@@ -6,7 +6,16 @@ from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
-from phone_host.model.images import CloudImage, CutCounts, DepthLimits, Disparity, RectifiedPair, Search, StereoGeometry
+from phone_host.model.images import (
+    CloudImage,
+    CutCounts,
+    DepthLimits,
+    Disparity,
+    Epipolar,
+    RectifiedPair,
+    Search,
+    StereoGeometry,
+)
 from phone_host.model.matching import Confidence, MatchReport
 
 
@@ -112,12 +121,16 @@ class DepthAccount:
         limits: of the newest pair; None without a cloud.
         search: how the newest pair was matched; None without a core.
         match_report: what the matcher corrected in the newest pair; None without a core.
+        median_report: the median of what it corrected in all pairs; None if the matcher tells nothing.
+        epipolar: which way the newest pair's epipolar lines run.
     """
 
     cut: CutCounts | None = None
     limits: DepthLimits | None = None
     search: Search | None = None
     match_report: MatchReport | None = None
+    median_report: MatchReport | None = None
+    epipolar: Epipolar = Epipolar.LEFT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,9 @@ _TOLD_PX: Final = 0.25
 _TOLD_SHARE: Final = 0.1
 """A difference of a tenth in brightness or contrast is what an eye sees when it looks from one image to the other."""
 
+_SEEN_PX, _SEEN_GAIN, _SEEN_LEVELS, _SEEN_PERCENT = 0.005, 0.005, 0.5, 0.5
+"""Less is 0 in the figures of a run."""
+
 _MIDDLE: Final = 128.0
 """Grey level at which brightness is told."""
 
@@ -27,6 +30,8 @@ def corrected_values(report: MatchReport | None) -> dict[str, Any] | None:
         "vertical_px": round(report.vertical_px, 3),
         "gain": round(report.gain, 4),
         "offset_levels": round(report.offset_levels, 2),
+        "vignetting_percent": round(report.vignetting_percent, 2),
+        "shading_percent": round(report.shading_percent, 2),
         "confidence_histogram": None if counts is None else list(counts),
     }
 
@@ -43,12 +48,37 @@ def corrected_words(report: MatchReport | None, epipolar: Epipolar = Epipolar.LE
     """
     if report is None:
         return ""
-    parts = [*_place(report.vertical_px, epipolar), *_levels(report)]
+    parts = [*_place(report.vertical_px, epipolar), *_levels(report), *_evenness(report)]
     if not parts:
         return ""
     both = {1: "this was", 2: "both were"}.get(len(parts), "all of this was")
     listed = " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
     return f"the right image {listed}; {both} corrected before matching"
+
+
+def run_corrected_words(report: MatchReport | None, epipolar: Epipolar = Epipolar.LEFT) -> str:
+    """Say in one line what was corrected over a run, figures included that are too small for `corrected_words`.
+
+    Args:
+        report: medians over the run; None: the matcher tells nothing.
+        epipolar: which way the pairs' epipolar lines run.
+
+    Returns:
+        One line; empty if the matcher tells nothing.
+    """
+    if report is None:
+        return ""
+    parts = []
+    if abs(report.vertical_px) >= _SEEN_PX:
+        where = "sideways" if epipolar.is_vertical else "up" if report.vertical_px > 0 else "down"
+        parts.append(f"moved {where} by {abs(report.vertical_px):.2f} px")
+    if abs(report.gain - 1) >= _SEEN_GAIN or abs(report.offset_levels) >= _SEEN_LEVELS:
+        parts.append(f"levels x {report.gain:.2f} {report.offset_levels:+.1f}")
+    if abs(report.vignetting_percent) >= _SEEN_PERCENT:
+        parts.append(f"corners another {report.vignetting_percent:+.0f}%")
+    if report.shading_percent >= _SEEN_PERCENT:
+        parts.append(f"one side {report.shading_percent:.0f}% more than the other")
+    return f"corrected before matching, right image (medians): {', '.join(parts) or 'nothing'}"
 
 
 def _place(vertical_px: float, epipolar: Epipolar) -> list[str]:
@@ -70,4 +100,15 @@ def _levels(report: MatchReport) -> list[str]:
         parts.append(f"was {abs(brightness):.0%} {'brighter' if brightness > 0 else 'darker'}")
     if abs(contrast) >= _TOLD_SHARE and abs(contrast - brightness) >= _TOLD_SHARE:
         parts.append(f"had {abs(contrast):.0%} {'more' if contrast > 0 else 'less'} contrast")
+    return parts
+
+
+def _evenness(report: MatchReport) -> list[str]:
+    """Tell where the right image was darker than elsewhere, before the correction."""
+    corners = 1 / max(1 + report.vignetting_percent / 100, 0.1) - 1
+    parts = []
+    if abs(corners) >= _TOLD_SHARE:
+        parts.append(f"was {abs(corners):.0%} {'brighter' if corners > 0 else 'darker'} at its corners")
+    if report.shading_percent >= 100 * _TOLD_SHARE:
+        parts.append(f"was {report.shading_percent:.0f}% darker at one side than at the other")
     return parts

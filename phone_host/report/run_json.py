@@ -153,6 +153,7 @@ def _depth(depth: DepthAccount) -> dict[str, object] | None:
         "scale": None if depth.search is None else round(depth.search.scale, 4),
         "disparities": None if depth.search is None else depth.search.disparities or None,
         "corrected": corrected_values(depth.match_report),
+        "corrected_median": corrected_values(depth.median_report),
         "limits": None if depth.limits is None else asdict(depth.limits),
         "cut": asdict(depth.cut),
     }

@@ -26,7 +26,7 @@ from phone_host.report.depth_view import cloud_view, depth_view
 from phone_host.report.page_frame import section
 from phone_host.report.page_links import FileLink
 from phone_host.report.report_page import Figure, Headline, PageData, Picture, Table, delay_series, page
-from phone_host.report.summary import past_lines, phase_lines
+from phone_host.report.summary import corrected_lines, past_lines, phase_lines
 
 _FINE: Final = frozenset({Regime.STARVED_BY_CAMERAS, Regime.UNKNOWN})
 """Regimes in which nothing has to be done."""
@@ -93,7 +93,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         *([f"Warning: {missed}."] if (missed := missed_words(run.budget)) else []),
         *(f"Warning: {item.sentence}." for item in concerns(run)),
         *(f"Warning: {line}." for line in past_lines(run)),
-        *(_sentence(line) for line in budget_lines(run.budget)),
+        *(_sentence(line) for line in (*corrected_lines(run.depth), *budget_lines(run.budget))),
         *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 

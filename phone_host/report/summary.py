@@ -18,6 +18,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, hist
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
+from phone_host.report.match_words import run_corrected_words
 from phone_host.sync.phase import Alignment, Phase
 
 _MS: Final = 1e6
@@ -57,6 +58,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += [f"warning: {line}" for line in past_lines(run)]
     lines += depth_lines(run.images)
     lines += cut_lines(run.depth)
+    lines += corrected_lines(run.depth)
     lines += [f"note: {run.matcher_note}"] if run.matcher_note else []
     lines += budget_lines(run.budget)
     lines += camera_troubles(run.camera)
@@ -124,6 +126,12 @@ def cut_lines(depth: DepthAccount) -> list[str]:
     """Say in one line what was cut from the clouds of all pairs; nothing if nothing was."""
     words = "" if depth.cut is None else cut_sentence(depth.cut, depth.limits)
     return [f"cut from the clouds: {words}"] if words else []
+
+
+def corrected_lines(depth: DepthAccount) -> list[str]:
+    """Say in one line what the matcher corrected; nothing if it does not tell."""
+    words = run_corrected_words(depth.median_report, depth.epipolar)
+    return [words] if words else []
 
 
 def camera_troubles(health: CameraHealth) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Final
 from common.frame import FrameFault, SpoiledImageError
 from common.ledger import HostMarks, PairLedger
 from phone_host.measure.delays import DelayStatistics, Sample
+from phone_host.measure.matched_medians import MatchedMedians
 from phone_host.measure.trouble import Trouble, Troubles
 from phone_host.model import CutCounts, DepthAccount, FramePair, Processed
 
@@ -82,7 +83,7 @@ class Ledgerer:
         self._lock = threading.Lock()
         self._delays, self._sample = DelayStatistics(), Sample()
         self._spoiled: Counter[FrameFault] = Counter()
-        self._depth = DepthAccount()
+        self._depth, self._corrected = DepthAccount(), MatchedMedians()
         self.last: Processed | None = None
         self.processed = self.undecodable = 0
         self.first_done_ns = self.last_done_ns = 0
@@ -133,6 +134,7 @@ class Ledgerer:
             self._delays.add(ledger, after_gap=is_gap, timeless=self._is_timeless())
             self._sample.add(ledger)
             self._depth = _with(self._depth, processed)
+            self._corrected.add(processed.match_report)
             self.last = processed
             self.first_done_ns = self.first_done_ns or marks.done_ns
             self.last_done_ns = marks.done_ns
@@ -159,7 +161,7 @@ class Ledgerer:
                 first_done_ns=self.first_done_ns,
                 last_done_ns=self.last_done_ns,
                 delays=self._delays.copy(),
-                depth=self._depth,
+                depth=replace(self._depth, median_report=self._corrected.report()),
                 gaps=self._gaps,
                 gap_ns=self._gap_ns,
                 after_gap_ns=frozenset(self._after_gap_ns),
@@ -180,4 +182,5 @@ def _with(depth: DepthAccount, processed: Processed) -> DepthAccount:
         limits=processed.limits,
         search=processed.search,
         match_report=processed.match_report,
+        epipolar=processed.pair.epipolar,
     )

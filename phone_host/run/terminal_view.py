@@ -25,7 +25,7 @@ from phone_host.measure.headline import headline
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.unused import unused
-from phone_host.report.summary import camera_troubles, depth_lines, phase_lines
+from phone_host.report.summary import camera_troubles, corrected_lines, depth_lines, phase_lines
 
 _REFRESH_S: Final = 0.25
 _WIDE: Final = 64
@@ -124,7 +124,10 @@ class LiveTable:
         return (
             *(_Part(0, line) for line in _warnings(run)),
             *(_Part(3, line) for line in _cameras(run)),
-            *(_Part(5, Text(line)) for line in (*depth_lines(run.images), *budget_lines(run.budget))),
+            *(
+                _Part(5, Text(line))
+                for line in (*depth_lines(run.images), *corrected_lines(run.depth), *budget_lines(run.budget))
+            ),
             _Part(2, _table(run, self._rate, width)),
             _Part(6, _stages(run)),
             _Part(7, Text(judge(figures(run)).sentence, style="dim")),

@@ -46,6 +46,8 @@ class Differences:
             vertical_px=self.vertical_px,
             gain=self.levels.gain,
             offset_levels=self.levels.offset_levels,
+            vignetting_percent=self.levels.vignetting_percent,
+            shading_percent=self.levels.shading_percent,
             confidence_histogram=confidence_histogram,
         )
 

@@ -1,11 +1,17 @@
 """What a matcher corrected reaches the report, in px of the rectified images, and is told in plain words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from common.errors import SettingsError
-from phone_host.model import Crop, Epipolar, Matched, MatchReport, RectifiedPair
-from phone_host.report.match_words import corrected_words
+from phone_host.measure.matched_medians import MatchedMedians
+from phone_host.model import Crop, CutCounts, DepthAccount, Epipolar, Matched, MatchReport, RectifiedPair, Side
+from phone_host.report.match_words import corrected_words, run_corrected_words
+from phone_host.report.run_json import build
+from phone_host.report.run_page import run_page
+from phone_host.report.summary import summary
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings, create_matcher, make_matcher
@@ -15,6 +21,7 @@ from phone_host.stereo.match_tandem import TandemMatcher
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.matcher_protocol import ReportingMatcher, matched_by
 from tests.support.planes import plane
+from tests.support.run_snapshots import run
 
 
 class _Confident:
@@ -86,4 +93,43 @@ def test_what_was_corrected_is_told_in_plain_words() -> None:
     assert "off to one side" in corrected_words(MatchReport(vertical_px=0.6), Epipolar.UP)
     assert "had 30% less contrast" in corrected_words(MatchReport(gain=1 / 0.7, offset_levels=-50))
     assert corrected_words(MatchReport(vertical_px=0.1, gain=1.02)) == ""
+    uneven = corrected_words(MatchReport(vignetting_percent=25.0, shading_percent=12.0))
+    assert "was 20% darker at its corners and was 12% darker at one side than at the other" in uneven
     assert corrected_words(None) == ""
+
+
+def test_a_run_tells_the_medians_of_what_was_corrected_in_one_line() -> None:
+    """Summary, page and report.json tell the medians; of a matcher that reports nothing they say nothing."""
+    medians = MatchedMedians()
+    for number in range(1000):
+        medians.add(MatchReport(vertical_px=0.4 + 0.0001 * number, gain=1.25, offset_levels=-3, vignetting_percent=12))
+    medians.add(None)
+    found = medians.report()
+    assert found is not None
+    assert found.vertical_px == pytest.approx(0.45, abs=0.001)
+    assert (found.gain, found.offset_levels, found.vignetting_percent) == (1.25, -3, 12)
+    line = "corrected before matching, right image (medians): moved up by 0.45 px, levels x 1.25 -3.0, corners another +12%"
+    told = replace(run(5), depth=DepthAccount(cut=CutCounts(kept=5), median_report=found))
+    assert line in summary(told).splitlines()
+    assert f"C{line[1:]}." in run_page(told, None, Side.LEFT, ())
+    depth = build(told)["depth"]
+    assert isinstance(depth, dict)
+    assert depth["corrected_median"]["vertical_px"] == pytest.approx(0.45, abs=0.001)
+
+
+def test_a_run_says_nothing_of_a_matcher_that_reports_nothing() -> None:
+    """`block` reports nothing: no line; a matcher that found nothing to correct says so."""
+    medians = MatchedMedians()
+    medians.add(MatchReport())
+    assert medians.report() is None
+    silent = replace(run(5), depth=DepthAccount(cut=CutCounts(kept=5)))
+    assert "corrected" not in summary(silent)
+    medians.add(MatchReport(confidence_histogram=(1,)))
+    assert run_corrected_words(medians.report()).endswith("(medians): nothing")
+
+
+def test_a_run_of_stacked_cameras_tells_the_direction_that_was_corrected() -> None:
+    """Of cameras one above the other the correction is sideways; a lamp at one side is told, too."""
+    words = run_corrected_words(MatchReport(vertical_px=-0.3, shading_percent=9), Epipolar.UP)
+    assert words.endswith("moved sideways by 0.30 px, one side 9% more than the other")
+    assert "moved down by 0.30 px" in run_corrected_words(MatchReport(vertical_px=-0.3))
