@@ -28,7 +28,7 @@ LEAST_INFORMATION = 4.0
 LEAST_SHARE = 0.5
 """Of a window's pixels that must have a disparity."""
 
-MOST_WINDOW_ROWS = 12
+MOST_WINDOW_ROWS = 10
 """More rows of windows than this, evenly chosen, do not change the result."""
 
 LEAST_WINDOWS = 20

@@ -8,8 +8,9 @@ image.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -48,6 +49,9 @@ CAUCHY_SCALES: Final = 2.0
 FIELD_GAIN: Final = 0.85
 """The field must lower the median residual by 15 %; on pairs of one good camera it lowers it by 5 % and changes nothing."""
 
+HOPELESS_ROUND, HOPELESS = 2, 0.95
+"""A field that has gained less than 5 % after two rounds gained 15 % in the end on one of 100 pairs."""
+
 RIDGE: Final = 0.002
 """Share of the mean information that pulls the field's numbers to 0 where no pixel speaks. Ten times as much would take a
 tenth from a vignetting that is there."""
@@ -57,6 +61,9 @@ MOST_CHANGE: Final = 0.4
 
 OFFSET_UNIT: Final = 50.0
 """Grey levels: brings the offset to the size of the field's other unknowns, so that one ridge fits all."""
+
+STRIP_PX: Final = 65_536
+"""Pixels that are changed at once: their gains stay in a core's cache."""
 
 HIGH_PASS_PX: Final = 15
 """Window of the mean that `without_levels` subtracts, px."""
@@ -91,11 +98,13 @@ class LevelField:
         if not any(self.field):
             levels = np.arange(256) * self.gain + self.offset_levels
             return np.asarray(cv2.LUT(image, np.clip(np.rint(levels), 0, 255).astype(np.uint8)), np.uint8)
-        height, width = image.shape
-        gain = self._gains(width, height)
-        return np.asarray(
-            cv2.add(cv2.multiply(image, gain, dtype=cv2.CV_32F), self.offset_levels, dtype=cv2.CV_8U), np.uint8
-        )
+        gains, evened = self._gains(*image.shape), np.empty_like(image)
+        offset, step = (self.offset_levels, 0.0, 0.0, 0.0), max(STRIP_PX // image.shape[1], 1)
+        for top in range(0, image.shape[0], step):
+            rows = slice(top, top + step)
+            product = cv2.multiply(image[rows], gains(rows), dtype=cv2.CV_32F)
+            evened[rows] = cv2.add(product, offset, dtype=cv2.CV_8U)  # type: ignore[call-overload]  # the stub lacks scalars
+        return evened
 
     @property
     def vignetting_percent(self) -> float:
@@ -109,17 +118,23 @@ class LevelField:
         """How much the gain differs between opposite edges, in the direction in which it changes most, percent."""
         return 200 * math.hypot(self.field[0], self.field[1])
 
-    def _gains(self, width: int, height: int) -> NDArray[np.float32]:
-        """Return the gain of each pixel, (H, W) float32: one operation at a time, so that processors do not differ."""
-        x = np.linspace(-1, 1, width, dtype=np.float32)
-        y = np.linspace(-1, 1, height, dtype=np.float32)
+    def _gains(self, height: int, width: int) -> Callable[[slice], NDArray[np.float32]]:
+        """Return what computes the gains of some rows, (h, W) float32, one operation at a time: processors do not differ."""
+        x, y = (np.linspace(-1, 1, size, dtype=np.float32) for size in (width, height))
         a, b, c, d, e = (np.float32(self.gain * value) for value in self.field)
-        gain = np.add.outer((e * y + b) * y, (c * x + a) * x + np.float32(self.gain))
-        gain += np.multiply.outer(d * y, x)
-        if sum(abs(value) for value in self.field) > MOST_CHANGE:
-            cv2.max(gain, self.gain * (1 - MOST_CHANGE), dst=gain)
-            cv2.min(gain, self.gain * (1 + MOST_CHANGE), dst=gain)
-        return gain
+        along, across, twist = (c * x + a) * x + np.float32(self.gain), (e * y + b) * y, d * y
+        most = np.float32(MOST_CHANGE * self.gain)
+        is_small = sum(abs(value) for value in self.field) <= MOST_CHANGE
+
+        def gains(rows: slice) -> NDArray[np.float32]:
+            gain = np.multiply.outer(twist[rows], x)
+            gain += across[rows, np.newaxis]
+            gain += along
+            if not is_small:
+                np.clip(gain, np.float32(self.gain) - most, np.float32(self.gain) + most, out=gain)
+            return np.asarray(gain, np.float32)
+
+        return gains
 
 
 UNCHANGED: Final = LevelField()
@@ -179,7 +194,7 @@ def _corresponding(left: Image, right: Image, disparity: Disparity) -> tuple[Val
     row, column = np.divmod(place, width)
     x = (column - disparity.reshape(-1)[place]).astype(np.float32)
     first = np.floor(x)
-    share = (1 - (x - first)) / 2  # x + share lies as far before a whole pixel as column + share lies behind one
+    share = (1 + first - x) / 2  # x + share lies as far before a whole pixel as column + share lies behind one
     here = _between(_local_means(left), row, column, share)
     there = _between(_local_means(right), row, first.astype(np.int64), 1 - share)
     used = np.minimum(here, there) > BLACKEST
@@ -193,24 +208,28 @@ def _local_means(image: Image) -> NDArray[np.float32]:
 
 
 def _between(
-    image: NDArray[np.float32], row: NDArray[np.int64], column: NDArray[np.int64], share: NDArray[np.float32]
+    image: NDArray[np.float32], row: NDArray[np.int64], column: NDArray[np.int64], share: NDArray[np.floating[Any]]
 ) -> NDArray[np.float32]:
     """Return the image at column + share, share from 0 to 1; the last column goes on."""
-    near = image[row, column]
-    return near + share * (image[row, np.minimum(column + 1, image.shape[1] - 1)] - near)
+    near, far = image[row, column], image[row, np.minimum(column + 1, image.shape[1] - 1)]
+    return np.asarray(near + share * (far - near), np.float32)
 
 
-def _weights(residuals: Values) -> Values:
-    scale = 1.4826 * float(np.median(np.abs(residuals))) + 0.5  # half a level: rounding
-    return 1 / (1 + (residuals / (CAUCHY_SCALES * scale)) ** 2)
+def _typical(residuals: Values) -> float:
+    return float(np.median(np.abs(residuals)))
+
+
+def _weights(residuals: Values, typical: float) -> Values:
+    scale = 1.4826 * typical + 0.5  # half a level: rounding
+    return np.asarray(1 / (1 + (residuals / (CAUCHY_SCALES * scale)) ** 2), np.float64)
 
 
 def _line(here: Values, there: Values) -> tuple[float, float]:
     """Fit here = gain * there + offset."""
     gain, offset = _weighted_line(here, there, np.full(here.size, 1 / here.size))
     for _ in range(ROUNDS):
-        before = gain, offset
-        gain, offset = _weighted_line(here, there, _weights(here - (gain * there + offset)))
+        before, rest = (gain, offset), here - (gain * there + offset)
+        gain, offset = _weighted_line(here, there, _weights(rest, _typical(rest)))
         # The line turns about the middle; no level is farther than 255 from 0.
         if abs(offset - before[1] + 128 * (gain - before[0])) + 128 * abs(gain - before[0]) < SETTLED_LEVELS:
             break
@@ -222,7 +241,7 @@ def _weighted_line(here: Values, there: Values, weight: Values) -> tuple[float, 
     weight = weight / weight.sum()
     middle_here, middle_there = float(weight @ here), float(weight @ there)
     spread_here, spread_there = float(weight @ (here - middle_here) ** 2), float(weight @ (there - middle_there) ** 2)
-    gain = math.sqrt(spread_here / max(spread_there, 1e-6))
+    gain = math.sqrt(max(spread_here, 1e-6) / max(spread_there, 1e-6))
     return gain, middle_here - gain * middle_there
 
 
@@ -237,9 +256,11 @@ def _with_field(linear: LevelField, here: Values, there: Values, x: Values, y: V
     changes *= there
     change, gain, offset = np.zeros(5), linear.gain, linear.offset_levels
     rest = here - (gain * there + offset)
-    at_first = float(np.median(np.abs(rest)))
-    for _ in range(ROUNDS):
-        weight = _weights(rest)
+    at_first = typical = _typical(rest)
+    for number in range(ROUNDS):
+        if number == HOPELESS_ROUND and typical > HOPELESS * at_first:
+            return linear
+        weight = _weights(rest, typical)
         even = there + change @ changes
         gain, offset = _weighted_line(here, even, weight)
         weighted = unknowns * weight
@@ -249,9 +270,10 @@ def _with_field(linear: LevelField, here: Values, there: Values, x: Values, y: V
         step = np.linalg.solve(information + ridge * np.eye(6), wanted)[:5]
         change += step
         rest = here - (gain * (there + change @ changes) + offset)
+        typical = _typical(rest)
         if 255 * gain * float(np.abs(step).sum()) < SETTLED_LEVELS:
             break
-    if float(np.median(np.abs(rest))) > FIELD_GAIN * at_first:
+    if typical > FIELD_GAIN * at_first:
         return linear
     a, b, c, d, e = (float(value) for value in change)
     return LevelField(gain=gain, offset_levels=offset, field=(a, b, c, d, e))
