@@ -34,6 +34,9 @@ LEAST_FOR_FIELD: Final = 2000
 MOST_PIXELS: Final = 3_000
 """More pixels than this, evenly chosen, do not change the result."""
 
+LOOKED_AT: Final = 6
+"""Times as many pixels are looked at for a disparity: where a sixth has one, there are enough."""
+
 LEAST_SPREAD: Final = 2.0
 """Grey levels: with a lower standard deviation a gain cannot be measured."""
 
@@ -188,11 +191,13 @@ def _corresponding(left: Image, right: Image, disparity: Disparity) -> tuple[Val
     read at whole pixels on the left only, a fine texture would seem to have 4 % less contrast on the right.
     """
     height, width = left.shape
-    place = np.flatnonzero(disparity <= np.arange(width, dtype=np.float32))  # NaN is at no place
+    step = max(math.isqrt(left.size // (LOOKED_AT * MOST_PIXELS)), 1)
+    few = disparity[::step, ::step]
+    place = np.flatnonzero(few <= np.arange(0, width, step, dtype=np.float32))  # NaN is at no place
     if place.size > MOST_PIXELS:
         place = place[np.arange(MOST_PIXELS) * place.size // MOST_PIXELS]
-    row, column = np.divmod(place, width)
-    x = (column - disparity.reshape(-1)[place]).astype(np.float32)
+    row, column = (step * values for values in np.divmod(place, few.shape[1]))
+    x = (column - disparity[row, column]).astype(np.float32)
     first = np.floor(x)
     share = (1 + first - x) / 2  # x + share lies as far before a whole pixel as column + share lies behind one
     here = _between(_local_means(left), row, column, share)
@@ -216,7 +221,8 @@ def _between(
 
 
 def _typical(residuals: Values) -> float:
-    return float(np.median(np.abs(residuals)))
+    """Return the median of the absolute residuals; a thousand of them tell it to 3 %."""
+    return float(np.median(np.abs(residuals[:: max(residuals.size // 1000, 1)])))
 
 
 def _weights(residuals: Values, typical: float) -> Values:
