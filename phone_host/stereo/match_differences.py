@@ -1,6 +1,7 @@
 """Finds how the two cameras of a pair differ, levels and vertical position, and undoes it: what our semi-global matchers do first.
 
-Both are measured at half size, along a rough match that needs no equal levels; each matcher makes that match itself.
+Both are measured at half size, along a rough match that needs no equal levels and works at half size or a quarter; each
+matcher makes that match itself.
 """
 
 from collections.abc import Callable

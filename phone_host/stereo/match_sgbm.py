@@ -3,7 +3,7 @@
 docs/decisions/0002-sgbm-tuning.md says what each step gains:
 
 1. the right image gets the left one's levels (match_levels), and is moved vertically if it is measurably too high or low
-   (match_align); both are measured along a rough match at half size that needs no equal levels (match_differences);
+   (match_align); both are measured along a rough match that needs no equal levels (match_differences);
 2. StereoSGBM, 3-way mode, single-pixel cost, once for the left and once for the right view, with OpenCV's own checks
    off; the left border is extended by N pixels, without which the first N columns would get no value;
 3. median of the left view, left-right check, speckles dropped, rows dropped whose texture says nothing: the rest is NaN;

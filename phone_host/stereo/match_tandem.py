@@ -1,6 +1,6 @@
 """The own matcher: semi-global matching of both views in C (`native/src/match.c`), for two unlike cameras.
 
-1. The right image gets the left one's levels and height, both measured along a rough match at half size (match_differences).
+1. The right image gets the left one's levels and height, both measured along a rough match (match_differences).
 2. The library matches: `native/src/match.c` says how. docs/decisions/0036-own-matcher.md says what each step gains and what
    was left out.
 """
