@@ -1,6 +1,7 @@
 """The processing of a pair: decode, optionally interpolate and rectify, match, reproject. Each stage is timed.
 
-This module alone defines the order of the stages.
+This module alone defines the order of the stages. It has two halves, up to the match and from there on, which two threads
+may do, each one pair at a time.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,8 @@ from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
 from phone_host.run.pair_budget import PairBudget
-from phone_host.stereo.core import StereoCore
+from phone_host.stereo.budget_ladder import Choice
+from phone_host.stereo.core import MatchedPair, StereoCore
 from phone_host.stereo.images import WHOLE
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
@@ -34,6 +36,25 @@ class _Plan:
 
     whole_px: tuple[Size, Size]
     reductions: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Halfway:
+    """A pair that is matched, or decoded if there is nothing to match with.
+
+    Attributes:
+        found: the matched pair, or the images as received.
+        choice: how it was matched by a time budget; None: there is none.
+        stages: times so far: decode and interpolate.
+        start_ns: when decoding began, ns.
+        end_ns: when the first half ended, ns.
+    """
+
+    found: MatchedPair | RectifiedPair
+    choice: Choice | None
+    stages: StageTimes
+    start_ns: int
+    end_ns: int
 
 
 class Pipeline:
@@ -81,6 +102,14 @@ class Pipeline:
             SpoiledImageError: a frame's bytes are not a whole image, or its size is not believed.
             DataError: the cameras' image sizes do not fit the rig.
         """
+        return self.finish(self.begin(pair))
+
+    def begin(self, pair: FramePair) -> Halfway:
+        """Do the first half of `process`: decode, interpolate, rectify, match.
+
+        Raises:
+            DataError: as `process`.
+        """
         board, host = _of_board(pair.board), self._of_host(pair.host)
         start_ns = self._clock()
         planned: list[_Plan] = []
@@ -95,16 +124,35 @@ class Pipeline:
         board_image = self._at_host_time(pair, board_image, decoding.reductions[0])
         interpolated_ns = self._clock()
         left, right = self._in_sides(board_image, host_image)
-        if self._core is None:
-            processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
-        else:
+        found: MatchedPair | RectifiedPair = RectifiedPair(left, right)
+        choice = None
+        if self._core is not None:
             sizes = self._in_sides(*decoding.whole_px)
             choice = None if self._budget is None else self._budget.choice(*sizes)
-            processed = self._core.compute(left, right, self._clock, whole_px=sizes, choice=choice)
-        stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
-        if self._budget is not None:
+            found = self._core.matched(left, right, self._clock, whole_px=sizes, choice=choice)
+        stages = StageTimes(decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
+        return Halfway(found, choice, stages, start_ns, self._clock())
+
+    def finish(self, halfway: Halfway) -> Processed:
+        """Do the second half: compute the points. The time since the first half ended counts as waiting to hand over.
+
+        Args:
+            halfway: what `begin` made; pairs are finished in the order in which they were begun.
+        """
+        start_ns = self._clock()
+        waited_ns = start_ns - halfway.end_ns
+        found = halfway.found
+        if self._core is None or isinstance(found, RectifiedPair):
+            assert isinstance(found, RectifiedPair)
+            return Processed(found, None, None, replace(halfway.stages, write=waited_ns))
+        processed = self._core.finished(found, self._clock)
+        times = processed.stages
+        if self._budget is not None and halfway.choice is not None:
             end_ns = self._clock()
-            self._budget.add(end_ns - start_ns, stages.match, end_ns)
+            self._budget.add(halfway.choice, end_ns - halfway.start_ns - waited_ns, times.match, end_ns)
+        stages = replace(
+            halfway.stages, rectify=times.rectify, match=times.match, reproject=times.reproject, write=waited_ns
+        )
         return replace(processed, stages=stages)
 
     def _of_host(self, frame: Frame) -> EncodedImage:
