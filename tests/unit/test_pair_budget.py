@@ -122,6 +122,17 @@ def test_other_sizes_begin_anew() -> None:
     assert (budget.account.pairs, budget.account.changes[0].reason) == (4, BudgetReason.OTHER_SIZE)
 
 
+def test_a_pair_that_was_matched_in_another_way_says_nothing_about_the_present_one() -> None:
+    """Pairs overlap: times of one that was begun before the change count in the account, but teach nothing about the new choice."""
+    budget = held(30, [(50, 45)] * 3)
+    before = budget.choice(SIZE, SIZE)
+    for at_ms in (200, 233, 266, 300, 333, 366):
+        budget.add(before, 50 * MS, 45 * MS, at_ms * MS)
+    assert budget.account is not None
+    assert budget.choice(SIZE, SIZE) != before
+    assert (budget.account.pairs, budget.account.changed) == (9, 1)
+
+
 def test_a_crop_is_what_is_matched() -> None:
     """Of 320x160 px only a part is matched: 100 px wide, the search and the margin to its left, 32 px of margin to its right."""
     core = settings_core(disparities=32)
