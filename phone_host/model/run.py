@@ -65,7 +65,7 @@ class Processed:
         pair: the rectified images; without a core, the images as received.
         disparity: px; None without a core.
         cloud: metres, cut to the limits; None without a core or geometry.
-        stages: time of each stage; `write` is so far the wait for the pair before to be handed over.
+        stages: time of each stage; `write` is still 0.
         geometry: converts this disparity to metres; None without a core or geometry.
         limits: to which the cloud was cut; None without a cloud.
         cut: what became of the pixels; None without a core. Without geometry, `kept` counts disparities.

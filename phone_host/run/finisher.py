@@ -30,13 +30,25 @@ class Finisher(Generic[T]):
         """Start the thread."""
         self._thread.start()
 
-    def put(self, item: T) -> None:
-        """Wait until the item before is finished, then hand this one over. Dropped after a failure."""
+    def take(self, item: T) -> bool:
+        """Take an item if the one before is finished. Never waits; after a failure the item is dropped.
+
+        Returns:
+            Whether it was taken or dropped.
+        """
         with self._changed:
-            self._changed.wait_for(lambda: not self._has_item or self.failure is not None)
-            if self.failure is None:
-                self._item, self._has_item = item, True
-                self._changed.notify_all()
+            if self.failure is not None:
+                return True
+            if self._has_item:
+                return False
+            self._item, self._has_item = item, True
+            self._changed.notify_all()
+            return True
+
+    def put(self, item: T) -> None:
+        """Wait until the item before is finished, then take this one, or drop it after a failure."""
+        with self._changed:  # reentrant
+            self._changed.wait_for(lambda: self.take(item))
 
     def end(self) -> None:
         """No item will follow: the thread ends after the last one."""

@@ -117,7 +117,7 @@ class Ledgerer:
             dequeued_ns=marks.dequeued_ns,
             done_ns=marks.done_ns,
             previous_done_ns=self.last_done_ns or pair.queued_ns,
-            stages=replace(processed.stages, write=processed.stages.write + marks.done_ns - marks.computed_ns),
+            stages=replace(processed.stages, write=marks.done_ns - marks.computed_ns),
             time_skew_ns=pair.time_skew_ns,
             offset_ns=board.offset_ns,
             uncertainty_ns=board.uncertainty_ns,

@@ -47,14 +47,12 @@ class Halfway:
         choice: how it was matched by a time budget; None: there is none.
         stages: times so far: decode and interpolate.
         start_ns: when decoding began, ns.
-        end_ns: when the first half ended, ns.
     """
 
     found: MatchedPair | RectifiedPair
     choice: Choice | None
     stages: StageTimes
     start_ns: int
-    end_ns: int
 
 
 class Pipeline:
@@ -131,29 +129,24 @@ class Pipeline:
             choice = None if self._budget is None else self._budget.choice(*sizes)
             found = self._core.matched(left, right, self._clock, whole_px=sizes, choice=choice)
         stages = StageTimes(decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
-        return Halfway(found, choice, stages, start_ns, self._clock())
+        return Halfway(found, choice, stages, start_ns)
 
     def finish(self, halfway: Halfway) -> Processed:
-        """Do the second half: compute the points. The time since the first half ended counts as waiting to hand over.
+        """Do the second half: compute the points.
 
         Args:
-            halfway: what `begin` made; pairs are finished in the order in which they were begun.
+            halfway: what `begin` made.
         """
-        start_ns = self._clock()
-        waited_ns = start_ns - halfway.end_ns
-        found = halfway.found
-        if self._core is None or isinstance(found, RectifiedPair):
-            assert isinstance(found, RectifiedPair)
-            return Processed(found, None, None, replace(halfway.stages, write=waited_ns))
+        found, stages = halfway.found, halfway.stages
+        if isinstance(found, RectifiedPair):
+            return Processed(found, None, None, stages)
+        assert self._core is not None, "it has matched the pair"
         processed = self._core.finished(found, self._clock)
         times = processed.stages
         if self._budget is not None and halfway.choice is not None:
             end_ns = self._clock()
-            self._budget.add(halfway.choice, end_ns - halfway.start_ns - waited_ns, times.match, end_ns)
-        stages = replace(
-            halfway.stages, rectify=times.rectify, match=times.match, reproject=times.reproject, write=waited_ns
-        )
-        return replace(processed, stages=stages)
+            self._budget.add(halfway.choice, end_ns - halfway.start_ns, times.match, end_ns)
+        return replace(processed, stages=replace(times, decode=stages.decode, interpolate=stages.interpolate))
 
     def _of_host(self, frame: Frame) -> EncodedImage:
         return EncodedImage(

@@ -9,14 +9,14 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from common import now
 from common.errors import DataError
 from common.frame import SpoiledImageError
 from common.program.logs import event
-from phone_host.model import FramePair, Result
+from phone_host.model import FramePair, Processed, Result
 from phone_host.run.finisher import Finisher
 from phone_host.run.ledgerer import Ledgerer, WorkerMarks
 from phone_host.run.pipeline import Halfway, Pipeline
@@ -30,12 +30,20 @@ _HOPELESS: Final = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Begun:
-    """A pair on its way from the worker to the finisher, and when it was taken, ns."""
+class _UnderWay:
+    """A pair on its way from the worker to the finisher.
+
+    Attributes:
+        pair: its frames.
+        dequeued_ns: when it was taken.
+        depth: what was computed so far.
+        computed_ns: when all was computed; 0: not yet.
+    """
 
     pair: FramePair
-    halfway: Halfway
     dequeued_ns: int
+    depth: Halfway | Processed
+    computed_ns: int = 0
 
 
 class Worker:
@@ -63,7 +71,7 @@ class Worker:
         self._queue, self._pipeline, self._ledgerer, self._sinks = queue, pipeline, ledgerer, tuple(sinks)
         self._most_pairs, self._taken = most_pairs, taken
         self._thread = threading.Thread(target=self._work, name="worker", daemon=True)
-        self._finisher: Finisher[_Begun] = Finisher("finisher", self._finish)
+        self._finisher: Finisher[_UnderWay] = Finisher("finisher", self._finish)
         self._begun = 0  # pairs handed to the finisher
         self.finished = threading.Event()
         self.failure: Exception | None = None
@@ -127,26 +135,34 @@ class Worker:
             self._note_failed(error)
             return
         self._begun += 1
-        self._finisher.put(_Begun(pair, halfway, dequeued_ns))
+        under_way = _UnderWay(pair, dequeued_ns, halfway)
+        if not self._finisher.take(under_way):  # a sink lets the pair before wait: that is no reason to be idle
+            self._finisher.put(self._computed(under_way)[0])
 
-    def _finish(self, begun: _Begun) -> None:
+    def _computed(self, under_way: _UnderWay) -> tuple[_UnderWay, Processed]:
+        depth = under_way.depth
+        if not isinstance(depth, Halfway):
+            return under_way, depth
+        processed = self._pipeline.finish(depth)
+        return replace(under_way, depth=processed, computed_ns=now.monotonic_ns()), processed
+
+    def _finish(self, under_way: _UnderWay) -> None:
         """Finish a pair, in the finisher's thread."""
         try:
-            self._hand_over(begun)
+            self._hand_over(under_way)
         except Exception as error:
             self._fail(error)
             raise
 
-    def _hand_over(self, begun: _Begun) -> None:
+    def _hand_over(self, under_way: _UnderWay) -> None:
         if self.has_given_up:
             return
-        processed = self._pipeline.finish(begun.halfway)
-        computed_ns = now.monotonic_ns()
+        computed, processed = self._computed(under_way)
         number = self._ledgerer.processed
         for sink in self._sinks:
             sink.await_place(number)
-        marks = WorkerMarks(begun.dequeued_ns, computed_ns, done_ns=now.monotonic_ns())
-        result = Result(number, begun.pair, processed, self._ledgerer.enter(begun.pair, processed, marks))
+        marks = WorkerMarks(computed.dequeued_ns, computed.computed_ns, done_ns=now.monotonic_ns())
+        result = Result(number, computed.pair, processed, self._ledgerer.enter(computed.pair, processed, marks))
         for sink in self._sinks:
             sink.offer(result)
         if self._most_pairs and number + 1 >= self._most_pairs:

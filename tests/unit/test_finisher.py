@@ -67,3 +67,16 @@ def test_a_failure_is_kept_and_whoever_hands_over_goes_on() -> None:
     assert done == [0]
     assert str(finisher.failure) == "item 0"
     finisher.put(5)
+
+
+def test_an_item_is_only_taken_where_the_place_is_free() -> None:
+    """Before the thread has started the first item is taken, the second is not; after it was finished, it is."""
+    done: list[int] = []
+    finisher: Finisher[int] = Finisher("test", done.append)
+    assert finisher.take(0)
+    assert not finisher.take(1)
+    finisher.start()
+    finisher.put(1)
+    finisher.end()
+    assert finisher.has_ended(60)
+    assert done == [0, 1]
