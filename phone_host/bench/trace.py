@@ -138,11 +138,12 @@ def _pair(
             yield _flow("s", flow, start_ns - zero_ns, place)
         if kind.name == "pairing":
             yield _flow("f", flow, start_ns - zero_ns, place)
-    at_ns = ledger.dequeued_ns  # from here on `place` is that of processing, which may overlap the next pair's
+    at_ns = ledger.dequeued_ns
     for stage in fields(StageTimes):
         length_ns = getattr(ledger.stages, stage.name)
         # The last stage, write, ends together with processing; hardly any time passes between the others.
         begin_ns = ledger.done_ns - length_ns if stage.name == "write" else at_ns
+        place = {"pid": pids[0], "tid": _tid(len(_KINDS) - 1, 0)}
         yield _slice(
             stage.name,
             start_ns=begin_ns - zero_ns,

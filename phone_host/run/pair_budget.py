@@ -1,11 +1,10 @@
 """Holds the time budget of a run: chooses how each pair is matched, follows the machine, and keeps the account.
 
-The worker's two threads call it; any thread may read the account.
+The worker's thread calls it; any thread may read the account.
 """
 
 import logging
 import math
-import threading
 from collections import deque
 from dataclasses import dataclass
 from typing import Final
@@ -64,7 +63,6 @@ class PairBudget:
 
     def __init__(self, wanted: BudgetWanted, core: StereoCore) -> None:
         self._wanted, self._core = wanted, core
-        self._lock = threading.Lock()
         self._held: _Held | None = None
         self._first_ns = 0
         self._pairs = self._within = self._narrowed = self._changed = 0
@@ -82,38 +80,35 @@ class PairBudget:
         Raises:
             DataError: the core cannot take images of these sizes.
         """
-        with self._lock:
-            held = self._held
-            if held is None or held.sizes != (left_px, right_px):
-                before, held = held, self._made((left_px, right_px))
-                self._held = held
-                if before is not None:
-                    self._note_change(held, BudgetReason.OTHER_SIZE, now.monotonic_ns())
-                _LOG.info(_told("budget_chosen", held.controller.step))
-            return held.controller.step.choice
+        held = self._held
+        if held is None or held.sizes != (left_px, right_px):
+            before, held = held, self._made((left_px, right_px))
+            self._held = held
+            if before is not None:
+                self._note_change(held, BudgetReason.OTHER_SIZE, now.monotonic_ns())
+            _LOG.info(_told("budget_chosen", held.controller.step))
+        return held.controller.step.choice
 
-    def add(self, choice: Choice, total_ns: int, match_ns: int, now_ns: int) -> None:
-        """Take the times of a pair. Pairs overlap: if another way to match was chosen meanwhile, this one says nothing about it.
+    def add(self, total_ns: int, match_ns: int, now_ns: int) -> None:
+        """Take the times of the pair that was matched as `choice` said.
 
         Args:
-            choice: how it was matched.
             total_ns: from the beginning of decoding to the cloud, ns.
             match_ns: the part of it that matching took, ns.
             now_ns: monotonic, ns.
         """
-        with self._lock:
-            held = self._held
-            assert held is not None, "a pair comes after its choice"
-            controller = held.controller
-            self._first_ns = self._first_ns or now_ns
-            self._pairs += 1
-            self._within += total_ns <= self._wanted.budget_ns
-            self._narrowed += choice.disparities < held.best.choice.disparities
-            reason = controller.add(total_ns, match_ns, now_ns) if choice == controller.step.choice else None
-            if reason is not None:
-                self._note_change(held, reason, now_ns)
-                _LOG.info(_told("budget_changed", controller.step, reason=reason.value))
-            self.account = self._accounted(held)
+        held = self._held
+        assert held is not None, "a pair comes after its choice"
+        controller, step = held.controller, held.controller.step
+        self._first_ns = self._first_ns or now_ns
+        self._pairs += 1
+        self._within += total_ns <= self._wanted.budget_ns
+        self._narrowed += step.choice.disparities < held.best.choice.disparities
+        reason = controller.add(total_ns, match_ns, now_ns)
+        if reason is not None:
+            self._note_change(held, reason, now_ns)
+            _LOG.info(_told("budget_changed", controller.step, reason=reason.value))
+        self.account = self._accounted(held)
 
     def _made(self, sizes: _Sizes) -> _Held:
         extent = self._core.extent(*sizes)

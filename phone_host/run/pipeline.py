@@ -1,7 +1,6 @@
 """The processing of a pair: decode, optionally interpolate and rectify, match, reproject. Each stage is timed.
 
-This module alone defines the order of the stages. It has two halves, up to the match and from there on, which two threads
-may do, each one pair at a time.
+This module alone defines the order of the stages.
 """
 
 from collections.abc import Callable
@@ -15,8 +14,7 @@ from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
 from phone_host.model import BoardFrame, FramePair, Image, Processed, RectifiedPair, Side
 from phone_host.run.pair_budget import PairBudget
-from phone_host.stereo.budget_ladder import Choice
-from phone_host.stereo.core import MatchedPair, StereoCore
+from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import WHOLE
 from phone_host.stereo.interpolate import LARGEST_FRACTION, Interpolator
 from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_frames
@@ -36,23 +34,6 @@ class _Plan:
 
     whole_px: tuple[Size, Size]
     reductions: tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Halfway:
-    """A pair that is matched, or decoded if there is nothing to match with.
-
-    Attributes:
-        found: the matched pair, or the images as received.
-        choice: how it was matched by a time budget; None: there is none.
-        stages: times so far: decode and interpolate.
-        start_ns: when decoding began, ns.
-    """
-
-    found: MatchedPair | RectifiedPair
-    choice: Choice | None
-    stages: StageTimes
-    start_ns: int
 
 
 class Pipeline:
@@ -100,14 +81,6 @@ class Pipeline:
             SpoiledImageError: a frame's bytes are not a whole image, or its size is not believed.
             DataError: the cameras' image sizes do not fit the rig.
         """
-        return self.finish(self.begin(pair))
-
-    def begin(self, pair: FramePair) -> Halfway:
-        """Do the first half of `process`: decode, interpolate, rectify, match.
-
-        Raises:
-            DataError: as `process`.
-        """
         board, host = _of_board(pair.board), self._of_host(pair.host)
         start_ns = self._clock()
         planned: list[_Plan] = []
@@ -122,31 +95,17 @@ class Pipeline:
         board_image = self._at_host_time(pair, board_image, decoding.reductions[0])
         interpolated_ns = self._clock()
         left, right = self._in_sides(board_image, host_image)
-        found: MatchedPair | RectifiedPair = RectifiedPair(left, right)
-        choice = None
-        if self._core is not None:
+        if self._core is None:
+            processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
+        else:
             sizes = self._in_sides(*decoding.whole_px)
             choice = None if self._budget is None else self._budget.choice(*sizes)
-            found = self._core.matched(left, right, self._clock, whole_px=sizes, choice=choice)
-        stages = StageTimes(decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
-        return Halfway(found, choice, stages, start_ns)
-
-    def finish(self, halfway: Halfway) -> Processed:
-        """Do the second half: compute the points.
-
-        Args:
-            halfway: what `begin` made.
-        """
-        found, stages = halfway.found, halfway.stages
-        if isinstance(found, RectifiedPair):
-            return Processed(found, None, None, stages)
-        assert self._core is not None, "it has matched the pair"
-        processed = self._core.finished(found, self._clock)
-        times = processed.stages
-        if self._budget is not None and halfway.choice is not None:
+            processed = self._core.compute(left, right, self._clock, whole_px=sizes, choice=choice)
+        stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
+        if self._budget is not None:
             end_ns = self._clock()
-            self._budget.add(halfway.choice, end_ns - halfway.start_ns, times.match, end_ns)
-        return replace(processed, stages=replace(times, decode=stages.decode, interpolate=stages.interpolate))
+            self._budget.add(end_ns - start_ns, stages.match, end_ns)
+        return replace(processed, stages=stages)
 
     def _of_host(self, frame: Frame) -> EncodedImage:
         return EncodedImage(

@@ -1,7 +1,7 @@
 """Sinks take the results of a run. Each has a bounded queue and its own thread, so a slow sink never delays a pair.
 
 Rules: a sink gets a result once its pair is done. If its queue is full, the result is dropped and counted under the
-sink's name. A sink that `waits` loses nothing: the finisher waits for a place before it marks the pair as done, and this
+sink's name. A sink that `waits` loses nothing: the worker waits for a place before it marks the pair as done, and this
 time counts as the pair's stage `write`.
 """
 
@@ -29,7 +29,7 @@ class NotWrittenError(Exception):
 class Sink(Protocol):
     """Takes results.
 
-    The worker's finisher calls it, one thread, except `finish`: the run's root calls that after the worker ended.
+    The worker's thread calls it, except `finish`: the run's root calls that after the worker ended.
     """
 
     def await_place(self, number: int) -> None:

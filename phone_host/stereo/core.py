@@ -76,25 +76,6 @@ class _Ready:
     limits: DepthLimits | None
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class MatchedPair:
-    """A pair whose disparities are found, but not yet its points: what `StereoCore.matched` hands to `StereoCore.finished`.
-
-    Attributes:
-        pair: the rectified images.
-        matched: their disparities.
-        ready: what was made for their sizes.
-        rectify_ns: time that rectification took, ns.
-        match_ns: time that matching took, ns.
-    """
-
-    pair: RectifiedPair
-    matched: Matched
-    ready: _Ready
-    rectify_ns: int
-    match_ns: int
-
-
 class StereoCore:
     """Computes a point cloud image from two images.
 
@@ -158,51 +139,21 @@ class StereoCore:
         Raises:
             DataError: a size does not fit the rig, the sizes differ and there is no rig, or the crop lies outside.
         """
-        return self.finished(self.matched(left, right, clock, whole_px=whole_px, choice=choice), clock)
-
-    def matched(
-        self,
-        left: Image,
-        right: Image,
-        clock: Callable[[], int],
-        *,
-        whole_px: _Sizes | None = None,
-        choice: Choice | None = None,
-    ) -> MatchedPair:
-        """Run the first two stages of `compute`, with its arguments: rectify or pass through, and match.
-
-        Raises:
-            DataError: as `compute`.
-        """
         start_ns = clock()
         ready = self._ready(*(whole_px or (size_px(left), size_px(right))), choice)
         pair = RectifiedPair(left, right) if ready.rectifier is None else ready.rectifier.rectify(left, right)
         rectified_ns = clock()
         matched = _match(pair, ready)
-        return MatchedPair(
-            pair=pair,
-            matched=matched,
-            ready=ready,
-            rectify_ns=rectified_ns - start_ns,
-            match_ns=clock() - rectified_ns,
-        )
-
-    def finished(self, found: MatchedPair, clock: Callable[[], int]) -> Processed:
-        """Run the last stage of `compute`. Needs nothing that `matched` changes, so another thread may match the next pair meanwhile.
-
-        Args:
-            found: a pair that this core has matched.
-            clock: monotonic, ns.
-        """
-        start_ns = clock()
-        ready = found.ready
-        disparity, cloud, cut = _reproject(found.matched.disparity, ready)
-        confidence = found.matched.confidence
+        matched_ns = clock()
+        disparity, cloud, cut = _reproject(matched.disparity, ready)
+        confidence = matched.confidence
         if confidence is not None:
             confidence = confidence_of_known(confidence, disparity)
-        times = StageTimes(rectify=found.rectify_ns, match=found.match_ns, reproject=clock() - start_ns)
+        times = StageTimes(
+            rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
+        )
         return Processed(
-            found.pair,
+            pair,
             disparity,
             cloud,
             times,
@@ -211,7 +162,7 @@ class StereoCore:
             cut=cut,
             search=ready.search,
             confidence=confidence,
-            match_report=found.matched.report,
+            match_report=matched.report,
         )
 
     def reductions(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> tuple[int, int]:

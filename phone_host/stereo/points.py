@@ -1,7 +1,6 @@
 """From disparities to a cut point cloud image: in one pass of the native library, or with numpy where there is none. Both give the same bits."""
 
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +9,6 @@ from phone_host.model import CloudImage, CutCounts, DepthLimits, Disparity, Ster
 from phone_host.stereo.depth_limits import above_zero, cut_cloud, drop_zeros, float32_below, is_wide
 from phone_host.stereo.native.library import Library, Missing, ReprojectJob, native
 from phone_host.stereo.reproject import least_in_front_px, rays, reproject
-from phone_host.stereo.two_threads import in_two_threads
-
-_FLOAT_BYTES: Final = 4
-
-_LEAST_FOR_TWO: Final = 200_000
-"""Pixels from which two threads are worth their start: 640x480 takes 0.5 ms in one thread, and a start 0.05 ms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,35 +64,15 @@ def _by_library(matched: Disparity, geometry: StereoGeometry, limits: DepthLimit
     cloud = np.empty((*matched.shape, 3), np.float32)
     slopes = rays(geometry, matched.shape[1], matched.shape[0])
     job = reproject_job(matched, slopes, geometry, limits, cloud)
-    if matched.size < _LEAST_FOR_TWO:
-        library.reproject(job)
-        parts: tuple[ReprojectJob, ...] = (job,)
-    else:
-        upper, lower = parts = halves(job)
-        in_two_threads(lambda: library.reproject(upper), lambda: library.reproject(lower))
-    counts = sum((_counts(part) for part in parts), CutCounts())
-    disparity = drop_zeros(matched, np.float32(job.at_zero_px)) if counts.at_zero else matched
-    return Points(disparity=disparity, cloud=cloud, counts=counts, found=sum(part.found for part in parts))
-
-
-def _counts(job: ReprojectJob) -> CutCounts:
-    kept = job.in_front - job.too_far - job.too_near
-    return CutCounts(kept=kept, at_zero=job.at_zero, too_far=job.too_far, too_near=job.too_near)
-
-
-def halves(job: ReprojectJob) -> tuple[ReprojectJob, ReprojectJob]:
-    """Split a computation of at least two rows into those of its upper and its lower rows. Together they write the same.
-
-    Args:
-        job: as `reproject_job` makes it; not computed yet.
-    """
-    upper, lower = ReprojectJob.from_buffer_copy(job), ReprojectJob.from_buffer_copy(job)
-    upper.height = job.height // 2
-    lower.height = job.height - upper.height
-    lower.disparity_px += upper.height * job.disparity_stride * _FLOAT_BYTES
-    lower.row_slopes += upper.height * _FLOAT_BYTES
-    lower.cloud_m += upper.height * job.width * 3 * _FLOAT_BYTES
-    return upper, lower
+    library.reproject(job)
+    counts = CutCounts(
+        kept=job.in_front - job.too_far - job.too_near,
+        at_zero=job.at_zero,
+        too_far=job.too_far,
+        too_near=job.too_near,
+    )
+    disparity = drop_zeros(matched, np.float32(job.at_zero_px)) if job.at_zero else matched
+    return Points(disparity=disparity, cloud=cloud, counts=counts, found=job.found)
 
 
 def reproject_job(

@@ -56,20 +56,6 @@ def test_points_have_the_bits_of_numpy(
         assert same(points_of(disparity, geometry, limits, library), points_of(disparity, geometry, limits, NONE))
 
 
-@pytest.mark.parametrize("shape", [(480, 640), (613, 331), (1, 200_001)])
-@pytest.mark.parametrize("cy_px", [100.0, 900.0])
-def test_large_images_have_the_bits_of_numpy(library: Library, shape: tuple[int, int], cy_px: float) -> None:
-    """Their two halves, computed at once, are those of the whole: also where only the lower or the upper rows reach beyond the far limit."""
-    disparity = np.random.default_rng(7).uniform(-1, 64, shape).astype(np.float32)
-    disparity[disparity < 3] = np.nan
-    geometry = StereoGeometry(focal_px=300.0, baseline_m=0.06, cx_px=200.0, cy_px=cy_px, doffs_px=1.5)
-    limits = DepthLimits(near_m=0.1, far_m=3.0, disparity_error_px=0.25, from_rig=True)
-    ours = points_of(disparity, geometry, limits, library)
-    assert ours.counts.kept
-    assert ours.counts.too_far
-    assert same(ours, points_of(disparity, geometry, limits, NONE))
-
-
 @pytest.mark.parametrize("part", [np.s_[:, 3:60], np.s_[::2, :], np.s_[:, ::3], np.s_[::-1, :], np.s_[:, ::-1]])
 def test_a_part_of_an_image_gives_the_part_of_the_cloud(library: Library, part: tuple[slice, slice]) -> None:
     """Views with any strides are read rightly."""

@@ -93,7 +93,8 @@ def held(budget_ms: float, times_ms: list[tuple[float, float]], **wanted: Any) -
     core = settings_core()
     budget = PairBudget(BudgetWanted(budget_ns=round(budget_ms * MS), matchers=(MatcherName.SGBM,), **wanted), core)
     for number, (total_ms, match_ms) in enumerate(times_ms):
-        budget.add(budget.choice(SIZE, SIZE), round(total_ms * MS), round(match_ms * MS), (number + 1) * 33 * MS)
+        budget.choice(SIZE, SIZE)
+        budget.add(round(total_ms * MS), round(match_ms * MS), (number + 1) * 33 * MS)
     return budget
 
 
@@ -116,21 +117,11 @@ def test_the_account_tells_what_was_chosen_and_why() -> None:
 def test_other_sizes_begin_anew() -> None:
     """When the camera changes its size, the ladder is that of the new one; the account goes on."""
     budget = held(30, [(10, 5)] * 3)
-    budget.add(budget.choice((640, 320), (640, 320)), 10 * MS, 5 * MS, 200 * MS)
+    budget.choice((640, 320), (640, 320))
+    budget.add(10 * MS, 5 * MS, 200 * MS)
     assert budget.account is not None
     assert budget.account.best.width_px == 640
     assert (budget.account.pairs, budget.account.changes[0].reason) == (4, BudgetReason.OTHER_SIZE)
-
-
-def test_a_pair_that_was_matched_in_another_way_says_nothing_about_the_present_one() -> None:
-    """Pairs overlap: times of one that was begun before the change count in the account, but teach nothing about the new choice."""
-    budget = held(30, [(50, 45)] * 3)
-    before = budget.choice(SIZE, SIZE)
-    for at_ms in (200, 233, 266, 300, 333, 366):
-        budget.add(before, 50 * MS, 45 * MS, at_ms * MS)
-    assert budget.account is not None
-    assert budget.choice(SIZE, SIZE) != before
-    assert (budget.account.pairs, budget.account.changed) == (9, 1)
 
 
 def test_a_crop_is_what_is_matched() -> None:
