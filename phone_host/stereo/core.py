@@ -48,6 +48,7 @@ from phone_host.stereo.working import (
     MARGIN_PX,
     Part,
     chosen_scale,
+    confidence_of_known,
     confidence_to_full_size,
     part_for,
     reduced,
@@ -147,7 +148,7 @@ class StereoCore:
         disparity, cloud, cut = _reproject(matched.disparity, ready)
         confidence = matched.confidence
         if confidence is not None:
-            confidence = np.where(np.isfinite(disparity), confidence, np.uint8(0))
+            confidence = confidence_of_known(confidence, disparity)
         times = StageTimes(
             rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
         )

@@ -31,6 +31,9 @@ MARGIN_PX: Final = 32
 _SURFACE_STEP_PX: Final = 1.0
 """Values within this belong to one surface, px of the matched images (`match_sgbm` bridges gaps by the same rule)."""
 
+_GREATEST: Final = float(np.finfo(np.float32).max)
+"""The greatest finite disparity there can be."""
+
 
 def chosen_scale(width_px: int, height_px: int, disparities: int) -> float:
     """Choose the size of the images to match.
@@ -117,6 +120,20 @@ def confidence_to_full_size(confidence: Confidence, width_px: int, height_px: in
     if (width, height) == (width_px, height_px):
         return confidence
     return np.asarray(cv2.resize(confidence, (width_px, height_px), interpolation=cv2.INTER_NEAREST_EXACT), np.uint8)
+
+
+def confidence_of_known(confidence: Confidence, disparity: Disparity) -> Confidence:
+    """Return the confidence with 0 wherever there is no disparity. Half the time of numpy's `isfinite` and `where`.
+
+    Args:
+        confidence: (H, W) uint8.
+        disparity: (H, W) float32, px.
+
+    Returns:
+        (H, W) uint8, another array.
+    """
+    known = cv2.inRange(disparity, -_GREATEST, _GREATEST)
+    return np.asarray(cv2.bitwise_and(confidence, known), np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,10 +3,14 @@
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
 
 import cv2
+import pytest
+
+from phone_host.stereo import two_threads
 
 
 @contextmanager
@@ -18,10 +22,13 @@ def watched_decoder(on_decoding: Callable[[], None]) -> Iterator[None]:
             on_decoding()
 
     before, before_in_threads = sys.getprofile(), threading.getprofile()
-    sys.setprofile(watch)
-    threading.setprofile(watch)
-    try:
-        yield
-    finally:
-        threading.setprofile(before_in_threads)
-        sys.setprofile(before)
+    # Threads that are kept from earlier decodings would not be seen: others take their place meanwhile.
+    with ThreadPoolExecutor(2) as helpers, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(two_threads, "_HELPERS", helpers)
+        sys.setprofile(watch)
+        threading.setprofile(watch)
+        try:
+            yield
+        finally:
+            threading.setprofile(before_in_threads)
+            sys.setprofile(before)

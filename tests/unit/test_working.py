@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from phone_host.model import Crop, Epipolar, RectifiedPair
 from phone_host.stereo.stacked import lying, upright_again
-from phone_host.stereo.working import MOST_PIXELS, MOST_STEPS, chosen_scale, part_for, reduced, to_full_size
+from phone_host.stereo.working import (
+    MOST_PIXELS,
+    MOST_STEPS,
+    chosen_scale,
+    confidence_of_known,
+    part_for,
+    reduced,
+    to_full_size,
+)
 from tests.support.planes import noise
 
 
@@ -115,3 +123,13 @@ def test_a_crops_part_holds_every_partner(epipolar: Epipolar, x: int, y: int, si
     placed = part.placed(np.ones(pair.left.shape, np.float32), 100, 80)
     assert np.nansum(placed) == crop.width_px * crop.height_px
     assert (placed[y : y + crop.height_px, x : x + crop.width_px] == 1).all()
+
+
+def test_confidence_is_kept_only_where_there_is_a_disparity() -> None:
+    """NaN and both infinities are none; 0, negative and the greatest finite numbers are."""
+    greatest = np.finfo(np.float32).max
+    disparity = np.array([[0, -1.5, np.nan, np.inf], [-np.inf, greatest, -greatest, 7]], np.float32)
+    confidence = np.array([[1, 2, 3, 4], [5, 6, 7, 255]], np.uint8)
+    known = confidence_of_known(confidence, disparity)
+    assert known.tolist() == [[1, 2, 0, 0], [0, 6, 7, 255]]
+    assert confidence.tolist() == [[1, 2, 3, 4], [5, 6, 7, 255]]
