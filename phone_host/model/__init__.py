@@ -46,6 +46,7 @@ from phone_host.model.run import (
     Result,
     Unwritten,
 )
+from phone_host.model.temporal import Searched, SearchedAs, TemporalAccount
 
 __all__ = [
     "UNMEASURED_NS",
@@ -78,9 +79,12 @@ __all__ = [
     "Result",
     "Rig",
     "Search",
+    "Searched",
+    "SearchedAs",
     "Side",
     "StereoGeometry",
     "Support",
+    "TemporalAccount",
     "TimeOffset",
     "Unwritten",
 ]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model.images import Disparity
+from phone_host.model.temporal import Searched
 
 Confidence = NDArray[np.uint8]
 """(H, W) uint8: 0 = no value, 255 = most certain. It orders the values of one pair; it is no probability."""
@@ -22,12 +23,14 @@ class MatchReport:
         offset_levels: then this was added to them, grey levels of 0 .. 255. Gain 1 and offset 0: nothing was corrected.
         confidence_histogram: number of pixels with a value by their confidence, in classes of equal width over 1 .. 255;
             None if the matcher has no confidence.
+        searched: which part of the range was looked at; None: always the full range.
     """
 
     vertical_px: float = 0.0
     gain: float = 1.0
     offset_levels: float = 0.0
     confidence_histogram: tuple[int, ...] | None = None
+    searched: Searched | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

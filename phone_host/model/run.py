@@ -8,6 +8,7 @@ from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
 from phone_host.model.images import CloudImage, CutCounts, DepthLimits, Disparity, RectifiedPair, Search, StereoGeometry
 from phone_host.model.matching import Confidence, MatchReport
+from phone_host.model.temporal import TemporalAccount
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,12 +113,14 @@ class DepthAccount:
         limits: of the newest pair; None without a cloud.
         search: how the newest pair was matched; None without a core.
         match_report: what the matcher corrected in the newest pair; None without a core.
+        temporal: how the pairs were searched; None: all in the full range, because nobody asked for less.
     """
 
     cut: CutCounts | None = None
     limits: DepthLimits | None = None
     search: Search | None = None
     match_report: MatchReport | None = None
+    temporal: TemporalAccount | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
