@@ -67,7 +67,5 @@ class TemporalAccount:
 
     def plus(self, searched: Searched) -> "TemporalAccount":
         """Return the account with one more pair."""
-        counts = tuple(
-            count + (why is searched.why) for count, why in zip(self.counts, SearchedAs, strict=True)
-        )
+        counts = tuple(count + (why is searched.why) for count, why in zip(self.counts, SearchedAs, strict=True))
         return TemporalAccount(counts=counts, share_sum=self.share_sum + searched.share)

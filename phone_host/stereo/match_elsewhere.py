@@ -22,7 +22,7 @@ FACTOR: Final = 4
 
 WINDOW_PX: Final = (3, 9)
 """Width and height of the windows, px of the small images: narrow, because a pole of 8 px is only two wide here, and half-occluded strips,
-which fit anywhere, are narrow, too. 5 x 5 missed the pole and raised two false alarms more on the scenes of decision 0002."""
+which fit anywhere, are narrow, too. 5 x 5 missed the pole and had larger patches by chance."""
 
 CAP: Final = 40
 """Grey levels: more is another surface, no worse fit."""
@@ -36,8 +36,8 @@ LEAST_GAIN: Final = 3.0
 AGREE_PX: Final = 1
 """Neighbours of one patch lie within this disparity of the patch's middle, px of the small images."""
 
-LEAST_AREA: Final = 12
-"""Pixels of the small images that make a patch: an object of about 14 x 14 px. False alarms had up to 8, a pole of 8 x 480 px 22."""
+LEAST_AREA: Final = 16
+"""Pixels of the small images that make a patch: an object of 16 x 16 px. Chance made up to 13 beside edges of depth, a pole of 8 x 480 px 22."""
 
 ROUNDING: Final = 0.5
 """Whole disparities of the small images within this of the range belong to it."""

@@ -21,9 +21,7 @@ import numpy as np
 
 from phone_host.model import (
     Disparity,
-    Image,
     Matched,
-    MatchReport,
     RectifiedPair,
     Searched,
     SearchedAs,
@@ -97,7 +95,9 @@ class TemporalMatcher:
             found, share = self._in_range(pair, wanted), wanted.size_px / searched
         self._last = _Last(
             shape=shape,
-            range=range_of(found.disparity, searched),
+            range=range_of(
+                found.disparity, searched, None if last is None or why is SearchedAs.ELSEWHERE else last.range
+            ),
             narrowed=0 if wanted is None or last is None else last.narrowed + 1,
         )
         return replace(found, report=replace(found.report, searched=Searched(why=why, share=share)))
@@ -133,12 +133,13 @@ def _plan(last: _Last | None, shape: tuple[int, ...], searched: int) -> tuple[Se
     return SearchedAs.NARROWED, last.range
 
 
-def range_of(disparity: Disparity, disparities: int) -> Range | None:
+def range_of(disparity: Disparity, disparities: int, before: Range | None = None) -> Range | None:
     """Find the range in which to search after a pair.
 
     Args:
         disparity: of that pair, (H, W) float32, px, NaN = none.
         disparities: N, px: the full range is 0 <= d < N.
+        before: the range of the pair before it; stays if it fits and is not much too large, so that one matcher serves many pairs.
 
     Returns:
         Where its values lie, but for TAIL_SHARE of the pixels at each end, with the margin; None if it has too few values.
@@ -148,8 +149,10 @@ def range_of(disparity: Disparity, disparities: int) -> Range | None:
     if whole.size <= 2 * tail:
         return None
     below = np.cumsum(np.bincount(whole, minlength=disparities))
-    low = int(np.searchsorted(below, tail, side="right")) - MARGIN_PX
-    high = int(np.searchsorted(below, whole.size - tail, side="left")) + 1 + MARGIN_PX
-    missing = -(high - max(low, 0)) % STEP_PX  # goes to the near side, where things move faster
-    high = min(max(low, 0) + (high - max(low, 0)) + missing, disparities)
-    return Range(low_px=max(low, 0), high_px=high)
+    low = max(int(np.searchsorted(below, tail, side="right")) - MARGIN_PX, 0)
+    high = min(int(np.searchsorted(below, whole.size - tail, side="left")) + 1 + MARGIN_PX, disparities)
+    holds = before is not None and before.low_px <= low and high <= before.high_px
+    if before is not None and holds and before.size_px - (high - low) < 2 * STEP_PX:
+        return before
+    missing = -(high - low) % STEP_PX  # goes to the near side, where things move faster
+    return Range(low_px=low, high_px=min(high + missing, disparities))
