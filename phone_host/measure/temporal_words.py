@@ -25,7 +25,5 @@ def temporal_lines(account: TemporalAccount | None) -> list[str]:
     reasons = [f"{account.of(why)} {words}" for why, words in _WHY.items() if account.of(why)]
     full = account.pairs - account.narrowed
     told = f"{full} in full ({', '.join(reasons)})" if reasons else "none in full"
-    return [
-        f"temporal: {account.narrowed} of {counted(account.pairs, 'pair')} searched where the last one found something, {told};"
-        f" {account.share:.0%} of the disparities on average"
-    ]
+    narrowed = f"{account.narrowed} of {counted(account.pairs, 'pair')} searched where the last one found something"
+    return [f"temporal: {narrowed}, {told}; {account.share:.0%} of the disparities on average"]
