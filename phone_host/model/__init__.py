@@ -25,6 +25,7 @@ from phone_host.model.images import (
     StereoGeometry,
 )
 from phone_host.model.matching import (
+    Completed,
     Confidence,
     Matched,
     MatchReport,
@@ -58,6 +59,7 @@ __all__ = [
     "BudgetStep",
     "CameraModel",
     "CloudImage",
+    "Completed",
     "Confidence",
     "Crop",
     "CutCounts",

@@ -7,7 +7,7 @@ from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
 from phone_host.model.images import CloudImage, CutCounts, DepthLimits, Disparity, RectifiedPair, Search, StereoGeometry
-from phone_host.model.matching import Confidence, MatchReport
+from phone_host.model.matching import Completed, Confidence, MatchReport
 from phone_host.model.temporal import TemporalAccount
 
 
@@ -73,6 +73,7 @@ class Processed:
         search: how the pair was matched; None without a core.
         confidence: of each disparity; None without a core, or if the matcher has none.
         match_report: what the matcher corrected, in px of the rectified images; None without a core.
+        completed: the disparity with completed holes, marked; None if nobody asked for it. The cloud never contains them.
     """
 
     pair: RectifiedPair
@@ -85,6 +86,7 @@ class Processed:
     search: Search | None = None
     confidence: Confidence | None = None
     match_report: MatchReport | None = None
+    completed: Completed | None = None
 
 
 @dataclass(frozen=True, slots=True)

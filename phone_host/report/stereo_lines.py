@@ -43,6 +43,8 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
             f"f = {report.geometry.focal_px:.1f} px, b = {report.geometry.baseline_m * 1e3:.2f} mm",
             *cut_lines(report),
         ]
+    if report.completed is not None:
+        lines.append(completed_words(report.completed, report.rectified_px))
     lines += [remark.line for remark in report.remarks_beside_headline]
     if missing := depth_png_words(written.not_in_depth_png):
         lines.append(f"note: {missing}")
@@ -79,6 +81,17 @@ def _shared_line(shared: SharedRemark, report: SetReport) -> str:
     such = "" if shared.alike else f", such as {shared.first}"
     kind = "note" if shared.remark.is_note else "warning"
     return f"{kind}: in {shared.pairs} of {len(report.pairs)} pairs{such}: {shared.remark.text}"
+
+
+def completed_words(count: int, size_px: tuple[int, int]) -> str:
+    """Say how many pixels were completed, and where they are.
+
+    Args:
+        count: pixels.
+        size_px: width and height of the image.
+    """
+    share = count / (size_px[0] * size_px[1])
+    return f"completed: {share:.1%} of the pixels, guessed from their surroundings: only in completed.pfm, marked in completed.png"
 
 
 def cut_lines(report: PairReport) -> list[str]:

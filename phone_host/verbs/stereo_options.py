@@ -90,7 +90,7 @@ def build_core(
             _matcher(chosen, options.disparities, temporal=temporal), Rectifier(rig), None, wanted
         ), rig.board_side
     if not options.rectified:
-        _refuse_idle_limits(options, ("near", "far", "crop", "scale"), "--calibration or --rectified")
+        _refuse_idle_limits(options, ("near", "far", "crop", "scale", "complete"), "--calibration or --rectified")
         return None, None
     geometry = rectified_geometry(options, size_px)
     if geometry is None:
@@ -118,6 +118,7 @@ def depth_wanted(options: argparse.Namespace) -> DepthWanted:
         far_m=far_m,
         crop=None if options.crop is None else crop_of(options.crop),
         scale=math.nan if options.scale is None else scale_of(options.scale),
+        complete=options.complete,
     )
 
 
@@ -187,7 +188,7 @@ def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None
 
 def _refuse_idle_limits(options: argparse.Namespace, names: tuple[str, ...], missing: str) -> None:
     """Refuse limits that would have no effect."""
-    given = [f"--{name}" for name in names if getattr(options, name) is not None]
+    given = [f"--{name}" for name in names if getattr(options, name) not in {None, False}]
     if given:
         raise SettingsError(f"{given[0]} without {missing}", "add them, or leave it out")
 
