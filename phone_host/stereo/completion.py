@@ -42,7 +42,7 @@ ONE_SIDED: Final = 0.5
 """Weight of a line with a value at one end only."""
 
 REACH_SHARE: Final = 0.25
-"""Values farther away than this share of the image's longer side say nothing."""
+"""A pixel whose nearest value is farther away than this share of the image's longer side stays open."""
 
 LEAST_ENDS: Final = 2
 """A hole in which one way alone leads to a value may be anything: a corner, or the margin that only one camera sees."""
@@ -59,7 +59,7 @@ class _Way:
     """The way from each hole's pixel to the next value in one direction; (P,) each.
 
     Attributes:
-        value_px: NaN: none within reach.
+        value_px: NaN: none.
         steps_px: how far, px.
         edges: sum of the image's steps on the way, grey levels.
     """
@@ -105,23 +105,24 @@ def completed(left: Image, disparity: Disparity, epipolar: Epipolar = Epipolar.L
 def _guessed(levels: Image, disparity: Disparity) -> Disparity:
     """Return the disparity with a guess in each pixel of a hole that has one."""
     holes = np.isnan(disparity)
-    reach_px = REACH_SHARE * max(disparity.shape)
-    to_left, to_right = _ways(levels, disparity, reach_px)
-    to_top, to_bottom = (_turned(way, holes) for way in _ways(levels.T, disparity.T, reach_px))
+    to_left, to_right = _ways(levels, disparity)
+    to_top, to_bottom = (_turned(way, holes) for way in _ways(levels.T, disparity.T))
     hidden = to_left.known & ~_one_surface(to_left, to_right)
     hidden &= (to_right.value_px > to_left.value_px) & (to_right.steps_px <= to_right.value_px - to_left.value_px + 1)
     row, row_weight = _along(to_left, to_right, hidden)
     column, column_weight = _along(to_top, to_bottom, np.zeros_like(hidden))
     by_row = np.isnan(column) | (row_weight > column_weight) | ((row_weight == column_weight) & (row < column))
     guess = np.where(hidden, to_left.value_px, np.where(by_row, row, column))
-    ends = sum(way.known.astype(np.int8) for way in (to_left, to_right, to_top, to_bottom))
-    guess[ends < LEAST_ENDS] = np.nan
+    ways = (to_left, to_right, to_top, to_bottom)
+    ends = np.count_nonzero([way.known for way in ways], axis=0)
+    nearest_px = np.min([np.where(way.known, way.steps_px, np.inf) for way in ways], axis=0)
+    guess[(ends < LEAST_ENDS) | (nearest_px > REACH_SHARE * max(disparity.shape))] = np.nan
     full = disparity.copy()
     full[holes] = guess
     return full
 
 
-def _ways(levels: NDArray[np.uint8], disparity: Disparity, reach_px: float) -> tuple[_Way, _Way]:
+def _ways(levels: NDArray[np.uint8], disparity: Disparity) -> tuple[_Way, _Way]:
     """Look from each pixel of a hole, in the order of rows, to the left and to the right."""
     height, width = disparity.shape
     column = np.arange(width, dtype=np.int32)
@@ -135,9 +136,8 @@ def _ways(levels: NDArray[np.uint8], disparity: Disparity, reach_px: float) -> t
 
     def way(end: NDArray[np.int32]) -> _Way:
         there = np.clip(end, 0, width - 1)
-        far = (end != there) | (np.abs(end - x) > reach_px)
         return _Way(
-            value_px=np.where(far, np.float32(np.nan), disparity[y, there]),
+            value_px=np.where(end == there, disparity[y, there], np.float32(np.nan)),
             steps_px=np.abs(end - x).astype(np.float32),
             edges=np.abs(climbed[y, x] - climbed[y, there]).astype(np.float32),
         )

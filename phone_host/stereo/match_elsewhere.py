@@ -20,9 +20,9 @@ from phone_host.stereo.match_levels import without_levels
 FACTOR: Final = 4
 """The images are looked at at this fraction of their size: the work falls with its third power."""
 
-WINDOW_PX: Final = (3, 9)
-"""Width and height of the windows, px of the small images: narrow, because a pole of 8 px is only two wide here, and half-occluded strips,
-which fit anywhere, are narrow, too. 5 x 5 missed the pole and had larger patches by chance."""
+WINDOW_PX: Final = (2, 9)
+"""Width and height of the windows, px of the small images: narrow, because a pole of 10 px is only two or three wide here, and half-occluded
+strips, which fit anywhere, are narrow, too. 5 x 5 missed such poles and had larger patches by chance, 3 x 9 missed one in three."""
 
 CAP: Final = 40
 """Grey levels: more is another surface, no worse fit."""
@@ -36,8 +36,9 @@ LEAST_GAIN: Final = 3.0
 AGREE_PX: Final = 1
 """Neighbours of one patch lie within this disparity of the patch's middle, px of the small images."""
 
-LEAST_AREA: Final = 16
-"""Pixels of the small images that make a patch: an object of 16 x 16 px. Chance made up to 13 beside edges of depth, a pole of 8 x 480 px 22."""
+LEAST_AREA: Final = 20
+"""Pixels of the small images that make a patch: an object of 18 x 18 px. Chance made up to 18 beside edges of depth; a pole of 10 px as high as
+320x240 pictures made 23 to 71."""
 
 ROUNDING: Final = 0.5
 """Whole disparities of the small images within this of the range belong to it."""

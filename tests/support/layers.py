@@ -81,9 +81,11 @@ def layers(
     there = x - disparity.astype(int)
     visible = (there >= 0) & (owner_right[y, np.maximum(there, 0)] == owner_left)
     rng = np.random.default_rng(sensor_seed)
-    images = (np.rint(image + rng.normal(0, NOISE_SIGMA, image.shape)) for image in (left, right))
-    pair = RectifiedPair(*(np.clip(image, 0, 255).astype(np.uint8) for image in images))
-    return Layers(pair=pair, disparity=disparity, visible=visible)
+
+    def seen(image: NDArray[np.float64]) -> Image:
+        return np.clip(np.rint(image + rng.normal(0, NOISE_SIGMA, image.shape)), 0, 255).astype(np.uint8)
+
+    return Layers(pair=RectifiedPair(seen(left), seen(right)), disparity=disparity, visible=visible)
 
 
 def _texture(width_px: int, height_px: int, seed: int) -> Image:

@@ -191,12 +191,12 @@ def test_any_pairs_in_any_order_keep_the_rules_of_matchers(
 
 
 def test_plain_and_repeated_patterns_ask_for_no_other_range() -> None:
-    """A uniform pair and vertical stripes of 16 px fit everywhere alike, so nothing fits better outside."""
+    """A uniform pair, and vertical stripes of 12 px that lie 30 px apart, fit everywhere alike, so nothing fits better outside."""
     inside = Range(low_px=16, high_px=48)
     bare = np.full((200, 320), 90, np.uint8)
     assert not fits_elsewhere(bare, bare, inside, N)
-    stripes = np.tile(np.where(np.arange(320) // 8 % 2, 200, 60).astype(np.uint8), (200, 1))
-    assert not fits_elsewhere(stripes, stripes, inside, N)
+    stripes = np.tile(np.where(np.arange(350) // 6 % 2, 200, 60).astype(np.uint8), (200, 1))
+    assert not fits_elsewhere(stripes[:, :320], stripes[:, 30:], inside, N)
 
 
 def test_a_range_holds_all_values_but_a_few_and_a_margin() -> None:

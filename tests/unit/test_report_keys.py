@@ -15,7 +15,7 @@ from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.model import CutCounts, DepthAccount, DepthLimits, Search
+from phone_host.model import CutCounts, DepthAccount, DepthLimits, Search, TemporalAccount
 from phone_host.report.run_json import build
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import FailedPair, SetReport
@@ -83,6 +83,7 @@ def _eventful_run() -> RunSnapshot:
             cut=CutCounts(kept=5),
             limits=DepthLimits(near_m=0.0, far_m=9.0, disparity_error_px=0.25, from_rig=True),
             search=Search(disparities=64),
+            temporal=TemporalAccount(counts=(9, 1, 0, 0, 0, 0), share_sum=4.0),
         ),
     )
 
