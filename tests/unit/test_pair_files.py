@@ -59,7 +59,7 @@ def test_completed_holes_have_files_of_their_own(tmp_path: Path, processed: Proc
     assert all(after[name] == content for name, content in before.items())
     assert read_pfm(tmp_path / "with" / "completed.pfm").tobytes() == filled.disparity.tobytes()
     marks = cv2.imread(str(tmp_path / "with" / "completed.png"), cv2.IMREAD_UNCHANGED)
-    assert (marks == np.where(mask, 255, 0)).all()
+    assert np.array_equal(marks, np.where(mask, 255, 0))
 
 
 def test_completed_pixels_are_striped_in_the_picture() -> None:
@@ -69,7 +69,7 @@ def test_completed_pixels_are_striped_in_the_picture() -> None:
     mask[10:30, 20:40] = True
     plain = disparity_picture(disparity)
     striped = completed_picture(Completed(disparity=disparity, mask=mask))
-    darker = (striped < plain).any(axis=2)[:, :60]
+    darker = np.asarray(striped < plain)[:, :60].any(axis=2)
     assert not darker[~mask].any()
     assert 0.2 < darker[mask].mean() < 0.5
 
@@ -154,5 +154,5 @@ def test_several_threads_write_the_same_bytes(tmp_path: Path, processed: Process
         (tmp_path / name).mkdir()
         with ThreadPoolExecutor(threads) as writers:
             write_pair(tmp_path / name, processed, STEREO_FILES, run_all=writers.map)
-    for file in STEREO_FILES:
-        assert (tmp_path / "one" / file.value).read_bytes() == (tmp_path / "four" / file.value).read_bytes()
+    for path in (tmp_path / "one").iterdir():
+        assert path.read_bytes() == (tmp_path / "four" / path.name).read_bytes()
