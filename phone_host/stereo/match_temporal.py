@@ -146,7 +146,7 @@ def range_of(disparity: Disparity, disparities: int, before: Range | None = None
         Where its values lie, but for TAIL_SHARE of the pixels at each end, with the margin; None if it has too few values.
     """
     valued = disparity.copy()
-    cv2.patchNaNs(valued, -1.0)  # below the histogram; numpy took 3 ms of 640x480, this takes a fifth
+    cv2.patchNaNs(valued, -1.0)  # below the histogram, so not counted
     counts = np.asarray(cv2.calcHist([valued], [0], None, [disparities], [0, disparities])).reshape(-1)
     below = np.cumsum(counts.astype(np.int64))
     tail, found = math.ceil(disparity.size * TAIL_SHARE), int(below[-1])
