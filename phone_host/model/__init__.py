@@ -25,6 +25,7 @@ from phone_host.model.images import (
     StereoGeometry,
 )
 from phone_host.model.matching import (
+    Completed,
     Confidence,
     Matched,
     MatchReport,
@@ -46,6 +47,7 @@ from phone_host.model.run import (
     Result,
     Unwritten,
 )
+from phone_host.model.temporal import Searched, SearchedAs, TemporalAccount
 
 __all__ = [
     "UNMEASURED_NS",
@@ -57,6 +59,7 @@ __all__ = [
     "BudgetStep",
     "CameraModel",
     "CloudImage",
+    "Completed",
     "Confidence",
     "Crop",
     "CutCounts",
@@ -78,9 +81,12 @@ __all__ = [
     "Result",
     "Rig",
     "Search",
+    "Searched",
+    "SearchedAs",
     "Side",
     "StereoGeometry",
     "Support",
+    "TemporalAccount",
     "TimeOffset",
     "Unwritten",
 ]

@@ -16,7 +16,8 @@ from phone_host.model.images import (
     Search,
     StereoGeometry,
 )
-from phone_host.model.matching import Confidence, MatchReport
+from phone_host.model.matching import Completed, Confidence, MatchReport
+from phone_host.model.temporal import TemporalAccount
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +82,7 @@ class Processed:
         search: how the pair was matched; None without a core.
         confidence: of each disparity; None without a core, or if the matcher has none.
         match_report: what the matcher corrected, in px of the rectified images; None without a core.
+        completed: the disparity with completed holes, marked; None if nobody asked for it. The cloud never contains them.
     """
 
     pair: RectifiedPair
@@ -93,6 +95,7 @@ class Processed:
     search: Search | None = None
     confidence: Confidence | None = None
     match_report: MatchReport | None = None
+    completed: Completed | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +126,7 @@ class DepthAccount:
         match_report: what the matcher corrected in the newest pair; None without a core.
         median_report: the median of what it corrected in all pairs; None if the matcher tells nothing.
         epipolar: which way the newest pair's epipolar lines run.
+        temporal: how the pairs were searched; None: all in the full range, because nobody asked for less.
     """
 
     cut: CutCounts | None = None
@@ -131,6 +135,7 @@ class DepthAccount:
     match_report: MatchReport | None = None
     median_report: MatchReport | None = None
     epipolar: Epipolar = Epipolar.LEFT
+    temporal: TemporalAccount | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

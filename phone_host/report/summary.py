@@ -15,6 +15,7 @@ from phone_host.measure.image_trust import ImageTrust
 from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history
+from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
@@ -61,6 +62,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += corrected_lines(run.depth)
     lines += [f"note: {run.matcher_note}"] if run.matcher_note else []
     lines += budget_lines(run.budget)
+    lines += temporal_lines(run.depth.temporal)
     lines += camera_troubles(run.camera)
     lines += [*rung_lines(run.link), *_links(run.link, width), *_unused_lines(run)]
     return "\n".join(lines)

@@ -24,6 +24,7 @@ from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, IDLE_STAGE_NS, STAG
 from phone_host.measure.headline import headline
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
+from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.report.summary import camera_troubles, corrected_lines, depth_lines, phase_lines
 
@@ -126,7 +127,12 @@ class LiveTable:
             *(_Part(3, line) for line in _cameras(run)),
             *(
                 _Part(5, Text(line))
-                for line in (*depth_lines(run.images), *corrected_lines(run.depth), *budget_lines(run.budget))
+                for line in (
+                    *depth_lines(run.images),
+                    *corrected_lines(run.depth),
+                    *budget_lines(run.budget),
+                    *temporal_lines(run.depth.temporal),
+                )
             ),
             _Part(2, _table(run, self._rate, width)),
             _Part(6, _stages(run)),

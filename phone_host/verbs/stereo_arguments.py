@@ -50,6 +50,11 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
         help="match images of this share of the size, 0.1 to 1; results keep the full size (default: 1, less for large images)",
     )
     parser.add_argument(
+        "--complete",
+        action="store_true",
+        help="also write completed.pfm: the disparity with its holes completed from their surroundings, and completed.png, which marks them; no other file contains them",
+    )
+    parser.add_argument(
         "--axes",
         choices=("camera", "y-up"),
         default="camera",

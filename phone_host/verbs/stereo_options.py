@@ -3,7 +3,7 @@
 import argparse
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -46,7 +46,13 @@ def output_options(options: argparse.Namespace) -> OutputOptions:
 
 
 def build_core(
-    options: argparse.Namespace, calibration: str, matcher: str, size_px: tuple[int, int], images: Path | None = None
+    options: argparse.Namespace,
+    calibration: str,
+    matcher: str,
+    size_px: tuple[int, int],
+    images: Path | None = None,
+    *,
+    temporal: bool = False,
 ) -> tuple[StereoCore | None, Side | None]:
     """Build the stereo core from the options.
 
@@ -57,6 +63,7 @@ def build_core(
         size_px: width and height of images that arrive rectified, px.
         images: an image file of either side, or its folder; None: not from files. KITTI's calib.txt holds two pairs of
             cameras, and only the folder's name tells which of them took the images.
+        temporal: whether pairs are searched where the last one found something.
 
     Returns: The core (None if neither a rig nor rectified images are given), and the side of the board's camera in the
         rig (None without a rig).
@@ -72,13 +79,18 @@ def build_core(
         raise SettingsError("--calibration and --rectified contradict each other", "give only one of the two")
     _refuse_idle_geometry(options, calibration)
     if of_rectified:
-        return _by_calib_txt(options, Path(calibration), chosen, wanted, size_px, cameras=_kitti_cameras(images)), None
+        core = _by_calib_txt(
+            options, Path(calibration), chosen, wanted, size_px, cameras=_kitti_cameras(images), temporal=temporal
+        )
+        return core, None
     if calibration:
         rig = read_rig(Path(calibration))
         refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
-        return StereoCore(_matcher(chosen, options.disparities), Rectifier(rig), None, wanted), rig.board_side
+        return StereoCore(
+            _matcher(chosen, options.disparities, temporal=temporal), Rectifier(rig), None, wanted
+        ), rig.board_side
     if not options.rectified:
-        _refuse_idle_limits(options, ("near", "far", "crop", "scale"), "--calibration or --rectified")
+        _refuse_idle_limits(options, ("near", "far", "crop", "scale", "complete"), "--calibration or --rectified")
         return None, None
     geometry = rectified_geometry(options, size_px)
     if geometry is None:
@@ -87,7 +99,7 @@ def build_core(
             raise SettingsError(
                 "--rectified without --disparities", "give the number of disparities, for example --disparities 64"
             )
-    return StereoCore(_matcher(chosen, options.disparities), None, geometry, wanted), None
+    return StereoCore(_matcher(chosen, options.disparities, temporal=temporal), None, geometry, wanted), None
 
 
 def depth_wanted(options: argparse.Namespace) -> DepthWanted:
@@ -106,11 +118,13 @@ def depth_wanted(options: argparse.Namespace) -> DepthWanted:
         far_m=far_m,
         crop=None if options.crop is None else crop_of(options.crop),
         scale=math.nan if options.scale is None else scale_of(options.scale),
+        complete=options.complete,
     )
 
 
-def _matcher(chosen: AnyMatcher, disparities: int | None) -> MatchSettings:
-    return MatchSettings(chosen) if disparities is None else MatchSettings(chosen, disparities)
+def _matcher(chosen: AnyMatcher, disparities: int | None, *, temporal: bool) -> MatchSettings:
+    settings = MatchSettings(chosen, temporal=temporal)
+    return settings if disparities is None else replace(settings, disparities=disparities)
 
 
 def refuse_rejected(rig: Rig, calibration: str, *, allowed: bool) -> None:
@@ -146,6 +160,7 @@ def _by_calib_txt(
     size_px: tuple[int, int],
     *,
     cameras: KittiCameras,
+    temporal: bool,
 ) -> StereoCore:
     """Build the core for rectified images from the file that their publisher gave; N is ndisp unless the user says otherwise."""
     found = read_calib_txt(path, cameras)
@@ -157,7 +172,7 @@ def _by_calib_txt(
         scale = 1.0 if found.size_px is None else size_px[0] / found.size_px[0]
         disparities = math.ceil(found.disparities * scale)
         wanted = depth_wanted(argparse.Namespace(**{**vars(options), "disparities": disparities}))
-    return StereoCore(_matcher(chosen, disparities), None, geometry, wanted)
+    return StereoCore(_matcher(chosen, disparities, temporal=temporal), None, geometry, wanted)
 
 
 def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None:
@@ -173,7 +188,7 @@ def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None
 
 def _refuse_idle_limits(options: argparse.Namespace, names: tuple[str, ...], missing: str) -> None:
     """Refuse limits that would have no effect."""
-    given = [f"--{name}" for name in names if getattr(options, name) is not None]
+    given = [f"--{name}" for name in names if getattr(options, name) not in {None, False}]
     if given:
         raise SettingsError(f"{given[0]} without {missing}", "add them, or leave it out")
 

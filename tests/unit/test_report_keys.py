@@ -15,7 +15,7 @@ from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.model import CutCounts, DepthAccount, DepthLimits, MatchReport, Search
+from phone_host.model import CutCounts, DepthAccount, DepthLimits, MatchReport, Search, TemporalAccount
 from phone_host.report.run_json import build
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import FailedPair, SetReport
@@ -31,7 +31,7 @@ _TEXT: Final = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
 
 _BY_NAME: Final = frozenset(
     {"delays_ms", "stages_ms", "delays", "stages", "not_measured", "sinks"}
-    | {"dropped", "orphaned", "disbelieved", "spoiled_images", "faults"}
+    | {"dropped", "orphaned", "disbelieved", "spoiled_images", "faults", "full_pairs"}
     | {"dropped_on_board_frames", "disbelieved_frames", "orphaned_frames"}
 )
 """Keys whose inner keys are names of stages, sinks or reasons."""
@@ -84,6 +84,7 @@ def _eventful_run() -> RunSnapshot:
             limits=DepthLimits(near_m=0.0, far_m=9.0, disparity_error_px=0.25, from_rig=True),
             search=Search(disparities=64),
             median_report=MatchReport(vertical_px=0.4),
+            temporal=TemporalAccount(counts=(9, 1, 0, 0, 0, 0), share_sum=4.0),
         ),
     )
 

@@ -170,13 +170,23 @@ def _core(
     """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else left."""
     images = replayed(settings.camera)
     core, rig_side = build_core(
-        options, settings.calibration, settings.matcher, size_px, Path(images) if images else None
+        options,
+        settings.calibration,
+        settings.matcher,
+        size_px,
+        Path(images) if images else None,
+        temporal=settings.temporal,
     )
     board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
     if rig_side not in {None, board_side}:
         raise SettingsError(
             f"--board-side {board_side.value} contradicts {settings.calibration}",
             "leave it out, or calibrate with the board there",
+        )
+    if core is None and options.temporal:
+        raise SettingsError(
+            "--temporal without --calibration or --rectified, so no depth is computed",
+            "add one of them, or leave it out",
         )
     if core is None:
         print("phone-host: no --calibration and not --rectified: pairs and delays only, no depth", file=sys.stderr)
