@@ -1,6 +1,7 @@
 """What the matcher corrected over a run: the median of each figure. Pure."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from statistics import median
 from typing import Final
 
@@ -22,7 +23,7 @@ class MatchedMedians:
 
     def add(self, report: MatchReport | None) -> None:
         """Take one pair's report; None, or one that tells nothing, is passed over."""
-        if report is None or report == _SILENT:
+        if report is None or replace(report, searched=None) == _SILENT:  # in which range is no correction
             return
         if self._count % self._stride == 0:
             self._reports.append(report)
