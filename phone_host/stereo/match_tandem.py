@@ -68,6 +68,7 @@ class TandemMatcher:
             height=height,
             disparities=searched,
             threads=self._threads,
+            guide=1,
         )
         needed = self._library.match_bytes(job)
         if self._workspace.size < needed:

@@ -8,7 +8,9 @@
 
 #include "crew.h"
 #include "kernels.h"
+#include "guide.h"
 #include "match.h"
+#include "support.h"
 
 enum {
     STRIP = 256,   /* rows of one sweep; strips are cut by the image's height alone, so that results do not depend on threads */
@@ -43,6 +45,11 @@ struct work {
     uint8_t *told;
     struct run *runs;
     int32_t *run_of; /* two rows */
+    struct guide guide;
+    struct support support;
+    int16_t *guide_rows; /* a row for each thread */
+    size_t support_bytes;
+    uint8_t *support_scratch; /* one for each thread */
 };
 
 static uint8_t *taken(uint8_t **at, size_t size)
@@ -54,6 +61,27 @@ static uint8_t *taken(uint8_t **at, size_t size)
 
 static int strips_of(int height) { return (height + STRIP - 1) / STRIP; }
 
+/* Lay out what the support needs: its planes live after the speckles and before the values become px. Returns their end. */
+static uint8_t *support_laid_out(struct work *work, uint8_t *at)
+{
+    const struct tandem_match_job *job = work->job;
+    const size_t width = (size_t)job->width, pixels = width * (size_t)job->height;
+    struct support *support = &work->support;
+    *support = (struct support){.width = job->width, .height = job->height, .left = job->left, .right = job->right,
+                                .left_stride = job->left_stride, .right_stride = job->right_stride, .guide = &work->guide,
+                                .steps = work->finish.checked};
+    support->own = (uint8_t *)work->right; /* the right view is not needed any more */
+    support->other = support->own + pixels;
+    support->apart = taken(&at, pixels);
+    support->flags = taken(&at, pixels);
+    support->region_capacity = region_capacity(job->width, job->height);
+    support->regions = (struct region *)(void *)taken(&at, (size_t)support->region_capacity * sizeof(struct region));
+    support->runs = (struct region_run *)(void *)taken(&at, 2 * (width + 1) * sizeof(struct region_run));
+    work->support_bytes = (work->kernels->support_scratch(job->width) + 127) / 64 * 64;
+    work->support_scratch = taken(&at, work->support_bytes * (size_t)work->threads);
+    return at;
+}
+
 /* Lay the workspace out. Returns its size. The planes that are not needed at the same time share memory. */
 static size_t laid_out(struct work *work, uint8_t *memory)
 {
@@ -61,7 +89,7 @@ static size_t laid_out(struct work *work, uint8_t *memory)
     const size_t width = (size_t)job->width, height = (size_t)job->height, pixels = width * height;
     uint8_t *at = memory;
     work->strips = strips_of(job->height);
-    const int tasks = 2 * work->strips;
+    const int tasks = 2 * work->strips + (job->guide != 0);
     work->threads = job->threads < 1 ? 1 : job->threads;
     const int sweepers = work->threads < tasks ? work->threads : tasks;
     work->scratch_bytes = (work->kernels->sweep_scratch(job->width, job->disparities) + 127) / 64 * 64;
@@ -72,9 +100,21 @@ static size_t laid_out(struct work *work, uint8_t *memory)
     work->finish.checked = (int16_t *)(void *)taken(&at, pixels * 2);
     work->told = taken(&at, height);
     work->run_of = (int32_t *)(void *)taken(&at, 2 * width * sizeof(int32_t));
+    work->guide = guide_of(job->width, job->height, job->disparities);
+    if (job->guide) {
+        work->guide.steps = (int16_t *)(void *)taken(&at, 2 * (size_t)work->guide.small_width * (size_t)work->guide.small_height);
+        work->guide_rows = (int16_t *)(void *)taken(&at, 2 * width * (size_t)work->threads);
+    }
     uint8_t *shared = at;
     work->scratch = taken(&at, (size_t)sweepers * work->scratch_bytes);
+    if (job->guide) { /* matched while the sweeps are under way */
+        work->guide.scratch = taken(&at, work->kernels->guide_scratch(&work->guide));
+    }
     uint8_t *end = at;
+    if (job->guide) {
+        at = support_laid_out(work, shared);
+        end = at > end ? at : end;
+    }
     at = shared; /* the sweeps are over when these are needed */
     work->runs = (struct run *)(void *)taken(&at, pixels * sizeof(struct run));
     end = at > end ? at : end;
@@ -275,19 +315,62 @@ static void clear_guards(struct work *work)
     }
 }
 
-enum step { SWEEP, CHECK, SPECKLES, TO_PX, COLUMNS_BRIDGED, SMOOTH, STEPS };
+/* The guide's own checks but that of the right view. */
+static void guide_task(struct work *work)
+{
+    struct guide *guide = &work->guide;
+    work->kernels->guide(guide);
+    for (int y = 0; y < guide->small_height; y++) {
+        const int last = (y + 1) * guide->factor - 1;
+        if (!work->told[last < guide->height ? last : guide->height - 1]) {
+            for (int x = 0; x < guide->small_width; x++) {
+                guide->steps[(ptrdiff_t)y * guide->small_width + x] = NO_STEPS;
+            }
+        }
+    }
+    /* Its volume, of 32 bytes a pixel at least, is not needed any more. */
+    const size_t pixels = (size_t)guide->small_width * (size_t)guide->small_height;
+    struct region_run *runs = (struct region_run *)(void *)(guide->scratch + (pixels * sizeof(struct region) + 63) / 64 * 64);
+    support_drop_islands(guide, (struct region *)(void *)guide->scratch, runs);
+}
+
+enum step {
+    SWEEP,
+    CHECK,
+    SPECKLES,
+    FIT, /* this and the next four: the support, see support.h */
+    SIDES,
+    REGIONS,
+    DROP,
+    FILL,
+    TO_PX,
+    COLUMNS_BRIDGED,
+    OPEN,
+    SMOOTH,
+    STEPS
+};
 
 static int tasks_of(void *context, int step)
 {
     const struct work *work = context;
-    const int bands = (work->job->height + BAND - 1) / BAND;
+    const int bands = (work->job->height + BAND - 1) / BAND, slabs = (work->job->width + SLAB - 1) / SLAB;
+    const int is_guided = work->job->guide != 0;
     switch (step) {
     case SWEEP:
-        return 2 * work->strips;
+        return 2 * work->strips + is_guided;
+    case FIT:
+    case DROP:
+    case OPEN:
+        return is_guided ? bands : 0;
+    case SIDES:
+    case FILL:
+        return is_guided ? slabs : 0;
+    case REGIONS:
+        return is_guided;
     case SPECKLES:
         return 1;
     case COLUMNS_BRIDGED:
-        return (work->job->width + SLAB - 1) / SLAB;
+        return slabs;
     default:
         return bands;
     }
@@ -297,9 +380,33 @@ static void do_task(void *context, int step, int task, int thread)
 {
     struct work *work = context;
     const int height = work->job->height, from = task * BAND, to = from + BAND < height ? from + BAND : height;
+    const int left = task * SLAB, right = left + SLAB < work->job->width ? left + SLAB : work->job->width;
+    int16_t *row = work->guide_rows + (ptrdiff_t)thread * work->job->width;
     switch (step) {
     case SWEEP:
-        sweep_task(work, task, thread);
+        if (task == 2 * work->strips) {
+            guide_task(work);
+        } else {
+            sweep_task(work, task, thread);
+        }
+        break;
+    case FIT:
+        work->kernels->support_cost_rows(&work->support, from, to, work->support_scratch + (size_t)thread * work->support_bytes);
+        break;
+    case SIDES:
+        support_columns(&work->support, left, right);
+        break;
+    case REGIONS:
+        support_regions(&work->support);
+        break;
+    case DROP:
+        support_drop_rows(&work->support, from, to, row);
+        break;
+    case FILL:
+        support_fill(&work->support, left, right);
+        break;
+    case OPEN:
+        support_open_rows(&work->support, work->finish.rough, from, to, row);
         break;
     case CHECK:
         work->kernels->check_rows(&work->finish, from, to);
@@ -340,6 +447,10 @@ int32_t tandem_match(int32_t isa, struct tandem_match_job *job)
         return TANDEM_NO_ROOM;
     }
     laid_out(&work, (uint8_t *)(((uintptr_t)job->workspace + 63) / 64 * 64));
+    work.guide.left = job->left;
+    work.guide.right = job->right;
+    work.guide.left_stride = job->left_stride;
+    work.guide.right_stride = job->right_stride;
     work.finish.width = job->width;
     work.finish.height = job->height;
     work.finish.left = work.left;
