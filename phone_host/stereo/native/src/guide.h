@@ -10,8 +10,8 @@
 
 /* Costs. Those of a pixel are half of what the sweeps use, so that eight paths fit a byte. */
 #ifndef GUIDE_STEP_COST
-#define GUIDE_STEP_COST 4  /* P1 */
-#define GUIDE_JUMP_COST 40 /* P2: plain areas take the depth of their edges, a board stays on one surface */
+#define GUIDE_STEP_COST 12  /* P1 */
+#define GUIDE_JUMP_COST 100 /* P2: plain areas take the depth of their edges, a board stays on one surface */
 #endif
 
 enum {
