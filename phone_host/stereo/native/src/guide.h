@@ -8,18 +8,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Costs. Those of a pixel are half of what the sweeps use, so that eight paths fit a byte. */
-#ifndef GUIDE_STEP_COST
-#define GUIDE_STEP_COST 12  /* P1 */
-#define GUIDE_JUMP_COST 100 /* P2: plain areas take the depth of their edges, a board stays on one surface */
-#endif
-
+/* The costs of a pixel are half of what the sweeps use, so that the sums of eight paths fit a byte where they matter. */
 enum {
     GUIDE_LANES = 32,                /* disparities are padded to multiples of it, on every processor */
-#ifndef GV
-#define GV 6
-#endif
-    GUIDE_VOLUME = GV * 1024 * 1024
+    GUIDE_VOLUME = 6 * 1024 * 1024,  /* bytes at most; above it the images are made smaller */
+    GUIDE_STEP_COST = 12, /* P1: with less, values drift on plain noise */
+    GUIDE_JUMP_COST = 100 /* P2: plain areas take the depth of their edges, a board stays on one surface */
 };
 
 struct guide {

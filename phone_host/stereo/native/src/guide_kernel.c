@@ -150,10 +150,7 @@ BYTES_INLINE void cost_row(const struct guide_room *room, int k, int y, const in
             const bytes slope = bytes_min(
                 beyond(value[SLOPE], there + SLOPE_LOW * other_pitch, there + SLOPE_HIGH * other_pitch),
                 bytes_max(bytes_minus(slope_there, value[SLOPE_HIGH]), bytes_minus(value[SLOPE_LOW], slope_there)));
-            bytes all = bytes_plus(grey, slope);
-#ifdef GUIDE_ORDER
-            all = bytes_plus(all, bytes_ones(bytes_xor(value[ORDER], bytes_load(there + ORDER * other_pitch))));
-#endif
+            const bytes all = bytes_plus(grey, slope); /* without the order of neighbours: with it twice as much was wrong on boards */
             bytes_store(cost + c * BYTES, bytes_half(bytes_min(all, cap)));
         }
         if (unused > 0) {

@@ -5,18 +5,14 @@
 #include "support.h"
 
 #include <string.h>
-#ifndef WV
-#define WV 11
-#define MV 8
-#endif
 
 enum {
     SLAB_MOST = 64,
     ISLAND = 100,     /* px of the guide's size: smaller ones are mismatches */
     FAR_PX = 16,      /* a region this far off is one period off, or an object that stands clear of everything: both are told by cost */
     FILL_COST = 50,   /* a quarter of 25 px with 8 grey levels each: where the guide costs more, it is not taken */
-    WORSE = WV,       /* tenths: a region within a surface stays if the guide costs more than 1.1 times as much */
-    MUCH_WORSE = MV    /* tenths: any region goes if the guide costs less than 0.8 of it */
+    WORSE = 16,       /* tenths: a region within a surface stays if the guide costs more than 1.6 times as much */
+    MUCH_WORSE = 10   /* tenths: any region goes if the guide costs less */
 };
 
 static inline int distance(int a, int b) { return a < b ? b - a : a - b; }
