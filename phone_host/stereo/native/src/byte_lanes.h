@@ -31,6 +31,7 @@ BYTES_INLINE bytes bytes_max(bytes a, bytes b) { return _mm512_max_epu8(a, b); }
 BYTES_INLINE bytes bytes_plus(bytes a, bytes b) { return _mm512_adds_epu8(a, b); }
 BYTES_INLINE bytes bytes_minus(bytes a, bytes b) { return _mm512_subs_epu8(a, b); }
 BYTES_INLINE bytes bytes_xor(bytes a, bytes b) { return _mm512_xor_si512(a, b); }
+BYTES_INLINE bytes bytes_half(bytes v) { return _mm512_and_si512(_mm512_srli_epi16(v, 1), _mm512_set1_epi8(127)); }
 /* Lane i gets lane i - 1; lane 0 gets the last one of the chunk below. */
 BYTES_INLINE bytes bytes_from_below(bytes v, bytes below)
 {
@@ -87,6 +88,7 @@ BYTES_INLINE bytes bytes_max(bytes a, bytes b) { return _mm256_max_epu8(a, b); }
 BYTES_INLINE bytes bytes_plus(bytes a, bytes b) { return _mm256_adds_epu8(a, b); }
 BYTES_INLINE bytes bytes_minus(bytes a, bytes b) { return _mm256_subs_epu8(a, b); }
 BYTES_INLINE bytes bytes_xor(bytes a, bytes b) { return _mm256_xor_si256(a, b); }
+BYTES_INLINE bytes bytes_half(bytes v) { return _mm256_and_si256(_mm256_srli_epi16(v, 1), _mm256_set1_epi8(127)); }
 BYTES_INLINE bytes bytes_from_below(bytes v, bytes below)
 {
     return _mm256_alignr_epi8(v, _mm256_permute2x128_si256(below, v, 0x21), 15);
@@ -139,6 +141,7 @@ BYTES_INLINE bytes bytes_max(bytes a, bytes b) { return _mm_max_epu8(a, b); }
 BYTES_INLINE bytes bytes_plus(bytes a, bytes b) { return _mm_adds_epu8(a, b); }
 BYTES_INLINE bytes bytes_minus(bytes a, bytes b) { return _mm_subs_epu8(a, b); }
 BYTES_INLINE bytes bytes_xor(bytes a, bytes b) { return _mm_xor_si128(a, b); }
+BYTES_INLINE bytes bytes_half(bytes v) { return _mm_and_si128(_mm_srli_epi16(v, 1), _mm_set1_epi8(127)); }
 BYTES_INLINE bytes bytes_from_below(bytes v, bytes below) { return _mm_alignr_epi8(v, below, 15); }
 BYTES_INLINE bytes bytes_from_above(bytes v, bytes above) { return _mm_alignr_epi8(above, v, 1); }
 BYTES_INLINE bytes bytes_ones(bytes v)
@@ -181,6 +184,7 @@ BYTES_INLINE bytes bytes_max(bytes a, bytes b) { return vmaxq_u8(a, b); }
 BYTES_INLINE bytes bytes_plus(bytes a, bytes b) { return vqaddq_u8(a, b); }
 BYTES_INLINE bytes bytes_minus(bytes a, bytes b) { return vqsubq_u8(a, b); }
 BYTES_INLINE bytes bytes_xor(bytes a, bytes b) { return veorq_u8(a, b); }
+BYTES_INLINE bytes bytes_half(bytes v) { return vshrq_n_u8(v, 1); }
 BYTES_INLINE bytes bytes_from_below(bytes v, bytes below) { return vextq_u8(below, v, 15); }
 BYTES_INLINE bytes bytes_from_above(bytes v, bytes above) { return vextq_u8(v, above, 1); }
 BYTES_INLINE bytes bytes_ones(bytes v) { return vcntq_u8(v); }
@@ -239,6 +243,7 @@ BYTES_INLINE bytes bytes_plus(bytes a, bytes b)
 }
 BYTES_INLINE bytes bytes_minus(bytes a, bytes b) { BYTES_EACH(a.lane[i] > b.lane[i] ? a.lane[i] - b.lane[i] : 0); }
 BYTES_INLINE bytes bytes_xor(bytes a, bytes b) { BYTES_EACH(a.lane[i] ^ b.lane[i]); }
+BYTES_INLINE bytes bytes_half(bytes v) { BYTES_EACH(v.lane[i] >> 1); }
 BYTES_INLINE bytes bytes_from_below(bytes v, bytes below) { BYTES_EACH(i > 0 ? v.lane[i - 1] : below.lane[BYTES - 1]); }
 BYTES_INLINE bytes bytes_from_above(bytes v, bytes above) { BYTES_EACH(i < BYTES - 1 ? v.lane[i + 1] : above.lane[0]); }
 BYTES_INLINE bytes bytes_ones(bytes v) { BYTES_EACH(__builtin_popcount(v.lane[i])); }

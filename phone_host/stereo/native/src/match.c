@@ -8,7 +8,9 @@
 
 #include "crew.h"
 #include "kernels.h"
+#include "guide.h"
 #include "match.h"
+#include "support.h"
 
 enum {
     STRIP = 256,   /* rows of one sweep; strips are cut by the image's height alone, so that results do not depend on threads */
@@ -37,6 +39,11 @@ struct work {
     uint8_t *told;
     int32_t *parent, *size; /* of the runs of pixels that hang together; a run has the number of its first pixel */
     int32_t *run_of;        /* two rows for each thread */
+    struct guide guide;
+    struct support support;
+    int16_t *guide_rows;    /* a row for each thread */
+    size_t support_bytes;
+    uint8_t *support_scratch; /* one for each thread */
 };
 
 static uint8_t *taken(uint8_t **at, size_t size)
@@ -48,11 +55,41 @@ static uint8_t *taken(uint8_t **at, size_t size)
 
 static int strips_of(int height) { return (height + STRIP - 1) / STRIP; }
 
+/* Lay out what guide and support need beyond the planes of the rest. */
+static void guide_laid_out(struct work *work, uint8_t **at)
+{
+    const struct tandem_match_job *job = work->job;
+    const size_t width = (size_t)job->width, pixels = width * (size_t)job->height;
+    struct guide *guide = &work->guide;
+    struct support *support = &work->support;
+    *guide = guide_of(job->width, job->height, job->disparities);
+    guide->left = job->left;
+    guide->right = job->right;
+    guide->left_stride = job->left_stride;
+    guide->right_stride = job->right_stride;
+    guide->steps = (int16_t *)(void *)taken(at, 2 * (size_t)guide->small_width * (size_t)guide->small_height);
+    guide->scratch = taken(at, work->kernels->guide_scratch(guide));
+    *support = (struct support){.width = job->width, .height = job->height, .left = job->left, .right = job->right,
+                                .left_stride = job->left_stride, .right_stride = job->right_stride, .guide = guide,
+                                .steps = work->finish.checked};
+    support->own = (uint8_t *)work->finish.rough;
+    support->other = support->own + pixels;
+    support->apart = support->other + pixels;
+    support->flags = support->apart + pixels;
+    support->regions = (struct region *)(void *)job->disparity;
+    support->region_capacity = (int32_t)(pixels * sizeof(float) / sizeof(struct region));
+    support->runs = (struct region_run *)(void *)taken(at, 2 * (width + 1) * sizeof(struct region_run));
+    work->guide_rows = (int16_t *)(void *)taken(at, 2 * width * (size_t)work->threads);
+    work->support_bytes = (work->kernels->support_scratch(job->width) + 127) / 64 * 64;
+    work->support_scratch = taken(at, work->support_bytes * (size_t)work->threads);
+}
+
 /* Lay the workspace out. Returns its size. What is not needed at the same time shares memory, the results' own planes included:
  *
  *     sweeps       raw disparities left, right | scratch      | margins: in `confidence`
  *     check        raw disparities left, right | checked      | margins
  *     speckles     parents                     | checked      | sizes: in `disparity`
+ *     support      costs, distance, flags      | checked      | regions: in `disparity`
  *     px, bridges  rough                       | checked: margins
  *     smooth       rough                       | margins      | disparity, confidence
  */
@@ -79,6 +116,9 @@ static size_t laid_out(struct work *work, uint8_t *memory)
     work->finish.confidence = job->confidence;
     work->told = taken(&at, height);
     work->run_of = (int32_t *)(void *)taken(&at, (size_t)work->threads * 2 * width * sizeof(int32_t));
+    if (job->guide) {
+        guide_laid_out(work, &at);
+    }
     return (size_t)(at - memory);
 }
 
@@ -286,7 +326,7 @@ static void band_to_px(struct work *work, int task)
                 }
                 known = x;
             }
-            steps[x] = (int16_t)(steps[x] < 0 ? 0 : margin[x] < MARGIN_CAP ? margin[x] : MARGIN_CAP);
+            steps[x] = (int16_t)(steps[x] < 0 ? NO_STEPS : margin[x] < MARGIN_CAP ? margin[x] : MARGIN_CAP);
         }
     }
 }
@@ -330,19 +370,64 @@ static void clear_guards(struct work *work)
     }
 }
 
-enum step { SWEEP, CHECK, LABEL, JOIN, SPECKLES, TO_PX, COLUMNS_BRIDGED, SMOOTH, STEPS };
+/* The guide's own checks but that of the right view. */
+static void guide_task(struct work *work)
+{
+    struct guide *guide = &work->guide;
+    work->kernels->guide(guide);
+    for (int y = 0; y < guide->small_height; y++) {
+        const int last = (y + 1) * guide->factor - 1;
+        if (!work->told[last < guide->height ? last : guide->height - 1]) {
+            for (int x = 0; x < guide->small_width; x++) {
+                guide->steps[(ptrdiff_t)y * guide->small_width + x] = NO_STEPS;
+            }
+        }
+    }
+    /* Its volume, of 32 bytes a pixel at least, is not needed any more. */
+    const size_t pixels = (size_t)guide->small_width * (size_t)guide->small_height;
+    struct region_run *runs = (struct region_run *)(void *)(guide->scratch + (pixels * sizeof(struct region) + 63) / 64 * 64);
+    support_drop_islands(guide, (struct region *)(void *)guide->scratch, runs);
+}
+
+enum step {
+    SWEEP,
+    CHECK,
+    LABEL,
+    JOIN,
+    SPECKLES,
+    FIT, /* this and the next four: the support, see support.h */
+    SIDES,
+    REGIONS,
+    DROP,
+    FILL,
+    TO_PX,
+    COLUMNS_BRIDGED,
+    OPEN,
+    SMOOTH,
+    STEPS
+};
 
 static int tasks_of(void *context, int step)
 {
     const struct work *work = context;
-    const int bands = (work->job->height + BAND - 1) / BAND;
+    const int bands = (work->job->height + BAND - 1) / BAND, slabs = (work->job->width + SLAB - 1) / SLAB;
+    const int is_guided = work->job->guide != 0;
     switch (step) {
     case SWEEP:
-        return 2 * work->strips;
+        return 2 * work->strips + is_guided;
+    case FIT:
+    case DROP:
+    case OPEN:
+        return is_guided ? bands : 0;
+    case SIDES:
+    case FILL:
+        return is_guided ? slabs : 0;
+    case REGIONS:
+        return is_guided;
     case JOIN:
         return 1;
     case COLUMNS_BRIDGED:
-        return (work->job->width + SLAB - 1) / SLAB;
+        return slabs;
     default:
         return bands;
     }
@@ -352,9 +437,33 @@ static void do_task(void *context, int step, int task, int thread)
 {
     struct work *work = context;
     const int height = work->job->height, from = task * BAND, to = from + BAND < height ? from + BAND : height;
+    const int left = task * SLAB, right = left + SLAB < work->job->width ? left + SLAB : work->job->width;
+    int16_t *row = work->guide_rows + (ptrdiff_t)thread * work->job->width;
     switch (step) {
     case SWEEP:
-        sweep_task(work, task, thread);
+        if (task == 2 * work->strips) {
+            guide_task(work);
+        } else {
+            sweep_task(work, task, thread);
+        }
+        break;
+    case FIT:
+        work->kernels->support_cost_rows(&work->support, from, to, work->support_scratch + (size_t)thread * work->support_bytes);
+        break;
+    case SIDES:
+        support_columns(&work->support, left, right);
+        break;
+    case REGIONS:
+        support_regions(&work->support);
+        break;
+    case DROP:
+        support_drop_rows(&work->support, from, to, row);
+        break;
+    case FILL:
+        support_fill(&work->support, left, right);
+        break;
+    case OPEN:
+        support_open_rows(&work->support, work->finish.rough, from, to, row);
         break;
     case CHECK:
         work->kernels->check_rows(&work->finish, from, to);

@@ -44,7 +44,7 @@ struct finish {
     int width, height;
     const int16_t *left, *right; /* disparities of the two views, 1/16 px */
     const uint8_t *told; /* (height,): whether the row's texture can say anything */
-    int16_t *checked;    /* disparities that are confirmed, NO_STEPS elsewhere; then their margins, 0 elsewhere */
+    int16_t *checked;    /* disparities that are confirmed, NO_STEPS elsewhere; then their margins, NO_STEPS still elsewhere */
     float *rough;        /* px; NONE_PX where there is none; holds GUARD more rows and columns on each side */
     float *disparity;    /* the result, NAN = none */
     uint8_t *confidence; /* margins of the left view's sums, then the result, 0 = none */

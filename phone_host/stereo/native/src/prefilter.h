@@ -89,7 +89,7 @@ static void order_row(const uint8_t *restrict up, const uint8_t *restrict here, 
 }
 
 /* Fill the planes of row y, `pitch` bytes apart; the image's borders are repeated. */
-static void prefilter_row(const uint8_t *image, ptrdiff_t stride, int width, int height, int y, uint8_t *planes, size_t pitch)
+static inline void prefilter_row(const uint8_t *image, ptrdiff_t stride, int width, int height, int y, uint8_t *planes, size_t pitch)
 {
     const uint8_t *row[5];
     for (int i = 0; i < 5; i++) {
