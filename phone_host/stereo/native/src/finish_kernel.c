@@ -121,7 +121,7 @@ static void confidence_row(const struct finish *job, int y)
         for (int line = top; line <= bottom; line++) {
             const int16_t *restrict margins = job->checked + (ptrdiff_t)line * width + first;
             for (int x = 0; x < last - first; x++) {
-                sums[x] = (int16_t)(sums[x] + (margins[x] > 0 ? margins[x] : 0));
+                sums[x] = (int16_t)(sums[x] + margins[x]);
             }
         }
         int sum = 0;

@@ -12,8 +12,8 @@
 enum {
     GUIDE_LANES = 32,                /* disparities are padded to multiples of it, on every processor */
     GUIDE_VOLUME = 6 * 1024 * 1024,  /* bytes at most; above it the images are made smaller */
-    GUIDE_STEP_COST = 12, /* P1: with less, values drift on plain noise */
-    GUIDE_JUMP_COST = 100 /* P2: plain areas take the depth of their edges, a board stays on one surface */
+    GUIDE_STEP_COST = 32, /* P1: with less, values drift on plain noise */
+    GUIDE_JUMP_COST = 200 /* P2: plain areas take the depth of their edges, a board stays on one surface */
 };
 
 struct guide {

@@ -151,7 +151,7 @@ BYTES_INLINE void cost_row(const struct guide_room *room, int k, int y, const in
                 beyond(value[SLOPE], there + SLOPE_LOW * other_pitch, there + SLOPE_HIGH * other_pitch),
                 bytes_max(bytes_minus(slope_there, value[SLOPE_HIGH]), bytes_minus(value[SLOPE_LOW], slope_there)));
             const bytes all = bytes_plus(grey, slope); /* without the order of neighbours: with it twice as much was wrong on boards */
-            bytes_store(cost + c * BYTES, bytes_half(bytes_min(all, cap)));
+            bytes_store(cost + c * BYTES, bytes_min(all, cap));
         }
         if (unused > 0) {
             memset(cost + room->disparities, 255, (size_t)unused);
@@ -197,7 +197,7 @@ BYTES_INLINE void along_rows(const struct guide_room *room, const int is_back, c
             uint8_t *sum = room->sum[k] + at;
             best[k] = path_step(room->cost[k] + at, rows[k].path, rows[k].least, chunks);
             for (int c = 0; c < chunks; c++) {
-                const bytes path = rows[k].path[c];
+                const bytes path = bytes_half(rows[k].path[c]);
                 bytes_store(sum + c * BYTES, is_back ? bytes_plus(bytes_load(sum + c * BYTES), path) : path);
             }
         }
@@ -236,7 +236,7 @@ BYTES_INLINE void slanted_row(const struct guide_room *room, int k, int turn, co
                 best[i] = path_step(cost + (x + i) * lanes, path, bytes_of(least_before[column]), chunks);
                 for (int c = 0; c < chunks; c++) {
                     bytes_store(now + (x + i + 1) * lanes + c * BYTES, path[c]);
-                    sum[i][c] = bytes_plus(sum[i][c], path[c]);
+                    sum[i][c] = bytes_plus(sum[i][c], bytes_half(path[c]));
                 }
             }
             const uint32_t packed = quad_packed(quad_least(best[0], best[1], best[2], best[3]));

@@ -32,6 +32,7 @@ typedef void tandem_sweep_fn(const struct sweep *job);
 typedef size_t tandem_sweep_scratch_fn(int width, int disparities);
 typedef void tandem_check_rows_fn(const struct finish *job, int from, int to);
 typedef void tandem_smooth_rows_fn(const struct finish *job, int from, int to);
+typedef void tandem_vote_rows_fn(const struct vote *job, int from, int to);
 typedef void tandem_guide_fn(const struct guide *job);
 typedef size_t tandem_guide_scratch_fn(const struct guide *job);
 typedef void tandem_support_cost_rows_fn(const struct support *job, int from, int to, uint8_t *scratch);
@@ -45,6 +46,7 @@ typedef size_t tandem_support_scratch_fn(int width);
     KERNEL(sweep_scratch)      \
     KERNEL(check_rows)         \
     KERNEL(smooth_rows)        \
+    KERNEL(vote_rows)          \
     KERNEL(guide)              \
     KERNEL(guide_scratch)      \
     KERNEL(support_cost_rows)  \

@@ -9,16 +9,19 @@
 enum {
     SLAB_MOST = 64,
     ISLAND = 100,     /* px of the guide's size: smaller ones are mismatches */
-    FAR_PX = 16,      /* a region this far off is one period off, or an object that stands clear of everything: both are told by cost */
-    FILL_COST = 50,   /* a quarter of 25 px with 8 grey levels each: where the guide costs more, it is not taken */
-    WORSE = 16,       /* tenths: a region within a surface stays if the guide costs more than 1.6 times as much */
-    MUCH_WORSE = 10   /* tenths: any region goes if the guide costs less */
+    FAR_PX = 16,      /* a region so far behind the guide is one period off, or seen through the gaps of an object */
+    FILL_COST = 120,   /* a quarter of 25 px with 8 grey levels each: where the guide costs more, it is not taken */
+    DOUBTFUL = 20,    /* mean margin: below it a region stays only if the guide costs at least WORSE tenths of what it costs */
+    UNSURE = 40,      /* below it, at least AS_BAD tenths, or MUCH_WORSE if it is behind the guide */
+    AS_BAD = 12,
+    WORSE = 20,
+    MUCH_WORSE = 30
 };
 
 static inline int distance(int a, int b) { return a < b ? b - a : a - b; }
 
 /* Down, then up, through some columns. */
-void support_columns(const struct support *job, int from, int to)
+static void pass_columns(const struct support *job, int from, int to)
 {
     uint8_t state[SLAB_MOST], step[SLAB_MOST];
     const int count = to - from, width = job->width;
@@ -157,21 +160,24 @@ void support_drop_islands(const struct guide *guide, struct region *regions, str
 
 static struct region summed(const struct support *job, ptrdiff_t at, int count, int32_t number)
 {
-    struct region sum = {.parent = number};
+    struct region sum = {.parent = number, .pixels = count};
     for (ptrdiff_t i = at; i < at + count; i++) {
-        sum.inside += 10 * is_inside(job->flags[i]) - 1;
-        sum.apart += job->apart[i] - FAR_PX;
+        sum.margin += job->margin[i];
+        sum.apart += job->apart[i] - AS_FAR;
         sum.own += job->own[i];
         sum.other += job->other[i];
     }
     return sum;
 }
 
-/* A region goes if it lies within a surface, or very far off, and the guide explains the images about as well; or if the guide does so much better. */
+/* A region goes unless it explains the images better than the guide: the less sure its values are, the more so. */
 static int goes(const struct region *region)
 {
-    const int64_t own = region->own, other = 10 * (int64_t)region->other;
-    return ((region->inside > 0 || region->apart > 0) && other <= WORSE * own) || other < MUCH_WORSE * own;
+    const int32_t pixels = region->pixels;
+    const int is_doubtful = region->margin < DOUBTFUL * pixels, is_unsure = region->margin < UNSURE * pixels;
+    const int is_behind = region->apart < -FAR_PX * pixels;
+    const uint32_t tenths = is_unsure && is_behind ? MUCH_WORSE : is_doubtful ? WORSE : is_unsure ? AS_BAD : 0;
+    return 10 * (uint64_t)region->other < tenths * (uint64_t)region->own;
 }
 
 /* Find the regions of values far from the guide, and mark those to drop by 255. Regions beyond the table's end stay: so many are noise that is
@@ -203,7 +209,8 @@ void support_regions(const struct support *job)
     for (int32_t i = 0; i < made; i++) {
         const int32_t root = root_of(regions, i);
         if (root != i) {
-            regions[root].inside += regions[i].inside;
+            regions[root].pixels += regions[i].pixels;
+            regions[root].margin += regions[i].margin;
             regions[root].apart += regions[i].apart;
             regions[root].own += regions[i].own;
             regions[root].other += regions[i].other;
@@ -216,7 +223,7 @@ void support_regions(const struct support *job)
             for (end = x + 1; end < width && row[end] != 0;) {
                 end++;
             }
-            memset(row + x, y < rows && goes(&regions[root_of(regions, made)]) ? 255 : 1, (size_t)(end - x));
+            memset(row + x, y < rows && goes(&regions[root_of(regions, made)]) ? DROPPED : 1, (size_t)(end - x));
             made += y < rows;
         }
     }
@@ -235,8 +242,8 @@ void support_drop_rows(const struct support *job, int from, int to, int16_t *row
         guide_row(job, y, row);
         for (int x = 0; x < width; x++) {
             const int far = distance(steps[x], guide[x]), is_both = (steps[x] >= 0) & (guide[x] >= 0);
-            const int drifts = is_both & (apart[x] == 0) & (far > nearly) & is_inside(flags[x]) & (other[x] < own[x]);
-            const int value = drifts | (apart[x] == 255) ? NO_STEPS : steps[x];
+            const int drifts = is_both & (apart[x] == NOT_APART) & (far > nearly) & (job->margin[at + x] < DOUBTFUL) & (2 * other[x] < 3 * own[x]);
+            const int value = drifts | (apart[x] == DROPPED) ? NO_STEPS : steps[x];
             const int is_kept = is_both & (value >= 0), agrees = far <= agree;
             steps[x] = (int16_t)value;
             flags[x] = (uint8_t)((flags[x] & (STEP_LEFT | STEP_ABOVE)) | (is_kept & agrees ? CONFIRMS : 0) |
@@ -251,7 +258,7 @@ void support_fill(const struct support *job, int from, int to)
 {
     const struct guide *guide = job->guide;
     const int width = job->width;
-    support_columns(job, from, to);
+    pass_columns(job, from, to);
     for (int y = 0; y < job->height; y++) {
         const ptrdiff_t at = (ptrdiff_t)y * width;
         const int line = y / guide->factor < guide->small_height ? y / guide->factor : guide->small_height - 1;
@@ -260,24 +267,8 @@ void support_fill(const struct support *job, int from, int to)
             if (job->steps[at + x] < 0 && (job->flags[at + x] & FROM_ALL) == FROM_ALL && job->other[at + x] < FILL_COST) {
                 const int column = x / guide->factor < guide->small_width ? x / guide->factor : guide->small_width - 1;
                 job->steps[at + x] = (int16_t)(smooth[column] * guide->factor);
+                job->margin[at + x] = 0; /* no cost was its own */
             }
-        }
-    }
-}
-
-/* Open those bridged gaps again whose bridge is not where the guide is. What has no guide stays bridged. */
-void support_open_rows(const struct support *job, float *rough, int from, int to, int16_t *row)
-{
-    const int width = job->width;
-    const float agree = (float)support_scaled(job, AGREE) / STEPS_PER_PX;
-    for (int y = from; y < to; y++) {
-        const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width;
-        float *restrict bridged = rough + (size_t)(y + GUARD) * rough_pitch(width) + GUARD;
-        guide_row(job, y, row);
-        for (int x = 0; x < width; x++) {
-            const float apart = bridged[x] - (float)row[x] * (1.0f / STEPS_PER_PX);
-            const int is_doubtful = (steps[x] < 0) & (row[x] >= 0) & ((apart > agree) | (apart < -agree));
-            bridged[x] = is_doubtful ? NONE_PX : bridged[x];
         }
     }
 }

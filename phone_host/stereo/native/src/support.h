@@ -1,8 +1,7 @@
 /* Whether the images support a disparity, or the guide's smoother surface explains them as well (decision 0036).
  *
  * The steps, in this order; those over bands of rows and over slabs of columns may be done by any threads:
- * support_cost_rows (bands), support_columns (slabs), support_regions (whole), support_drop_rows (bands), support_fill (slabs),
- * and, when gaps have been bridged, support_open_rows (bands).
+ * support_cost_rows (bands), support_regions (whole), support_drop_rows (bands), support_fill (slabs).
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -30,10 +29,13 @@ enum support_flag {
 /* Distances between a value and the guide, 1/16 px, for a guide of half size; in proportion for a smaller one. */
 enum { AGREE = 16, NEARLY = 12, APART = 32 };
 
+enum { NOT_APART = 0, AS_FAR = 128, DROPPED = 255 };
+
 struct region {
     int32_t parent;
-    int32_t inside; /* pixels that lie within a surface of the guide, times 10, minus all pixels */
-    int32_t apart;  /* sum of the distance from the guide beyond FAR_PX */
+    int32_t pixels;
+    int32_t margin; /* sums over the pixels */
+    int32_t apart;  /* px that the values are nearer than the guide */
     uint32_t own, other;
 };
 
@@ -48,7 +50,8 @@ struct support {
     const struct guide *guide;
     int16_t *steps;         /* (height, width): the values, 1/16 px, NO_STEPS = none; changed */
     uint8_t *own, *other;   /* (height, width): cost of the value and of the guide */
-    uint8_t *apart;         /* (height, width): px from the guide where that is much, else 0 */
+    uint8_t *margin;        /* (height, width): of the values' costs; 0 where the guide gave the value */
+    uint8_t *apart;         /* (height, width): AS_FAR + px that the value is nearer than the guide where that is much, NOT_APART elsewhere */
     uint8_t *flags;         /* (height, width): enum support_flag */
     struct region *regions; /* region_capacity of them */
     struct region_run *runs; /* 2 (width + 1) */
@@ -75,6 +78,17 @@ static inline void guide_row(const struct support *job, int y, int16_t *restrict
     }
 }
 
+/* Whether a value for the pixel at an offset lies on the guide, or there is none to say. */
+static inline int support_allows(const struct support *job, ptrdiff_t at, int value)
+{
+    const struct guide *guide = job->guide;
+    const int y = (int)(at / job->width) / guide->factor, x = (int)(at % job->width) / guide->factor;
+    const int line = y < guide->small_height ? y : guide->small_height - 1, column = x < guide->small_width ? x : guide->small_width - 1;
+    const int smooth = guide->steps[(ptrdiff_t)line * guide->small_width + column];
+    const int far = smooth * guide->factor - value, agree = support_scaled(job, AGREE);
+    return smooth < 0 || (far <= agree && -far <= agree);
+}
+
 /* Pass on along a row from which sides a confirmed surface is reached. */
 static inline void scan_row(uint8_t *flags, int width)
 {
@@ -94,17 +108,9 @@ static inline void scan_row(uint8_t *flags, int width)
     }
 }
 
-static inline int is_inside(unsigned flags)
-{
-    return (flags & (FROM_LEFT | FROM_RIGHT)) == (FROM_LEFT | FROM_RIGHT) ||
-           (flags & (FROM_ABOVE | FROM_BELOW)) == (FROM_ABOVE | FROM_BELOW);
-}
-
-void support_columns(const struct support *job, int from, int to);
 void support_regions(const struct support *job);
 void support_drop_rows(const struct support *job, int from, int to, int16_t *row);
 void support_fill(const struct support *job, int from, int to);
-void support_open_rows(const struct support *job, float *rough, int from, int to, int16_t *row);
 
 /* Drop the islands of the guide that are too small to be a surface; `regions` holds a region for each of its pixels, `runs` 2 (small_width + 1). */
 void support_drop_islands(const struct guide *guide, struct region *regions, struct region_run *runs);

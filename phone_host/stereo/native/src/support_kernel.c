@@ -169,7 +169,7 @@ static void square_row(const struct fit_room *room, int i, int line, int width, 
     }
 }
 
-/* How far the values of a row are from the guide, and from which sides of the row it is confirmed. */
+/* How far the values of a row are from the guide, and where that has steps. */
 static void flag_row(const struct support *job, const struct fit_room *room, int y)
 {
     const int width = job->width, agree = support_scaled(job, AGREE), much = support_scaled(job, APART);
@@ -179,16 +179,15 @@ static void flag_row(const struct support *job, const struct fit_room *room, int
     guide_row(job, y > 0 ? y - 1 : 0, room->guide_above);
     for (int x = 0; x < width; x++) {
         const int value = steps[x], smooth = guide[x], far = value < smooth ? smooth - value : value - smooth;
-        const int is_known = smooth >= 0, is_both = is_known & (value >= 0);
-        const int px = (far + STEPS_PER_PX / 2) / STEPS_PER_PX, rise = above[x] < smooth ? smooth - above[x] : above[x] - smooth;
-        apart[x] = (uint8_t)(is_both & (far > much) ? (px < 255 ? px : 255) : 0);
-        flags[x] = (uint8_t)((is_both & (far <= agree) ? CONFIRMS : 0) | (is_known ? 0 : BREAKS) | (rise > agree ? STEP_ABOVE : 0));
+        const int is_both = (smooth >= 0) & (value >= 0);
+        const int px = inside_of((value - smooth) / STEPS_PER_PX + AS_FAR, DROPPED - 1), rise = above[x] < smooth ? smooth - above[x] : above[x] - smooth;
+        apart[x] = (uint8_t)(is_both & (far > much) ? (px > 1 ? px : 1) : NOT_APART);
+        flags[x] = (uint8_t)(rise > agree ? STEP_ABOVE : 0);
     }
     for (int x = 1; x < width; x++) {
         const int rise = guide[x] < guide[x - 1] ? guide[x - 1] - guide[x] : guide[x] - guide[x - 1];
         flags[x] = (uint8_t)(flags[x] | (rise > agree ? STEP_LEFT : 0));
     }
-    scan_row(flags, width);
 }
 
 void ISA_NAME(support_cost_rows)(const struct support *job, int from, int to, uint8_t *scratch)
