@@ -3,8 +3,7 @@
  *
  * Some rows are worked on together, because each step of a path along the row waits for the one before: so several are under way. Both
  * horizontal paths start at the ends. Up to the middle they work on fresh costs and leave theirs behind; beyond it each adds to what
- * the other one left, and the vertical path and the least sum follow at once. Tile by tile, so that a tile stays in the first-level
- * cache.
+ * the other one left, and the vertical path and the least sum follow tile by tile, while the sums are in a near cache.
  *
  * One register holds the costs of one pixel for many disparities. Where it takes several registers (chunks), disparity d is lane
  * d / chunks of chunk d % chunks: so the neighbours d - 1 and d + 1 are the same lane of another chunk.
@@ -25,7 +24,7 @@ enum {
     MOST_CHUNKS = MOST_DISPARITIES / BYTES,
     MOST_ROWS = 4,
     GROUP = 4,        /* columns whose least costs are found together */
-    TILE_BYTES = 1024 /* of costs of one row, at each end; four rows of costs and sums at both ends fill half of 32 KB */
+    TILE = 64  /* columns at each end that go through one pass after another: fewer cost more in mispredicted ends of loops */
 };
 
 /* Lanes beyond the last disparity cost more than any other, and adding to it does not overflow. */
@@ -33,7 +32,7 @@ enum { UNUSED_COST = 255 - JUMP_COST };
 
 /* Where the scratch memory's parts lie. Widths are padded: the paths may begin beyond the last column, where everything costs 0. */
 struct room {
-    int width, columns, disparities, lanes, chunks, rows, tile;
+    int width, columns, disparities, lanes, chunks, rows;
     size_t row_pitch, other_pitch, part_pitch;  /* from one plane to the next; from one part of a plane to the next */
     uint8_t *own[MOST_ROWS];                    /* PLANES rows of `width` bytes each */
     uint8_t *other[MOST_ROWS];                  /* the same backwards, with `lanes` more; part i is every chunks-th byte from the i-th */
@@ -48,13 +47,16 @@ struct room {
     uint8_t *down, *down_least;                 /* the vertical path: (columns, lanes), (columns,) */
     uint8_t *along_least;                       /* of each path along a row */
     uint8_t *unused;                            /* (lanes,): UNUSED_COST beyond the last disparity, else 0 */
-    uint8_t *total;                             /* (tile, lanes and more): the sums of all paths */
+    uint8_t *total;                             /* (TILE, lanes and more): the sums of all paths */
     size_t total_pitch;
     uint16_t *place;                            /* (lanes + 2,): where disparity d - 1 lies among the lanes */
     int16_t *steps;
 };
 
 static size_t padded(size_t size) { return (size + 127) / 64 * 64; }
+
+/* From one plane to the next: an odd number of cache lines, so that planes do not compete for the same ones. */
+static size_t apart(size_t size) { return (size + 127) / 128 * 128 + 64; }
 
 static uint8_t *taken(uint8_t **free_from, size_t size)
 {
@@ -98,11 +100,10 @@ static size_t laid_out(struct room *room, int width, int disparities, uint8_t *s
     room->disparities = disparities;
     room->chunks = (disparities + BYTES - 1) / BYTES;
     room->lanes = room->chunks * BYTES;
-    room->tile = TILE_BYTES / room->lanes > GROUP ? TILE_BYTES / room->lanes / GROUP * GROUP : GROUP;
     const size_t columns = (size_t)room->columns, lanes = (size_t)room->lanes;
     room->rows = rows_together(columns * lanes);
-    room->row_pitch = padded(columns + lanes + MARGIN + BEYOND);
-    room->part_pitch = padded(room->row_pitch / (size_t)room->chunks);
+    room->row_pitch = apart(columns + lanes + MARGIN + BEYOND);
+    room->part_pitch = apart(room->row_pitch / (size_t)room->chunks);
     room->other_pitch = room->part_pitch * (size_t)room->chunks;
     for (int k = 0; k < room->rows; k++) {
         row_laid_out(room, k, &at);
@@ -117,7 +118,7 @@ static size_t laid_out(struct room *room, int width, int disparities, uint8_t *s
     room->along_least = taken(&at, 2 * MOST_ROWS);
     room->unused = taken(&at, lanes);
     room->total_pitch = lanes + BYTES;
-    room->total = taken(&at, (size_t)room->tile * room->total_pitch);
+    room->total = taken(&at, TILE * room->total_pitch);
     room->place = (uint16_t *)(void *)taken(&at, 2 * (lanes + 2));
     room->steps = (int16_t *)(void *)taken(&at, 2 * columns);
     return (size_t)(at - scratch);
@@ -435,14 +436,14 @@ BYTES_INLINE void finish_columns(const struct sweep *job, const struct room *roo
 BYTES_INLINE void sweep_rows(const struct sweep *job, const struct room *memory, int n, const int rows, const int chunks)
 {
     const struct room copy = *memory, *room = &copy; /* so that the compiler knows that no store changes it */
-    const int columns = room->columns, half = columns / 2, tile = room->tile, is_written = n + rows > job->begin;
+    const int columns = room->columns, half = columns / 2, is_written = n + rows > job->begin;
     struct along paths[2][4];
     start_along(room, paths, rows, chunks);
     for (int k = 0; k < rows; k++) {
         prepare_row(job, memory, k, n + k < job->end ? n + k : job->end - 1);
     }
-    for (int from = 0; from < half; from += tile) {
-        const int to = from + tile < half ? from + tile : half;
+    for (int from = 0; from < half; from += TILE) {
+        const int to = from + TILE < half ? from + TILE : half;
         for (int k = 0; k < rows; k++) {
             cost_columns(room, k, from, to, chunks);
             cost_columns(room, k, columns - to, columns - from, chunks);
@@ -451,8 +452,8 @@ BYTES_INLINE void sweep_rows(const struct sweep *job, const struct room *memory,
             along_columns(room, paths, from, to - from, 0, rows, chunks);
         }
     }
-    for (int from = half; from < columns; from += tile) {
-        const int to = from + tile < columns ? from + tile : columns;
+    for (int from = half; from < columns; from += TILE) {
+        const int to = from + TILE < columns ? from + TILE : columns;
         if (is_written) {
             along_columns(room, paths, from, to - from, 1, rows, chunks);
         }
@@ -489,7 +490,7 @@ static void set_up(const struct room *room)
         room->unused[place] = d < (size_t)room->disparities ? 0 : UNUSED_COST;
     }
     room->place[0] = room->place[lanes + 1] = (uint16_t)lanes; /* beside the sums */
-    memset(room->total, 255, (size_t)room->tile * room->total_pitch);
+    memset(room->total, 255, TILE * room->total_pitch);
     memset(room->down, 0, (size_t)room->columns * lanes);
     memset(room->down_least, 0, (size_t)room->columns);
     for (int k = 0; k < room->rows; k++) {
