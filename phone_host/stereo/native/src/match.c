@@ -278,15 +278,30 @@ static void band_to_px(struct work *work, int task)
             const int value = steps[x];
             row[x] = value < 0 ? NONE_PX : (float)value * (1.0f / STEPS_PER_PX) + UNLOCKED_PX[value & (STEPS_PER_PX - 1)];
         }
-        int known = -1;
-        for (int x = 0; x < width; x++) {
-            if (steps[x] >= 0) {
-                if (known >= 0 && x - known > 1) {
+        for (int x = 1; x < width; x++) {
+            if (steps[x] < 0 && steps[x - 1] >= 0) { /* a gap begins */
+                const int known = x - 1;
+                while (x < width && steps[x] < 0) {
+                    x++;
+                }
+                if (x < width) {
                     bridge(row, 1, known, x);
                 }
-                known = x;
             }
-            steps[x] = (int16_t)(steps[x] < 0 ? 0 : margin[x] < MARGIN_CAP ? margin[x] : MARGIN_CAP);
+        }
+        for (int x = 0; x < width; x++) {
+            const int sure = margin[x] < MARGIN_CAP ? margin[x] : MARGIN_CAP;
+            steps[x] = (int16_t)(steps[x] < 0 ? 0 : sure);
+        }
+    }
+}
+
+/* Bridge the gaps that end in row y. */
+static void bridge_row(float *row, ptrdiff_t pitch, const int *known, int count, int y)
+{
+    for (int x = 0; x < count; x++) {
+        if (row[x] >= 0.0f && y - 1 - known[x] > 0) {
+            bridge(row + x - y * pitch, pitch, known[x], y);
         }
     }
 }
@@ -295,22 +310,23 @@ static void bridge_columns(struct work *work, int task)
 {
     const int width = work->job->width, height = work->job->height;
     const size_t pitch = rough_pitch(width);
-    const int from = task * SLAB, to = from + SLAB < width ? from + SLAB : width;
-    int known[SLAB];
-    float *plane = work->finish.rough + GUARD * pitch + GUARD;
+    const int from = task * SLAB, count = from + SLAB < width ? SLAB : width - from;
+    int known[SLAB]; /* the last row with a value; before the first one: far above, so that no gap is bridged */
+    float *row = work->finish.rough + GUARD * pitch + GUARD + (size_t)from;
     for (int i = 0; i < SLAB; i++) {
-        known[i] = -1;
+        known[i] = -GAP - 2;
     }
-    for (int y = 0; y < height; y++) {
-        const float *row = plane + (size_t)y * pitch;
-        for (int x = from; x < to; x++) {
-            if (row[x] >= 0.0f) {
-                const int last = known[x - from];
-                if (last >= 0 && y - last > 1) {
-                    bridge(plane + x, (ptrdiff_t)pitch, last, y);
-                }
-                known[x - from] = y;
-            }
+    for (int y = 0; y < height; y++, row += pitch) {
+        int ends = 0; /* most rows end no gap: that is found out for all columns at once */
+        for (int x = 0; x < count; x++) {
+            const int is_known = -(row[x] >= 0.0f), gap = y - 1 - known[x];
+            ends |= is_known & -((unsigned)(gap - 1) < GAP);
+        }
+        if (ends != 0) {
+            bridge_row(row, (ptrdiff_t)pitch, known, count, y);
+        }
+        for (int x = 0; x < count; x++) {
+            known[x] = row[x] >= 0.0f ? y : known[x];
         }
     }
 }
