@@ -169,6 +169,9 @@ static void number_runs(struct work *work, int y, int is_new, int32_t *run_of)
         if (is_new) {
             work->parent[run] = run;
             work->size[run] = end - x;
+            if (end - x > 1) {
+                work->parent[run + 1] = end; /* no run begins there, so that its end may be noted */
+            }
         }
         for (; x < end; x++) {
             run_of[x] = run;
@@ -230,8 +233,9 @@ static void drop_speckles(struct work *work, int from, int to)
                 x++;
                 continue;
             }
-            const int end = end_of_run(row, x, width);
+            const int is_long = x + 1 < width && row[x + 1] >= 0 && near(row[x + 1], row[x]);
             int32_t root = y * width + x;
+            const int end = is_long ? work->parent[root + 1] : x + 1;
             while (work->parent[root] != root) { /* other bands read, too: nothing is shortened here */
                 root = work->parent[root];
             }
