@@ -50,20 +50,26 @@ void bridge_rows(const struct bridges *job, int from, int to)
 
 void bridge_columns(const struct bridges *job, int from, int to)
 {
-    int known[MOST_COLUMNS];
-    for (int x = from; x < to; x++) {
-        known[x - from] = -GAP - 2;
+    const int count = to - from;
+    int16_t known[MOST_COLUMNS]; /* the last row with a value; before the first one: far above, so that no gap is bridged */
+    for (int x = 0; x < count; x++) {
+        known[x] = -GAP - 2;
     }
     for (int y = 0; y < job->height; y++) {
-        const int16_t *row = job->steps + (ptrdiff_t)y * job->width;
-        for (int x = from; x < to; x++) {
-            if (row[x] >= 0) {
-                const int last = known[x - from], gap = y - last - 1;
-                if (gap > 0 && gap <= GAP) {
-                    bridge(job, (ptrdiff_t)last * job->width + x, job->width, gap);
-                }
-                known[x - from] = y;
+        const int16_t *row = job->steps + (ptrdiff_t)y * job->width + from;
+        int16_t ends = 0; /* most rows end no gap: that is found out for all columns at once */
+        for (int x = 0; x < count; x++) {
+            const uint16_t gap = (uint16_t)(y - 1 - known[x]);
+            ends |= (int16_t)((row[x] >= 0) & ((uint16_t)(gap - 1) < GAP));
+        }
+        for (int x = 0; x < count && ends; x++) {
+            const int gap = y - 1 - known[x];
+            if (row[x] >= 0 && gap > 0 && gap <= GAP) {
+                bridge(job, (ptrdiff_t)known[x] * job->width + from + x, job->width, gap);
             }
+        }
+        for (int x = 0; x < count; x++) {
+            known[x] = row[x] >= 0 ? (int16_t)y : known[x];
         }
     }
 }

@@ -18,11 +18,10 @@ enum { ROWS = 4, SLANTS = 3, MOST_GUIDE_CHUNKS = MOST_DISPARITIES / 2 / BYTES + 
 struct guide_room {
     int width, height, disparities, chunks;
     size_t lanes, columns, row_bytes;
-    size_t own_pitch, other_pitch;
-    uint8_t *left, *right;            /* the small images */
+    size_t small_pitch, own_pitch, other_pitch;
+    uint8_t *left, *right;            /* the small images, the right one turned; rows `small_pitch` bytes apart, with their ends repeated */
     uint8_t *volume;                  /* (height, width, lanes): sums of the paths of the way down */
     uint8_t *own, *other[ROWS];       /* planes of the left row; of the right row, backwards */
-    uint8_t *turned;
     uint8_t *cost[ROWS], *sum[ROWS];  /* (columns, lanes) */
     uint8_t *path[2][SLANTS];         /* of the row before and of this one: a column of zeros, (columns + 1, lanes) */
     uint8_t *least[2][SLANTS];        /* the least of each, a column on both sides */
@@ -52,15 +51,15 @@ static size_t laid_out(struct guide_room *room, const struct guide *job)
     room->chunks = (int)(room->lanes / BYTES);
     room->columns = (width + 3) / 4 * 4;
     room->row_bytes = room->columns * room->lanes;
-    room->own_pitch = padded(room->columns);
-    room->other_pitch = padded(room->columns + room->lanes + BYTES);
-    room->left = taken(&at, width * height);
-    room->right = taken(&at, width * height);
+    room->small_pitch = padded(width + MARGIN + BEYOND);
+    room->own_pitch = padded(width + MARGIN + BEYOND);
+    room->other_pitch = padded(width + room->lanes + MARGIN + BEYOND);
+    room->left = taken(&at, height * room->small_pitch) + MARGIN;
+    room->right = taken(&at, height * room->small_pitch) + MARGIN;
     room->volume = taken(&at, width * height * room->lanes);
-    room->own = taken(&at, PLANES * room->own_pitch);
-    room->turned = taken(&at, PLANES * room->own_pitch);
+    room->own = taken(&at, PLANES * room->own_pitch) + MARGIN;
     for (int k = 0; k < ROWS; k++) {
-        room->other[k] = taken(&at, PLANES * room->other_pitch);
+        room->other[k] = taken(&at, PLANES * room->other_pitch) + MARGIN;
         room->cost[k] = taken(&at, room->row_bytes);
         room->sum[k] = taken(&at, room->row_bytes);
     }
@@ -86,42 +85,52 @@ size_t ISA_NAME(guide_scratch)(const struct guide *job)
     return laid_out(&room, &unplaced);
 }
 
-/* Make an image smaller: the mean of each factor x factor pixels; where the image has fewer, its last are repeated. */
-static void shrink(const uint8_t *image, ptrdiff_t stride, const struct guide *job, uint8_t *restrict small)
+/* Make a row smaller: the mean of each factor x factor pixels; where the image has fewer, its last are repeated. */
+static void shrink_row(const uint8_t *image, ptrdiff_t stride, const struct guide *job, int y, uint8_t *restrict small)
 {
     const int factor = job->factor, width = job->small_width, half = factor * factor / 2;
-    const int is_wide = job->width >= 2 && job->height >= 2;
-    for (int y = 0; y < job->small_height; y++, small += width) {
-        if (factor == 2 && is_wide) {
-            const uint8_t *restrict one = image + 2 * y * stride, *restrict two = one + stride;
-            for (int x = 0; x < width; x++) {
-                small[x] = (uint8_t)((one[2 * x] + one[2 * x + 1] + two[2 * x] + two[2 * x + 1] + 2) >> 2);
-            }
-            continue;
-        }
+    if (factor == 2 && job->width >= 2 && job->height >= 2) {
+        const uint8_t *restrict one = image + 2 * y * stride, *restrict two = one + stride;
         for (int x = 0; x < width; x++) {
-            int sum = half;
-            for (int i = 0; i < factor * factor; i++) {
-                const int row = inside_of(y * factor + i / factor, job->height - 1);
-                sum += image[row * stride + inside_of(x * factor + i % factor, job->width - 1)];
-            }
-            small[x] = (uint8_t)(sum / (factor * factor));
+            small[x] = (uint8_t)((one[2 * x] + one[2 * x + 1] + two[2 * x] + two[2 * x + 1] + 2) >> 2);
         }
+        return;
+    }
+    for (int x = 0; x < width; x++) {
+        int sum = half;
+        for (int i = 0; i < factor * factor; i++) {
+            const int row = inside_of(y * factor + i / factor, job->height - 1);
+            sum += image[row * stride + inside_of(x * factor + i % factor, job->width - 1)];
+        }
+        small[x] = (uint8_t)(sum / (factor * factor));
     }
 }
 
-static void prepare_right(const struct guide_room *room, int k, int y)
+static void shrink(const struct guide *job, const struct guide_room *room)
 {
-    const int width = room->width;
-    prefilter_row(room->right, width, width, room->height, y, room->turned, room->own_pitch);
-    for (size_t plane = 0; plane < PLANES; plane++) {
-        const uint8_t *restrict from = room->turned + plane * room->own_pitch;
-        uint8_t *restrict to = room->other[k] + plane * room->other_pitch;
-        for (int x = 0; x < width; x++) {
-            to[x] = from[width - 1 - x];
+    const int width = job->small_width;
+    for (int y = 0; y < job->small_height; y++) {
+        uint8_t *left = room->left + (size_t)y * room->small_pitch, *right = room->right + (size_t)y * room->small_pitch;
+        shrink_row(job->left, job->left_stride, job, y, left);
+        shrink_row(job->right, job->right_stride, job, y, right);
+        for (int x = 0; x < width / 2; x++) {
+            const uint8_t swap = right[x];
+            right[x] = right[width - 1 - x];
+            right[width - 1 - x] = swap;
         }
-        memset(to + width, to[width - 1], room->lanes + BYTES);
+        widen(left, width, 2);
+        widen(right, width, 2);
     }
+}
+
+/* Fill the planes of a row of one of the small images. */
+static void prepare(const struct guide_room *room, uint8_t *image, int is_turned, int y, uint8_t *planes, size_t pitch)
+{
+    uint8_t *rows[5];
+    for (int i = 0; i < 5; i++) {
+        rows[i] = image + (size_t)inside_of(y + i - 2, room->height - 1) * room->small_pitch;
+    }
+    prefilter_row(rows, room->width, is_turned, planes, pitch);
 }
 
 BYTES_INLINE bytes beyond(bytes value, const uint8_t *lows, const uint8_t *highs)
@@ -134,8 +143,12 @@ BYTES_INLINE void cost_row(const struct guide_room *room, int k, int y, const in
     const size_t own_pitch = room->own_pitch, other_pitch = room->other_pitch;
     const int unused = (int)room->lanes - room->disparities;
     const bytes cap = bytes_of(COST_CAP);
-    prepare_right(room, k, y);
-    prefilter_row(room->left, room->width, room->width, room->height, y, room->own, own_pitch);
+    prepare(room, room->right, 1, y, room->other[k], other_pitch);
+    for (size_t plane = 0; plane < PLANES; plane++) { /* its last pixel is repeated */
+        uint8_t *end = room->other[k] + plane * other_pitch + room->width;
+        memset(end, end[-1], room->lanes);
+    }
+    prepare(room, room->left, 0, y, room->own, own_pitch);
     for (int x = 0; x < room->width; x++) {
         const uint8_t *own = room->own + x, *other = room->other[k] + (room->width - 1 - x);
         uint8_t *cost = room->cost[k] + (size_t)x * room->lanes;
@@ -201,11 +214,11 @@ BYTES_INLINE void along_rows(const struct guide_room *room, const int is_back, c
                 bytes_store(sum + c * BYTES, is_back ? bytes_plus(bytes_load(sum + c * BYTES), path) : path);
             }
         }
-        const quad least = quad_least(best[0], best[1], best[2], best[3]);
-        rows[0].least = quad_bytes(least, 0);
-        rows[1].least = quad_bytes(least, 1);
-        rows[2].least = quad_bytes(least, 2);
-        rows[3].least = quad_bytes(least, 3);
+        uint8_t least[ROWS];
+        least_of_four(best, least);
+        for (int k = 0; k < ROWS; k++) {
+            rows[k].least = bytes_of(least[k]);
+        }
     }
 }
 
@@ -239,8 +252,7 @@ BYTES_INLINE void slanted_row(const struct guide_room *room, int k, int turn, co
                     sum[i][c] = bytes_plus(sum[i][c], bytes_half(path[c]));
                 }
             }
-            const uint32_t packed = quad_packed(quad_least(best[0], best[1], best[2], best[3]));
-            memcpy(room->least[1 - turn][slant] + x + 1, &packed, 4);
+            least_of_four(best, room->least[1 - turn][slant] + x + 1);
         }
         for (size_t i = 0; i < 4 && x + i < (size_t)room->width; i++) {
             for (int c = 0; c < chunks; c++) {
@@ -281,16 +293,13 @@ BYTES_INLINE void best_row(const struct guide_room *room, const int chunks)
                 best[i] = bytes_min(best[i], bytes_load(total + c * BYTES));
             }
         }
-        const quad least = quad_least(best[0], best[1], best[2], best[3]);
-        const uint32_t packed = quad_packed(least);
-        memcpy(room->best_sum + x, &packed, 4);
-        const bytes value[4] = {quad_bytes(least, 0), quad_bytes(least, 1), quad_bytes(least, 2), quad_bytes(least, 3)};
+        least_of_four(best, room->best_sum + x);
 #pragma GCC unroll 4
         for (size_t i = 0; i < 4; i++) {
             const uint8_t *total = room->total + (x + i) * lanes;
             int d = 0;
             for (int c = chunks - 1; c >= 0; c--) {
-                const int found = bytes_find(bytes_load(total + c * BYTES), value[i]);
+                const int found = bytes_find(bytes_load(total + c * BYTES), bytes_of(room->best_sum[x + i]));
                 d = found < BYTES ? c * BYTES + found : d;
             }
             room->best[x + i] = (uint16_t)d;
@@ -377,8 +386,7 @@ void ISA_NAME(guide)(const struct guide *job)
     }
     memset(room.total - 64, 255, room.row_bytes + 128);
     memset(room.right_least, 255, room.columns + room.lanes);
-    shrink(job->left, job->left_stride, job, room.left);
-    shrink(job->right, job->right_stride, job, room.right);
+    shrink(job, &room);
     if (room.chunks == 1) {
         guide_rows_1(job, &room);
     } else if (room.chunks == 2) {

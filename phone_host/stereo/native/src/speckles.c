@@ -57,6 +57,9 @@ static void number_runs(const struct speckles *job, int y, int is_new, int32_t *
         if (is_new) {
             job->parent[run] = run;
             job->size[run] = end - x;
+            if (end - x > 1) {
+                job->parent[run + 1] = end; /* no run begins there, so that its end may be noted */
+            }
         }
         for (; x < end; x++) {
             run_of[x] = run;
@@ -118,8 +121,9 @@ void speckles_drop_rows(const struct speckles *job, int from, int to)
                 x++;
                 continue;
             }
-            const int end = end_of_run(row, x, width);
+            const int is_long = x + 1 < width && row[x + 1] >= 0 && near(row[x + 1], row[x]);
             int32_t root = y * width + x;
+            const int end = is_long ? job->parent[root + 1] : x + 1;
             while (job->parent[root] != root) { /* other bands read, too: nothing is shortened here */
                 root = job->parent[root];
             }

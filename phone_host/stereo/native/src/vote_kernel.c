@@ -17,7 +17,7 @@ enum {
     WIDE = BLOCK + 2 * REACH,
     STEP = 24,           /* 1/16 px: a greater difference within the window is a step between surfaces */
     ALIKE = 40,          /* grey levels: neighbours that differ by more have no vote, by less (ALIKE - difference)^2 / 32 */
-    DENSE = 22,          /* of 49 neighbours must be known for a missing value to be voted on */
+    DENSE = 24,          /* of 49 neighbours must be known for a missing value to be voted on */
     MAJORITY = 3         /* so many times the votes of the other surface are needed for a value that is missing */
 };
 
