@@ -140,6 +140,7 @@ class _Engine:
             # d <= x < width: a wider search could only find places outside the right image.
             disparities=min(-(-self._disparities // factor), width),
             threads=self._threads,
+            guide=1,
         )
         needed = self._library.match_bytes(job)
         if self._workspace.size < needed:

@@ -35,10 +35,13 @@ PER_ISA: Final = (
     "remap_kernel.c",
     "sweep_kernel.c",
     "finish_kernel.c",
+    "guide_kernel.c",
+    "vote_kernel.c",
+    "support_kernel.c",
 )
 """Compiled once per instruction set."""
 
-ONCE: Final = ("dispatch.c", "match.c", "crew.c")
+ONCE: Final = ("dispatch.c", "match.c", "speckles.c", "support.c", "bridges.c", "crew.c")
 """Compiled once, for the plainest processor of the architecture."""
 
 FLAGS: Final = (

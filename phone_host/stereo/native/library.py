@@ -17,7 +17,7 @@ from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
 
-_ABI: Final = 2  # TANDEM_ABI of tandem.h
+_ABI: Final = 3  # TANDEM_ABI of tandem.h
 _HERE: Final = Path(__file__).resolve().parent
 _INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
 _REINSTALL: Final = "reinstall"
@@ -111,6 +111,8 @@ class MatchJob(ctypes.Structure):
         ("height", ctypes.c_int32),
         ("disparities", ctypes.c_int32),
         ("threads", ctypes.c_int32),
+        ("guide", ctypes.c_int32),
+        ("reserved", ctypes.c_int32),
     )
 
 

@@ -13,7 +13,9 @@
 
 #include <float.h>
 
+#include "guide.h"
 #include "match.h"
+#include "support.h"
 #include "tandem.h"
 
 #if FLT_EVAL_METHOD != 0
@@ -30,6 +32,11 @@ typedef void tandem_sweep_fn(const struct sweep *job);
 typedef size_t tandem_sweep_scratch_fn(int width, int disparities);
 typedef void tandem_check_rows_fn(const struct finish *job, int from, int to);
 typedef void tandem_smooth_rows_fn(const struct finish *job, int from, int to);
+typedef void tandem_vote_rows_fn(const struct vote *job, int from, int to);
+typedef void tandem_guide_fn(const struct guide *job);
+typedef size_t tandem_guide_scratch_fn(const struct guide *job);
+typedef void tandem_support_cost_rows_fn(const struct support *job, int from, int to, uint8_t *scratch);
+typedef size_t tandem_support_scratch_fn(int width);
 
 #define TANDEM_KERNELS(KERNEL) \
     KERNEL(reproject)          \
@@ -38,7 +45,12 @@ typedef void tandem_smooth_rows_fn(const struct finish *job, int from, int to);
     KERNEL(sweep)              \
     KERNEL(sweep_scratch)      \
     KERNEL(check_rows)         \
-    KERNEL(smooth_rows)
+    KERNEL(smooth_rows)        \
+    KERNEL(vote_rows)          \
+    KERNEL(guide)              \
+    KERNEL(guide_scratch)      \
+    KERNEL(support_cost_rows)  \
+    KERNEL(support_scratch)
 
 struct tandem_kernels {
 #define TANDEM_FIELD(name) tandem_##name##_fn *name;

@@ -2,24 +2,22 @@
  *
  * SPDX-License-Identifier: Apache-2.0
  */
-#include <math.h>
-#include <stdatomic.h>
 #include <string.h>
 
 #include "crew.h"
+#include "finish.h"
+#include "guide.h"
 #include "kernels.h"
 #include "match.h"
+#include "support.h"
 
 enum {
     STRIP = 256,   /* rows of one sweep; strips are cut by the image's height alone, so that results do not depend on threads */
     WARM_UP = 24,  /* rows that a strip's vertical path begins earlier: older rows hardly count */
     BAND = 16,     /* rows of one task after the sweeps */
     SLAB = 64,     /* columns of one task */
-    SPECKLE_AREA = 60, /* islands of up to 60 px (about 8 x 8) are mismatches more often than objects */
-    SPECKLE_STEP = STEPS_PER_PX,
-    GAP = 16 /* gaps of up to 16 px are bridged: three of four such pixels are right within 2 px; wider gaps do worse */
+    VOTES = 3      /* rounds: each carries a surface three pixels further; more close holes that are better left */
 };
-static const float GAP_STEP_PX = 1.0f;
 
 /* Pixel locking undone: 0.12 px sin(2 pi d) (Shimizu and Okutomi, IJCV 63(3), 2005), for d in sixteenths. */
 static const float UNLOCKED_PX[STEPS_PER_PX] = {
@@ -35,8 +33,13 @@ struct work {
     uint8_t *scratch; /* one for each thread */
     int16_t *left, *right;
     uint8_t *told;
-    int32_t *parent, *size; /* of the runs of pixels that hang together; a run has the number of its first pixel */
-    int32_t *run_of;        /* two rows for each thread */
+    struct speckles speckles;
+    struct bridges bridges;
+    struct guide guide;
+    struct support support;
+    int16_t *guide_rows;    /* a row for each thread */
+    size_t support_bytes;
+    uint8_t *support_scratch; /* one for each thread */
 };
 
 static uint8_t *taken(uint8_t **at, size_t size)
@@ -48,13 +51,44 @@ static uint8_t *taken(uint8_t **at, size_t size)
 
 static int strips_of(int height) { return (height + STRIP - 1) / STRIP; }
 
+/* Lay out what guide and support need beyond the planes of the rest. */
+static void guide_laid_out(struct work *work, uint8_t **at)
+{
+    const struct tandem_match_job *job = work->job;
+    const size_t width = (size_t)job->width, pixels = width * (size_t)job->height;
+    struct guide *guide = &work->guide;
+    struct support *support = &work->support;
+    *guide = guide_of(job->width, job->height, job->disparities);
+    guide->left = job->left;
+    guide->right = job->right;
+    guide->left_stride = job->left_stride;
+    guide->right_stride = job->right_stride;
+    guide->steps = (int16_t *)(void *)taken(at, 2 * (size_t)guide->small_width * (size_t)guide->small_height);
+    guide->scratch = taken(at, work->kernels->guide_scratch(guide));
+    *support = (struct support){.width = job->width, .height = job->height, .left = job->left, .right = job->right,
+                                .left_stride = job->left_stride, .right_stride = job->right_stride, .guide = guide,
+                                .steps = work->finish.checked, .margin = job->confidence};
+    support->own = (uint8_t *)work->finish.rough;
+    support->other = support->own + pixels;
+    support->apart = support->other + pixels;
+    support->flags = support->apart + pixels;
+    support->regions = (struct region *)(void *)job->disparity;
+    support->region_capacity = (int32_t)(pixels * sizeof(float) / sizeof(struct region));
+    support->runs = (struct region_run *)(void *)taken(at, 2 * (width + 1) * sizeof(struct region_run));
+    work->guide_rows = (int16_t *)(void *)taken(at, 2 * width * (size_t)work->threads);
+    work->support_bytes = (work->kernels->support_scratch(job->width) + 127) / 64 * 64;
+    work->support_scratch = taken(at, work->support_bytes * (size_t)work->threads);
+}
+
 /* Lay the workspace out. Returns its size. What is not needed at the same time shares memory, the results' own planes included:
  *
- *     sweeps       raw disparities left, right | scratch      | margins: in `confidence`
- *     check        raw disparities left, right | checked      | margins
- *     speckles     parents                     | checked      | sizes: in `disparity`
- *     px, bridges  rough                       | checked: margins
- *     smooth       rough                       | margins      | disparity, confidence
+ *     sweeps       raw disparities left, right | scratch | margins: in `confidence`
+ *     check        raw disparities left, right | checked | margins
+ *     speckles     parents                     | checked | margins, sizes: in `disparity`
+ *     support      costs, distance, flags      | checked | margins, regions: in `disparity`
+ *     votes                                    | checked | margins, two planes of steps: in `disparity`
+ *     px           rough                       | margins | steps: in `disparity`
+ *     smooth       rough                       | margins | confidence, disparity
  */
 static size_t laid_out(struct work *work, uint8_t *memory)
 {
@@ -70,15 +104,26 @@ static size_t laid_out(struct work *work, uint8_t *memory)
     work->finish.rough = (float *)(void *)taken(&at, guarded);
     work->left = (int16_t *)(void *)work->finish.rough;
     work->right = work->left + pixels;
-    work->parent = (int32_t *)(void *)work->finish.rough;
-    work->size = (int32_t *)(void *)job->disparity;
     const size_t scratch = (size_t)sweepers * work->scratch_bytes, checked = pixels * sizeof(int16_t);
     work->scratch = taken(&at, scratch > checked ? scratch : checked);
     work->finish.checked = (int16_t *)(void *)work->scratch;
     work->finish.disparity = job->disparity;
     work->finish.confidence = job->confidence;
     work->told = taken(&at, height);
-    work->run_of = (int32_t *)(void *)taken(&at, (size_t)work->threads * 2 * width * sizeof(int32_t));
+    work->speckles = (struct speckles){
+        .width = job->width,
+        .height = job->height,
+        .band = BAND,
+        .steps = work->finish.checked,
+        .parent = (int32_t *)(void *)work->finish.rough,
+        .size = (int32_t *)(void *)job->disparity,
+        .run_of = (int32_t *)(void *)taken(&at, (size_t)work->threads * 2 * width * sizeof(int32_t)),
+    };
+    work->bridges = (struct bridges){.width = job->width, .height = job->height, .steps = work->finish.checked, .margin = job->confidence};
+    if (job->guide) {
+        guide_laid_out(work, &at);
+        work->bridges.support = &work->support;
+    }
     return (size_t)(at - memory);
 }
 
@@ -123,153 +168,48 @@ static void find_told_rows(struct work *work)
     }
 }
 
-static inline int32_t root_of(int32_t *parent, int32_t run)
+/* The steps after as many rounds of votes; each round reads one plane and writes the next. */
+static int16_t *voted(const struct work *work, int rounds)
 {
-    while (parent[run] != run) {
-        parent[run] = parent[parent[run]];
-        run = parent[run];
-    }
-    return run;
+    int16_t *planes = (int16_t *)(void *)work->job->disparity;
+    const size_t pixels = (size_t)work->job->width * (size_t)work->job->height;
+    return rounds == 0 ? work->finish.checked : planes + (rounds & 1) * pixels;
 }
 
-static void join(struct work *work, int32_t one, int32_t other)
+static void vote_band(const struct work *work, int round, int from, int to)
 {
-    const int32_t a = root_of(work->parent, one), b = root_of(work->parent, other);
-    if (a != b) { /* the earlier run leads, so that chains stay short */
-        const int32_t first = a < b ? a : b, second = a < b ? b : a;
-        work->parent[second] = first;
-        work->size[first] += work->size[second];
-    }
+    const struct tandem_match_job *job = work->job;
+    const struct vote vote = {.width = job->width, .height = job->height, .image = job->left, .stride = job->left_stride,
+                              .from = voted(work, round), .to = voted(work, round + 1), .margin = job->confidence};
+    work->kernels->vote_rows(&vote, from, to);
 }
 
-static inline int near(int a, int b) { return a - b <= SPECKLE_STEP && b - a <= SPECKLE_STEP; }
-
-/* Where the run that begins at x ends. */
-static inline int end_of_run(const int16_t *row, int x, int width)
+/* A row of nothing. */
+static void clear_row(struct work *work, int y)
 {
-    x++;
-    while (x < width && row[x] >= 0 && near(row[x], row[x - 1])) {
-        x++;
-    }
-    return x;
-}
-
-/* Write for each pixel of row y the run that it belongs to, -1 for none; new runs hang together with nothing yet. */
-static void number_runs(struct work *work, int y, int is_new, int32_t *run_of)
-{
-    const int width = work->job->width;
-    const int16_t *row = work->finish.checked + (ptrdiff_t)y * width;
-    for (int x = 0; x < width;) {
-        if (row[x] < 0) {
-            run_of[x++] = -1;
-            continue;
-        }
-        const int32_t run = y * width + x;
-        const int end = end_of_run(row, x, width);
-        if (is_new) {
-            work->parent[run] = run;
-            work->size[run] = end - x;
-        }
-        for (; x < end; x++) {
-            run_of[x] = run;
-        }
+    const size_t pitch = rough_pitch(work->job->width);
+    float *row = work->finish.rough + (size_t)(y + GUARD) * pitch;
+    for (size_t x = 0; x < pitch; x++) {
+        row[x] = NONE_PX;
     }
 }
 
-/* Join the runs of row y with those of the row above that they touch. */
-static void join_rows(struct work *work, int y, const int32_t *here, const int32_t *there)
-{
-    const int width = work->job->width;
-    const int16_t *row = work->finish.checked + (ptrdiff_t)y * width, *above = row - width;
-    int32_t last_here = -1, last_there = -1;
-    for (int x = 0; x < width; x++) {
-        if (here[x] >= 0 && there[x] >= 0 && (here[x] != last_here || there[x] != last_there) && near(row[x], above[x])) {
-            last_here = here[x];
-            last_there = there[x];
-            join(work, last_here, last_there);
-        }
-    }
-}
-
-/* Connected areas, with at most SPECKLE_STEP between neighbours: within a band of rows, ... */
-static void label_band(struct work *work, int from, int to, int thread)
-{
-    const int width = work->job->width;
-    int32_t *here = work->run_of + 2 * (size_t)thread * (size_t)width, *there = here + width;
-    for (int y = from; y < to; y++) {
-        number_runs(work, y, 1, here);
-        if (y > from) {
-            join_rows(work, y, here, there);
-        }
-        int32_t *const swap = here;
-        here = there;
-        there = swap;
-    }
-}
-
-/* ... across the bands' borders, ... */
-static void join_bands(struct work *work)
-{
-    const int width = work->job->width;
-    int32_t *here = work->run_of, *there = here + width;
-    for (int y = BAND; y < work->job->height; y += BAND) {
-        number_runs(work, y - 1, 0, there);
-        number_runs(work, y, 0, here);
-        join_rows(work, y, here, there);
-    }
-}
-
-/* ... and what is too small to be an object goes. */
-static void drop_speckles(struct work *work, int from, int to)
-{
-    const int width = work->job->width;
-    for (int y = from; y < to; y++) {
-        int16_t *row = work->finish.checked + (ptrdiff_t)y * width;
-        for (int x = 0; x < width;) {
-            if (row[x] < 0) {
-                x++;
-                continue;
-            }
-            const int end = end_of_run(row, x, width);
-            int32_t root = y * width + x;
-            while (work->parent[root] != root) { /* other bands read, too: nothing is shortened here */
-                root = work->parent[root];
-            }
-            if (work->size[root] <= SPECKLE_AREA) {
-                for (; x < end; x++) {
-                    row[x] = NO_STEPS;
-                }
-            }
-            x = end;
-        }
-    }
-}
-
-/* Close a gap between two known values along a line if they agree: the disparity of a plane is linear. */
-static inline void bridge(float *values, ptrdiff_t stride, int before, int after)
-{
-    const int gap = after - before - 1;
-    if (gap < 1 || gap > GAP) {
-        return;
-    }
-    const float start = values[before * stride], rise = values[after * stride] - start;
-    if (fabsf(rise) <= GAP_STEP_PX) {
-        for (int i = 1; i <= gap; i++) {
-            values[(before + i) * stride] = start + rise * ((float)i / (float)(gap + 1));
-        }
-    }
-}
-
-/* Rows of steps become px, and their gaps are bridged; their margins take their place. */
-static void band_to_px(struct work *work, int task)
+/* Rows of steps become px, and their margins are limited. The first and the last band have the rows of nothing beside the image, too. */
+static void band_to_px(struct work *work, int from, int to)
 {
     const int width = work->job->width, height = work->job->height;
-    const size_t pitch = rough_pitch(width);
-    const int from = task * BAND, to = from + BAND < height ? from + BAND : height;
+    for (int y = -GUARD; y < 0 && from == 0; y++) {
+        clear_row(work, y);
+    }
+    for (int y = height; y < height + GUARD && to == height; y++) {
+        clear_row(work, y);
+    }
     for (int y = from; y < to; y++) {
-        int16_t *steps = work->finish.checked + (ptrdiff_t)y * width;
-        const uint8_t *margin = work->finish.confidence + (ptrdiff_t)y * width;
-        float *row = work->finish.rough + (size_t)(y + GUARD) * pitch;
+        const ptrdiff_t at = (ptrdiff_t)y * width;
+        const int16_t *steps = voted(work, work->job->guide ? VOTES : 0) + at;
+        const uint8_t *margin = work->finish.confidence + at;
+        int16_t *limited = work->finish.checked + at;
+        float *row = work->finish.rough + (size_t)(y + GUARD) * rough_pitch(width);
         for (int x = 0; x < GUARD; x++) {
             row[x] = row[(size_t)x + GUARD + (size_t)width] = NONE_PX;
         }
@@ -277,74 +217,66 @@ static void band_to_px(struct work *work, int task)
         for (int x = 0; x < width; x++) {
             const int value = steps[x];
             row[x] = value < 0 ? NONE_PX : (float)value * (1.0f / STEPS_PER_PX) + UNLOCKED_PX[value & (STEPS_PER_PX - 1)];
-        }
-        int known = -1;
-        for (int x = 0; x < width; x++) {
-            if (steps[x] >= 0) {
-                if (known >= 0 && x - known > 1) {
-                    bridge(row, 1, known, x);
-                }
-                known = x;
-            }
-            steps[x] = (int16_t)(steps[x] < 0 ? 0 : margin[x] < MARGIN_CAP ? margin[x] : MARGIN_CAP);
+            limited[x] = (int16_t)(value < 0 ? 0 : margin[x] < MARGIN_CAP ? margin[x] : MARGIN_CAP);
         }
     }
 }
 
-static void bridge_columns(struct work *work, int task)
+/* The guide's own checks but that of the right view. */
+static void guide_task(struct work *work)
 {
-    const int width = work->job->width, height = work->job->height;
-    const size_t pitch = rough_pitch(width);
-    const int from = task * SLAB, to = from + SLAB < width ? from + SLAB : width;
-    int known[SLAB];
-    float *plane = work->finish.rough + GUARD * pitch + GUARD;
-    for (int i = 0; i < SLAB; i++) {
-        known[i] = -1;
-    }
-    for (int y = 0; y < height; y++) {
-        const float *row = plane + (size_t)y * pitch;
-        for (int x = from; x < to; x++) {
-            if (row[x] >= 0.0f) {
-                const int last = known[x - from];
-                if (last >= 0 && y - last > 1) {
-                    bridge(plane + x, (ptrdiff_t)pitch, last, y);
-                }
-                known[x - from] = y;
+    struct guide *guide = &work->guide;
+    work->kernels->guide(guide);
+    for (int y = 0; y < guide->small_height; y++) {
+        const int last = (y + 1) * guide->factor - 1;
+        if (!work->told[last < guide->height ? last : guide->height - 1]) {
+            for (int x = 0; x < guide->small_width; x++) {
+                guide->steps[(ptrdiff_t)y * guide->small_width + x] = NO_STEPS;
             }
         }
     }
+    /* Its volume, of 32 bytes a pixel at least, is not needed any more. */
+    const size_t pixels = (size_t)guide->small_width * (size_t)guide->small_height;
+    struct region_run *runs = (struct region_run *)(void *)(guide->scratch + (pixels * sizeof(struct region) + 63) / 64 * 64);
+    support_drop_islands(guide, (struct region *)(void *)guide->scratch, runs);
 }
 
-/* The rows above and below the image, which hold nothing. */
-static void clear_guards(struct work *work)
-{
-    const int height = work->job->height;
-    const size_t pitch = rough_pitch(work->job->width);
-    for (int y = -GUARD; y < height + GUARD; y++) {
-        if (y < 0 || y >= height) {
-            float *row = work->finish.rough + (size_t)(y + GUARD) * pitch;
-            for (size_t x = 0; x < pitch; x++) {
-                row[x] = NONE_PX;
-            }
-        }
-    }
-}
-
-enum step { SWEEP, CHECK, LABEL, JOIN, SPECKLES, TO_PX, COLUMNS_BRIDGED, SMOOTH, STEPS };
+enum step {
+    SWEEP,
+    CHECK,
+    LABEL,
+    JOIN,
+    SPECKLES,
+    FIT, /* this and the next three: the support, see support.h */
+    REGIONS,
+    DROP,
+    FILL,
+    ROWS_BRIDGED,
+    COLUMNS_BRIDGED,
+    VOTE,
+    TO_PX = VOTE + VOTES,
+    SMOOTH,
+    STEPS
+};
 
 static int tasks_of(void *context, int step)
 {
     const struct work *work = context;
-    const int bands = (work->job->height + BAND - 1) / BAND;
+    const int bands = (work->job->height + BAND - 1) / BAND, slabs = (work->job->width + SLAB - 1) / SLAB;
+    const int is_guided = work->job->guide != 0;
     switch (step) {
     case SWEEP:
-        return 2 * work->strips;
+        return 2 * work->strips + is_guided;
     case JOIN:
         return 1;
+    case REGIONS:
+        return is_guided;
+    case FILL:
+        return is_guided ? slabs : 0;
     case COLUMNS_BRIDGED:
-        return (work->job->width + SLAB - 1) / SLAB;
+        return slabs;
     default:
-        return bands;
+        return !is_guided && (step == FIT || step == DROP || (step >= VOTE && step < TO_PX)) ? 0 : bands;
     }
 }
 
@@ -352,33 +284,54 @@ static void do_task(void *context, int step, int task, int thread)
 {
     struct work *work = context;
     const int height = work->job->height, from = task * BAND, to = from + BAND < height ? from + BAND : height;
+    const int left = task * SLAB, right = left + SLAB < work->job->width ? left + SLAB : work->job->width;
+    int16_t *row = work->guide_rows + (ptrdiff_t)thread * work->job->width;
     switch (step) {
     case SWEEP:
-        sweep_task(work, task, thread);
+        if (task == 2 * work->strips) {
+            guide_task(work);
+        } else {
+            sweep_task(work, task, thread);
+        }
         break;
     case CHECK:
         work->kernels->check_rows(&work->finish, from, to);
         break;
     case LABEL:
-        label_band(work, from, to, thread);
+        speckles_label_rows(&work->speckles, from, to, thread);
         break;
     case JOIN:
-        join_bands(work);
+        speckles_join_bands(&work->speckles);
         break;
     case SPECKLES:
-        drop_speckles(work, from, to);
+        speckles_drop_rows(&work->speckles, from, to);
         break;
-    case TO_PX:
-        if (task == 0) {
-            clear_guards(work);
-        }
-        band_to_px(work, task);
+    case FIT:
+        work->kernels->support_cost_rows(&work->support, from, to, work->support_scratch + (size_t)thread * work->support_bytes);
+        break;
+    case REGIONS:
+        support_regions(&work->support);
+        break;
+    case DROP:
+        support_drop_rows(&work->support, from, to, row);
+        break;
+    case FILL:
+        support_fill(&work->support, left, right);
+        break;
+    case ROWS_BRIDGED:
+        bridge_rows(&work->bridges, from, to);
         break;
     case COLUMNS_BRIDGED:
-        bridge_columns(work, task);
+        bridge_columns(&work->bridges, left, right);
+        break;
+    case TO_PX:
+        band_to_px(work, from, to);
+        break;
+    case SMOOTH:
+        work->kernels->smooth_rows(&work->finish, from, to);
         break;
     default:
-        work->kernels->smooth_rows(&work->finish, from, to);
+        vote_band(work, step - VOTE, from, to);
         break;
     }
 }

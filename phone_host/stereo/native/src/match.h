@@ -44,10 +44,20 @@ struct finish {
     int width, height;
     const int16_t *left, *right; /* disparities of the two views, 1/16 px */
     const uint8_t *told; /* (height,): whether the row's texture can say anything */
-    int16_t *checked;    /* disparities that are confirmed, NO_STEPS elsewhere; then their margins, 0 elsewhere */
+    int16_t *checked;    /* disparities that are confirmed, NO_STEPS elsewhere; in the end their margins, 0 elsewhere */
     float *rough;        /* px; NONE_PX where there is none; holds GUARD more rows and columns on each side */
     float *disparity;    /* the result, NAN = none */
     uint8_t *confidence; /* margins of the left view's sums, then the result, 0 = none */
+};
+
+/* Votes on the surface that pixels belong to; see vote_kernel.c. Planes are (height, width), packed. */
+struct vote {
+    int width, height;
+    const uint8_t *image; /* the left one, rows `stride` bytes apart */
+    ptrdiff_t stride;
+    const int16_t *from; /* 1/16 px, NO_STEPS = none */
+    int16_t *to;
+    uint8_t *margin; /* of the values; 0 where a vote decided */
 };
 
 enum {

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "byte_lanes.h"
 #include "match.h"
 
 enum plane {
@@ -21,88 +22,104 @@ enum plane {
     PLANES
 };
 
+/* Values on each side of a row that repeat its ends, and as many bytes more as a register may reach beyond. */
+enum { MARGIN = 64, BEYOND = 2 * MARGIN };
+
 static inline int inside_of(int value, int most) { return value < 0 ? 0 : value > most ? most : value; }
 
-static inline void interval(const uint8_t *value, int x, int left, int right, uint8_t *low, uint8_t *high)
+/* Repeat the ends of a row. */
+static inline void widen(uint8_t *row, int width, int by)
 {
-    const int here = value[x], a = (here + value[left]) >> 1, b = (here + value[right]) >> 1;
-    const int less = a < b ? a : b, more = a < b ? b : a;
-    low[x] = (uint8_t)(here < less ? here : less);
-    high[x] = (uint8_t)(here > more ? here : more);
+    for (int i = 1; i <= by; i++) {
+        row[-i] = row[0];
+        row[width - 1 + i] = row[width - 1];
+    }
 }
+
+/* How many values are computed: more than the width, so that none is left over. */
+static inline int whole_registers(int width) { return (width + MARGIN - 1) / MARGIN * MARGIN; }
+
+/* Half-way between two values, rounded down, without a greater type. */
+static inline uint8_t between(uint8_t a, uint8_t b) { return (uint8_t)((a & b) + ((uint8_t)(a ^ b) >> 1)); }
 
 /* The interval that each value and the half-way points to its neighbours span. */
-static void interval_row(const uint8_t *restrict value, int width, uint8_t *restrict low, uint8_t *restrict high)
+static inline void interval_row(const uint8_t *restrict value, int width, uint8_t *restrict low, uint8_t *restrict high)
 {
-    interval(value, 0, 0, width > 1, low, high);
-    for (int x = 1; x < width - 1; x++) {
-        interval(value, x, x - 1, x + 1, low, high);
-    }
-    if (width > 1) {
-        interval(value, width - 1, width - 2, width - 1, low, high);
+    for (int x = 0; x < whole_registers(width); x++) {
+        const uint8_t here = value[x], a = between(here, value[x - 1]), b = between(here, value[x + 1]);
+        const uint8_t less = a < b ? a : b, more = a < b ? b : a;
+        low[x] = here < less ? here : less;
+        high[x] = here > more ? here : more;
     }
 }
 
-static inline uint8_t slope_at(const uint8_t *up, const uint8_t *here, const uint8_t *down, int left, int right)
+static inline void grey_row(const uint8_t *restrict row, int width, uint8_t *restrict grey)
 {
-    const int slope = (up[right] - up[left]) + 2 * (here[right] - here[left]) + (down[right] - down[left]);
-    return (uint8_t)inside_of(((slope * SLOPE_WEIGHT + 8) >> 4) + SLOPE_CAP, 2 * SLOPE_CAP);
-}
-
-static void slope_row(const uint8_t *restrict up, const uint8_t *restrict here, const uint8_t *restrict down, int width,
-                      uint8_t *restrict slope)
-{
-    slope[0] = slope_at(up, here, down, 0, width > 1);
-    for (int x = 1; x < width - 1; x++) {
-        slope[x] = slope_at(up, here, down, x - 1, x + 1);
-    }
-    slope[width - 1] = slope_at(up, here, down, width > 1 ? width - 2 : 0, width - 1);
-}
-
-static inline uint8_t order_at(const uint8_t *up, const uint8_t *here, const uint8_t *down, int x, int left, int right)
-{
-    const uint8_t mid = here[x];
-    uint8_t darker = up[left] < mid ? 1 : 0;
-    darker |= up[x] < mid ? 2 : 0;
-    darker |= up[right] < mid ? 4 : 0;
-    darker |= here[left] < mid ? 8 : 0;
-    darker |= here[right] < mid ? 16 : 0;
-    darker |= down[left] < mid ? 32 : 0;
-    darker |= down[x] < mid ? 64 : 0;
-    darker |= down[right] < mid ? 128 : 0;
-    return darker;
-}
-
-static void order_row(const uint8_t *restrict up, const uint8_t *restrict here, const uint8_t *restrict down, int width,
-                      uint8_t *restrict order)
-{
-    const int last = width - 1;
-    for (int x = 0; x < width && x < 2; x++) {
-        order[x] = order_at(up, here, down, x, 0, inside_of(x + 2, last));
-    }
-    for (int x = 2; x < width - 2; x++) {
-        order[x] = order_at(up, here, down, x, x - 2, x + 2);
-    }
-    for (int x = width < 4 ? 2 : width - 2; x < width; x++) {
-        order[x] = order_at(up, here, down, x, x - 2, last);
+    for (int x = 0; x < whole_registers(width); x++) {
+        grey[x] = (uint8_t)((row[x] * GREY_WEIGHT + 8) >> 4);
     }
 }
 
-/* Fill the planes of row y, `pitch` bytes apart; the image's borders are repeated. */
-static void prefilter_row(const uint8_t *image, ptrdiff_t stride, int width, int height, int y, uint8_t *planes, size_t pitch)
+static inline void slope_row(const uint8_t *restrict up, const uint8_t *restrict here, const uint8_t *restrict down, int width,
+                             int16_t weight, uint8_t *restrict slope)
 {
-    const uint8_t *row[5];
-    for (int i = 0; i < 5; i++) {
-        row[i] = image + inside_of(y + i - 2, height - 1) * stride;
+    for (int x = 0; x < whole_registers(width); x++) {
+        const int16_t outer = (int16_t)((up[x + 1] - up[x - 1]) + (down[x + 1] - down[x - 1]));
+        const int16_t whole = (int16_t)(outer + 2 * (here[x + 1] - here[x - 1]));
+        const int16_t weighted = (int16_t)((int16_t)((int16_t)(whole * weight) + 8) >> 4);
+        const int16_t low = weighted < -SLOPE_CAP ? -SLOPE_CAP : weighted, both = low > SLOPE_CAP ? SLOPE_CAP : low;
+        slope[x] = (uint8_t)(both + SLOPE_CAP);
     }
-    uint8_t *restrict grey = planes + GREY * pitch;
-    for (int x = 0; x < width; x++) {
-        grey[x] = (uint8_t)((row[2][x] * GREY_WEIGHT + 8) >> 4);
+}
+
+/* One bit more: whether `there` is darker. */
+BYTES_INLINE bytes with_darker(bytes bits, bytes here, const uint8_t *there)
+{
+    return bytes_add(bytes_add(bits, bits), bytes_min(bytes_minus(here, bytes_load(there)), bytes_of(1)));
+}
+
+static inline void order_row(const uint8_t *up, const uint8_t *row, const uint8_t *down, int width, int side, uint8_t *order)
+{
+    for (int x = 0; x < width; x += BYTES) {
+        const bytes here = bytes_load(row + x);
+        bytes bits = with_darker(bytes_of(0), here, up + x - side);
+        bits = with_darker(bits, here, up + x);
+        bits = with_darker(bits, here, up + x + side);
+        bits = with_darker(bits, here, row + x - side);
+        bits = with_darker(bits, here, row + x + side);
+        bits = with_darker(bits, here, down + x - side);
+        bits = with_darker(bits, here, down + x);
+        bytes_store(order + x, with_darker(bits, here, down + x + side));
     }
-    slope_row(row[1], row[2], row[3], width, planes + SLOPE * pitch);
-    order_row(row[0], row[2], row[4], width, planes + ORDER * pitch);
+}
+
+/* Fill the planes of a row, `pitch` bytes apart, from it and two rows on each side, which are wider by 2; all have MARGIN bytes before
+ * and BEYOND bytes behind them. If the image is turned, left is right. */
+static inline void prefilter_row(uint8_t *const row[5], int width, int is_turned, uint8_t *planes, size_t pitch)
+{
+    uint8_t *grey = planes + GREY * pitch, *slope = planes + SLOPE * pitch;
+    grey_row(row[2], width, grey);
+    slope_row(row[1], row[2], row[3], width, is_turned ? -SLOPE_WEIGHT : SLOPE_WEIGHT, slope);
+    order_row(row[0], row[2], row[4], width, is_turned ? -2 : 2, planes + ORDER * pitch);
+    widen(grey, width, 1);
+    widen(slope, width, 1);
     interval_row(grey, width, planes + GREY_LOW * pitch, planes + GREY_HIGH * pitch);
-    interval_row(planes + SLOPE * pitch, width, planes + SLOPE_LOW * pitch, planes + SLOPE_HIGH * pitch);
+    interval_row(slope, width, planes + SLOPE_LOW * pitch, planes + SLOPE_HIGH * pitch);
+}
+
+/* P2 - P1 by the difference of two grey levels: at most LEAST_JUMP_COST from a difference of 12 on. */
+static inline void jump_row(const uint8_t *one, const uint8_t *another, int width, uint8_t *jump)
+{
+#define JUMP(d) ((JUMP_COST * JUMP_SLOPE / (JUMP_SLOPE + (d)) > LEAST_JUMP_COST ? JUMP_COST * JUMP_SLOPE / (JUMP_SLOPE + (d)) : LEAST_JUMP_COST) - STEP_COST)
+    _Static_assert(JUMP(15) == LEAST_JUMP_COST - STEP_COST, "the table holds all jump costs");
+    static const uint8_t costs[16] = {JUMP(0), JUMP(1), JUMP(2),  JUMP(3),  JUMP(4),  JUMP(5),  JUMP(6),  JUMP(7),
+                                      JUMP(8), JUMP(9), JUMP(10), JUMP(11), JUMP(12), JUMP(13), JUMP(14), JUMP(15)};
+#undef JUMP
+    for (int x = 0; x < width; x += BYTES) {
+        const bytes a = bytes_load(one + x), b = bytes_load(another + x);
+        const bytes difference = bytes_max(bytes_minus(a, b), bytes_minus(b, a));
+        bytes_store(jump + x, bytes_of_table(costs, bytes_min(difference, bytes_of(15))));
+    }
 }
 
 #endif

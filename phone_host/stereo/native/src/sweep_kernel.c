@@ -1,8 +1,12 @@
 /* Semi-global matching (Hirschmueller, PAMI 30(2), 2008) in one sweep over rows, three paths: from the left, from the right, and along
  * the sweep. No cost volume: a few rows of costs stay in the second-level cache.
  *
- * Some rows are worked on together, in four passes: costs; both horizontal paths, several at once, because each step of a path waits
- * for the one before; the vertical path; the least sum. One register holds the costs of one pixel for many disparities.
+ * Some rows are worked on together, because each step of a path along the row waits for the one before: so several are under way. Both
+ * horizontal paths start at the ends. Up to the middle they work on fresh costs and leave theirs behind; beyond it each adds to what
+ * the other one left, and the vertical path and the least sum follow tile by tile, while the sums are in a near cache.
+ *
+ * One register holds the costs of one pixel for many disparities. Where it takes several registers (chunks), disparity d is lane
+ * d / chunks of chunk d % chunks: so the neighbours d - 1 and d + 1 are the same lane of another chunk.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -16,31 +20,43 @@
 #define FEW_VARIANTS
 #endif
 
-enum { MOST_CHUNKS = MOST_DISPARITIES / BYTES, MOST_ROWS = 4 };
+enum {
+    MOST_CHUNKS = MOST_DISPARITIES / BYTES,
+    MOST_ROWS = 4,
+    GROUP = 4,        /* columns whose least costs are found together */
+    TILE = 64  /* columns at each end that go through one pass after another: fewer cost more in mispredicted ends of loops */
+};
 
-/* Where the scratch memory's parts lie. */
+/* Lanes beyond the last disparity cost more than any other, and adding to it does not overflow. */
+enum { UNUSED_COST = 255 - JUMP_COST };
+
+/* Where the scratch memory's parts lie. Widths are padded: the paths may begin beyond the last column, where everything costs 0. */
 struct room {
-    int width, lanes, chunks, rows;
-    size_t own_pitch, other_pitch;              /* from one plane to the next */
-    size_t row_bytes;                           /* of a row of costs */
+    int width, columns, disparities, lanes, chunks, rows;
+    size_t row_pitch, other_pitch, part_pitch;  /* from one plane to the next; from one part of a plane to the next */
     uint8_t *own[MOST_ROWS];                    /* PLANES rows of `width` bytes each */
-    uint8_t *other[MOST_ROWS];                  /* the same backwards, with `lanes` more */
-    uint8_t *jump_along[MOST_ROWS];             /* P2 between a column and the one before it */
-    uint8_t *jump_down[MOST_ROWS];              /* P2 between a pixel and the one in the row before */
-    uint8_t *cost[MOST_ROWS], *sum[MOST_ROWS];  /* (width, lanes) */
-    uint8_t *planes;                            /* PLANES rows and one more, while a row is prepared */
-    uint8_t *down, *down_least;                 /* the vertical path: (width, lanes), (width,) */
-    uint8_t *around;                            /* 255 at three places in the middle */
-    uint8_t *total;                             /* four pixels' sums, each with 255 on both sides */
+    uint8_t *other[MOST_ROWS];                  /* the same backwards, with `lanes` more; part i is every chunks-th byte from the i-th */
+    uint8_t *jump_along[MOST_ROWS];             /* P2 - P1 between a column and the one before it */
+    uint8_t *jump_down[MOST_ROWS];              /* P2 - P1 between a pixel and the one in the row before */
+    uint8_t *cost[MOST_ROWS], *sum[MOST_ROWS];  /* (columns, lanes) */
+    uint8_t *least[MOST_ROWS], *low[MOST_ROWS]; /* of a row: the least sum, those beside it, the next best */
+    uint8_t *high[MOST_ROWS], *next[MOST_ROWS];
+    uint16_t *best[MOST_ROWS];                  /* where the least is */
+    uint8_t *straight[5], *turned[5];           /* rows around the one that is prepared: the left image's; the right one's, backwards */
+    uint8_t *planes;                            /* PLANES rows, while a row is prepared */
+    uint8_t *down, *down_least;                 /* the vertical path: (columns, lanes), (columns,) */
+    uint8_t *along_least;                       /* of each path along a row */
+    uint8_t *unused;                            /* (lanes,): UNUSED_COST beyond the last disparity, else 0 */
+    uint8_t *total;                             /* (TILE, lanes and more): the sums of all paths */
     size_t total_pitch;
-    uint8_t *least, *low, *high, *next;         /* of a row: the least sum, those beside it, the next best */
-    uint16_t *best;                             /* where the least is */
+    uint16_t *place;                            /* (lanes + 2,): where disparity d - 1 lies among the lanes */
     int16_t *steps;
 };
 
 static size_t padded(size_t size) { return (size + 127) / 64 * 64; }
 
-static size_t padded_columns(int width) { return ((size_t)width + 3) / 4 * 4; }
+/* From one plane to the next: an odd number of cache lines, so that planes do not compete for the same ones. */
+static size_t apart(size_t size) { return (size + 127) / 128 * 128 + 64; }
 
 static uint8_t *taken(uint8_t **free_from, size_t size)
 {
@@ -49,7 +65,7 @@ static uint8_t *taken(uint8_t **free_from, size_t size)
     return part;
 }
 
-/* How many rows are worked on together: four are faster (two need one third of the cache). */
+/* How many rows are worked on together: four are faster (two need half of the cache). */
 static int rows_together(size_t row_bytes)
 {
 #if defined(FEW_VARIANTS)
@@ -60,36 +76,50 @@ static int rows_together(size_t row_bytes)
 #endif
 }
 
+static void row_laid_out(struct room *room, int k, uint8_t **at)
+{
+    const size_t columns = (size_t)room->columns, row_bytes = columns * (size_t)room->lanes;
+    room->own[k] = taken(at, PLANES * room->row_pitch) + MARGIN;
+    room->other[k] = taken(at, PLANES * room->other_pitch) + MARGIN;
+    room->jump_along[k] = taken(at, columns + BEYOND);
+    room->jump_down[k] = taken(at, columns + BEYOND);
+    room->cost[k] = taken(at, row_bytes);
+    room->sum[k] = taken(at, row_bytes);
+    room->least[k] = taken(at, columns);
+    room->low[k] = taken(at, columns);
+    room->high[k] = taken(at, columns);
+    room->next[k] = taken(at, columns);
+    room->best[k] = (uint16_t *)(void *)taken(at, 2 * columns);
+}
+
 static size_t laid_out(struct room *room, int width, int disparities, uint8_t *scratch)
 {
     uint8_t *at = scratch;
     room->width = width;
+    room->columns = (width + 2 * GROUP - 1) / (2 * GROUP) * (2 * GROUP);
+    room->disparities = disparities;
     room->chunks = (disparities + BYTES - 1) / BYTES;
     room->lanes = room->chunks * BYTES;
-    room->row_bytes = padded_columns(width) * (size_t)room->lanes;
-    room->rows = rows_together(room->row_bytes);
-    const size_t columns = padded_columns(width); /* four at a time: the last ones may be none */
-    room->own_pitch = padded(columns);
-    room->other_pitch = padded(columns + (size_t)room->lanes + BYTES);
+    const size_t columns = (size_t)room->columns, lanes = (size_t)room->lanes;
+    room->rows = rows_together(columns * lanes);
+    room->row_pitch = apart(columns + lanes + MARGIN + BEYOND);
+    room->part_pitch = apart(room->row_pitch / (size_t)room->chunks);
+    room->other_pitch = room->part_pitch * (size_t)room->chunks;
     for (int k = 0; k < room->rows; k++) {
-        room->own[k] = taken(&at, PLANES * room->own_pitch);
-        room->other[k] = taken(&at, PLANES * room->other_pitch);
-        room->jump_along[k] = taken(&at, columns + 1);
-        room->jump_down[k] = taken(&at, columns);
-        room->cost[k] = taken(&at, room->row_bytes);
-        room->sum[k] = taken(&at, room->row_bytes);
+        row_laid_out(room, k, &at);
     }
-    room->planes = taken(&at, (PLANES + 1) * padded(columns));
-    room->down = taken(&at, room->row_bytes);
+    for (int i = 0; i < 5; i++) {
+        room->straight[i] = taken(&at, room->row_pitch) + MARGIN;
+        room->turned[i] = taken(&at, room->row_pitch) + MARGIN;
+    }
+    room->planes = taken(&at, PLANES * room->row_pitch) + MARGIN;
+    room->down = taken(&at, columns * lanes);
     room->down_least = taken(&at, columns);
-    room->around = taken(&at, 2 * (size_t)room->lanes + BYTES);
-    room->total_pitch = padded((size_t)room->lanes + 64);
-    room->total = taken(&at, 4 * room->total_pitch + 64) + 64;
-    room->least = taken(&at, columns);
-    room->low = taken(&at, columns);
-    room->high = taken(&at, columns);
-    room->next = taken(&at, columns);
-    room->best = (uint16_t *)(void *)taken(&at, 2 * columns);
+    room->along_least = taken(&at, 2 * MOST_ROWS);
+    room->unused = taken(&at, lanes);
+    room->total_pitch = lanes + BYTES;
+    room->total = taken(&at, TILE * room->total_pitch);
+    room->place = (uint16_t *)(void *)taken(&at, 2 * (lanes + 2));
     room->steps = (int16_t *)(void *)taken(&at, 2 * columns);
     return (size_t)(at - scratch);
 }
@@ -111,45 +141,68 @@ static void turn_row(const uint8_t *restrict from, int width, uint8_t *restrict 
     }
 }
 
-/* P2 by the difference of two grey levels. */
-static void jump_row(const uint8_t *restrict one, const uint8_t *restrict another, int width, uint8_t *restrict jump)
+static inline __attribute__((always_inline)) void every(size_t step, const uint8_t *restrict from, size_t count,
+                                                        uint8_t *restrict to)
 {
-    for (int x = 0; x < width; x++) {
-        const int difference = one[x] < another[x] ? another[x] - one[x] : one[x] - another[x];
-        const int cost = (int)((float)(JUMP_COST * JUMP_SLOPE) / (float)(difference + JUMP_SLOPE));
-        jump[x] = (uint8_t)(cost < LEAST_JUMP_COST ? LEAST_JUMP_COST : cost);
+    for (size_t i = 0; i < count; i++) {
+        to[i] = from[i * step];
     }
 }
 
-/* Fill the planes of the n-th row, and its jump costs. The right view is the left view of the mirrored pair. */
+/* Every `step`-th byte; the compiler can do the usual steps with registers. */
+static void every_byte(size_t step, const uint8_t *from, size_t count, uint8_t *to)
+{
+    switch (step) {
+    case 2:
+        every(2, from, count, to);
+        break;
+    case 4:
+        every(4, from, count, to);
+        break;
+    case 8:
+        every(8, from, count, to);
+        break;
+    default:
+        every(step, from, count, to);
+        break;
+    }
+}
+
+/* Fill the planes of the other image's row, each in `chunks` parts; its last pixel is repeated beyond its end. */
+static void prepare_other(const struct room *room, uint8_t *const rows[5], int is_turned, uint8_t *other)
+{
+    const size_t chunks = (size_t)room->chunks, lanes = (size_t)room->lanes, width = (size_t)room->width;
+    const int is_whole = chunks == 1;
+    uint8_t *planes = is_whole ? other : room->planes;
+    const size_t pitch = is_whole ? room->other_pitch : room->row_pitch;
+    prefilter_row(rows, room->width, is_turned, planes, pitch);
+    for (size_t plane = 0; plane < PLANES; plane++) {
+        uint8_t *whole = planes + plane * pitch;
+        memset(whole + width, whole[width - 1], lanes + chunks);
+        for (size_t part = 0; !is_whole && part < chunks; part++) {
+            every_byte(chunks, whole + part, (width + lanes) / chunks + 1, other + plane * room->other_pitch + part * room->part_pitch);
+        }
+    }
+}
+
+/* Fill the planes of the n-th row, and its jump costs. The right view is the left view of the mirrored pair, so the right image is
+ * turned in both. */
 static void prepare_row(const struct sweep *job, const struct room *room, int k, int n)
 {
     const int width = job->width, y = row_of(job, n), before = row_of(job, n > 0 ? n - 1 : n);
-    const size_t own_pitch = room->own_pitch, other_pitch = room->other_pitch;
-    uint8_t *turned = room->planes, *jump = room->planes + PLANES * own_pitch;
-    const uint8_t *here = job->own + y * job->own_stride, *there = job->own + before * job->own_stride;
-    if (job->is_right) {
-        prefilter_row(job->own, job->own_stride, width, job->height, y, turned, own_pitch);
-        prefilter_row(job->other, job->other_stride, width, job->height, y, room->other[k], other_pitch);
-    } else {
-        prefilter_row(job->own, job->own_stride, width, job->height, y, room->own[k], own_pitch);
-        prefilter_row(job->other, job->other_stride, width, job->height, y, turned, own_pitch);
+    for (int i = 0; i < 5; i++) {
+        const int line = inside_of(y + i - 2, job->height - 1);
+        const uint8_t *own = job->own + line * job->own_stride, *other = job->other + line * job->other_stride;
+        memcpy(room->straight[i], job->is_right ? other : own, (size_t)width);
+        turn_row(job->is_right ? own : other, width, room->turned[i]);
+        widen(room->straight[i], width, 2);
+        widen(room->turned[i], width, 2);
     }
-    for (int plane = 0; plane < PLANES; plane++) {
-        uint8_t *own = room->own[k] + (size_t)plane * own_pitch, *other = room->other[k] + (size_t)plane * other_pitch;
-        turn_row(turned + (size_t)plane * own_pitch, width, job->is_right ? own : other);
-        memset(other + width, other[width - 1], (size_t)room->lanes + BYTES);
-    }
-    if (job->is_right) {
-        jump_row(here, there, width, jump);
-        turn_row(jump, width, room->jump_down[k]);
-        jump_row(here, here + 1, width - 1, jump);
-        turn_row(jump, width - 1, room->jump_along[k] + 1);
-    } else {
-        jump_row(here, there, width, room->jump_down[k]);
-        jump_row(here, here + 1, width - 1, room->jump_along[k] + 1);
-    }
-    room->jump_along[k][0] = room->jump_along[k][width] = JUMP_COST;
+    uint8_t *const *own = job->is_right ? room->turned : room->straight;
+    prefilter_row(own, width, job->is_right, room->own[k], room->row_pitch);
+    prepare_other(room, job->is_right ? room->straight : room->turned, !job->is_right, room->other[k]);
+    jump_row(own[2], own[before - y + 2], width, room->jump_down[k]);
+    jump_row(own[2] - 1, own[2], width + 1, room->jump_along[k]);
 }
 
 /* How far a value lies outside the other pixel's interval: one direction of Birchfield and Tomasi's measure. */
@@ -158,48 +211,52 @@ BYTES_INLINE bytes beyond(bytes value, const uint8_t *lows, const uint8_t *highs
     return bytes_max(bytes_minus(value, bytes_load(highs)), bytes_minus(bytes_load(lows), value));
 }
 
-/* The costs of a row's pixels for all disparities; 255 beyond the last one. */
-BYTES_INLINE void cost_row(int disparities, const struct room *room, int k, const int chunks)
+/* The costs of some of a row's pixels for all disparities. */
+BYTES_INLINE void cost_columns(const struct room *room, int k, int from, int to, const int chunks)
 {
-    const size_t own_pitch = room->own_pitch, other_pitch = room->other_pitch;
-    const int unused = room->lanes - disparities;
+    const size_t row_pitch = room->row_pitch, other_pitch = room->other_pitch;
     const bytes cap = bytes_of(COST_CAP);
-    for (int x = 0; x < room->width; x++) {
-        const uint8_t *own = room->own[k] + x, *other = room->other[k] + (room->width - 1 - x);
+    const int has_unused = room->disparities < room->lanes;
+    const int end = to < room->width ? to : room->width;
+    for (int x = from; x < end; x++) {
+        const uint8_t *own = room->own[k] + x;
         uint8_t *cost = room->cost[k] + (size_t)x * (size_t)room->lanes;
+        unsigned at = (unsigned)(room->width - 1 - x) / (unsigned)chunks, part = (unsigned)(room->width - 1 - x) % (unsigned)chunks;
         bytes value[PLANES];
         for (int plane = 0; plane < PLANES; plane++) {
-            value[plane] = bytes_of(own[(size_t)plane * own_pitch]);
+            value[plane] = bytes_of(own[(size_t)plane * row_pitch]);
         }
         for (int c = 0; c < chunks; c++) {
-            const uint8_t *there = other + c * BYTES;
+            const uint8_t *there = room->other[k] + part * room->part_pitch + at;
             const bytes grey = beyond(value[GREY], there + GREY_LOW * other_pitch, there + GREY_HIGH * other_pitch);
             const bytes slope_there = bytes_load(there + SLOPE * other_pitch);
             const bytes slope = bytes_min(
                 beyond(value[SLOPE], there + SLOPE_LOW * other_pitch, there + SLOPE_HIGH * other_pitch),
                 bytes_max(bytes_minus(slope_there, value[SLOPE_HIGH]), bytes_minus(value[SLOPE_LOW], slope_there)));
             const bytes order = bytes_ones(bytes_xor(value[ORDER], bytes_load(there + ORDER * other_pitch)));
-            bytes_store(cost + c * BYTES, bytes_min(bytes_plus(bytes_plus(grey, slope), order), cap));
-        }
-        if (unused > 0) {
-            memset(cost + disparities, 255, (size_t)unused);
+            const bytes all = bytes_min(bytes_add(bytes_add(grey, slope), order), cap);
+            bytes_store(cost + c * BYTES, has_unused ? bytes_max(all, bytes_load(room->unused + c * BYTES)) : all);
+            part = part + 1 < (unsigned)chunks ? part + 1 : 0;
+            at += part == 0;
         }
     }
 }
 
 /* One step of a path but for the least of its costs, which the next step needs: `path` holds the costs at the pixel before, whose
- * least is `least`, and gets those at this pixel. Returns the chunks' minimum. */
+ * least is `least`, and gets those at this pixel; `jump` is P2 - P1. Returns the chunks' minimum. */
 BYTES_INLINE bytes path_step(const uint8_t *cost, bytes *path, bytes least, bytes jump, const int chunks)
 {
-    const bytes none = bytes_of(255), step = bytes_of(STEP_COST), jumped = bytes_plus(least, jump);
-    bytes below = none, best = none;
+    const bytes none = bytes_of(255), step = bytes_of(STEP_COST);
+    bytes before[MOST_CHUNKS], best = none;
     for (int c = 0; c < chunks; c++) {
-        const bytes before = path[c], above = c + 1 < chunks ? path[c + 1] : none;
-        const bytes beside = bytes_min(bytes_from_below(before, below), bytes_from_above(before, above));
-        const bytes cheapest = bytes_min(bytes_min(before, bytes_plus(beside, step)), jumped);
-        path[c] = bytes_plus(bytes_minus(cheapest, least), bytes_load(cost + c * BYTES));
+        before[c] = bytes_sub(path[c], least);
+    }
+    for (int c = 0; c < chunks; c++) {
+        const bytes below = c > 0 ? before[c - 1] : bytes_from_below(before[chunks - 1], none);
+        const bytes above = c + 1 < chunks ? before[c + 1] : bytes_from_above(before[0], none);
+        const bytes changed = bytes_add(bytes_min(bytes_min(below, above), jump), step);
+        path[c] = bytes_add(bytes_min(before[c], changed), bytes_load(cost + c * BYTES));
         best = c == 0 ? path[0] : bytes_min(best, path[c]);
-        below = before;
     }
     return best;
 }
@@ -208,12 +265,13 @@ BYTES_INLINE bytes path_step(const uint8_t *cost, bytes *path, bytes least, byte
 struct along {
     const uint8_t *cost, *jump;
     uint8_t *sum;
-    bytes path[MOST_CHUNKS], least;
+    bytes path[MOST_CHUNKS];
 };
 
-/* One step of four paths; the costs are stored in the sum, or added to those of the other direction. */
-BYTES_INLINE void four_steps(struct along *four, ptrdiff_t forth, ptrdiff_t back, size_t lanes, const int is_second,
-                             const int chunks)
+/* One step of four paths, whose least costs are in `least`; the costs are stored in the sum, or added to those of the other
+ * direction. */
+BYTES_INLINE void four_steps(struct along *four, uint8_t *least, ptrdiff_t forth, ptrdiff_t back, size_t lanes,
+                             const int is_second, const int chunks)
 {
     bytes best[4];
 #pragma GCC unroll 4
@@ -221,141 +279,124 @@ BYTES_INLINE void four_steps(struct along *four, ptrdiff_t forth, ptrdiff_t back
         struct along *one = &four[i];
         const ptrdiff_t x = i < 2 ? forth : back;
         const ptrdiff_t at = x * (ptrdiff_t)lanes;
-        best[i] = path_step(one->cost + at, one->path, one->least, bytes_of(one->jump[x]), chunks);
+        best[i] = path_step(one->cost + at, one->path, bytes_of(least[i]), bytes_of(one->jump[x]), chunks);
         for (int c = 0; c < chunks; c++) {
             uint8_t *sum = one->sum + at + c * BYTES;
             bytes_store(sum, is_second ? bytes_plus(bytes_load(sum), one->path[c]) : one->path[c]);
         }
     }
-    const quad least = quad_least(best[0], best[1], best[2], best[3]);
-    four[0].least = quad_bytes(least, 0);
-    four[1].least = quad_bytes(least, 1);
-    four[2].least = quad_bytes(least, 2);
-    four[3].least = quad_bytes(least, 3);
+    least_of_four(best, least);
 }
 
-/* The paths from the left and from the right through some rows at once: each step of a path waits for the one before, so several are
- * under way. Until they meet they write the sums, then they add to what the other one wrote. */
-BYTES_INLINE void along_rows(const struct room *room, const int rows, const int chunks)
+/* `count` steps of all paths along the rows. */
+BYTES_INLINE void along_columns(const struct room *room, struct along paths[2][4], ptrdiff_t from, ptrdiff_t count,
+                                const int is_second, const int rows, const int chunks)
 {
-    const size_t lanes = (size_t)room->lanes;
-    const ptrdiff_t last = room->width - 1, half = room->width / 2;
-    struct along paths[2][4];
-#pragma GCC unroll 2
-    for (int group = 0; group < rows / 2; group++) {
-#pragma GCC unroll 4
-        for (int i = 0; i < 4; i++) {
-            struct along *one = &paths[group][i];
-            const int k = 2 * group + (i & 1);
-            one->cost = room->cost[k];
-            one->sum = room->sum[k];
-            one->jump = room->jump_along[k] + (i < 2 ? 0 : 1); /* the way back pays for the same edge */
-            one->least = bytes_of(0);
-            for (int c = 0; c < chunks; c++) {
-                one->path[c] = bytes_of(0);
-            }
-        }
-    }
-    for (ptrdiff_t x = 0; x < half; x++) {
+    const ptrdiff_t last = room->columns - 1;
+    for (ptrdiff_t x = from; x < from + count; x++) {
 #pragma GCC unroll 2
         for (int group = 0; group < rows / 2; group++) {
-            four_steps(paths[group], x, last - x, lanes, 0, chunks);
-        }
-    }
-    if (room->width & 1) { /* both are at the middle: clear it, so that both add */
-        for (int k = 0; k < rows; k++) {
-            memset(room->sum[k] + (size_t)half * lanes, 0, lanes);
-        }
-    }
-    for (ptrdiff_t x = half; x <= last; x++) {
-#pragma GCC unroll 2
-        for (int group = 0; group < rows / 2; group++) {
-            four_steps(paths[group], x, last - x, lanes, 1, chunks);
+            four_steps(paths[group], room->along_least + 4 * group, x, last - x, (size_t)room->lanes, is_second, chunks);
         }
     }
 }
 
-/* The vertical path through a row: columns do not wait for each other. */
-BYTES_INLINE void down_row(const struct room *room, int k, const int chunks)
+/* The paths from the left and from the right through some rows, before their first steps. */
+BYTES_INLINE void start_along(const struct room *room, struct along paths[2][4], const int rows, const int chunks)
+{
+#pragma GCC unroll 8
+    for (int i = 0; i < 2 * rows; i++) {
+        struct along *one = &paths[i / 4][i % 4];
+        const int k = i / 4 * 2 + i % 2, is_back = i % 4 / 2;
+        one->cost = room->cost[k];
+        one->sum = room->sum[k];
+        one->jump = room->jump_along[k] + is_back; /* the way back pays for the same edge */
+        room->along_least[i] = 0;
+        for (int c = 0; c < chunks; c++) {
+            one->path[c] = bytes_of(0);
+        }
+    }
+}
+
+/* The vertical path at some of a row's columns, which do not wait for each other, and the sums of all paths. */
+BYTES_INLINE void down_columns(const struct room *room, int k, int from, int to, const int chunks)
 {
     const size_t lanes = (size_t)room->lanes;
-    const uint8_t *cost = room->cost[k], *jump = room->jump_down[k];
-    uint8_t *down = room->down, *least = room->down_least;
-    for (size_t x = 0; x < padded_columns(room->width); x += 4) {
-        bytes best[4];
+    const uint8_t *jump = room->jump_down[k];
+    uint8_t *total = room->total;
+    for (int x = from; x < to; x += GROUP) {
+        bytes best[GROUP], best_total[GROUP] = {bytes_of(255), bytes_of(255), bytes_of(255), bytes_of(255)};
 #pragma GCC unroll 4
-        for (size_t i = 0; i < 4; i++) {
-            const size_t at = (x + i) * lanes;
+        for (int i = 0; i < GROUP; i++) {
+            const size_t at = (size_t)(x + i) * lanes;
+            uint8_t *down = room->down + at;
             bytes path[MOST_CHUNKS];
             for (int c = 0; c < chunks; c++) {
-                path[c] = bytes_load(down + at + c * BYTES);
+                path[c] = bytes_load(down + c * BYTES);
             }
-            best[i] = path_step(cost + at, path, bytes_of(least[x + i]), bytes_of(jump[x + i]), chunks);
+            best[i] = path_step(room->cost[k] + at, path, bytes_of(room->down_least[x + i]), bytes_of(jump[x + i]), chunks);
             for (int c = 0; c < chunks; c++) {
-                bytes_store(down + at + c * BYTES, path[c]);
+                const bytes sum = bytes_plus(bytes_load(room->sum[k] + at + c * BYTES), path[c]);
+                bytes_store(down + c * BYTES, path[c]);
+                bytes_store(total + c * BYTES, sum);
+                best_total[i] = c == 0 ? sum : bytes_min(best_total[i], sum);
             }
+            total += room->total_pitch;
         }
-        const uint32_t packed = quad_packed(quad_least(best[0], best[1], best[2], best[3]));
-        memcpy(least + x, &packed, 4);
+        least_of_four(best, room->down_least + x);
+        least_of_four(best_total, room->least[k] + x);
     }
 }
 
-/* The best disparities of a row: the least sum of all paths, its neighbours, and the next best beyond them. */
-BYTES_INLINE void best_row(const struct room *room, int k, int disparities, const int wants_next, const int chunks)
+/* The best disparities of some of a row's pixels by the sums of all paths: the first least sum, and its neighbours. They are struck
+ * out if the next best is wanted. */
+BYTES_INLINE void find_columns(const struct room *room, int k, int from, int to, int is_struck, const int chunks)
 {
-    const size_t lanes = (size_t)room->lanes;
-    const uint8_t *sums = room->sum[k], *down = room->down;
     uint8_t *total = room->total;
-    uint16_t *best_at = room->best;
-    for (size_t x = 0; x < padded_columns(room->width); x += 4) {
-        bytes best[4] = {bytes_of(255), bytes_of(255), bytes_of(255), bytes_of(255)};
+    for (int x = from; x < to; x++) {
+        const bytes value = bytes_of(room->least[k][x]);
+        int d = 0;
+        for (int c = 0; c < chunks; c++) {
+            const int found = bytes_find(bytes_load(total + c * BYTES), value) * chunks + c;
+            d = c == 0 || found < d ? found : d;
+        }
+        const uint16_t *place = room->place + d; /* of d - 1, d and d + 1 */
+        room->best[k][x] = (uint16_t)d;
+        room->low[k][x] = total[place[0]];
+        room->high[k][x] = total[place[2]];
+        if (is_struck) {
+            total[place[0]] = total[place[1]] = total[place[2]] = 255;
+        }
+        total += room->total_pitch;
+    }
+}
+
+/* The least sums that are left. */
+BYTES_INLINE void next_columns(const struct room *room, int k, int from, int to, const int chunks)
+{
+    const uint8_t *total = room->total;
+    for (int x = from; x < to; x += GROUP) {
+        bytes best[GROUP] = {bytes_of(255), bytes_of(255), bytes_of(255), bytes_of(255)};
 #pragma GCC unroll 4
-        for (size_t i = 0; i < 4; i++) {
-            const size_t at = (x + i) * lanes;
+        for (int i = 0; i < GROUP; i++) {
             for (int c = 0; c < chunks; c++) {
-                const bytes sum = bytes_plus(bytes_load(sums + at + c * BYTES), bytes_load(down + at + c * BYTES));
-                bytes_store(total + i * room->total_pitch + c * BYTES, sum);
+                const bytes sum = bytes_load(total + c * BYTES);
                 best[i] = c == 0 ? sum : bytes_min(best[i], sum);
             }
+            total += room->total_pitch;
         }
-        const quad least = quad_least(best[0], best[1], best[2], best[3]);
-        const uint32_t packed = quad_packed(least);
-        memcpy(room->least + x, &packed, 4);
-        const bytes value[4] = {quad_bytes(least, 0), quad_bytes(least, 1), quad_bytes(least, 2), quad_bytes(least, 3)};
-#pragma GCC unroll 4
-        for (size_t i = 0; i < 4; i++) {
-            const uint8_t *sum = total + i * room->total_pitch;
-            int d = disparities;
-            for (int c = chunks - 1; c >= 0; c--) {
-                const int found = bytes_find(bytes_load(sum + c * BYTES), value[i]);
-                d = found < BYTES ? c * BYTES + found : d;
-            }
-            best_at[x + i] = (uint16_t)d;
-            room->low[x + i] = sum[d - 1];
-            room->high[x + i] = sum[d + 1];
-            if (wants_next) {
-                const uint8_t *around = room->around + lanes - d;
-                for (int c = 0; c < chunks; c++) {
-                    const bytes other = bytes_max(bytes_load(sum + c * BYTES), bytes_load(around + c * BYTES));
-                    best[i] = c == 0 ? other : bytes_min(best[i], other);
-                }
-            }
-        }
-        if (wants_next) {
-            const uint32_t next = quad_packed(quad_least(best[0], best[1], best[2], best[3]));
-            memcpy(room->next + x, &next, 4);
-        }
+        least_of_four(best, room->next[k] + x);
     }
 }
 
 /* Sub-pixel steps of a row by a parabola through the sums beside the least. */
-static void write_row(const struct sweep *job, const struct room *room, int n)
+static void write_row(const struct sweep *job, const struct room *room, int k, int n)
 {
     const int width = room->width, y = row_of(job, n), last = job->disparities - 1;
     int16_t *restrict steps = room->steps;
-    const uint8_t *restrict low = room->low, *restrict high = room->high;
-    const uint8_t *restrict least = room->least, *restrict next = room->next;
-    const uint16_t *restrict best = room->best;
+    const uint8_t *restrict low = room->low[k], *restrict high = room->high[k];
+    const uint8_t *restrict least = room->least[k], *restrict next = room->next[k];
+    const uint16_t *restrict best = room->best[k];
     for (int x = 0; x < width; x++) {
         const int is_inside = best[x] > 0 && best[x] < last;
         const int a = is_inside ? low[x] - least[x] : 0, b = is_inside ? high[x] - least[x] : 0, bend = a + b;
@@ -376,26 +417,52 @@ static void write_row(const struct sweep *job, const struct room *room, int n)
     }
 }
 
+/* What follows at columns that both horizontal paths have passed. Rows before the first that is written only warm up. */
+BYTES_INLINE void finish_columns(const struct sweep *job, const struct room *room, int n, int from, int to, const int rows,
+                                 const int chunks)
+{
+    for (int k = 0; k < rows && n + k < job->end; k++) {
+        down_columns(room, k, from, to, chunks);
+        if (n + k >= job->begin) {
+            find_columns(room, k, from, to, !job->is_right, chunks);
+            if (!job->is_right) {
+                next_columns(room, k, from, to, chunks);
+            }
+        }
+    }
+}
+
 /* Work on `rows` rows together, of which the first is the n-th and some may lie beyond the end. */
 BYTES_INLINE void sweep_rows(const struct sweep *job, const struct room *memory, int n, const int rows, const int chunks)
 {
     const struct room copy = *memory, *room = &copy; /* so that the compiler knows that no store changes it */
+    const int columns = room->columns, half = columns / 2, is_written = n + rows > job->begin;
+    struct along paths[2][4];
+    start_along(room, paths, rows, chunks);
     for (int k = 0; k < rows; k++) {
         prepare_row(job, memory, k, n + k < job->end ? n + k : job->end - 1);
-        cost_row(job->disparities, room, k, chunks);
     }
-    if (n + rows > job->begin) { /* else the vertical path only warms up */
-        along_rows(room, rows, chunks);
+    for (int from = 0; from < half; from += TILE) {
+        const int to = from + TILE < half ? from + TILE : half;
+        for (int k = 0; k < rows; k++) {
+            cost_columns(room, k, from, to, chunks);
+            cost_columns(room, k, columns - to, columns - from, chunks);
+        }
+        if (is_written) {
+            along_columns(room, paths, from, to - from, 0, rows, chunks);
+        }
+    }
+    for (int from = half; from < columns; from += TILE) {
+        const int to = from + TILE < columns ? from + TILE : columns;
+        if (is_written) {
+            along_columns(room, paths, from, to - from, 1, rows, chunks);
+        }
+        finish_columns(job, room, n, from, to, rows, chunks);
+        finish_columns(job, room, n, columns - to, columns - from, rows, chunks);
     }
     for (int k = 0; k < rows && n + k < job->end; k++) {
-        down_row(room, k, chunks);
         if (n + k >= job->begin) {
-            if (job->is_right) {
-                best_row(room, k, job->disparities, 0, chunks);
-            } else {
-                best_row(room, k, job->disparities, 1, chunks);
-            }
-            write_row(job, memory, n + k);
+            write_row(job, memory, k, n + k);
         }
     }
 }
@@ -413,15 +480,30 @@ SWEEP(4, many, MANY)
 SWEEP(4, n, room->chunks)
 #endif
 
+/* Fill what stays the same in all rows. */
+static void set_up(const struct room *room)
+{
+    const size_t lanes = (size_t)room->lanes, chunks = (size_t)room->chunks;
+    for (size_t d = 0; d < lanes; d++) {
+        const size_t place = d % chunks * BYTES + d / chunks;
+        room->place[d + 1] = (uint16_t)place;
+        room->unused[place] = d < (size_t)room->disparities ? 0 : UNUSED_COST;
+    }
+    room->place[0] = room->place[lanes + 1] = (uint16_t)lanes; /* beside the sums */
+    memset(room->total, 255, TILE * room->total_pitch);
+    memset(room->down, 0, (size_t)room->columns * lanes);
+    memset(room->down_least, 0, (size_t)room->columns);
+    for (int k = 0; k < room->rows; k++) {
+        memset(room->cost[k] + (size_t)room->width * lanes, 0, (size_t)(room->columns - room->width) * lanes);
+        memset(room->sum[k], 0, (size_t)room->columns * lanes); /* read, though not used, while rows only warm up */
+    }
+}
+
 void ISA_NAME(sweep)(const struct sweep *job)
 {
     struct room room;
     laid_out(&room, job->width, job->disparities, job->scratch);
-    memset(room.down, 0, room.row_bytes);
-    memset(room.down_least, 0, (size_t)room.width);
-    memset(room.around, 0, 2 * (size_t)room.lanes + BYTES);
-    memset(room.around + room.lanes - 1, 255, 3);
-    memset(room.total - 64, 255, 4 * room.total_pitch + 64);
+    set_up(&room);
     for (int n = job->first; n < job->end; n += room.rows) {
 #if !defined(FEW_VARIANTS)
         if (room.rows == 4) {

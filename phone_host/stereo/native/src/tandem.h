@@ -16,7 +16,7 @@
 #define TANDEM_API __attribute__((visibility("default")))
 
 /* Raise it, here and in library.py, when a signature or a struct changes. */
-#define TANDEM_ABI 2
+#define TANDEM_ABI 3
 
 /* Instruction sets, from the plainest. The numbers are part of the ABI, isa_name() their names for people. */
 enum tandem_isa {
@@ -111,6 +111,8 @@ struct tandem_match_job {
     int32_t height;
     int32_t disparities;     /* 0 <= d < disparities */
     int32_t threads;         /* results do not depend on it */
+    int32_t guide;           /* 1: what the images do not support is dropped, and surfaces are completed (support.h); 0: neither */
+    int32_t reserved;
 };
 
 TANDEM_API int64_t tandem_match_bytes(int32_t isa, const struct tandem_match_job *job); /* of the workspace; -1: no such set */

@@ -1,0 +1,274 @@
+/* The steps of the support that follow columns or whole regions; see support.h.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include "support.h"
+
+#include <string.h>
+
+enum {
+    SLAB_MOST = 64,
+    ISLAND = 100,     /* px of the guide's size: smaller ones are mismatches */
+    FAR_PX = 16,      /* a region so far behind the guide is one period off, or seen through the gaps of an object */
+    FILL_COST = 120,   /* a quarter of 25 px with 8 grey levels each: where the guide costs more, it is not taken */
+    DOUBTFUL = 20,    /* mean margin: below it a region stays only if the guide costs at least WORSE tenths of what it costs */
+    UNSURE = 40,      /* below it, at least AS_BAD tenths, or MUCH_WORSE if it is behind the guide */
+    AS_BAD = 12,
+    WORSE = 20,
+    MUCH_WORSE = 30
+};
+
+static inline int distance(int a, int b) { return a < b ? b - a : a - b; }
+
+/* Down, then up, through some columns. */
+static void pass_columns(const struct support *job, int from, int to)
+{
+    uint8_t state[SLAB_MOST], step[SLAB_MOST];
+    const int count = to - from, width = job->width;
+    memset(state, 0, sizeof state);
+    for (int y = 0; y < job->height; y++) {
+        uint8_t *restrict flags = job->flags + (ptrdiff_t)y * width + from;
+        for (int i = 0; i < count; i++) {
+            const uint8_t flag = flags[i];
+            state[i] = (uint8_t)((flag & CONFIRMS) | (state[i] & ~(flag >> 1) & ~(flag >> 3)));
+            flags[i] = (uint8_t)(flag | (state[i] & 1) << 6);
+        }
+    }
+    memset(state, 0, sizeof state);
+    memset(step, 0, sizeof step);
+    for (int y = job->height - 1; y >= 0; y--) {
+        uint8_t *restrict flags = job->flags + (ptrdiff_t)y * width + from;
+        for (int i = 0; i < count; i++) {
+            const uint8_t flag = flags[i];
+            state[i] = (uint8_t)((flag & CONFIRMS) | (state[i] & ~(flag >> 1) & ~step[i]));
+            flags[i] = (uint8_t)(flag | (state[i] & 1) << 7);
+            step[i] = flag >> 3;
+        }
+    }
+}
+
+/* ---- regions ---- */
+
+static int32_t root_of(struct region *regions, int32_t region)
+{
+    while (regions[region].parent != region) {
+        regions[region].parent = regions[regions[region].parent].parent;
+        region = regions[region].parent;
+    }
+    return region;
+}
+
+static void join(struct region *regions, int32_t one, int32_t other)
+{
+    const int32_t a = root_of(regions, one), b = root_of(regions, other);
+    if (a < b) {
+        regions[b].parent = a;
+    } else {
+        regions[a].parent = b;
+    }
+}
+
+/* Join the runs of a row with those above that they touch. `row` is NULL, or runs hang together only where its values are near. */
+static void join_rows(struct region *regions, const struct region_run *here, int count, const struct region_run *above, int count_above,
+                      const int16_t *row, int width)
+{
+    for (int i = 0, j = 0; i < count && j < count_above;) {
+        const int from = here[i].from > above[j].from ? here[i].from : above[j].from;
+        const int to = here[i].to < above[j].to ? here[i].to : above[j].to;
+        int touches = from < to && row == NULL;
+        for (int x = from; row != NULL && x < to && !touches; x++) {
+            touches = distance(row[x], row[x - width]) <= STEPS_PER_PX;
+        }
+        if (touches) {
+            join(regions, here[i].region, above[j].region);
+        }
+        if (here[i].to < above[j].to) {
+            i++;
+        } else {
+            j++;
+        }
+    }
+}
+
+/* The end of the run of islands' pixels that begins at x. */
+static int end_of_values(const int16_t *row, int x, int width)
+{
+    for (x++; x < width && row[x] >= 0 && distance(row[x], row[x - 1]) <= STEPS_PER_PX;) {
+        x++;
+    }
+    return x;
+}
+
+static int next_set(const uint8_t *row, int x, int width)
+{
+    uint64_t eight;
+    for (; x + 8 <= width; x += 8) {
+        memcpy(&eight, row + x, 8);
+        if (eight != 0) {
+            break;
+        }
+    }
+    while (x < width && row[x] == 0) {
+        x++;
+    }
+    return x;
+}
+
+void support_drop_islands(const struct guide *guide, struct region *regions, struct region_run *runs)
+{
+    const int width = guide->small_width, height = guide->small_height;
+    struct region_run *here = runs, *above = runs + width + 1;
+    int32_t made = 0;
+    int count_above = 0;
+    for (int y = 0; y < height; y++) {
+        const int16_t *row = guide->steps + (ptrdiff_t)y * width;
+        int count = 0;
+        for (int x = 0, end; x < width; x = end) {
+            end = x + 1;
+            if (row[x] >= 0) {
+                end = end_of_values(row, x, width);
+                regions[made] = (struct region){.parent = made, .own = (uint32_t)(end - x)};
+                here[count++] = (struct region_run){x, end, made++};
+            }
+        }
+        join_rows(regions, here, count, above, count_above, row, width);
+        struct region_run *swap = here;
+        here = above;
+        above = swap;
+        count_above = count;
+    }
+    for (int32_t i = 0; i < made; i++) {
+        const int32_t root = root_of(regions, i);
+        regions[root].own += root == i ? 0 : regions[i].own;
+    }
+    made = 0;
+    for (int y = 0; y < height; y++) {
+        int16_t *row = guide->steps + (ptrdiff_t)y * width;
+        for (int x = 0, end; x < width; x = end) {
+            end = x + 1;
+            if (row[x] >= 0) {
+                end = end_of_values(row, x, width);
+                if (regions[root_of(regions, made++)].own <= ISLAND) {
+                    for (int i = x; i < end; i++) {
+                        row[i] = NO_STEPS;
+                    }
+                }
+            }
+        }
+    }
+}
+
+static struct region summed(const struct support *job, ptrdiff_t at, int count, int32_t number)
+{
+    struct region sum = {.parent = number, .pixels = count};
+    for (ptrdiff_t i = at; i < at + count; i++) {
+        sum.margin += job->margin[i];
+        sum.apart += job->apart[i] - AS_FAR;
+        sum.own += job->own[i];
+        sum.other += job->other[i];
+    }
+    return sum;
+}
+
+/* A region goes unless it explains the images better than the guide: the less sure its values are, the more so. */
+static int goes(const struct region *region)
+{
+    const int32_t pixels = region->pixels;
+    const int is_doubtful = region->margin < DOUBTFUL * pixels, is_unsure = region->margin < UNSURE * pixels;
+    const int is_behind = region->apart < -FAR_PX * pixels;
+    const uint32_t tenths = is_unsure && is_behind ? MUCH_WORSE : is_doubtful ? WORSE : is_unsure ? AS_BAD : 0;
+    return 10 * (uint64_t)region->other < tenths * (uint64_t)region->own;
+}
+
+/* Find the regions of values far from the guide, and mark those to drop by 255. Regions beyond the table's end stay: so many are noise that is
+ * dropped elsewhere. */
+void support_regions(const struct support *job)
+{
+    const int width = job->width;
+    struct region *regions = job->regions;
+    struct region_run *here = job->runs, *above = job->runs + width + 1;
+    int32_t made = 0;
+    int count_above = 0, rows = 0;
+    for (; rows < job->height && made + width / 2 + 1 <= job->region_capacity; rows++) {
+        const ptrdiff_t at = (ptrdiff_t)rows * width;
+        const uint8_t *row = job->apart + at;
+        int count = 0;
+        for (int x = next_set(row, 0, width), end; x < width; x = next_set(row, end, width)) {
+            for (end = x + 1; end < width && row[end] != 0;) {
+                end++;
+            }
+            regions[made] = summed(job, at + x, end - x, made);
+            here[count++] = (struct region_run){x, end, made++};
+        }
+        join_rows(regions, here, count, above, count_above, NULL, width);
+        struct region_run *swap = here;
+        here = above;
+        above = swap;
+        count_above = count;
+    }
+    for (int32_t i = 0; i < made; i++) {
+        const int32_t root = root_of(regions, i);
+        if (root != i) {
+            regions[root].pixels += regions[i].pixels;
+            regions[root].margin += regions[i].margin;
+            regions[root].apart += regions[i].apart;
+            regions[root].own += regions[i].own;
+            regions[root].other += regions[i].other;
+        }
+    }
+    made = 0;
+    for (int y = 0; y < job->height; y++) {
+        uint8_t *row = job->apart + (ptrdiff_t)y * width;
+        for (int x = next_set(row, 0, width), end; x < width; x = next_set(row, end, width)) {
+            for (end = x + 1; end < width && row[end] != 0;) {
+                end++;
+            }
+            memset(row + x, y < rows && goes(&regions[root_of(regions, made)]) ? DROPPED : 1, (size_t)(end - x));
+            made += y < rows;
+        }
+    }
+}
+
+/* Drop what is marked, and single values a little off that fit worse than the guide; find from which sides of the row the guide is still confirmed. */
+void support_drop_rows(const struct support *job, int from, int to, int16_t *row)
+{
+    const int width = job->width, agree = support_scaled(job, AGREE), nearly = support_scaled(job, NEARLY);
+    for (int y = from; y < to; y++) {
+        const ptrdiff_t at = (ptrdiff_t)y * width;
+        int16_t *restrict steps = job->steps + at;
+        uint8_t *restrict flags = job->flags + at;
+        const uint8_t *restrict apart = job->apart + at, *restrict own = job->own + at, *restrict other = job->other + at;
+        const int16_t *restrict guide = row;
+        guide_row(job, y, row);
+        for (int x = 0; x < width; x++) {
+            const int far = distance(steps[x], guide[x]), is_both = (steps[x] >= 0) & (guide[x] >= 0);
+            const int drifts = is_both & (apart[x] == NOT_APART) & (far > nearly) & (job->margin[at + x] < DOUBTFUL) & (2 * other[x] < 3 * own[x]);
+            const int value = drifts | (apart[x] == DROPPED) ? NO_STEPS : steps[x];
+            const int is_kept = is_both & (value >= 0), agrees = far <= agree;
+            steps[x] = (int16_t)value;
+            flags[x] = (uint8_t)((flags[x] & (STEP_LEFT | STEP_ABOVE)) | (is_kept & agrees ? CONFIRMS : 0) |
+                                 ((guide[x] < 0) | (is_kept & !agrees) ? BREAKS : 0));
+        }
+        scan_row(flags, width);
+    }
+}
+
+/* Complete surfaces: what is missing takes the guide's value where that is confirmed on all four sides and fits. */
+void support_fill(const struct support *job, int from, int to)
+{
+    const struct guide *guide = job->guide;
+    const int width = job->width;
+    pass_columns(job, from, to);
+    for (int y = 0; y < job->height; y++) {
+        const ptrdiff_t at = (ptrdiff_t)y * width;
+        const int line = y / guide->factor < guide->small_height ? y / guide->factor : guide->small_height - 1;
+        const int16_t *smooth = guide->steps + (ptrdiff_t)line * guide->small_width;
+        for (int x = from; x < to; x++) {
+            if (job->steps[at + x] < 0 && (job->flags[at + x] & FROM_ALL) == FROM_ALL && job->other[at + x] < FILL_COST) {
+                const int column = x / guide->factor < guide->small_width ? x / guide->factor : guide->small_width - 1;
+                job->steps[at + x] = (int16_t)(smooth[column] * guide->factor);
+                job->margin[at + x] = 0; /* no cost was its own */
+            }
+        }
+    }
+}

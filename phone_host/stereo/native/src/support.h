@@ -1,0 +1,118 @@
+/* Whether the images support a disparity, or the guide's smoother surface explains them as well (decision 0036).
+ *
+ * The steps, in this order; those over bands of rows and over slabs of columns may be done by any threads:
+ * support_cost_rows (bands), support_regions (whole), support_drop_rows (bands), support_fill (slabs).
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#ifndef TANDEM_SUPPORT_H
+#define TANDEM_SUPPORT_H
+
+#include "guide.h"
+#include "match.h"
+
+enum { SUPPORT_BAND = 16 /* rows that support_cost_rows is given at most */ };
+
+/* What is known of a pixel, and from which sides the guide leads to it, without a break, from a value that confirms the guide. */
+enum support_flag {
+    CONFIRMS = 1,
+    BREAKS = 2,        /* no guide, or a value far from it */
+    STEP_LEFT = 4,     /* the guide steps between this pixel and the one to the left */
+    STEP_ABOVE = 8,
+    FROM_LEFT = 16,
+    FROM_RIGHT = 32,
+    FROM_ABOVE = 64,
+    FROM_BELOW = 128,
+    FROM_ALL = FROM_LEFT | FROM_RIGHT | FROM_ABOVE | FROM_BELOW
+};
+
+/* Distances between a value and the guide, 1/16 px, for a guide of half size; in proportion for a smaller one. */
+enum { AGREE = 16, NEARLY = 12, APART = 32 };
+
+enum { NOT_APART = 0, AS_FAR = 128, DROPPED = 255 };
+
+struct region {
+    int32_t parent;
+    int32_t pixels;
+    int32_t margin; /* sums over the pixels */
+    int32_t apart;  /* px that the values are nearer than the guide */
+    uint32_t own, other;
+};
+
+struct region_run { /* of pixels of one row */
+    int32_t from, to, region;
+};
+
+struct support {
+    int width, height;
+    const uint8_t *left, *right;
+    ptrdiff_t left_stride, right_stride;
+    const struct guide *guide;
+    int16_t *steps;         /* (height, width): the values, 1/16 px, NO_STEPS = none; changed */
+    uint8_t *own, *other;   /* (height, width): cost of the value and of the guide */
+    uint8_t *margin;        /* (height, width): of the values' costs; 0 where the guide gave the value */
+    uint8_t *apart;         /* (height, width): AS_FAR + px that the value is nearer than the guide where that is much, NOT_APART elsewhere */
+    uint8_t *flags;         /* (height, width): enum support_flag */
+    struct region *regions; /* region_capacity of them */
+    struct region_run *runs; /* 2 (width + 1) */
+    int32_t region_capacity;
+};
+
+static inline int32_t region_capacity(int width, int height) { return width * height / 4 + width + 1; }
+
+static inline int support_scaled(const struct support *job, int distance) { return distance * job->guide->factor / 2; }
+
+/* A row of the guide at full size, 1/16 px, NO_STEPS = none. */
+static inline void guide_row(const struct support *job, int y, int16_t *restrict row)
+{
+    const struct guide *guide = job->guide;
+    const int factor = guide->factor, line = y / factor < guide->small_height ? y / factor : guide->small_height - 1;
+    const int16_t *restrict steps = guide->steps + (ptrdiff_t)line * guide->small_width;
+    int x = 0;
+    for (int i = 0; i < guide->small_width; i++) {
+        const int value = steps[i] < 0 ? NO_STEPS : steps[i] * factor;
+        const int end = i == guide->small_width - 1 ? job->width : (i + 1) * factor;
+        for (; x < end; x++) {
+            row[x] = (int16_t)value;
+        }
+    }
+}
+
+/* Whether a value for the pixel at an offset lies on the guide, or there is none to say. */
+static inline int support_allows(const struct support *job, ptrdiff_t at, int value)
+{
+    const struct guide *guide = job->guide;
+    const int y = (int)(at / job->width) / guide->factor, x = (int)(at % job->width) / guide->factor;
+    const int line = y < guide->small_height ? y : guide->small_height - 1, column = x < guide->small_width ? x : guide->small_width - 1;
+    const int smooth = guide->steps[(ptrdiff_t)line * guide->small_width + column];
+    const int far = smooth * guide->factor - value, agree = support_scaled(job, AGREE);
+    return smooth < 0 || (far <= agree && -far <= agree);
+}
+
+/* Pass on along a row from which sides a confirmed surface is reached. */
+static inline void scan_row(uint8_t *flags, int width)
+{
+    unsigned state = 0;
+    for (int x = 0; x < width; x++) {
+        const unsigned flag = flags[x];
+        state = (flag & CONFIRMS) | (state & ~(flag >> 1) & ~(flag >> 2));
+        flags[x] = (uint8_t)(flag | (state & 1) * FROM_LEFT);
+    }
+    state = 0;
+    unsigned step = 0;
+    for (int x = width - 1; x >= 0; x--) {
+        const unsigned flag = flags[x];
+        state = (flag & CONFIRMS) | (state & ~(flag >> 1) & ~step);
+        flags[x] = (uint8_t)(flag | (state & 1) * FROM_RIGHT);
+        step = flag >> 2;
+    }
+}
+
+void support_regions(const struct support *job);
+void support_drop_rows(const struct support *job, int from, int to, int16_t *row);
+void support_fill(const struct support *job, int from, int to);
+
+/* Drop the islands of the guide that are too small to be a surface; `regions` holds a region for each of its pixels, `runs` 2 (small_width + 1). */
+void support_drop_islands(const struct guide *guide, struct region *regions, struct region_run *runs);
+
+#endif

@@ -1,0 +1,208 @@
+/* How badly the two images fit together by the values, and by the guide: capped differences of level and of slope along the row, summed over
+ * squares. Half of a match's support is spent here, so this is compiled for each instruction set.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include <string.h>
+
+#include "kernels.h"
+#include "prefilter.h"
+#include "support.h"
+
+enum {
+    FIT_CAP = 20,    /* grey levels, of level and of slope each: more than this is another surface, no worse match */
+    FIT_WINDOW = 5,  /* edge of the square, px; 1 px lets noise decide */
+    REACH = FIT_WINDOW / 2,
+    PARTS = 4,       /* the right image is read at quarters of a pixel */
+    SLIDE = 3,       /* parts: the guide is tried this far to both sides, too, for it was matched at half the size */
+    FITS = 4,        /* the value; the guide, as it is and slid to both sides */
+    LINES = SUPPORT_BAND + 2 * REACH,
+    ZERO_SLOPE = 128
+};
+
+struct fit_room {
+    size_t pitch;
+    uint8_t *fit[FITS];                /* (LINES, pitch): costs of single pixels, REACH columns more on both sides */
+    uint8_t *sum;                      /* (pitch,): of five rows */
+    uint16_t *own, *parts, *there;     /* level and slope: of the left row; of the right row at each part; as read */
+    uint8_t *level, *slope;            /* of a row, with one more pixel */
+    int32_t *place;
+    int16_t *guide, *guide_above;
+};
+
+static uint8_t *taken(uint8_t **free_from, size_t size)
+{
+    uint8_t *part = *free_from;
+    *free_from += (size + 127) / 64 * 64;
+    return part;
+}
+
+static size_t laid_out(struct fit_room *room, int columns, uint8_t *scratch)
+{
+    uint8_t *at = scratch;
+    const size_t width = (size_t)columns;
+    room->pitch = (width + 2 * REACH + 63) / 64 * 64;
+    for (int i = 0; i < FITS; i++) {
+        room->fit[i] = taken(&at, LINES * room->pitch);
+    }
+    room->sum = taken(&at, room->pitch);
+    room->own = (uint16_t *)(void *)taken(&at, 2 * width);
+    room->parts = (uint16_t *)(void *)taken(&at, 2 * PARTS * width);
+    room->there = (uint16_t *)(void *)taken(&at, 2 * width);
+    room->level = taken(&at, width + 1);
+    room->slope = taken(&at, width + 1);
+    room->place = (int32_t *)(void *)taken(&at, 4 * width);
+    room->guide = (int16_t *)(void *)taken(&at, 2 * width);
+    room->guide_above = (int16_t *)(void *)taken(&at, 2 * width);
+    return (size_t)(at - scratch);
+}
+
+size_t ISA_NAME(support_scratch)(int width)
+{
+    static uint8_t nowhere[64];
+    struct fit_room room;
+    return laid_out(&room, width, nowhere);
+}
+
+/* Sobel's weights add up to 8 for a slope of one level a pixel; two of its steps are as bad as one of level. */
+static inline uint8_t slope_of(const uint8_t *up, const uint8_t *here, const uint8_t *down, int left, int right)
+{
+    const int slope = (up[right] - up[left]) + 2 * (here[right] - here[left]) + (down[right] - down[left]);
+    return (uint8_t)inside_of((slope >> 2) + ZERO_SLOPE, 255);
+}
+
+static void slopes_of_row(const uint8_t *image, ptrdiff_t stride, int width, int height, int y, uint8_t *restrict slope)
+{
+    const uint8_t *restrict up = image + inside_of(y - 1, height - 1) * stride, *restrict here = image + y * stride;
+    const uint8_t *restrict down = image + inside_of(y + 1, height - 1) * stride;
+    slope[0] = slope_of(up, here, down, 0, width > 1);
+    for (int x = 1; x < width - 1; x++) {
+        slope[x] = slope_of(up, here, down, x - 1, x + 1);
+    }
+    slope[width - 1] = slope_of(up, here, down, width > 1 ? width - 2 : 0, width - 1);
+}
+
+/* The right row at every quarter of a pixel. */
+static void part_row(const struct support *job, const struct fit_room *room, int y)
+{
+    const int width = job->width;
+    uint8_t *restrict level = room->level, *restrict slope = room->slope;
+    uint16_t *restrict parts = room->parts;
+    memcpy(level, job->right + y * job->right_stride, (size_t)width);
+    slopes_of_row(job->right, job->right_stride, width, job->height, y, slope);
+    level[width] = level[width - 1];
+    slope[width] = slope[width - 1];
+    for (int x = 0; x < width; x++) {
+        const int a = level[x], b = level[x + 1], s = slope[x], t = slope[x + 1];
+        parts[PARTS * x] = (uint16_t)(a | s << 8);
+        parts[PARTS * x + 1] = (uint16_t)((3 * a + b + 2) >> 2 | ((3 * s + t + 2) >> 2) << 8);
+        parts[PARTS * x + 2] = (uint16_t)((a + b + 1) >> 1 | ((s + t + 1) >> 1) << 8);
+        parts[PARTS * x + 3] = (uint16_t)((a + 3 * b + 2) >> 2 | ((s + 3 * t + 2) >> 2) << 8);
+    }
+}
+
+/* Costs of the row's pixels where the right image is read at `place`, slid. */
+static void fit_row(const struct fit_room *room, int width, int slide, uint8_t *restrict fit)
+{
+    const uint16_t *restrict own = room->own, *restrict parts = room->parts;
+    const int32_t *restrict place = room->place;
+    uint16_t *restrict there = room->there;
+    const int last = PARTS * (width - 1);
+    for (int x = 0; x < width; x++) {
+        const int at = place[x] + slide;
+        there[x] = parts[at < 0 ? 0 : at > last ? last : at];
+    }
+    for (int x = 0; x < width; x++) {
+        const int a = own[x] & 255, b = there[x] & 255, s = own[x] >> 8, t = there[x] >> 8;
+        const int level = a < b ? b - a : a - b, slope = s < t ? t - s : s - t;
+        fit[x] = (uint8_t)((level < FIT_CAP ? level : FIT_CAP) + (slope < FIT_CAP ? slope : FIT_CAP));
+    }
+    for (int x = 1; x <= REACH; x++) {
+        fit[-x] = fit[0];
+        fit[width - 1 + x] = fit[width - 1];
+    }
+}
+
+/* The four costs of an image row. A value that is missing has the guide's cost, and the other way round. */
+static void fit_line(const struct support *job, const struct fit_room *room, int y, int line)
+{
+    const int width = job->width, slide = SLIDE * job->guide->factor / 2;
+    const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width, *restrict guide = room->guide;
+    const uint8_t *restrict left = job->left + y * job->left_stride;
+    uint8_t *restrict slope = room->slope;
+    uint16_t *restrict own = room->own;
+    int32_t *restrict place = room->place;
+    const size_t at = (size_t)line * room->pitch + REACH;
+    guide_row(job, y, room->guide);
+    slopes_of_row(job->left, job->left_stride, width, job->height, y, slope);
+    for (int x = 0; x < width; x++) {
+        own[x] = (uint16_t)(left[x] | slope[x] << 8);
+    }
+    part_row(job, room, y);
+    for (int x = 0; x < width; x++) {
+        const int value = steps[x] >= 0 ? steps[x] : guide[x];
+        place[x] = PARTS * x - ((value + 2) >> 2);
+    }
+    fit_row(room, width, 0, room->fit[0] + at);
+    for (int x = 0; x < width; x++) {
+        const int value = guide[x] >= 0 ? guide[x] : steps[x];
+        place[x] = PARTS * x - ((value + 2) >> 2);
+    }
+    fit_row(room, width, 0, room->fit[1] + at);
+    fit_row(room, width, slide, room->fit[2] + at);
+    fit_row(room, width, -slide, room->fit[3] + at);
+}
+
+/* A quarter of the sum over the square around each pixel of a row; if not the first, the less of that and what is there. */
+static void square_row(const struct fit_room *room, int i, int line, int width, int is_first, uint8_t *restrict out)
+{
+    const uint8_t *restrict a = room->fit[i] + (size_t)line * room->pitch, *restrict b = a + room->pitch;
+    const uint8_t *restrict c = b + room->pitch, *restrict d = c + room->pitch, *restrict e = d + room->pitch;
+    uint8_t *restrict sum = room->sum;
+    for (int x = 0; x < width + 2 * REACH; x++) {
+        sum[x] = (uint8_t)(a[x] + b[x] + c[x] + d[x] + e[x]);
+    }
+    for (int x = 0; x < width; x++) {
+        const uint16_t all = (uint16_t)(sum[x] + sum[x + 1] + sum[x + 2] + sum[x + 3] + sum[x + 4]);
+        const uint8_t value = (uint8_t)(all >> 2);
+        out[x] = is_first || value < out[x] ? value : out[x];
+    }
+}
+
+/* How far the values of a row are from the guide, and where that has steps. */
+static void flag_row(const struct support *job, const struct fit_room *room, int y)
+{
+    const int width = job->width, agree = support_scaled(job, AGREE), much = support_scaled(job, APART);
+    const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width, *restrict guide = room->guide, *restrict above = room->guide_above;
+    uint8_t *restrict apart = job->apart + (ptrdiff_t)y * width, *restrict flags = job->flags + (ptrdiff_t)y * width;
+    guide_row(job, y, room->guide);
+    guide_row(job, y > 0 ? y - 1 : 0, room->guide_above);
+    for (int x = 0; x < width; x++) {
+        const int value = steps[x], smooth = guide[x], far = value < smooth ? smooth - value : value - smooth;
+        const int is_both = (smooth >= 0) & (value >= 0);
+        const int px = inside_of((value - smooth) / STEPS_PER_PX + AS_FAR, DROPPED - 1), rise = above[x] < smooth ? smooth - above[x] : above[x] - smooth;
+        apart[x] = (uint8_t)(is_both & (far > much) ? (px > 1 ? px : 1) : NOT_APART);
+        flags[x] = (uint8_t)(rise > agree ? STEP_ABOVE : 0);
+    }
+    for (int x = 1; x < width; x++) {
+        const int rise = guide[x] < guide[x - 1] ? guide[x - 1] - guide[x] : guide[x] - guide[x - 1];
+        flags[x] = (uint8_t)(flags[x] | (rise > agree ? STEP_LEFT : 0));
+    }
+}
+
+void ISA_NAME(support_cost_rows)(const struct support *job, int from, int to, uint8_t *scratch)
+{
+    struct fit_room room;
+    laid_out(&room, job->width, scratch);
+    for (int y = from - REACH; y < to + REACH; y++) {
+        fit_line(job, &room, inside_of(y, job->height - 1), y - from + REACH);
+    }
+    for (int y = from; y < to; y++) {
+        uint8_t *own = job->own + (ptrdiff_t)y * job->width, *other = job->other + (ptrdiff_t)y * job->width;
+        square_row(&room, 0, y - from, job->width, 1, own);
+        for (int i = 1; i < FITS; i++) {
+            square_row(&room, i, y - from, job->width, i == 1, other);
+        }
+        flag_row(job, &room, y);
+    }
+}
