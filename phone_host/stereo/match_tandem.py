@@ -140,7 +140,7 @@ class _Engine:
             # d <= x < width: a wider search could only find places outside the right image.
             disparities=min(-(-self._disparities // factor), width),
             threads=self._threads,
-            guide=1,
+            guide=int(factor == 1),  # a rough match only has to be right where it has a value
         )
         needed = self._library.match_bytes(job)
         if self._workspace.size < needed:

@@ -27,7 +27,7 @@ class MatcherName(Enum):
 FALLBACK: Final[MatcherName] = MatcherName.SGBM
 """The matcher that works wherever OpenCV does."""
 
-PREFERRED: Final[MatcherName] = MatcherName.SGBM
+PREFERRED: Final[MatcherName] = MatcherName.TANDEM
 """The default of all commands, on machines where it works; elsewhere FALLBACK (see `default_matcher`)."""
 
 
