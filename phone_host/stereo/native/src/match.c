@@ -14,7 +14,7 @@
 enum {
     STRIP = 256,   /* rows of one sweep; strips are cut by the image's height alone, so that results do not depend on threads */
     WARM_UP = 24,  /* rows that a strip's vertical path begins earlier: older rows hardly count */
-    BAND = 16,     /* rows of one task after the sweeps */
+    BAND = VOTE_ROWS, /* rows of one task after the sweeps */
     SLAB = 64,     /* columns of one task */
     VOTES = 3      /* rounds: each carries a surface three pixels further; more close holes that are better left */
 };
@@ -86,7 +86,7 @@ static void guide_laid_out(struct work *work, uint8_t **at)
  *     check        raw disparities left, right | checked | margins
  *     speckles     parents                     | checked | margins, sizes: in `disparity`
  *     support      costs, distance, flags      | checked | margins, regions: in `disparity`
- *     votes                                    | checked | margins, two planes of steps: in `disparity`
+ *     votes        changed cells               | checked | margins, two planes of steps: in `disparity`
  *     px           rough                       | margins | steps: in `disparity`
  *     smooth       rough                       | margins | confidence, disparity
  */
@@ -176,11 +176,18 @@ static int16_t *voted(const struct work *work, int rounds)
     return rounds == 0 ? work->finish.checked : planes + (rounds & 1) * pixels;
 }
 
+/* Where a round of votes changed something. */
+static uint8_t *changed_by(const struct work *work, int round)
+{
+    return (uint8_t *)work->finish.rough + (size_t)(round & 1) * vote_cells(work->job->width) * (size_t)work->job->height;
+}
+
 static void vote_band(const struct work *work, int round, int from, int to)
 {
     const struct tandem_match_job *job = work->job;
     const struct vote vote = {.width = job->width, .height = job->height, .image = job->left, .stride = job->left_stride,
-                              .from = voted(work, round), .to = voted(work, round + 1), .margin = job->confidence};
+                              .from = voted(work, round), .to = voted(work, round + 1), .margin = job->confidence,
+                              .changed_before = round == 0 ? NULL : changed_by(work, round - 1), .changed = changed_by(work, round)};
     work->kernels->vote_rows(&vote, from, to);
 }
 
