@@ -86,7 +86,7 @@ static void guide_laid_out(struct work *work, uint8_t **at)
  *     check        raw disparities left, right | checked | margins
  *     speckles     parents                     | checked | margins, sizes: in `disparity`
  *     support      costs, distance, flags      | checked | margins, regions: in `disparity`
- *     votes        changed cells               | checked | margins, two planes of steps: in `disparity`
+ *     votes                                    | checked | margins, two planes of steps: in `disparity`
  *     px           rough                       | margins | steps: in `disparity`
  *     smooth       rough                       | margins | confidence, disparity
  */
@@ -168,26 +168,19 @@ static void find_told_rows(struct work *work)
     }
 }
 
-/* The steps after as many rounds of votes; each round reads one plane and writes the next. */
+/* The steps after as many rounds of votes; each round reads what the two before it left, and writes a third plane. */
 static int16_t *voted(const struct work *work, int rounds)
 {
     int16_t *planes = (int16_t *)(void *)work->job->disparity;
     const size_t pixels = (size_t)work->job->width * (size_t)work->job->height;
-    return rounds == 0 ? work->finish.checked : planes + (rounds & 1) * pixels;
-}
-
-/* Where a round of votes changed something. */
-static uint8_t *changed_by(const struct work *work, int round)
-{
-    return (uint8_t *)work->finish.rough + (size_t)(round & 1) * vote_cells(work->job->width) * (size_t)work->job->height;
+    return rounds % 3 == 0 ? work->finish.checked : planes + (rounds % 3 - 1) * pixels;
 }
 
 static void vote_band(const struct work *work, int round, int from, int to)
 {
     const struct tandem_match_job *job = work->job;
     const struct vote vote = {.width = job->width, .height = job->height, .image = job->left, .stride = job->left_stride,
-                              .from = voted(work, round), .to = voted(work, round + 1), .margin = job->confidence,
-                              .changed_before = round == 0 ? NULL : changed_by(work, round - 1), .changed = changed_by(work, round)};
+                              .before = voted(work, round > 0 ? round - 1 : 0), .from = voted(work, round), .to = voted(work, round + 1), .margin = job->confidence};
     work->kernels->vote_rows(&vote, from, to);
 }
 

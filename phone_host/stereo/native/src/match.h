@@ -55,23 +55,13 @@ struct vote {
     int width, height;
     const uint8_t *image; /* the left one, rows `stride` bytes apart */
     ptrdiff_t stride;
-    const int16_t *from; /* 1/16 px, NO_STEPS = none */
+    const int16_t *before; /* what the round before had; `from` in the first round */
+    const int16_t *from;   /* 1/16 px, NO_STEPS = none */
     int16_t *to;
     uint8_t *margin; /* of the values; 0 where a vote decided */
-    const uint8_t *changed_before; /* (height, vote_cells): whether the round before changed any pixel of a cell; NULL: there was none */
-    uint8_t *changed;
 };
 
-enum {
-    VOTE_ROWS = 16, /* that vote_rows is given at most */
-    VOTE_COLUMNS = 128, /* that it works on at a time */
-    VOTE_CELL = 8 /* pixels of a row whose changes are noted together */
-};
-
-/* Cells of a row: for whole VOTE_COLUMNS, and one on each side. */
-static inline size_t vote_cells(int width) { return (size_t)((width + VOTE_COLUMNS - 1) / VOTE_COLUMNS * (VOTE_COLUMNS / VOTE_CELL) + 2); }
-
-static inline size_t vote_cell(int width, int x, int y) { return (size_t)y * vote_cells(width) + (size_t)(x / VOTE_CELL) + 1; }
+enum { VOTE_ROWS = 16 /* that vote_rows is given at most */ };
 
 enum {
     GUARD = 4,

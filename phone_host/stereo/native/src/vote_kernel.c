@@ -20,9 +20,8 @@ enum {
 };
 
 enum {
-    COLUMNS = VOTE_COLUMNS,
-    BLOCK = 16,                   /* pixels whose votes are counted at a time, if any of them needs it */
-    EIGHTHS = COLUMNS / VOTE_CELL + 2, /* cells that a tile sees in a row */
+    COLUMNS = 128,
+    BLOCK = 16, /* pixels whose votes are counted at a time, if any of them needs it */
     PITCH = COLUMNS + 32,
     ROWS = VOTE_ROWS + 2 * REACH,
     ROOM = ROWS * PITCH,
@@ -36,6 +35,7 @@ struct tile {
     int16_t high[ROOM]; /* the greatest value that a pixel sees */
     uint16_t low[ROOM]; /* the least; as numbers without a sign, missing values are the greatest */
     uint8_t known[ROOM]; /* how many it sees */
+    uint8_t changed[ROOM]; /* how many of them the round before changed: if none, nothing but what it decided can be decided */
 };
 
 enum { CENTRE = REACH * PITCH + REACH };
@@ -49,18 +49,23 @@ static void take_tile(const struct vote *job, int x, int y, struct tile *tile)
         const int line = y + i - REACH;
         const ptrdiff_t from = x - REACH;
         int16_t *restrict value = tile->value + i * PITCH, *restrict grey = tile->grey + i * PITCH;
+        uint8_t *restrict known = tile->known + i * PITCH, *restrict changed = tile->changed + i * PITCH;
         if (line < 0 || line >= job->height || end - first < PITCH) {
             for (int j = 0; j < PITCH; j++) {
                 value[j] = NO_STEPS;
                 grey[j] = 0;
+                known[j] = changed[j] = 0;
             }
         }
         if (line >= 0 && line < job->height) {
             const int16_t *restrict values = job->from + (ptrdiff_t)line * job->width + from;
             const uint8_t *restrict image = job->image + line * job->stride + from;
+            const int16_t *restrict before = job->before + (ptrdiff_t)line * job->width + from;
             for (int j = first; j < end; j++) {
                 value[j] = values[j];
                 grey[j] = image[j];
+                known[j] = values[j] >= 0;
+                changed[j] = values[j] != before[j];
             }
         }
     }
@@ -94,20 +99,17 @@ static void find_spread(struct tile *tile)
     take_ahead(tile, COMPLETE, 3);
 }
 
-static void count_known(struct tile *tile)
+/* How many flags each pixel sees, in place of the flags. */
+static void count_seen(uint8_t *flags)
 {
     uint8_t column[COMPLETE + SIDE];
-    uint8_t *known = tile->known;
     memset(column + COMPLETE, 0, SIDE);
-    for (int i = 0; i < ROOM; i++) {
-        known[i] = tile->value[i] >= 0;
+    for (int i = 0; i < COMPLETE; i++) {
+        column[i] = (uint8_t)(flags[i] + flags[i + PITCH] + flags[i + 2 * PITCH] + flags[i + 3 * PITCH] + flags[i + 4 * PITCH] +
+                              flags[i + 5 * PITCH] + flags[i + 6 * PITCH]);
     }
     for (int i = 0; i < COMPLETE; i++) {
-        column[i] = (uint8_t)(known[i] + known[i + PITCH] + known[i + 2 * PITCH] + known[i + 3 * PITCH] + known[i + 4 * PITCH] +
-                              known[i + 5 * PITCH] + known[i + 6 * PITCH]);
-    }
-    for (int i = 0; i < COMPLETE; i++) {
-        known[i] = (uint8_t)(column[i] + column[i + 1] + column[i + 2] + column[i + 3] + column[i + 4] + column[i + 5] + column[i + 6]);
+        flags[i] = (uint8_t)(column[i] + column[i + 1] + column[i + 2] + column[i + 3] + column[i + 4] + column[i + 5] + column[i + 6]);
     }
 }
 
@@ -116,11 +118,11 @@ static int is_needed(const struct tile *tile, int at)
 {
     const int16_t *restrict value = tile->value + at + CENTRE, *restrict high = tile->high + at;
     const uint16_t *restrict low = tile->low + at;
-    const uint8_t *restrict known = tile->known + at;
+    const uint8_t *restrict known = tile->known + at, *restrict changed = tile->changed + at;
     int16_t needed = 0;
     for (int x = 0; x < BLOCK; x++) {
         const int16_t is_step = (int16_t)(high[x] - (int16_t)low[x]) > STEP;
-        needed |= (int16_t)(is_step | ((value[x] < 0) & (known[x] >= DENSE)));
+        needed |= (int16_t)((is_step | ((value[x] < 0) & (known[x] >= DENSE))) & (changed[x] != 0));
     }
     return needed;
 }
@@ -158,19 +160,31 @@ static void count_votes(const struct tile *tile, int at, struct votes *votes)
     }
 }
 
+/* The values of a row of a window, and one more. */
+typedef int16_t row_words __attribute__((vector_size(16)));
+typedef int32_t row_sums __attribute__((vector_size(32)));
+
+static inline row_words row_load(const int16_t *from)
+{
+    row_words row;
+    memcpy(&row, from, sizeof row);
+    return row;
+}
+
 /* The mean of the values of one surface, weighted as they vote. */
 static int value_of(const struct tile *tile, int at, int middle, int is_near)
 {
-    const int here = tile->grey[at + CENTRE];
-    int32_t sums[SIDE + 1] = {0}, votes[SIDE + 1] = {0}; /* by column; the last is beyond the window */
+    const row_words none = {0}, window = {-1, -1, -1, -1, -1, -1, -1, 0}, other_side = none - (int16_t)(1 - is_near);
+    const int16_t here = tile->grey[at + CENTRE];
+    row_sums sums = {0};
+    row_words votes = {0};
     for (int i = 0; i < SIDE; i++) {
-        const int16_t *restrict value = tile->value + at + i * PITCH, *restrict grey = tile->grey + at + i * PITCH;
-        for (int j = 0; j < SIDE + 1; j++) {
-            const int apart = grey[j] > here ? grey[j] - here : here - grey[j], alike = apart < ALIKE ? ALIKE - apart : 0;
-            const int vote = (value[j] >= 0) & ((value[j] > middle) == is_near) ? (alike * alike) >> 5 : 0;
-            sums[j] += vote * value[j];
-            votes[j] += vote;
-        }
+        const row_words value = row_load(tile->value + at + i * PITCH), grey = row_load(tile->grey + at + i * PITCH);
+        const row_words above = grey - (int16_t)(here - ALIKE), below = (int16_t)(here + ALIKE) - grey;
+        const row_words is_less = above < below, less = (above & is_less) | (below & ~is_less), alike = less & (less > 0);
+        const row_words vote = ((alike * alike) >> 5) & (value >= 0) & ((value > (int16_t)middle) ^ other_side) & window;
+        sums += __builtin_convertvector(vote, row_sums) * __builtin_convertvector(value, row_sums);
+        votes += vote;
     }
     int32_t sum = 0, all = 0;
     for (int j = 0; j < SIDE; j++) {
@@ -209,50 +223,28 @@ static void write_voted(const struct vote *job, const struct tile *tile, int at,
         if (voted[i]) {
             const int found = value_of(tile, at + i, votes.middle[i], voted[i] - 1);
             if (found >= 0 && found <= (x + i) * STEPS_PER_PX) {
-                if (found != job->to[row + x + i]) {
-                    job->to[row + x + i] = (int16_t)found;
-                    job->changed[vote_cell(job->width, x + i, y)] = 1;
-                }
+                job->to[row + x + i] = (int16_t)found;
                 job->margin[row + x + i] = 0; /* no cost was its own */
             }
         }
     }
 }
 
-/* Which cells of a tile's row see a change of the round before; those of others would be decided as they were. Returns whether any does. */
-static int find_touched(const struct vote *job, int x, int y, uint8_t *touched)
-{
-    memset(touched, job->changed_before == NULL, EIGHTHS);
-    for (int line = y - REACH; line <= y + REACH && job->changed_before != NULL; line++) {
-        if (line >= 0 && line < job->height) {
-            const uint8_t *restrict changed = job->changed_before + vote_cell(job->width, x, line) - 1;
-            for (int i = 0; i < EIGHTHS; i++) {
-                touched[i] |= changed[i];
-            }
-        }
-    }
-    return memchr(touched, 1, EIGHTHS) != NULL;
-}
-
 static void vote_tile(const struct vote *job, int x, int from, int to, struct tile *tile)
 {
-    uint8_t touched[VOTE_ROWS][EIGHTHS];
-    int is_any = 0;
-    for (int y = from; y < to; y++) {
-        is_any |= find_touched(job, x, y, touched[y - from]);
-    }
-    if (!is_any) {
-        return;
-    }
     take_tile(job, x, from, tile);
+    if (job->before == job->from) { /* the first round */
+        memset(tile->changed, 1, sizeof tile->changed);
+    } else {
+        count_seen(tile->changed);
+    }
     find_spread(tile);
-    count_known(tile);
+    count_seen(tile->known);
     const int end = job->width - x < COLUMNS ? job->width - x : COLUMNS;
     for (int y = from; y < to; y++) {
         for (int i = 0; i < end; i += BLOCK) {
-            const uint8_t *cells = touched[y - from] + i / VOTE_CELL;
             const int at = (y - from) * PITCH + i;
-            if (memchr(cells, 1, BLOCK / VOTE_CELL + 2) != NULL && is_needed(tile, at)) {
+            if (is_needed(tile, at)) {
                 write_voted(job, tile, at, x + i, y);
             }
         }
@@ -263,9 +255,7 @@ void ISA_NAME(vote_rows)(const struct vote *job, int from, int to)
 {
     struct tile tile;
     const ptrdiff_t row = (ptrdiff_t)from * job->width;
-    const size_t cells = vote_cells(job->width);
     memcpy(job->to + row, job->from + row, (size_t)(to - from) * (size_t)job->width * sizeof *job->to);
-    memset(job->changed + (size_t)from * cells, 0, (size_t)(to - from) * cells);
     memset(&tile, 0, sizeof tile);
     for (int x = 0; x < job->width; x += COLUMNS) {
         vote_tile(job, x, from, to, &tile);
