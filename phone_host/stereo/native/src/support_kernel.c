@@ -1,10 +1,11 @@
-/* How badly the two images fit together by the values, and by the guide: capped differences of level and of slope along the row, summed over
- * squares. Half of a match's support is spent here, so this is compiled for each instruction set.
+/* The steps of the support that follow rows: how badly the two images fit together by the values, and by the guide (capped differences of
+ * level and of slope along the row, summed over squares), and which values that speaks against.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
 #include <string.h>
 
+#include "flood.h"
 #include "kernels.h"
 #include "prefilter.h"
 #include "support.h"
@@ -62,6 +63,27 @@ size_t ISA_NAME(support_scratch)(int width)
     static uint8_t nowhere[64];
     struct fit_room room;
     return laid_out(&room, width, nowhere);
+}
+
+/* A row of the guide at full size, 1/16 px, NO_STEPS = none. */
+static void guide_row(const struct support *job, int y, int16_t *restrict row)
+{
+    const struct guide *guide = job->guide;
+    const int factor = guide->factor, line = y / factor < guide->small_height ? y / factor : guide->small_height - 1;
+    const int16_t *restrict steps = guide->steps + (ptrdiff_t)line * guide->small_width;
+    const int end = guide->small_width * factor < job->width ? guide->small_width * factor : job->width;
+    if (factor == 2) {
+        for (int i = 0; i < end / 2; i++) {
+            row[2 * i] = row[2 * i + 1] = (int16_t)(steps[i] < 0 ? NO_STEPS : 2 * steps[i]);
+        }
+    } else {
+        for (int x = 0; x < end; x++) {
+            row[x] = (int16_t)(steps[x / factor] < 0 ? NO_STEPS : steps[x / factor] * factor);
+        }
+    }
+    for (int x = factor == 2 ? end / 2 * 2 : end; x < job->width; x++) {
+        row[x] = (int16_t)(steps[guide->small_width - 1] < 0 ? NO_STEPS : steps[guide->small_width - 1] * factor);
+    }
 }
 
 /* Sobel's weights add up to 8 for a slope of one level a pixel; two of its steps are as bad as one of level. */
@@ -204,5 +226,37 @@ void ISA_NAME(support_cost_rows)(const struct support *job, int from, int to, ui
             square_row(&room, i, y - from, job->width, i == 1, other);
         }
         flag_row(job, &room, y);
+    }
+}
+
+/* Drop what is marked, and single values a little off that fit worse than the guide; flag what confirms the guide and what breaks it. */
+static void drop_row(const struct support *job, int y, const int16_t *restrict guide)
+{
+    const ptrdiff_t at = (ptrdiff_t)y * job->width;
+    const int16_t agree = (int16_t)support_scaled(job, AGREE), nearly = (int16_t)support_scaled(job, NEARLY);
+    int16_t *restrict steps = job->steps + at;
+    uint8_t *restrict flags = job->flags + at;
+    const uint8_t *restrict apart = job->apart + at, *restrict own = job->own + at, *restrict other = job->other + at;
+    const uint8_t *restrict margin = job->margin + at;
+    for (int x = 0; x < job->width; x++) {
+        const int16_t value = steps[x], smooth = guide[x];
+        const int16_t far = (int16_t)(value < smooth ? smooth - value : value - smooth);
+        const int16_t is_worse = (int16_t)(2 * other[x]) < (int16_t)(3 * own[x]), is_both = (value >= 0) & (smooth >= 0);
+        const int16_t drifts = is_both & (apart[x] == NOT_APART) & (far > nearly) & (margin[x] < DOUBTFUL) & is_worse;
+        const int16_t is_dropped = drifts | (apart[x] == DROPPED), is_kept = is_both & !is_dropped, agrees = far <= agree;
+        steps[x] = (int16_t)(is_dropped ? NO_STEPS : value);
+        flags[x] = (uint8_t)((flags[x] & (STEP_LEFT | STEP_ABOVE)) | (is_kept & agrees ? CONFIRMS : 0) |
+                             ((smooth < 0) | (is_kept & !agrees) ? BREAKS : 0));
+    }
+}
+
+void ISA_NAME(support_drop_rows)(const struct support *job, int from, int to, uint8_t *scratch)
+{
+    struct fit_room room;
+    laid_out(&room, job->width, scratch);
+    for (int y = from; y < to; y++) {
+        guide_row(job, y, room.guide);
+        drop_row(job, y, room.guide);
+        flood_row(job->flags + (ptrdiff_t)y * job->width, job->width);
     }
 }
