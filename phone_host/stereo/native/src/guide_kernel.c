@@ -371,9 +371,11 @@ BYTES_INLINE void guide_rows(const struct guide *job, const struct guide_room *m
     {                                                                                                                        \
         guide_rows(job, room, chunks);                                                                                       \
     }
-GUIDE_ROWS(1, 1)
-GUIDE_ROWS(2, 2)
-GUIDE_ROWS(4, 4)
+#ifndef TANDEM_IS_SCALAR /* without registers of bytes a known number gains little, and takes long to compile */
+enum { FEW = GUIDE_LANES / BYTES, MANY = 2 * FEW };
+GUIDE_ROWS(few, FEW)
+GUIDE_ROWS(many, MANY)
+#endif
 GUIDE_ROWS(n, room->chunks)
 
 void ISA_NAME(guide)(const struct guide *job)
@@ -387,13 +389,9 @@ void ISA_NAME(guide)(const struct guide *job)
     memset(room.total - 64, 255, room.row_bytes + 128);
     memset(room.right_least, 255, room.columns + room.lanes);
     shrink(job, &room);
-    if (room.chunks == 1) {
-        guide_rows_1(job, &room);
-    } else if (room.chunks == 2) {
-        guide_rows_2(job, &room);
-    } else if (room.chunks == 4) {
-        guide_rows_4(job, &room);
-    } else {
-        guide_rows_n(job, &room);
-    }
+#ifndef TANDEM_IS_SCALAR
+    (room.chunks == FEW ? guide_rows_few : room.chunks == MANY ? guide_rows_many : guide_rows_n)(job, &room);
+#else
+    guide_rows_n(job, &room);
+#endif
 }

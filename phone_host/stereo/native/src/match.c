@@ -14,7 +14,7 @@
 enum {
     STRIP = 256,   /* rows of one sweep; strips are cut by the image's height alone, so that results do not depend on threads */
     WARM_UP = 24,  /* rows that a strip's vertical path begins earlier: older rows hardly count */
-    BAND = 16,     /* rows of one task after the sweeps */
+    BAND = VOTE_ROWS, /* rows of one task after the sweeps */
     SLAB = 64,     /* columns of one task */
     VOTES = 3      /* rounds: each carries a surface three pixels further; more close holes that are better left */
 };
@@ -37,7 +37,6 @@ struct work {
     struct bridges bridges;
     struct guide guide;
     struct support support;
-    int16_t *guide_rows;    /* a row for each thread */
     size_t support_bytes;
     uint8_t *support_scratch; /* one for each thread */
 };
@@ -75,7 +74,6 @@ static void guide_laid_out(struct work *work, uint8_t **at)
     support->regions = (struct region *)(void *)job->disparity;
     support->region_capacity = (int32_t)(pixels * sizeof(float) / sizeof(struct region));
     support->runs = (struct region_run *)(void *)taken(at, 2 * (width + 1) * sizeof(struct region_run));
-    work->guide_rows = (int16_t *)(void *)taken(at, 2 * width * (size_t)work->threads);
     work->support_bytes = (work->kernels->support_scratch(job->width) + 127) / 64 * 64;
     work->support_scratch = taken(at, work->support_bytes * (size_t)work->threads);
 }
@@ -168,19 +166,20 @@ static void find_told_rows(struct work *work)
     }
 }
 
-/* The steps after as many rounds of votes; each round reads one plane and writes the next. */
+/* The steps after as many rounds of votes; each round reads what the two before it left, and writes a third plane. */
 static int16_t *voted(const struct work *work, int rounds)
 {
     int16_t *planes = (int16_t *)(void *)work->job->disparity;
     const size_t pixels = (size_t)work->job->width * (size_t)work->job->height;
-    return rounds == 0 ? work->finish.checked : planes + (rounds & 1) * pixels;
+    return rounds % 3 == 0 ? work->finish.checked : planes + (rounds % 3 - 1) * pixels;
 }
 
 static void vote_band(const struct work *work, int round, int from, int to)
 {
     const struct tandem_match_job *job = work->job;
     const struct vote vote = {.width = job->width, .height = job->height, .image = job->left, .stride = job->left_stride,
-                              .from = voted(work, round), .to = voted(work, round + 1), .margin = job->confidence};
+                              .before = voted(work, round > 0 ? round - 1 : 0), .from = voted(work, round), .to = voted(work, round + 1),
+                              .margin = job->confidence};
     work->kernels->vote_rows(&vote, from, to);
 }
 
@@ -285,7 +284,7 @@ static void do_task(void *context, int step, int task, int thread)
     struct work *work = context;
     const int height = work->job->height, from = task * BAND, to = from + BAND < height ? from + BAND : height;
     const int left = task * SLAB, right = left + SLAB < work->job->width ? left + SLAB : work->job->width;
-    int16_t *row = work->guide_rows + (ptrdiff_t)thread * work->job->width;
+    uint8_t *scratch = work->support_scratch + (size_t)thread * work->support_bytes;
     switch (step) {
     case SWEEP:
         if (task == 2 * work->strips) {
@@ -307,13 +306,13 @@ static void do_task(void *context, int step, int task, int thread)
         speckles_drop_rows(&work->speckles, from, to);
         break;
     case FIT:
-        work->kernels->support_cost_rows(&work->support, from, to, work->support_scratch + (size_t)thread * work->support_bytes);
+        work->kernels->support_cost_rows(&work->support, from, to, scratch);
         break;
     case REGIONS:
         support_regions(&work->support);
         break;
     case DROP:
-        support_drop_rows(&work->support, from, to, row);
+        work->kernels->support_drop_rows(&work->support, from, to, scratch);
         break;
     case FILL:
         support_fill(&work->support, left, right);

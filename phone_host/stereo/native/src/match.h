@@ -55,10 +55,13 @@ struct vote {
     int width, height;
     const uint8_t *image; /* the left one, rows `stride` bytes apart */
     ptrdiff_t stride;
-    const int16_t *from; /* 1/16 px, NO_STEPS = none */
+    const int16_t *before; /* what the round before had; `from` in the first round */
+    const int16_t *from;   /* 1/16 px, NO_STEPS = none */
     int16_t *to;
     uint8_t *margin; /* of the values; 0 where a vote decided */
 };
+
+enum { VOTE_ROWS = 16 /* that vote_rows is given at most */ };
 
 enum {
     GUARD = 4,

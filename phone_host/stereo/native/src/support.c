@@ -11,10 +11,9 @@ enum {
     ISLAND = 100,     /* px of the guide's size: smaller ones are mismatches */
     FAR_PX = 16,      /* a region so far behind the guide is one period off, or seen through the gaps of an object */
     FILL_COST = 120,   /* a quarter of 25 px with 8 grey levels each: where the guide costs more, it is not taken */
-    DOUBTFUL = 20,    /* mean margin: below it a region stays only if the guide costs at least WORSE tenths of what it costs */
-    UNSURE = 40,      /* below it, at least AS_BAD tenths, or MUCH_WORSE if it is behind the guide */
+    UNSURE = 40,      /* mean margin: below it a region stays only if the guide costs at least AS_BAD tenths of what it costs, or MUCH_WORSE if it is behind the guide */
     AS_BAD = 12,
-    WORSE = 20,
+    WORSE = 20,       /* where the mean margin is DOUBTFUL */
     MUCH_WORSE = 30
 };
 
@@ -226,30 +225,6 @@ void support_regions(const struct support *job)
             memset(row + x, y < rows && goes(&regions[root_of(regions, made)]) ? DROPPED : 1, (size_t)(end - x));
             made += y < rows;
         }
-    }
-}
-
-/* Drop what is marked, and single values a little off that fit worse than the guide; find from which sides of the row the guide is still confirmed. */
-void support_drop_rows(const struct support *job, int from, int to, int16_t *row)
-{
-    const int width = job->width, agree = support_scaled(job, AGREE), nearly = support_scaled(job, NEARLY);
-    for (int y = from; y < to; y++) {
-        const ptrdiff_t at = (ptrdiff_t)y * width;
-        int16_t *restrict steps = job->steps + at;
-        uint8_t *restrict flags = job->flags + at;
-        const uint8_t *restrict apart = job->apart + at, *restrict own = job->own + at, *restrict other = job->other + at;
-        const int16_t *restrict guide = row;
-        guide_row(job, y, row);
-        for (int x = 0; x < width; x++) {
-            const int far = distance(steps[x], guide[x]), is_both = (steps[x] >= 0) & (guide[x] >= 0);
-            const int drifts = is_both & (apart[x] == NOT_APART) & (far > nearly) & (job->margin[at + x] < DOUBTFUL) & (2 * other[x] < 3 * own[x]);
-            const int value = drifts | (apart[x] == DROPPED) ? NO_STEPS : steps[x];
-            const int is_kept = is_both & (value >= 0), agrees = far <= agree;
-            steps[x] = (int16_t)value;
-            flags[x] = (uint8_t)((flags[x] & (STEP_LEFT | STEP_ABOVE)) | (is_kept & agrees ? CONFIRMS : 0) |
-                                 ((guide[x] < 0) | (is_kept & !agrees) ? BREAKS : 0));
-        }
-        scan_row(flags, width);
     }
 }
 

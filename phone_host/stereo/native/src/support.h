@@ -31,6 +31,8 @@ enum { AGREE = 16, NEARLY = 12, APART = 32 };
 
 enum { NOT_APART = 0, AS_FAR = 128, DROPPED = 255 };
 
+enum { DOUBTFUL = 20 /* margins below it are no surer than chance */ };
+
 struct region {
     int32_t parent;
     int32_t pixels;
@@ -62,22 +64,6 @@ static inline int32_t region_capacity(int width, int height) { return width * he
 
 static inline int support_scaled(const struct support *job, int distance) { return distance * job->guide->factor / 2; }
 
-/* A row of the guide at full size, 1/16 px, NO_STEPS = none. */
-static inline void guide_row(const struct support *job, int y, int16_t *restrict row)
-{
-    const struct guide *guide = job->guide;
-    const int factor = guide->factor, line = y / factor < guide->small_height ? y / factor : guide->small_height - 1;
-    const int16_t *restrict steps = guide->steps + (ptrdiff_t)line * guide->small_width;
-    int x = 0;
-    for (int i = 0; i < guide->small_width; i++) {
-        const int value = steps[i] < 0 ? NO_STEPS : steps[i] * factor;
-        const int end = i == guide->small_width - 1 ? job->width : (i + 1) * factor;
-        for (; x < end; x++) {
-            row[x] = (int16_t)value;
-        }
-    }
-}
-
 /* Whether a value for the pixel at an offset lies on the guide, or there is none to say. */
 static inline int support_allows(const struct support *job, ptrdiff_t at, int value)
 {
@@ -89,27 +75,7 @@ static inline int support_allows(const struct support *job, ptrdiff_t at, int va
     return smooth < 0 || (far <= agree && -far <= agree);
 }
 
-/* Pass on along a row from which sides a confirmed surface is reached. */
-static inline void scan_row(uint8_t *flags, int width)
-{
-    unsigned state = 0;
-    for (int x = 0; x < width; x++) {
-        const unsigned flag = flags[x];
-        state = (flag & CONFIRMS) | (state & ~(flag >> 1) & ~(flag >> 2));
-        flags[x] = (uint8_t)(flag | (state & 1) * FROM_LEFT);
-    }
-    state = 0;
-    unsigned step = 0;
-    for (int x = width - 1; x >= 0; x--) {
-        const unsigned flag = flags[x];
-        state = (flag & CONFIRMS) | (state & ~(flag >> 1) & ~step);
-        flags[x] = (uint8_t)(flag | (state & 1) * FROM_RIGHT);
-        step = flag >> 2;
-    }
-}
-
 void support_regions(const struct support *job);
-void support_drop_rows(const struct support *job, int from, int to, int16_t *row);
 void support_fill(const struct support *job, int from, int to);
 
 /* Drop the islands of the guide that are too small to be a surface; `regions` holds a region for each of its pixels, `runs` 2 (small_width + 1). */

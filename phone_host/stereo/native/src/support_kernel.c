@@ -1,10 +1,11 @@
-/* How badly the two images fit together by the values, and by the guide: capped differences of level and of slope along the row, summed over
- * squares. Half of a match's support is spent here, so this is compiled for each instruction set.
+/* The steps of the support that follow rows: how badly the two images fit together by the values, and by the guide (capped differences of
+ * level and of slope along the row, summed over squares), and which values that speaks against.
  *
  * SPDX-License-Identifier: Apache-2.0
  */
 #include <string.h>
 
+#include "flood.h"
 #include "kernels.h"
 #include "prefilter.h"
 #include "support.h"
@@ -62,6 +63,29 @@ size_t ISA_NAME(support_scratch)(int width)
     static uint8_t nowhere[64];
     struct fit_room room;
     return laid_out(&room, width, nowhere);
+}
+
+/* A row of the guide at full size, 1/16 px, NO_STEPS = none. */
+static void guide_row(const struct support *job, int y, int16_t *restrict row)
+{
+    const struct guide *guide = job->guide;
+    const int factor = guide->factor, line = y / factor < guide->small_height ? y / factor : guide->small_height - 1;
+    const int16_t *restrict steps = guide->steps + (ptrdiff_t)line * guide->small_width;
+    const int count = guide->small_width * factor <= job->width ? guide->small_width : 0; /* 0: images narrower than one pixel of the guide */
+    if (factor == 2) {
+        for (int i = 0; i < count; i++) {
+            row[2 * i] = row[2 * i + 1] = (int16_t)(steps[i] < 0 ? NO_STEPS : 2 * steps[i]);
+        }
+    }
+    for (int i = 0; i < count && factor > 2; i++) {
+        const int16_t value = (int16_t)(steps[i] < 0 ? NO_STEPS : factor * steps[i]);
+        for (int x = 0; x < factor; x++) {
+            row[i * factor + x] = value;
+        }
+    }
+    for (int x = count * factor; x < job->width; x++) {
+        row[x] = (int16_t)(steps[guide->small_width - 1] < 0 ? NO_STEPS : steps[guide->small_width - 1] * factor);
+    }
 }
 
 /* Sobel's weights add up to 8 for a slope of one level a pixel; two of its steps are as bad as one of level. */
@@ -140,13 +164,13 @@ static void fit_line(const struct support *job, const struct fit_room *room, int
     }
     part_row(job, room, y);
     for (int x = 0; x < width; x++) {
-        const int value = steps[x] >= 0 ? steps[x] : guide[x];
-        place[x] = PARTS * x - ((value + 2) >> 2);
+        const int value = steps[x], smooth = guide[x];
+        place[x] = PARTS * x - (((value >= 0 ? value : smooth) + 2) >> 2);
     }
     fit_row(room, width, 0, room->fit[0] + at);
     for (int x = 0; x < width; x++) {
-        const int value = guide[x] >= 0 ? guide[x] : steps[x];
-        place[x] = PARTS * x - ((value + 2) >> 2);
+        const int value = steps[x], smooth = guide[x];
+        place[x] = PARTS * x - (((smooth >= 0 ? smooth : value) + 2) >> 2);
     }
     fit_row(room, width, 0, room->fit[1] + at);
     fit_row(room, width, slide, room->fit[2] + at);
@@ -204,5 +228,38 @@ void ISA_NAME(support_cost_rows)(const struct support *job, int from, int to, ui
             square_row(&room, i, y - from, job->width, i == 1, other);
         }
         flag_row(job, &room, y);
+    }
+}
+
+/* Drop what is marked, and single values a little off that fit worse than the guide; flag what confirms the guide and what breaks it. */
+static void drop_row(const struct support *job, int y, const int16_t *restrict guide)
+{
+    const int width = job->width;
+    const ptrdiff_t at = (ptrdiff_t)y * width;
+    const int16_t agree = (int16_t)support_scaled(job, AGREE), nearly = (int16_t)support_scaled(job, NEARLY);
+    int16_t *restrict steps = job->steps + at;
+    uint8_t *restrict flags = job->flags + at;
+    const uint8_t *restrict apart = job->apart + at, *restrict own = job->own + at, *restrict other = job->other + at;
+    const uint8_t *restrict margin = job->margin + at;
+    for (int x = 0; x < width; x++) {
+        const int16_t value = steps[x], smooth = guide[x];
+        const int16_t far = (int16_t)(value < smooth ? smooth - value : value - smooth);
+        const uint8_t is_worse = 2 * other[x] < 3 * own[x], is_unsure = margin[x] < DOUBTFUL, is_near = apart[x] == NOT_APART;
+        const uint8_t is_both = (value | smooth) >= 0, is_off = far > nearly, agrees = far <= agree, is_marked = apart[x] == DROPPED;
+        const uint8_t is_dropped = (uint8_t)((is_both & is_near & is_off & is_unsure & is_worse) | is_marked), is_kept = is_both & (is_dropped ^ 1);
+        const uint8_t breaks = (uint8_t)((smooth < 0) | (is_kept & (agrees ^ 1)));
+        steps[x] = (int16_t)(is_dropped ? NO_STEPS : value);
+        flags[x] = (uint8_t)((flags[x] & (STEP_LEFT | STEP_ABOVE)) | (is_kept & agrees) * CONFIRMS | breaks * BREAKS);
+    }
+}
+
+void ISA_NAME(support_drop_rows)(const struct support *job, int from, int to, uint8_t *scratch)
+{
+    struct fit_room room;
+    laid_out(&room, job->width, scratch);
+    for (int y = from; y < to; y++) {
+        guide_row(job, y, room.guide);
+        drop_row(job, y, room.guide);
+        flood_row(job->flags + (ptrdiff_t)y * job->width, job->width);
     }
 }

@@ -13,144 +13,239 @@
 enum {
     REACH = 3,
     SIDE = 2 * REACH + 1,
-    BLOCK = 32,          /* pixels at a time */
-    WIDE = BLOCK + 2 * REACH,
     STEP = 24,           /* 1/16 px: a greater difference within the window is a step between surfaces */
     ALIKE = 40,          /* grey levels: neighbours that differ by more have no vote, by less (ALIKE - difference)^2 / 32 */
     DENSE = 24,          /* of 49 neighbours must be known for a missing value to be voted on */
     MAJORITY = 3         /* so many times the votes of the other surface are needed for a value that is missing */
 };
 
-struct window {
-    int16_t value[SIDE][WIDE];
-    uint8_t grey[SIDE][WIDE];
-    int16_t high[BLOCK], low[BLOCK], known[BLOCK];
-    uint16_t near[BLOCK], all[BLOCK];
+enum {
+    COLUMNS = 128,
+    BLOCK = 16, /* pixels whose votes are counted at a time, if any of them needs it */
+    PITCH = COLUMNS + 32,
+    ROWS = VOTE_ROWS + 2 * REACH,
+    ROOM = ROWS * PITCH,
+    COMPLETE = VOTE_ROWS * PITCH
 };
 
-/* What the pixels of a block see; beyond the image nothing is known. */
-static void take_window(const struct vote *job, int x, int y, struct window *window)
+/* What some pixels see. A pixel of the image has the index of the first value of its window, which is REACH rows above it and REACH columns to
+ * its left. Types are as small as they can be, and loops simple, for the compiler to work on many pixels at once. */
+struct tile {
+    int16_t value[ROOM], grey[ROOM];
+    int16_t high[ROOM]; /* the greatest value that a pixel sees */
+    uint16_t low[ROOM]; /* the least; as numbers without a sign, missing values are the greatest */
+    uint8_t known[ROOM]; /* how many it sees */
+    uint8_t changed[ROOM]; /* how many of them the round before changed: if none, nothing but what it decided can be decided */
+};
+
+enum { CENTRE = REACH * PITCH + REACH };
+
+/* Beyond the image nothing is known. */
+static void take_tile(const struct vote *job, int x, int y, struct tile *tile)
 {
-    const int first = x - REACH < 0 ? REACH - x : 0;
-    const int end = job->width - (x - REACH) < WIDE ? job->width - (x - REACH) : WIDE;
-    for (int i = 0; i < SIDE; i++) {
+    const int first = x < REACH ? REACH - x : 0;
+    const int rest = job->width - (x - REACH), end = rest < PITCH ? rest : PITCH;
+    for (int i = 0; i < ROWS; i++) {
         const int line = y + i - REACH;
-        int16_t *value = window->value[i];
-        if (line < 0 || line >= job->height) {
-            for (int j = 0; j < WIDE; j++) {
+        const ptrdiff_t from = x - REACH;
+        int16_t *restrict value = tile->value + i * PITCH, *restrict grey = tile->grey + i * PITCH;
+        uint8_t *restrict known = tile->known + i * PITCH, *restrict changed = tile->changed + i * PITCH;
+        if (line < 0 || line >= job->height || end - first < PITCH) {
+            for (int j = 0; j < PITCH; j++) {
                 value[j] = NO_STEPS;
-            }
-            continue;
-        }
-        const ptrdiff_t from = x - REACH + first;
-        if (end - first < WIDE) {
-            for (int j = 0; j < WIDE; j++) {
-                value[j] = NO_STEPS;
+                grey[j] = 0;
+                known[j] = changed[j] = 0;
             }
         }
-        memcpy(value + first, job->from + (ptrdiff_t)line * job->width + from, (size_t)(end - first) * sizeof *value);
-        memcpy(window->grey[i] + first, job->image + line * job->stride + from, (size_t)(end - first));
+        if (line >= 0 && line < job->height) {
+            const int16_t *restrict values = job->from + (ptrdiff_t)line * job->width + from;
+            const uint8_t *restrict image = job->image + line * job->stride + from;
+            const int16_t *restrict before = job->before + (ptrdiff_t)line * job->width + from;
+            for (int j = first; j < end; j++) {
+                value[j] = values[j];
+                grey[j] = image[j];
+                known[j] = values[j] >= 0;
+                changed[j] = values[j] != before[j];
+            }
+        }
     }
 }
 
-/* The greatest and the least value that a pixel sees, and how many. Returns whether any of them needs a vote. */
-static int find_spread(struct window *window)
+/* One step of finding the extremes of windows: each place takes the place so far ahead, too. */
+static inline __attribute__((always_inline)) void take_ahead(struct tile *tile, int count, const int ahead)
 {
-    int16_t high[WIDE], known[WIDE];
-    uint16_t low[WIDE]; /* as numbers without a sign, missing values are the greatest */
-    for (int j = 0; j < WIDE; j++) {
-        high[j] = window->value[0][j];
-        low[j] = (uint16_t)window->value[0][j];
-        known[j] = window->value[0][j] >= 0;
+    int16_t *high = tile->high;
+    uint16_t *low = tile->low;
+    for (int i = 0; i < count; i++) {
+        high[i] = high[i + ahead] > high[i] ? high[i + ahead] : high[i];
     }
-    for (int i = 1; i < SIDE; i++) {
-        for (int j = 0; j < WIDE; j++) {
-            const int16_t value = window->value[i][j];
-            const uint16_t plain = (uint16_t)value;
-            high[j] = value > high[j] ? value : high[j];
-            low[j] = plain < low[j] ? plain : low[j];
-            known[j] = (int16_t)(known[j] + (value >= 0));
-        }
+    for (int i = 0; i < count; i++) {
+        low[i] = low[i + ahead] < low[i] ? low[i + ahead] : low[i];
     }
+}
+
+/* Seven in a row or column are two, and two of these, and two of these that overlap. */
+static void find_spread(struct tile *tile)
+{
+    for (int i = 0; i < ROOM; i++) {
+        tile->high[i] = tile->value[i];
+        tile->low[i] = (uint16_t)tile->value[i];
+    }
+    take_ahead(tile, (ROWS - 1) * PITCH, PITCH);
+    take_ahead(tile, (ROWS - 3) * PITCH, 2 * PITCH);
+    take_ahead(tile, COMPLETE, 3 * PITCH);
+    take_ahead(tile, COMPLETE, 1); /* what comes from the next row stays beyond COLUMNS */
+    take_ahead(tile, COMPLETE, 2);
+    take_ahead(tile, COMPLETE, 3);
+}
+
+/* How many flags each pixel sees, in place of the flags. */
+static void count_seen(uint8_t *flags)
+{
+    uint8_t column[COMPLETE + SIDE];
+    memset(column + COMPLETE, 0, SIDE);
+    for (int i = 0; i < COMPLETE; i++) {
+        column[i] = (uint8_t)(flags[i] + flags[i + PITCH] + flags[i + 2 * PITCH] + flags[i + 3 * PITCH] + flags[i + 4 * PITCH] +
+                              flags[i + 5 * PITCH] + flags[i + 6 * PITCH]);
+    }
+    for (int i = 0; i < COMPLETE; i++) {
+        flags[i] = (uint8_t)(column[i] + column[i + 1] + column[i + 2] + column[i + 3] + column[i + 4] + column[i + 5] + column[i + 6]);
+    }
+}
+
+/* Whether any pixel of the block that begins at a place needs votes. */
+static int is_needed(const struct tile *tile, int at)
+{
+    const int16_t *restrict value = tile->value + at + CENTRE, *restrict high = tile->high + at;
+    const uint16_t *restrict low = tile->low + at;
+    const uint8_t *restrict known = tile->known + at, *restrict changed = tile->changed + at;
     int16_t needed = 0;
     for (int x = 0; x < BLOCK; x++) {
-        int16_t most = high[x], count = known[x];
-        uint16_t least = low[x];
-        for (int j = 1; j < SIDE; j++) {
-            most = high[x + j] > most ? high[x + j] : most;
-            least = low[x + j] < least ? low[x + j] : least;
-            count = (int16_t)(count + known[x + j]);
-        }
-        window->high[x] = most;
-        window->low[x] = (int16_t)least;
-        window->known[x] = count;
-        const int16_t is_missing = window->value[REACH][x + REACH] < 0, is_step = (int16_t)(most - (int16_t)least) > STEP;
-        needed |= (int16_t)((is_missing & (count >= DENSE)) | ((count > 1) & is_step));
+        const int16_t is_step = (int16_t)(high[x] - (int16_t)low[x]) > STEP;
+        needed |= (int16_t)((is_step | ((value[x] < 0) & (known[x] >= DENSE))) & (changed[x] != 0));
     }
     return needed;
 }
 
-static void count_votes(struct window *window)
+struct votes {
+    int16_t middle[BLOCK]; /* between the two surfaces */
+    int16_t near[BLOCK], all[BLOCK];
+};
+
+static void count_votes(const struct tile *tile, int at, struct votes *votes)
 {
-    int16_t middle[BLOCK];
+    const int16_t *restrict here = tile->grey + at + CENTRE, *restrict high = tile->high + at;
+    const uint16_t *restrict low = tile->low + at;
+    int16_t *restrict middle = votes->middle, *restrict nears = votes->near, *restrict alls = votes->all;
     for (int x = 0; x < BLOCK; x++) {
-        middle[x] = (int16_t)((window->high[x] + window->low[x]) >> 1);
-        window->near[x] = window->all[x] = 0;
+        middle[x] = (int16_t)((high[x] + (int16_t)low[x]) >> 1);
+        nears[x] = alls[x] = 0;
     }
-    const uint8_t *restrict here = window->grey[REACH] + REACH;
-    uint16_t *restrict near = window->near, *restrict all = window->all;
     for (int i = 0; i < SIDE; i++) {
-        for (int j = 0; j < SIDE; j++) {
-            const int16_t *restrict value = window->value[i] + j;
-            const uint8_t *restrict grey = window->grey[i] + j;
-            for (int x = 0; x < BLOCK; x++) {
-                const int16_t apart = (int16_t)(grey[x] > here[x] ? grey[x] - here[x] : here[x] - grey[x]);
-                const int16_t alike = (int16_t)(apart < ALIKE ? ALIKE - apart : 0);
-                const uint16_t vote = (uint16_t)(value[x] >= 0 ? (uint16_t)(alike * alike) >> 5 : 0);
-                all[x] = (uint16_t)(all[x] + vote);
-                near[x] = (uint16_t)(near[x] + (value[x] > middle[x] ? vote : 0));
+        const int16_t *restrict value = tile->value + at + i * PITCH, *restrict grey = tile->grey + at + i * PITCH;
+        for (int x = 0; x < BLOCK; x++) {
+            const int16_t brightest = (int16_t)(here[x] + ALIKE), darkest = (int16_t)(here[x] - ALIKE);
+            int16_t near = 0, all = 0;
+#pragma GCC unroll 7
+            for (int j = 0; j < SIDE; j++) {
+                const int16_t above = (int16_t)(grey[x + j] - darkest), below = (int16_t)(brightest - grey[x + j]);
+                const int16_t less = above < below ? above : below, alike = less > 0 ? less : 0;
+                const int16_t vote = (int16_t)((int16_t)(alike * alike) >> 5);
+                all = (int16_t)(all + (value[x + j] >= 0 ? vote : 0));
+                near = (int16_t)(near + (value[x + j] > middle[x] ? vote : 0));
+            }
+            nears[x] = (int16_t)(nears[x] + near);
+            alls[x] = (int16_t)(alls[x] + all);
+        }
+    }
+}
+
+/* The values of a row of a window, and one more. */
+typedef int16_t row_words __attribute__((vector_size(16)));
+typedef int32_t row_sums __attribute__((vector_size(32)));
+
+static inline row_words row_load(const int16_t *from)
+{
+    row_words row;
+    memcpy(&row, from, sizeof row);
+    return row;
+}
+
+/* The mean of the values of one surface, weighted as they vote. */
+static int value_of(const struct tile *tile, int at, int middle, int is_near)
+{
+    const row_words none = {0}, window = {-1, -1, -1, -1, -1, -1, -1, 0}, other_side = none - (int16_t)(1 - is_near);
+    const int16_t here = tile->grey[at + CENTRE];
+    row_sums sums = {0};
+    row_words votes = {0};
+    for (int i = 0; i < SIDE; i++) {
+        const row_words value = row_load(tile->value + at + i * PITCH), grey = row_load(tile->grey + at + i * PITCH);
+        const row_words above = grey - (int16_t)(here - ALIKE), below = (int16_t)(here + ALIKE) - grey;
+        const row_words is_less = above < below, less = (above & is_less) | (below & ~is_less), alike = less & (less > 0);
+        const row_words vote = ((alike * alike) >> 5) & (value >= 0) & ((value > (int16_t)middle) ^ other_side) & window;
+        sums += __builtin_convertvector(vote, row_sums) * __builtin_convertvector(value, row_sums);
+        votes += vote;
+    }
+    int32_t sum = 0, all = 0;
+    for (int j = 0; j < SIDE; j++) {
+        sum += sums[j];
+        all += votes[j];
+    }
+    return all > 0 ? (sum + all / 2) / all : NO_STEPS;
+}
+
+/* Note which pixels of a block get the value of the surface that most of their votes are for: 1 the far one, 2 the near one. */
+static void decide(const struct tile *tile, int at, const struct votes *votes, uint8_t *restrict voted)
+{
+    const int16_t *restrict value = tile->value + at + CENTRE, *restrict high = tile->high + at;
+    const uint16_t *restrict low = tile->low + at;
+    const uint8_t *restrict known = tile->known + at;
+    for (int x = 0; x < BLOCK; x++) {
+        const int16_t near = votes->near[x], far = (int16_t)(votes->all[x] - near);
+        const int16_t more = near > far ? near : far, less = near > far ? far : near;
+        const int16_t is_step = (int16_t)(high[x] - (int16_t)low[x]) > STEP, is_near = near > far, was_near = value[x] > votes->middle[x];
+        const int16_t is_closed = (int16_t)((known[x] >= DENSE) & (!is_step | (more > (int16_t)(MAJORITY * less))));
+        const int16_t is_moved = (int16_t)(is_step & (was_near != is_near) & (near != far));
+        voted[x] = (uint8_t)((value[x] < 0 ? is_closed : is_moved) << is_near);
+    }
+}
+
+/* Give the pixels of the block at (x, y) that were voted on their values. */
+static void write_voted(const struct vote *job, const struct tile *tile, int at, int x, int y)
+{
+    struct votes votes;
+    uint8_t voted[BLOCK];
+    count_votes(tile, at, &votes);
+    decide(tile, at, &votes, voted);
+    const int count = job->width - x < BLOCK ? job->width - x : BLOCK;
+    const ptrdiff_t row = (ptrdiff_t)y * job->width;
+    for (int i = 0; i < count; i++) {
+        if (voted[i]) {
+            const int found = value_of(tile, at + i, votes.middle[i], voted[i] - 1);
+            if (found >= 0 && found <= (x + i) * STEPS_PER_PX) {
+                job->to[row + x + i] = (int16_t)found;
+                job->margin[row + x + i] = 0; /* no cost was its own */
             }
         }
     }
 }
 
-/* The mean of the values of one surface, weighted as they vote. */
-static int value_of(const struct window *window, int x, int is_near)
+static void vote_tile(const struct vote *job, int x, int from, int to, struct tile *tile)
 {
-    const int middle = (window->high[x] + window->low[x]) >> 1, here = window->grey[REACH][x + REACH];
-    int32_t sum = 0, votes = 0;
-    for (int i = 0; i < SIDE; i++) {
-        for (int j = 0; j < SIDE; j++) {
-            const int value = window->value[i][x + j], grey = window->grey[i][x + j];
-            const int apart = grey > here ? grey - here : here - grey, alike = apart < ALIKE ? ALIKE - apart : 0;
-            const int vote = value >= 0 && (value > middle) == is_near ? (alike * alike) >> 5 : 0;
-            sum += vote * value;
-            votes += vote;
-        }
+    take_tile(job, x, from, tile);
+    if (job->before == job->from) { /* the first round */
+        memset(tile->changed, 1, sizeof tile->changed);
+    } else {
+        count_seen(tile->changed);
     }
-    return votes > 0 ? (sum + votes / 2) / votes : NO_STEPS;
-}
-
-static void decide(const struct vote *job, const struct window *window, int x, int y, int count)
-{
-    int16_t *to = job->to + (ptrdiff_t)y * job->width + x;
-    uint8_t *margin = job->margin + (ptrdiff_t)y * job->width + x;
-    for (int i = 0; i < count; i++) {
-        const int value = window->value[REACH][i + REACH], near = window->near[i], far = window->all[i] - near;
-        const int is_step = window->high[i] - window->low[i] > STEP, is_near = near > far;
-        const int middle = (window->high[i] + window->low[i]) >> 1;
-        int is_voted;
-        if (value < 0) {
-            const int more = is_near ? near : far, less = is_near ? far : near;
-            is_voted = window->known[i] >= DENSE && (!is_step || more > MAJORITY * less);
-        } else {
-            is_voted = is_step && (value > middle) != is_near && near != far;
-        }
-        if (is_voted) {
-            const int found = value_of(window, i, is_near);
-            if (found >= 0 && found <= (x + i) * STEPS_PER_PX) {
-                to[i] = (int16_t)found;
-                margin[i] = 0; /* no cost was its own */
+    find_spread(tile);
+    count_seen(tile->known);
+    const int end = job->width - x < COLUMNS ? job->width - x : COLUMNS;
+    for (int y = from; y < to; y++) {
+        for (int i = 0; i < end; i += BLOCK) {
+            const int at = (y - from) * PITCH + i;
+            if (is_needed(tile, at)) {
+                write_voted(job, tile, at, x + i, y);
             }
         }
     }
@@ -158,16 +253,11 @@ static void decide(const struct vote *job, const struct window *window, int x, i
 
 void ISA_NAME(vote_rows)(const struct vote *job, int from, int to)
 {
-    struct window window;
-    memset(&window, 0, sizeof window);
-    for (int y = from; y < to; y++) {
-        memcpy(job->to + (ptrdiff_t)y * job->width, job->from + (ptrdiff_t)y * job->width, (size_t)job->width * sizeof *job->to);
-        for (int x = 0; x < job->width; x += BLOCK) {
-            take_window(job, x, y, &window);
-            if (find_spread(&window)) {
-                count_votes(&window);
-                decide(job, &window, x, y, job->width - x < BLOCK ? job->width - x : BLOCK);
-            }
-        }
+    struct tile tile;
+    const ptrdiff_t row = (ptrdiff_t)from * job->width;
+    memcpy(job->to + row, job->from + row, (size_t)(to - from) * (size_t)job->width * sizeof *job->to);
+    memset(&tile, 0, sizeof tile);
+    for (int x = 0; x < job->width; x += COLUMNS) {
+        vote_tile(job, x, from, to, &tile);
     }
 }
