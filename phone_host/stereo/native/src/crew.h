@@ -5,7 +5,7 @@
 #ifndef TANDEM_CREW_H
 #define TANDEM_CREW_H
 
-enum { MOST_THREADS = 64, MOST_STEPS = 16 };
+enum { MOST_THREADS = 64, MOST_STEPS = 24 };
 
 typedef int crew_tasks_fn(void *context, int step);
 typedef void crew_task_fn(void *context, int step, int task, int thread);

@@ -35,8 +35,9 @@ typedef void tandem_smooth_rows_fn(const struct finish *job, int from, int to);
 typedef void tandem_vote_rows_fn(const struct vote *job, int from, int to);
 typedef void tandem_guide_fn(const struct guide *job);
 typedef size_t tandem_guide_scratch_fn(const struct guide *job);
+typedef void tandem_support_smooth_rows_fn(const struct support *job, int from, int to, uint8_t *scratch);
 typedef void tandem_support_cost_rows_fn(const struct support *job, int from, int to, uint8_t *scratch);
-typedef void tandem_support_drop_rows_fn(const struct support *job, int from, int to, uint8_t *scratch);
+typedef void tandem_support_drop_rows_fn(const struct support *job, int from, int to);
 typedef size_t tandem_support_scratch_fn(int width);
 
 #define TANDEM_KERNELS(KERNEL) \
@@ -50,6 +51,7 @@ typedef size_t tandem_support_scratch_fn(int width);
     KERNEL(vote_rows)          \
     KERNEL(guide)              \
     KERNEL(guide_scratch)      \
+    KERNEL(support_smooth_rows) \
     KERNEL(support_cost_rows)  \
     KERNEL(support_drop_rows)  \
     KERNEL(support_scratch)

@@ -72,7 +72,8 @@ static void guide_laid_out(struct work *work, uint8_t **at)
     support->apart = support->other + pixels;
     support->flags = support->apart + pixels;
     support->regions = (struct region *)(void *)job->disparity;
-    support->region_capacity = (int32_t)(pixels * sizeof(float) / sizeof(struct region));
+    support->region_capacity = (int32_t)(pixels * sizeof(int16_t) / sizeof(struct region));
+    support->smooth = (int16_t *)(void *)job->disparity + pixels;
     support->runs = (struct region_run *)(void *)taken(at, 2 * (width + 1) * sizeof(struct region_run));
     work->support_bytes = (work->kernels->support_scratch(job->width) + 127) / 64 * 64;
     work->support_scratch = taken(at, work->support_bytes * (size_t)work->threads);
@@ -83,7 +84,7 @@ static void guide_laid_out(struct work *work, uint8_t **at)
  *     sweeps       raw disparities left, right | scratch | margins: in `confidence`
  *     check        raw disparities left, right | checked | margins
  *     speckles     parents                     | checked | margins, sizes: in `disparity`
- *     support      costs, distance, flags      | checked | margins, regions: in `disparity`
+ *     support      costs, distance, flags      | checked | margins, regions and the guide at full size: in `disparity`
  *     votes                                    | checked | margins, two planes of steps: in `disparity`
  *     px           rough                       | margins | steps: in `disparity`
  *     smooth       rough                       | margins | confidence, disparity
@@ -246,7 +247,8 @@ enum step {
     LABEL,
     JOIN,
     SPECKLES,
-    FIT, /* this and the next three: the support, see support.h */
+    GUIDE, /* this and the next four: the support, see support.h */
+    FIT,
     REGIONS,
     DROP,
     FILL,
@@ -257,6 +259,7 @@ enum step {
     SMOOTH,
     STEPS
 };
+_Static_assert((int)STEPS <= (int)MOST_STEPS, "the crew counts the tasks of each step");
 
 static int tasks_of(void *context, int step)
 {
@@ -275,7 +278,7 @@ static int tasks_of(void *context, int step)
     case COLUMNS_BRIDGED:
         return slabs;
     default:
-        return !is_guided && (step == FIT || step == DROP || (step >= VOTE && step < TO_PX)) ? 0 : bands;
+        return !is_guided && (step == GUIDE || step == FIT || step == DROP || (step >= VOTE && step < TO_PX)) ? 0 : bands;
     }
 }
 
@@ -305,6 +308,9 @@ static void do_task(void *context, int step, int task, int thread)
     case SPECKLES:
         speckles_drop_rows(&work->speckles, from, to);
         break;
+    case GUIDE:
+        work->kernels->support_smooth_rows(&work->support, from, to, scratch);
+        break;
     case FIT:
         work->kernels->support_cost_rows(&work->support, from, to, scratch);
         break;
@@ -312,7 +318,7 @@ static void do_task(void *context, int step, int task, int thread)
         support_regions(&work->support);
         break;
     case DROP:
-        work->kernels->support_drop_rows(&work->support, from, to, scratch);
+        work->kernels->support_drop_rows(&work->support, from, to);
         break;
     case FILL:
         support_fill(&work->support, left, right);

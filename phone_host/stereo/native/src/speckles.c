@@ -7,7 +7,7 @@
 #include "match.h"
 
 enum {
-    SPECKLE_AREA = 20, /* islands of up to 60 px (about 8 x 8) are mismatches more often than objects */
+    SPECKLE_AREA = 30, /* islands of up to 30 px are mismatches more often than objects */
     SPECKLE_STEP = STEPS_PER_PX
 };
 

@@ -231,17 +231,13 @@ void support_regions(const struct support *job)
 /* Complete surfaces: what is missing takes the guide's value where that is confirmed on all four sides and fits. */
 void support_fill(const struct support *job, int from, int to)
 {
-    const struct guide *guide = job->guide;
     const int width = job->width;
     pass_columns(job, from, to);
     for (int y = 0; y < job->height; y++) {
         const ptrdiff_t at = (ptrdiff_t)y * width;
-        const int line = y / guide->factor < guide->small_height ? y / guide->factor : guide->small_height - 1;
-        const int16_t *smooth = guide->steps + (ptrdiff_t)line * guide->small_width;
         for (int x = from; x < to; x++) {
             if (job->steps[at + x] < 0 && (job->flags[at + x] & FROM_ALL) == FROM_ALL && job->other[at + x] < FILL_COST) {
-                const int column = x / guide->factor < guide->small_width ? x / guide->factor : guide->small_width - 1;
-                job->steps[at + x] = (int16_t)(smooth[column] * guide->factor);
+                job->steps[at + x] = job->smooth[at + x];
                 job->margin[at + x] = 0; /* no cost was its own */
             }
         }

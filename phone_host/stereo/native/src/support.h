@@ -1,7 +1,7 @@
 /* Whether the images support a disparity, or the guide's smoother surface explains them as well (decision 0036).
  *
  * The steps, in this order; those over bands of rows and over slabs of columns may be done by any threads:
- * support_cost_rows (bands), support_regions (whole), support_drop_rows (bands), support_fill (slabs).
+ * support_smooth_rows (bands), support_cost_rows (bands), support_regions (whole), support_drop_rows (bands), support_fill (slabs).
  *
  * SPDX-License-Identifier: Apache-2.0
  */
@@ -26,8 +26,8 @@ enum support_flag {
     FROM_ALL = FROM_LEFT | FROM_RIGHT | FROM_ABOVE | FROM_BELOW
 };
 
-/* Distances between a value and the guide, 1/16 px, for a guide of half size; in proportion for a smaller one. */
-enum { AGREE = 16, NEARLY = 12, APART = 32 };
+/* Distances between a value and the guide, 1/16 px, for a guide of half size; half as much again for one of a quarter, and so on. */
+enum { AGREE = 12, NEARLY = 8, APART = 24 };
 
 enum { NOT_APART = 0, AS_FAR = 128, DROPPED = 255 };
 
@@ -50,6 +50,7 @@ struct support {
     const uint8_t *left, *right;
     ptrdiff_t left_stride, right_stride;
     const struct guide *guide;
+    int16_t *smooth;        /* (height, width): the guide at full size, 1/16 px, NO_STEPS = none */
     int16_t *steps;         /* (height, width): the values, 1/16 px, NO_STEPS = none; changed */
     uint8_t *own, *other;   /* (height, width): cost of the value and of the guide */
     uint8_t *margin;        /* (height, width): of the values' costs; 0 where the guide gave the value */
@@ -60,18 +61,12 @@ struct support {
     int32_t region_capacity;
 };
 
-static inline int32_t region_capacity(int width, int height) { return width * height / 4 + width + 1; }
-
-static inline int support_scaled(const struct support *job, int distance) { return distance * job->guide->factor / 2; }
+static inline int support_scaled(const struct support *job, int distance) { return distance * (job->guide->factor + 2) / 4; }
 
 /* Whether a value for the pixel at an offset lies on the guide, or there is none to say. */
 static inline int support_allows(const struct support *job, ptrdiff_t at, int value)
 {
-    const struct guide *guide = job->guide;
-    const int y = (int)(at / job->width) / guide->factor, x = (int)(at % job->width) / guide->factor;
-    const int line = y < guide->small_height ? y : guide->small_height - 1, column = x < guide->small_width ? x : guide->small_width - 1;
-    const int smooth = guide->steps[(ptrdiff_t)line * guide->small_width + column];
-    const int far = smooth * guide->factor - value, agree = support_scaled(job, AGREE);
+    const int smooth = job->smooth[at], far = smooth - value, agree = support_scaled(job, AGREE);
     return smooth < 0 || (far <= agree && -far <= agree);
 }
 

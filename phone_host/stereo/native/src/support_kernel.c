@@ -16,9 +16,16 @@ enum {
     REACH = FIT_WINDOW / 2,
     PARTS = 4,       /* the right image is read at quarters of a pixel */
     SLIDE = 3,       /* parts: the guide is tried this far to both sides, too, for it was matched at half the size */
+    EVEN = 32,       /* 1/16 px of the guide: four of its pixels that differ by more lie on two surfaces */
     FITS = 4,        /* the value; the guide, as it is and slid to both sides */
     LINES = SUPPORT_BAND + 2 * REACH,
     ZERO_SLOPE = 128
+};
+
+/* Of two rows of the guide: the least and the greatest of both, and their weighted sum. */
+struct guide_cell {
+    int16_t *low, *high;
+    int32_t *value;
 };
 
 struct fit_room {
@@ -28,7 +35,7 @@ struct fit_room {
     uint16_t *own, *parts, *there;     /* level and slope: of the left row; of the right row at each part; as read */
     uint8_t *level, *slope;            /* of a row, with one more pixel */
     int32_t *place;
-    int16_t *guide, *guide_above;
+    struct guide_cell cells;
 };
 
 static uint8_t *taken(uint8_t **free_from, size_t size)
@@ -53,8 +60,9 @@ static size_t laid_out(struct fit_room *room, int columns, uint8_t *scratch)
     room->level = taken(&at, width + 1);
     room->slope = taken(&at, width + 1);
     room->place = (int32_t *)(void *)taken(&at, 4 * width);
-    room->guide = (int16_t *)(void *)taken(&at, 2 * width);
-    room->guide_above = (int16_t *)(void *)taken(&at, 2 * width);
+    room->cells.low = (int16_t *)(void *)taken(&at, 2 * width);
+    room->cells.high = (int16_t *)(void *)taken(&at, 2 * width);
+    room->cells.value = (int32_t *)(void *)taken(&at, 4 * width);
     return (size_t)(at - scratch);
 }
 
@@ -65,26 +73,52 @@ size_t ISA_NAME(support_scratch)(int width)
     return laid_out(&room, width, nowhere);
 }
 
-/* A row of the guide at full size, 1/16 px, NO_STEPS = none. */
-static void guide_row(const struct support *job, int y, int16_t *restrict row)
+/* Columns and rows between which a row of small pixels lies: pixel `at` of the whole image lies between `first` and the next of the small
+ * one's, `part` of 2 * factor from the first. Outside the outermost centres both are the same one. */
+struct between {
+    int first, next, part;
+};
+
+static struct between between_pixels(int at, int factor, int count)
+{
+    const int halves = 2 * at + 1 - factor, first = halves < 0 ? 0 : halves / (2 * factor), last = count - 1;
+    return (struct between){.first = first < last ? first : last, .next = halves < 0 ? 0 : first + 1 < last ? first + 1 : last,
+                            .part = halves < 0 ? 0 : halves - 2 * factor * first};
+}
+
+/* A row of the guide at full size: between four of its pixels that lie on one surface it is even, elsewhere it is that of the nearest. */
+static void smooth_row(const struct support *job, int y, struct guide_cell *restrict cells, int16_t *restrict row)
 {
     const struct guide *guide = job->guide;
-    const int factor = guide->factor, line = y / factor < guide->small_height ? y / factor : guide->small_height - 1;
-    const int16_t *restrict steps = guide->steps + (ptrdiff_t)line * guide->small_width;
-    const int count = guide->small_width * factor <= job->width ? guide->small_width : 0; /* 0: images narrower than one pixel of the guide */
-    if (factor == 2) {
-        for (int i = 0; i < count; i++) {
-            row[2 * i] = row[2 * i + 1] = (int16_t)(steps[i] < 0 ? NO_STEPS : 2 * steps[i]);
-        }
+    const int factor = guide->factor, whole = 2 * factor, small_width = guide->small_width;
+    const struct between lines = between_pixels(y, factor, guide->small_height);
+    const int nearest = y / factor < guide->small_height ? y / factor : guide->small_height - 1;
+    const int16_t *restrict upper = guide->steps + (ptrdiff_t)lines.first * small_width;
+    const int16_t *restrict lower = guide->steps + (ptrdiff_t)lines.next * small_width;
+    const int16_t *restrict here = guide->steps + (ptrdiff_t)nearest * small_width;
+    for (int i = 0; i < small_width; i++) {
+        const int16_t a = upper[i], b = lower[i], low = a < b ? a : b, high = a < b ? b : a;
+        cells->low[i] = low;
+        cells->high[i] = high;
+        cells->value[i] = a * (whole - lines.part) + b * lines.part;
     }
-    for (int i = 0; i < count && factor > 2; i++) {
-        const int16_t value = (int16_t)(steps[i] < 0 ? NO_STEPS : factor * steps[i]);
-        for (int x = 0; x < factor; x++) {
-            row[i * factor + x] = value;
-        }
+    for (int x = 0; x < job->width; x++) {
+        const struct between columns = between_pixels(x, factor, small_width);
+        const int a = columns.first, b = columns.next, own = x / factor < small_width ? x / factor : small_width - 1;
+        const int low = cells->low[a] < cells->low[b] ? cells->low[a] : cells->low[b];
+        const int high = cells->high[a] > cells->high[b] ? cells->high[a] : cells->high[b];
+        const int even = (cells->value[a] * (whole - columns.part) + cells->value[b] * columns.part + whole) / (2 * whole);
+        const int plain = here[own] < 0 ? NO_STEPS : here[own] * factor;
+        row[x] = (int16_t)(low >= 0 && high - low <= EVEN && plain >= 0 ? even : plain);
     }
-    for (int x = count * factor; x < job->width; x++) {
-        row[x] = (int16_t)(steps[guide->small_width - 1] < 0 ? NO_STEPS : steps[guide->small_width - 1] * factor);
+}
+
+void ISA_NAME(support_smooth_rows)(const struct support *job, int from, int to, uint8_t *scratch)
+{
+    struct fit_room room;
+    laid_out(&room, job->width, scratch);
+    for (int y = from; y < to; y++) {
+        smooth_row(job, y, &room.cells, job->smooth + (ptrdiff_t)y * job->width);
     }
 }
 
@@ -151,13 +185,12 @@ static void fit_row(const struct fit_room *room, int width, int slide, uint8_t *
 static void fit_line(const struct support *job, const struct fit_room *room, int y, int line)
 {
     const int width = job->width, slide = SLIDE * job->guide->factor / 2;
-    const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width, *restrict guide = room->guide;
+    const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width, *restrict guide = job->smooth + (ptrdiff_t)y * width;
     const uint8_t *restrict left = job->left + y * job->left_stride;
     uint8_t *restrict slope = room->slope;
     uint16_t *restrict own = room->own;
     int32_t *restrict place = room->place;
     const size_t at = (size_t)line * room->pitch + REACH;
-    guide_row(job, y, room->guide);
     slopes_of_row(job->left, job->left_stride, width, job->height, y, slope);
     for (int x = 0; x < width; x++) {
         own[x] = (uint16_t)(left[x] | slope[x] << 8);
@@ -194,13 +227,12 @@ static void square_row(const struct fit_room *room, int i, int line, int width, 
 }
 
 /* How far the values of a row are from the guide, and where that has steps. */
-static void flag_row(const struct support *job, const struct fit_room *room, int y)
+static void flag_row(const struct support *job, int y)
 {
     const int width = job->width, agree = support_scaled(job, AGREE), much = support_scaled(job, APART);
-    const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width, *restrict guide = room->guide, *restrict above = room->guide_above;
+    const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width, *restrict guide = job->smooth + (ptrdiff_t)y * width;
+    const int16_t *restrict above = y > 0 ? guide - width : guide;
     uint8_t *restrict apart = job->apart + (ptrdiff_t)y * width, *restrict flags = job->flags + (ptrdiff_t)y * width;
-    guide_row(job, y, room->guide);
-    guide_row(job, y > 0 ? y - 1 : 0, room->guide_above);
     for (int x = 0; x < width; x++) {
         const int value = steps[x], smooth = guide[x], far = value < smooth ? smooth - value : value - smooth;
         const int is_both = (smooth >= 0) & (value >= 0);
@@ -227,17 +259,18 @@ void ISA_NAME(support_cost_rows)(const struct support *job, int from, int to, ui
         for (int i = 1; i < FITS; i++) {
             square_row(&room, i, y - from, job->width, i == 1, other);
         }
-        flag_row(job, &room, y);
+        flag_row(job, y);
     }
 }
 
 /* Drop what is marked, and single values a little off that fit worse than the guide; flag what confirms the guide and what breaks it. */
-static void drop_row(const struct support *job, int y, const int16_t *restrict guide)
+static void drop_row(const struct support *job, int y)
 {
     const int width = job->width;
     const ptrdiff_t at = (ptrdiff_t)y * width;
     const int16_t agree = (int16_t)support_scaled(job, AGREE), nearly = (int16_t)support_scaled(job, NEARLY);
     int16_t *restrict steps = job->steps + at;
+    const int16_t *restrict guide = job->smooth + at;
     uint8_t *restrict flags = job->flags + at;
     const uint8_t *restrict apart = job->apart + at, *restrict own = job->own + at, *restrict other = job->other + at;
     const uint8_t *restrict margin = job->margin + at;
@@ -253,13 +286,10 @@ static void drop_row(const struct support *job, int y, const int16_t *restrict g
     }
 }
 
-void ISA_NAME(support_drop_rows)(const struct support *job, int from, int to, uint8_t *scratch)
+void ISA_NAME(support_drop_rows)(const struct support *job, int from, int to)
 {
-    struct fit_room room;
-    laid_out(&room, job->width, scratch);
     for (int y = from; y < to; y++) {
-        guide_row(job, y, room.guide);
-        drop_row(job, y, room.guide);
+        drop_row(job, y);
         flood_row(job->flags + (ptrdiff_t)y * job->width, job->width);
     }
 }
