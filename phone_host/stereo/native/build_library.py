@@ -255,7 +255,9 @@ def _compiled(compiler: Sequence[str], scratch: Path, source: str, isa: Isa, ext
     path = scratch / f"{Path(source).stem}_{isa.name}.o"
     named = (f"-DTANDEM_ISA={isa.name}", f"-DTANDEM_IS_{isa.name.upper()}=1") if isa.name else ()
     level = _SCALAR_LEVEL if isa.name == _SCALAR.name else ()
-    _run([*compiler, *FLAGS, *level, *WARNINGS, *isa.flags, *named, *extra, "-c", str(SOURCES / source), "-o", str(path)])
+    _run(
+        [*compiler, *FLAGS, *level, *WARNINGS, *isa.flags, *named, *extra, "-c", str(SOURCES / source), "-o", str(path)]
+    )
     return path
 
 
