@@ -76,6 +76,8 @@ class Isa:
 
 
 _SCALAR: Final = Isa("scalar")
+_SCALAR_LEVEL: Final = ("-O2",)
+"""Registers of 16 bytes become loops there; -O3 unrolls them all: four times as long to compile, and slower."""
 _X86: Final = (
     _SCALAR,
     Isa("sse41", ("-mssse3", "-msse4.1")),
@@ -252,7 +254,10 @@ def _plain(sets: Sequence[Isa]) -> Isa:
 def _compiled(compiler: Sequence[str], scratch: Path, source: str, isa: Isa, extra: Sequence[str]) -> Path:
     path = scratch / f"{Path(source).stem}_{isa.name}.o"
     named = (f"-DTANDEM_ISA={isa.name}", f"-DTANDEM_IS_{isa.name.upper()}=1") if isa.name else ()
-    _run([*compiler, *FLAGS, *WARNINGS, *isa.flags, *named, *extra, "-c", str(SOURCES / source), "-o", str(path)])
+    level = _SCALAR_LEVEL if isa.name == _SCALAR.name else ()
+    _run(
+        [*compiler, *FLAGS, *level, *WARNINGS, *isa.flags, *named, *extra, "-c", str(SOURCES / source), "-o", str(path)]
+    )
     return path
 
 

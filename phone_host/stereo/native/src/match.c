@@ -30,7 +30,7 @@ struct work {
     struct finish finish;
     int strips, threads;
     size_t scratch_bytes;
-    uint8_t *scratch; /* one for each thread */
+    uint8_t *scratch; /* one for each thread or task of the sweeps, whichever are fewer */
     int16_t *left, *right;
     uint8_t *told;
     struct speckles speckles;
@@ -146,7 +146,7 @@ static void sweep_task(struct work *work, int task, int thread)
         .end = (strip + 1) * job->height / work->strips,
         .steps = is_right ? work->right : work->left,
         .margin = work->finish.confidence,
-        .scratch = work->scratch + (size_t)thread * work->scratch_bytes,
+        .scratch = work->scratch + (size_t)(work->threads < 2 * work->strips ? thread : task) * work->scratch_bytes,
     };
     sweep.first = sweep.begin > WARM_UP ? sweep.begin - WARM_UP : 0;
     work->kernels->sweep(&sweep);
@@ -290,10 +290,10 @@ static void do_task(void *context, int step, int task, int thread)
     uint8_t *scratch = work->support_scratch + (size_t)thread * work->support_bytes;
     switch (step) {
     case SWEEP:
-        if (task == 2 * work->strips) {
+        if (work->job->guide && task == 0) { /* first: it takes longer than a sweep */
             guide_task(work);
         } else {
-            sweep_task(work, task, thread);
+            sweep_task(work, task - (work->job->guide != 0), thread);
         }
         break;
     case CHECK:

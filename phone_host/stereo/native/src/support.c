@@ -11,10 +11,10 @@ enum {
     ISLAND = 100,     /* px of the guide's size: smaller ones are mismatches */
     FAR_PX = 16,      /* a region so far behind the guide is one period off, or seen through the gaps of an object */
     FILL_COST = 120,   /* a quarter of 25 px with 8 grey levels each: where the guide costs more, it is not taken */
-    UNSURE = 40,      /* mean margin: below it a region stays only if the guide costs at least AS_BAD tenths of what it costs, or MUCH_WORSE if it is behind the guide */
+    UNSURE = 40,      /* mean margin: below it a region goes if the guide costs less than AS_BAD tenths of what it costs */
     AS_BAD = 12,
     WORSE = 20,       /* where the mean margin is DOUBTFUL */
-    MUCH_WORSE = 30
+    MUCH_WORSE = 30   /* where it is behind the guide */
 };
 
 static inline int distance(int a, int b) { return a < b ? b - a : a - b; }

@@ -19,7 +19,8 @@ enum {
     EVEN = 32,       /* 1/16 px of the guide: four of its pixels that differ by more lie on two surfaces */
     FITS = 4,        /* the value; the guide, as it is and slid to both sides */
     LINES = SUPPORT_BAND + 2 * REACH,
-    ZERO_SLOPE = 128
+    ZERO_SLOPE = 128,
+    SPAN = 32        /* columns for which costs are computed, or not, together */
 };
 
 /* Of two rows of the guide: the least and the greatest of both, and their weighted sum. */
@@ -36,6 +37,11 @@ struct fit_room {
     uint8_t *level, *slope;            /* of a row, with one more pixel */
     int32_t *place;
     struct guide_cell cells;
+    uint8_t *asked;                    /* (width,): whether any row of the band asks for the column's costs */
+};
+
+struct span {
+    int from, to;
 };
 
 static uint8_t *taken(uint8_t **free_from, size_t size)
@@ -63,6 +69,7 @@ static size_t laid_out(struct fit_room *room, int columns, uint8_t *scratch)
     room->cells.low = (int16_t *)(void *)taken(&at, 2 * width);
     room->cells.high = (int16_t *)(void *)taken(&at, 2 * width);
     room->cells.value = (int32_t *)(void *)taken(&at, 4 * width);
+    room->asked = taken(&at, width);
     return (size_t)(at - scratch);
 }
 
@@ -159,67 +166,79 @@ static void part_row(const struct support *job, const struct fit_room *room, int
     }
 }
 
-/* Costs of the row's pixels where the right image is read at `place`, slid. */
-static void fit_row(const struct fit_room *room, int width, int slide, uint8_t *restrict fit)
+/* Costs of the span's pixels where the right image is read at `place`, slid. */
+static void fit_row(const struct fit_room *room, int width, struct span span, int slide, uint8_t *restrict fit)
 {
+    const int from = span.from, to = span.to;
     const uint16_t *restrict own = room->own, *restrict parts = room->parts;
     const int32_t *restrict place = room->place;
     uint16_t *restrict there = room->there;
     const int last = PARTS * (width - 1);
-    for (int x = 0; x < width; x++) {
+    for (int x = from; x < to; x++) {
         const int at = place[x] + slide;
         there[x] = parts[at < 0 ? 0 : at > last ? last : at];
     }
-    for (int x = 0; x < width; x++) {
+    for (int x = from; x < to; x++) {
         const int a = own[x] & 255, b = there[x] & 255, s = own[x] >> 8, t = there[x] >> 8;
         const int level = a < b ? b - a : a - b, slope = s < t ? t - s : s - t;
         fit[x] = (uint8_t)((level < FIT_CAP ? level : FIT_CAP) + (slope < FIT_CAP ? slope : FIT_CAP));
     }
-    for (int x = 1; x <= REACH; x++) {
+    for (int x = 1; x <= REACH && from == 0; x++) {
         fit[-x] = fit[0];
+    }
+    for (int x = 1; x <= REACH && to == width; x++) {
         fit[width - 1 + x] = fit[width - 1];
     }
 }
 
-/* The four costs of an image row. A value that is missing has the guide's cost, and the other way round. */
-static void fit_line(const struct support *job, const struct fit_room *room, int y, int line)
+/* The four costs of a span of an image row whose parts are known. A value that is missing has the guide's cost, and the other way round. */
+static void fit_span(const struct support *job, const struct fit_room *room, int y, int line, struct span span)
 {
     const int width = job->width, slide = SLIDE * job->guide->factor / 2;
     const int16_t *restrict steps = job->steps + (ptrdiff_t)y * width, *restrict guide = job->smooth + (ptrdiff_t)y * width;
+    int32_t *restrict place = room->place;
+    const size_t at = (size_t)line * room->pitch + REACH;
+    span.from = span.from > REACH ? span.from - REACH : 0;
+    span.to = span.to + REACH < width ? span.to + REACH : width;
+    for (int x = span.from; x < span.to; x++) {
+        const int value = steps[x], smooth = guide[x];
+        place[x] = PARTS * x - (((value >= 0 ? value : smooth) + 2) >> 2);
+    }
+    fit_row(room, width, span, 0, room->fit[0] + at);
+    for (int x = span.from; x < span.to; x++) {
+        const int value = steps[x], smooth = guide[x];
+        place[x] = PARTS * x - (((smooth >= 0 ? smooth : value) + 2) >> 2);
+    }
+    fit_row(room, width, span, 0, room->fit[1] + at);
+    fit_row(room, width, span, slide, room->fit[2] + at);
+    fit_row(room, width, span, -slide, room->fit[3] + at);
+}
+
+/* What the costs of a row are computed from. */
+static void prepare_row(const struct support *job, const struct fit_room *room, int y)
+{
+    const int width = job->width;
     const uint8_t *restrict left = job->left + y * job->left_stride;
     uint8_t *restrict slope = room->slope;
     uint16_t *restrict own = room->own;
-    int32_t *restrict place = room->place;
-    const size_t at = (size_t)line * room->pitch + REACH;
     slopes_of_row(job->left, job->left_stride, width, job->height, y, slope);
     for (int x = 0; x < width; x++) {
         own[x] = (uint16_t)(left[x] | slope[x] << 8);
     }
     part_row(job, room, y);
-    for (int x = 0; x < width; x++) {
-        const int value = steps[x], smooth = guide[x];
-        place[x] = PARTS * x - (((value >= 0 ? value : smooth) + 2) >> 2);
-    }
-    fit_row(room, width, 0, room->fit[0] + at);
-    for (int x = 0; x < width; x++) {
-        const int value = steps[x], smooth = guide[x];
-        place[x] = PARTS * x - (((smooth >= 0 ? smooth : value) + 2) >> 2);
-    }
-    fit_row(room, width, 0, room->fit[1] + at);
-    fit_row(room, width, slide, room->fit[2] + at);
-    fit_row(room, width, -slide, room->fit[3] + at);
 }
 
 /* A quarter of the sum over the square around each pixel of a row; if not the first, the less of that and what is there. */
-static void square_row(const struct fit_room *room, int i, int line, int width, int is_first, uint8_t *restrict out)
+static void square_row(const struct fit_room *room, int i, int line, struct span span, int is_first, uint8_t *restrict out)
 {
+    const int from = span.from, to = span.to;
     const uint8_t *restrict a = room->fit[i] + (size_t)line * room->pitch, *restrict b = a + room->pitch;
     const uint8_t *restrict c = b + room->pitch, *restrict d = c + room->pitch, *restrict e = d + room->pitch;
     uint8_t *restrict sum = room->sum;
-    for (int x = 0; x < width + 2 * REACH; x++) {
+    for (int x = from; x < to + 2 * REACH; x++) {
         sum[x] = (uint8_t)(a[x] + b[x] + c[x] + d[x] + e[x]);
     }
-    for (int x = 0; x < width; x++) {
+    for (int x = from; x < to; x++) {
         const uint16_t all = (uint16_t)(sum[x] + sum[x + 1] + sum[x + 2] + sum[x + 3] + sum[x + 4]);
         const uint8_t value = (uint8_t)(all >> 2);
         out[x] = is_first || value < out[x] ? value : out[x];
@@ -246,20 +265,65 @@ static void flag_row(const struct support *job, int y)
     }
 }
 
+/* Costs are asked for where a value may be dropped or filled in. */
+static void ask_row(const struct support *job, const struct fit_room *room, int y)
+{
+    const int width = job->width;
+    const ptrdiff_t at = (ptrdiff_t)y * width;
+    const int16_t nearly = (int16_t)support_scaled(job, NEARLY);
+    const int16_t *restrict steps = job->steps + at, *restrict guide = job->smooth + at;
+    const uint8_t *restrict apart = job->apart + at, *restrict margin = job->margin + at;
+    uint8_t *restrict asked = room->asked;
+    for (int x = 0; x < width; x++) {
+        const int16_t value = steps[x], smooth = guide[x], far = (int16_t)(value < smooth ? smooth - value : value - smooth);
+        const uint8_t is_both = (value | smooth) >= 0, is_off = far > nearly, is_unsure = margin[x] < DOUBTFUL;
+        const uint8_t is_open = (value & ~smooth) < 0, is_apart = apart[x] != NOT_APART;
+        asked[x] |= (uint8_t)((is_both & is_off & is_unsure) | is_open | is_apart);
+    }
+}
+
+/* The next span from `from` on that asks for costs. Returns an empty one at the end of the row. */
+static struct span next_span(const uint8_t *asked, int from, int width)
+{
+    struct span span = {width, width};
+    for (int x = from; x < width; x += SPAN) {
+        const int is_asked = memchr(asked + x, 1, (size_t)(width - x < SPAN ? width - x : SPAN)) != NULL;
+        if (is_asked && span.from == width) {
+            span.from = x;
+        } else if (!is_asked && span.from < width) {
+            span.to = x;
+            break;
+        }
+    }
+    return span;
+}
+
 void ISA_NAME(support_cost_rows)(const struct support *job, int from, int to, uint8_t *scratch)
 {
+    const int width = job->width;
     struct fit_room room;
-    laid_out(&room, job->width, scratch);
-    for (int y = from - REACH; y < to + REACH; y++) {
-        fit_line(job, &room, inside_of(y, job->height - 1), y - from + REACH);
-    }
+    laid_out(&room, width, scratch);
+    memset(room.asked, 0, (size_t)width);
     for (int y = from; y < to; y++) {
-        uint8_t *own = job->own + (ptrdiff_t)y * job->width, *other = job->other + (ptrdiff_t)y * job->width;
-        square_row(&room, 0, y - from, job->width, 1, own);
-        for (int i = 1; i < FITS; i++) {
-            square_row(&room, i, y - from, job->width, i == 1, other);
-        }
         flag_row(job, y);
+        ask_row(job, &room, y);
+    }
+    const struct span first = next_span(room.asked, 0, width);
+    for (int y = from - REACH; y < to + REACH && first.from < width; y++) {
+        const int row = inside_of(y, job->height - 1);
+        prepare_row(job, &room, row);
+        for (struct span span = first; span.from < width; span = next_span(room.asked, span.to, width)) {
+            fit_span(job, &room, row, y - from + REACH, span);
+        }
+    }
+    for (struct span span = first; span.from < width; span = next_span(room.asked, span.to, width)) {
+        for (int y = from; y < to; y++) {
+            uint8_t *own = job->own + (ptrdiff_t)y * width, *other = job->other + (ptrdiff_t)y * width;
+            square_row(&room, 0, y - from, span, 1, own);
+            for (int i = 1; i < FITS; i++) {
+                square_row(&room, i, y - from, span, i == 1, other);
+            }
+        }
     }
 }
 
