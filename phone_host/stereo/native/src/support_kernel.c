@@ -80,43 +80,58 @@ size_t ISA_NAME(support_scratch)(int width)
     return laid_out(&room, width, nowhere);
 }
 
-/* Columns and rows between which a row of small pixels lies: pixel `at` of the whole image lies between `first` and the next of the small
- * one's, `part` of 2 * factor from the first. Outside the outermost centres both are the same one. */
-struct between {
-    int first, next, part;
-};
-
-static struct between between_pixels(int at, int factor, int count)
+/* A pixel of the whole image between two of the guide, at `part` of 2 * factor from the first: even where all four around it lie on one
+ * surface, elsewhere that of the nearest. */
+static inline int16_t even_or(const struct guide_cell *cells, int i, int part, int whole, int nearest)
 {
-    const int halves = 2 * at + 1 - factor, first = halves < 0 ? 0 : halves / (2 * factor), last = count - 1;
-    return (struct between){.first = first < last ? first : last, .next = halves < 0 ? 0 : first + 1 < last ? first + 1 : last,
-                            .part = halves < 0 ? 0 : halves - 2 * factor * first};
+    const int16_t low = cells->low[i] < cells->low[i + 1] ? cells->low[i] : cells->low[i + 1];
+    const int16_t high = cells->high[i] > cells->high[i + 1] ? cells->high[i] : cells->high[i + 1];
+    const int even = (cells->value[i] * (whole - part) + cells->value[i + 1] * part + whole) / (2 * whole);
+    const int plain = nearest < 0 ? NO_STEPS : nearest * (whole / 2);
+    return (int16_t)((low >= 0) & (high - low <= EVEN) ? even : plain);
 }
 
-/* A row of the guide at full size: between four of its pixels that lie on one surface it is even, elsewhere it is that of the nearest. */
-static void smooth_row(const struct support *job, int y, struct guide_cell *restrict cells, int16_t *restrict row)
+/* The pixels between the guide's columns; inlined for the usual factor, so that the compiler divides by shifts. */
+static inline __attribute__((always_inline)) void between_columns(const struct guide_cell *cells, const int16_t *restrict here, int columns,
+                                                                  const int factor, int16_t *restrict row)
+{
+    for (int i = 0; i + 1 < columns; i++) {
+        for (int k = 0; k < factor; k++) {
+            row[i * factor + k] = even_or(cells, i, 2 * k + 1, 2 * factor, here[i + (2 * k >= factor)]);
+        }
+    }
+}
+
+/* A row of the guide at full size. */
+static void smooth_row(const struct support *job, int y, const struct guide_cell *cells, int16_t *restrict row)
 {
     const struct guide *guide = job->guide;
-    const int factor = guide->factor, whole = 2 * factor, small_width = guide->small_width;
-    const struct between lines = between_pixels(y, factor, guide->small_height);
-    const int nearest = y / factor < guide->small_height ? y / factor : guide->small_height - 1;
-    const int16_t *restrict upper = guide->steps + (ptrdiff_t)lines.first * small_width;
-    const int16_t *restrict lower = guide->steps + (ptrdiff_t)lines.next * small_width;
-    const int16_t *restrict here = guide->steps + (ptrdiff_t)nearest * small_width;
-    for (int i = 0; i < small_width; i++) {
-        const int16_t a = upper[i], b = lower[i], low = a < b ? a : b, high = a < b ? b : a;
-        cells->low[i] = low;
-        cells->high[i] = high;
-        cells->value[i] = a * (whole - lines.part) + b * lines.part;
+    const int factor = guide->factor, whole = 2 * factor, columns = guide->small_width, half = factor / 2;
+    const int halves = 2 * y + 1 - factor, last = guide->small_height - 1, first = halves < 0 ? 0 : halves / whole;
+    const int line = first < last ? first : last, next = halves < 0 || line == last ? line : line + 1, part = next > line ? halves - whole * line : 0;
+    const int16_t *restrict upper = guide->steps + (ptrdiff_t)line * columns, *restrict lower = guide->steps + (ptrdiff_t)next * columns;
+    const int16_t *restrict here = 2 * part < whole ? upper : lower;
+    int16_t *restrict low = cells->low, *restrict high = cells->high;
+    int32_t *restrict value = cells->value;
+    for (int i = 0; i < columns; i++) {
+        const int16_t a = upper[i], b = lower[i];
+        low[i] = a < b ? a : b;
+        high[i] = a < b ? b : a;
+        value[i] = a * (whole - part) + b * part;
     }
-    for (int x = 0; x < job->width; x++) {
-        const struct between columns = between_pixels(x, factor, small_width);
-        const int a = columns.first, b = columns.next, own = x / factor < small_width ? x / factor : small_width - 1;
-        const int low = cells->low[a] < cells->low[b] ? cells->low[a] : cells->low[b];
-        const int high = cells->high[a] > cells->high[b] ? cells->high[a] : cells->high[b];
-        const int even = (cells->value[a] * (whole - columns.part) + cells->value[b] * columns.part + whole) / (2 * whole);
-        const int plain = here[own] < 0 ? NO_STEPS : here[own] * factor;
-        row[x] = (int16_t)(low >= 0 && high - low <= EVEN && plain >= 0 ? even : plain);
+    const int from = half < job->width ? half : job->width, to = from + (columns - 1) * factor;
+    for (int x = 0; x < from; x++) {
+        row[x] = (int16_t)(here[0] < 0 ? NO_STEPS : here[0] * factor);
+    }
+    if (factor == 2) {
+        between_columns(cells, here, columns, 2, row + from);
+    } else if (factor == 4) {
+        between_columns(cells, here, columns, 4, row + from);
+    } else {
+        between_columns(cells, here, columns, factor, row + from);
+    }
+    for (int x = columns > 1 ? to : from; x < job->width; x++) {
+        row[x] = (int16_t)(here[columns - 1] < 0 ? NO_STEPS : here[columns - 1] * factor);
     }
 }
 
