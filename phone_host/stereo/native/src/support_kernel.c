@@ -271,7 +271,7 @@ static void flag_row(const struct support *job, int y)
         const int value = steps[x], smooth = guide[x], far = value < smooth ? smooth - value : value - smooth;
         const int is_both = (smooth >= 0) & (value >= 0);
         const int px = inside_of((value - smooth) / STEPS_PER_PX + AS_FAR, DROPPED - 1), rise = above[x] < smooth ? smooth - above[x] : above[x] - smooth;
-        apart[x] = (uint8_t)(is_both & (far > much) ? (px > 1 ? px : 1) : NOT_APART);
+        apart[x] = (uint8_t)((is_both & (far > much)) ? (px > 1 ? px : 1) : NOT_APART);
         flags[x] = (uint8_t)(rise > agree ? STEP_ABOVE : 0);
     }
     for (int x = 1; x < width; x++) {
