@@ -27,8 +27,10 @@ def runtime(compiler: tuple[str, ...]) -> str:
     return str(path)
 
 
-def sanitized(folder: Path) -> dict[str, str]:
+@pytest.fixture(scope="module")
+def sanitized(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Build the library with sanitizers; return the environment in which Python can load it."""
+    folder = tmp_path_factory.mktemp("sanitized")
     compiler = find_compiler()
     preload = runtime(compiler)
     build(folder, FLAGS)
@@ -42,20 +44,20 @@ def sanitized(folder: Path) -> dict[str, str]:
     }
 
 
-def test_no_access_outside_and_no_undefined_operation(tmp_path: Path) -> None:
+@pytest.mark.timeout(300)  # building with sanitizers, too
+def test_no_access_outside_and_no_undefined_operation(sanitized: dict[str, str]) -> None:
     """Every other test of this folder passes with the sanitized library, on every instruction set."""
-    environment = sanitized(tmp_path)
     left_out = [f"--ignore={HERE / name}" for name in NOT_AGAIN]
     command = [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *left_out, str(HERE)]
     done = subprocess.run(
-        command, cwd=HERE.parents[1], env=environment, capture_output=True, text=True, check=False, timeout=150
+        command, cwd=HERE.parents[1], env=sanitized, capture_output=True, text=True, check=False, timeout=200
     )
     assert done.returncode == 0, f"{done.stdout[-3000:]}\n{done.stderr[-5000:]}"
 
 
-def test_the_sanitizers_are_on(tmp_path: Path) -> None:
+@pytest.mark.timeout(300)
+def test_the_sanitizers_are_on(sanitized: dict[str, str]) -> None:
     """A cloud that is one row too small for its disparities is reported: the check above would see such a fault."""
-    environment = sanitized(tmp_path)
     code = (
         "import os, numpy as np\n"
         "from pathlib import Path\n"
@@ -65,6 +67,6 @@ def test_the_sanitizers_are_on(tmp_path: Path) -> None:
         "library.pack(PackJob(cloud_m=cloud.ctypes.data, colours=colours.ctypes.data, records=records.ctypes.data,\n"
         "    cloud_stride=270, colour_stride=90, width=90, height=4, channels=1))\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code], env=sanitized, capture_output=True, text=True, check=False)
     assert done.returncode == 99
     assert "heap-buffer-overflow" in done.stderr
