@@ -132,11 +132,11 @@ def remap_cases() -> Iterator[Case]:
 
 
 def match_cases(library: Library) -> Iterator[Case]:
-    """Pairs of all kinds, sizes and strides."""
+    """Pairs of all kinds, sizes and strides, with and without the guide."""
     for case in fixed_cases():
         left, right = case.left, case.right
         whole = [case.width, case.height, case.disparities, case.threads]
-        whole += [left.offset, left.stride, right.offset, right.stride]
+        whole += [left.offset, left.stride, right.offset, right.stride, case.guide]
         found = result_of(library, case)
         yield Case("match", (np.array(whole, "<i4"), left.memory, right.memory, *found))
 
