@@ -167,9 +167,12 @@ def built_program(compiler: str, library: Path, folder: Path) -> Path:
 
 
 def checked(machine: Machine, cases: Path, folder: Path) -> bool:
-    """Build for a machine and compute the cases there; return whether all sets agree."""
-    os.environ["CC"] = machine.compiler
-    program = built_program(machine.compiler, build(folder, ["-Werror"]).path, folder)
+    """Build for a machine, unless another one of its kind was before, and compute the cases there; return whether all sets agree."""
+    program = folder / "check"
+    if not folder.exists():
+        folder.mkdir()
+        os.environ["CC"] = machine.compiler
+        built_program(machine.compiler, build(folder, ["-Werror"]).path, folder)
     done = subprocess.run(
         [machine.emulator, *machine.options, "-E", f"LD_LIBRARY_PATH={folder}", program, cases],
         capture_output=True,
@@ -202,10 +205,7 @@ def main() -> int:
         cases = every_case(library)
         write_cases(folder / "cases", cases)
         print(f"{len(cases)} cases, computed here with {library.simd.text} ({LIBRARY_FILE})")
-        results = []
-        for machine in machines:
-            (folder / machine.name).mkdir()
-            results.append(checked(machine, folder / "cases", folder / machine.name))
+        results = [checked(machine, folder / "cases", folder / machine.compiler) for machine in machines]
     return 0 if all(results) else 4
 
 
