@@ -50,6 +50,17 @@ def test_variants_change_one_value_each_and_the_product_nothing(tmp_path: Path) 
     }
 
 
+def test_a_constant_is_one_number_in_one_place(tmp_path: Path) -> None:
+    """A product of numbers, and one that two files set, cannot be varied."""
+    (tmp_path / "one.h").write_text("enum { SIZE = 6 * 1024, /* bytes */ EDGE = 3 };\n", encoding="ascii")
+    assert current("EDGE", tmp_path) == 3
+    with pytest.raises(VariantError, match=r"SIZE is 6 \* 1024, which is no plain number"):
+        current("SIZE", tmp_path)
+    (tmp_path / "two.c").write_text("enum { EDGE = 4 };\n", encoding="ascii")
+    with pytest.raises(VariantError, match="EDGE is set in 2 places"):
+        current("EDGE", tmp_path)
+
+
 def test_variants_are_one_at_a_time_or_all_combinations() -> None:
     """Three values of two constants, each with the present one: four variants and the present, or eight and the present."""
     step, jump = current("STEP_COST"), current("JUMP_COST")
@@ -58,5 +69,3 @@ def test_variants_are_one_at_a_time_or_all_combinations() -> None:
     assert len(variants_of(choices, grid=True)) == 9
     with pytest.raises(VariantError, match="NOTHING is set in 0 places"):
         variants_of({"NOTHING": (1,)}, grid=False)
-    with pytest.raises(VariantError, match="no plain number"):
-        current("GUIDE_VOLUME")
