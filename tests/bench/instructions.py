@@ -15,6 +15,7 @@ from typing import Final
 _LOGGING: Final = ("-singlestep", "-d", "nochain,exec")
 _BLOCK: Final = b"Trace "
 """How each line of the log begins."""
+_PART: Final = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +57,17 @@ def executed(what: Emulated, repetitions: int) -> int:
     command = [what.emulator, *cpu, *_LOGGING, str(what.program), *what.arguments, str(repetitions)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
-        count, said = 0, b""
-        for line in process.stderr:
-            if line.startswith(_BLOCK):
-                count += 1
-            else:
-                said = line
+        count, rest, said = 0, b"", b""
+        # In large parts: line by line takes several times as long as the emulation.
+        while part := process.stderr.read(_PART):
+            whole, _, rest = (rest + part).rpartition(b"\n")
+            lines = whole.count(b"\n") + bool(whole)
+            blocks = whole.count(b"\n" + _BLOCK) + whole.startswith(_BLOCK)
+            count += blocks
+            if blocks != lines:
+                said = next(line for line in reversed(whole.split(b"\n")) if not line.startswith(_BLOCK))
     if process.returncode or not count:
+        said = rest or said
         raise RuntimeError(f"{command[0]} ended with {process.returncode}: {said.decode(errors='replace').strip()}")
     return count
 

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.model import RectifiedPair
+from phone_host.model import Image, RectifiedPair
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_protocol import ReportingMatcher
 from tests.contract.test_matcher import every_matcher, shifted
 from tests.support.planes import noise, plane
 
@@ -62,6 +63,50 @@ def test_a_bare_patch_gets_its_plane_or_nothing(name: MatcherName) -> None:
     disparity = create_matcher(MatchSettings(name, 32)).match(RectifiedPair(left, right))
     assert invented(disparity[36:84, 68:132], 7) < 0.02
     assert (np.abs(disparity[4:24, 11:-4] - 7) < 0.2).mean() > 0.95
+
+
+@every_matcher
+@pytest.mark.parametrize("levels", [(255, 255), (0, 255), (3, 3)])
+@pytest.mark.parametrize("size", [(1, 300), (300, 1), (2, 2), (17, 64), (65, 16), (290, 130)])
+def test_uniform_images_of_any_size_have_no_disparity(
+    name: MatcherName, size: tuple[int, int], levels: tuple[int, int]
+) -> None:
+    """Black, white and grey, long and flat, in as many rows as are worked on in two parts: no pixel gets a value."""
+    left, right = (np.full(size, level, np.uint8) for level in levels)
+    assert np.isnan(create_matcher(MatchSettings(name, 64)).match(RectifiedPair(left, right))).all()
+
+
+@every_matcher
+def test_constant_rows_give_the_texture_below_its_disparity_alone(name: MatcherName) -> None:
+    """Rows of one level each, another one in each row, above a texture: they have no value, the texture has its own."""
+    pair = shifted(160, 60, 7, seed=8)
+    bands = np.repeat(noise(1, 50, seed=9), 160, axis=1)
+    left, right = (np.vstack([bands, image]) for image in (pair.left, pair.right))
+    disparity = create_matcher(MatchSettings(name, 32)).match(RectifiedPair(left, right))
+    assert np.isnan(disparity[:46]).all()
+    assert (np.abs(disparity[56:-4, 11:-4] - 7) < 0.2).mean() > 0.95
+
+
+@every_matcher
+@pytest.mark.parametrize("width", [1, 2, 3])
+def test_hardly_any_columns_keep_the_rules(name: MatcherName, width: int) -> None:
+    """An image of one to three columns gives its own shape, and no value that points out of the right image."""
+    left, right = (noise(width, 70, seed) for seed in (1, 2))
+    for other in (left, right):
+        disparity = create_matcher(MatchSettings(name, 64)).match(RectifiedPair(left, other))
+        assert disparity.shape == (70, width)
+        assert not ((disparity < 0) | (disparity >= np.arange(width) + 1)).any()
+
+
+@every_matcher
+def test_the_pair_upside_down_has_the_same_disparity(name: MatcherName) -> None:
+    """Both images upside down: what was below is above, with the same disparity."""
+    far, near = shifted(160, 40, 7, seed=5), shifted(160, 40, 12, seed=6)
+    left, right = np.vstack([far.left, near.left]), np.vstack([far.right, near.right])
+    turned = RectifiedPair(left[::-1].copy(), right[::-1].copy())
+    disparity = create_matcher(MatchSettings(name, 32)).match(turned)
+    assert (np.abs(disparity[4:34, 16:-4] - 12) < 0.2).mean() > 0.95
+    assert (np.abs(disparity[46:-4, 11:-4] - 7) < 0.2).mean() > 0.95
 
 
 @every_matcher
@@ -138,7 +183,7 @@ HALVES: Final[dict[str, tuple[Any, Any, Any]]] = {
 @every_matcher
 @pytest.mark.parametrize("level", [0, 255])
 @pytest.mark.parametrize("half", HALVES)
-@pytest.mark.parametrize("which", ["both images", "right image"])
+@pytest.mark.parametrize("which", ["both images", "right image", "left image"])
 def test_a_saturated_half_gets_no_invented_values_and_spares_the_other(
     request: pytest.FixtureRequest, name: MatcherName, which: str, half: str, level: int
 ) -> None:
@@ -151,8 +196,9 @@ def test_a_saturated_half_gets_no_invented_values_and_spares_the_other(
     moved = np.zeros((120, 247), np.bool_)
     moved[:, :240][saturated] = True
     moved[:, 240:] = moved[:, 239:240]
-    right[moved[:, 7:]] = level
-    if which == "both images":
+    if which != "left image":
+        right[moved[:, 7:]] = level
+    if which != "right image":
         left[moved[:, :240]] = level
     disparity = create_matcher(MatchSettings(name, 32)).match(RectifiedPair(left, right))
     assert (np.abs(disparity[rest] - 7) < 0.5).mean() > 0.95
@@ -239,6 +285,39 @@ def test_hostile_pairs_leave_no_trace(name: MatcherName) -> None:
     with pytest.raises(DataError):
         used.match(RectifiedPair(white, white[1:]))
     assert used.match(pair).tobytes() == create_matcher(MatchSettings(name, 48)).match(pair).tobytes()
+
+
+def same(image: Image) -> RectifiedPair:
+    """Both cameras see the same."""
+    return RectifiedPair(image, image.copy())
+
+
+HARD: Final[dict[str, Callable[[], RectifiedPair]]] = {
+    "uniform": lambda: RectifiedPair(np.full((40, 60), 9, np.uint8), np.full((40, 60), 200, np.uint8)),
+    "one column": lambda: RectifiedPair(noise(1, 40, 1), noise(1, 40, 2)),
+    "constant rows": lambda: same(np.repeat(noise(1, 40, 3), 60, axis=1)),
+    "half white": lambda: same(np.hstack([noise(40, 40, 4), np.full((40, 40), 255, np.uint8)])),
+    "unrelated": lambda: RectifiedPair(noise(90, 60, 5), noise(90, 60, 6)),
+    "textured": lambda: shifted(120, 60, 7),
+}
+"""Pairs by what is hard about them."""
+
+
+@every_matcher
+@pytest.mark.parametrize("what", HARD)
+def test_whoever_tells_confidence_tells_it_where_there_is_a_value(name: MatcherName, what: str) -> None:
+    """Confidence has the image's size, is uint8, and is 0 just where there is no value; the disparity is that of `match`."""
+    matcher = create_matcher(MatchSettings(name, 32))
+    if not isinstance(matcher, ReportingMatcher):
+        pytest.skip(f"{name.value} tells no confidence")
+    pair = HARD[what]()
+    found = matcher.matched(pair)
+    assert found.disparity.tobytes() == matcher.match(pair).tobytes()
+    if found.confidence is None:
+        pytest.skip(f"{name.value} tells no confidence")
+    assert found.confidence.dtype == np.uint8
+    assert found.confidence.shape == pair.left.shape[:2]
+    assert ((found.confidence > 0) == np.isfinite(found.disparity)).all()
 
 
 @every_matcher

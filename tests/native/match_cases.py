@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.stereo.match_tandem import GREATEST_SEARCH
 from phone_host.stereo.native.library import Library, MatchJob
 from tests.support.planes import noise, plane
 
@@ -40,6 +41,7 @@ class MatchCase:
         height: px.
         disparities: N, at least 1; more than the width is allowed.
         threads: any number.
+        guide: whether what the images do not support is dropped, and surfaces are completed.
     """
 
     left: Stored
@@ -48,10 +50,14 @@ class MatchCase:
     height: int
     disparities: int
     threads: int = 1
+    guide: bool = False
 
 
 def stored(image: Bytes, pitch: int, *, upside_down: bool) -> Stored:
-    """Lay an image out with `pitch` bytes from row to row, the last row first if `upside_down`."""
+    """Lay an image out with `pitch` bytes from row to row, the last row first if `upside_down`.
+
+    With less than the width, rows share memory: the image is what was written last. 0: every row is the same.
+    """
     height, width = image.shape
     memory = np.full((height - 1) * pitch + width, 99, np.uint8)
     rows = np.lib.stride_tricks.as_strided(memory, (height, width), (pitch, 1))
@@ -86,19 +92,61 @@ def content(kind: str, width: int, height: int, random: np.random.Generator) -> 
     return left, right
 
 
-def random_case(random: np.random.Generator) -> MatchCase:
-    """Make a case of up to 70 x 70 px and 80 disparities."""
+def random_size(random: np.random.Generator) -> tuple[int, int, int]:
+    """Choose width, height and N: mostly of up to 70 px and 80 disparities, now and then far from square or with a vast search."""
     width, height = (int(side) for side in random.integers(1, 71, 2))
-    images = content(str(random.choice(CONTENTS)), width, height, random)
+    disparities = int(random.integers(1, 81))
+    match int(random.integers(0, 16)):
+        case 0:
+            width, height = int(random.integers(100, 1500)), int(random.integers(1, 6))
+        case 1:
+            # Two strips of rows and more.
+            width, height = int(random.integers(1, 12)), int(random.integers(257, 700))
+        case 2:
+            width, height = (int(side) for side in random.integers(1, 20, 2))
+            disparities = int(random.integers(1, GREATEST_SEARCH + 1))
+        case 3:
+            # As large as a guide that is a quarter of the size.
+            width, height, disparities = int(random.integers(200, 400)), int(random.integers(30, 90)), width
+        case _:
+            pass
+    return width, height, disparities
+
+
+def random_stored(image: Bytes, random: np.random.Generator) -> Stored:
+    """Lay an image out with rows padded or packed, and now and then overlapping, either way up."""
+    width = image.shape[1]
+    overlapping = random.integers(0, 8) == 0
+    pitch = int(random.integers(0, width)) if overlapping else width + int(random.integers(0, 9))
+    return stored(image, pitch, upside_down=bool(random.integers(0, 2)))
+
+
+def random_case(random: np.random.Generator) -> MatchCase:
+    """Make a case of any content, size and strides, with or without the guide."""
+    width, height, disparities = random_size(random)
     left, right = (
-        stored(image, width + int(random.integers(0, 9)), upside_down=bool(random.integers(0, 2))) for image in images
+        random_stored(image, random) for image in content(str(random.choice(CONTENTS)), width, height, random)
     )
-    disparities, threads = int(random.integers(1, 81)), int(random.choice((-1, 0, 1, 2, 3, 8)))
-    return MatchCase(left=left, right=right, width=width, height=height, disparities=disparities, threads=threads)
+    return MatchCase(
+        left=left,
+        right=right,
+        width=width,
+        height=height,
+        disparities=disparities,
+        threads=int(random.choice((-1, 0, 1, 2, 3, 8, 1000))),
+        guide=bool(random.integers(0, 2)),
+    )
 
 
 def fixed_cases() -> Iterator[MatchCase]:
-    """Cases for other processors: all contents, sizes around every register's, two strips of rows, a plane with noise."""
+    """Cases for other processors, each without the guide and with it."""
+    for case in unguided_cases():
+        yield case
+        yield replace(case, guide=True)
+
+
+def unguided_cases() -> Iterator[MatchCase]:
+    """All contents, sizes around every register's, two strips of rows, a plane with noise, tiles before a bare wall."""
     random = np.random.default_rng(20)
     sizes = ((1, 1, 1), (1, 9, 64), (9, 1, 5), (15, 8, 16), (16, 17, 33), (31, 5, 80), (64, 16, 63), (65, 33, 64))
     for (width, height, disparities), kind in zip(sizes, CONTENTS, strict=True):
@@ -116,8 +164,24 @@ def fixed_cases() -> Iterator[MatchCase]:
     case = MatchCase(left=left, right=right, width=150, height=290, disparities=48, threads=3)
     yield case
     yield replace(case, disparities=129)
+    yield tiles(random)
     left = stored(noise(120, 40, 6), 120, upside_down=False)
     yield MatchCase(left=left, right=left, width=120, height=40, disparities=100)
+
+
+def tiles(random: np.random.Generator) -> MatchCase:
+    """Make a case that the guide decides: a board of equal tiles on a bare wall, textured at its edge, by two noisy sensors."""
+    wide = noise(230, 130, seed=8)
+    wide[12:-12, 30:-30] = 140
+    y, x = np.indices(wide.shape)
+    wide[40:90, 60:170] = np.where((x // 9 + y // 9) % 2, 200, 60)[40:90, 60:170]
+    left, right = (
+        stored(
+            np.clip(np.rint(view + random.normal(0, 2, view.shape)), 0, 255).astype(np.uint8), 210, upside_down=False
+        )
+        for view in (wide[:, :210], wide[:, 20:])
+    )
+    return MatchCase(left=left, right=right, width=210, height=130, disparities=64, threads=2)
 
 
 def result_of(library: Library, case: MatchCase) -> tuple[NDArray[np.float32], Bytes]:
@@ -135,6 +199,7 @@ def result_of(library: Library, case: MatchCase) -> tuple[NDArray[np.float32], B
         height=case.height,
         disparities=case.disparities,
         threads=case.threads,
+        guide=int(case.guide),
     )
     workspace = np.full(library.match_bytes(job), 0xA5, np.uint8)  # what an earlier pair left must not matter
     job.workspace, job.workspace_bytes = workspace.ctypes.data, workspace.size

@@ -6,18 +6,27 @@ With sanitizers in `test_sanitized`; for longer, `python -m tests.native.fuzz_ma
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phone_host.stereo.native.library import Library, MatchJob, Simd
-from tests.native.match_cases import MatchCase, fixed_cases, random_case, result_of
+from tests.native.match_cases import MatchCase, fixed_cases, random_case, result_of, tiles
 
 CASES = 12
 """Random pairs for each instruction set: few, because sanitizers make them slow; fuzz_match tries more."""
 
 
-def require_sound(library: Library, case: MatchCase) -> None:
-    """Check a result: the bits of plain C with one thread, values only in [0, N), confidence just where there is a value."""
+Result = tuple[NDArray[np.float32], NDArray[np.uint8]]
+
+
+def reference(library: Library, case: MatchCase) -> Result:
+    """What a case must give: the bits of plain C with one thread."""
+    return result_of(library.using(Simd.SCALAR), replace(case, threads=1))
+
+
+def require_sound(library: Library, case: MatchCase, expected: Result | None = None) -> None:
+    """Check a result: the bits of the reference, values only in [0, N), confidence just where there is a value."""
     disparity, confidence = result_of(library, case)
-    expected = result_of(library.using(Simd.SCALAR), replace(case, threads=1))
+    expected = reference(library, case) if expected is None else expected
     assert (disparity.tobytes(), confidence.tobytes()) == tuple(array.tobytes() for array in expected), case
     values = disparity[~np.isnan(disparity)]
     assert ((values >= 0) & (values < case.disparities)).all(), case
@@ -35,6 +44,13 @@ def test_random_cases(library: Library) -> None:
     random = np.random.default_rng(2)
     for _ in range(CASES):
         require_sound(library, random_case(random))
+
+
+def test_the_guide_changes_a_case_that_the_others_are_compared_with(native_library: Library) -> None:
+    """Tiles before a bare wall: with the guide other pixels have values, so comparing its bits compares its work."""
+    case = tiles(np.random.default_rng(20))
+    (plain, _), (guided, _) = (result_of(native_library, replace(case, guide=guide)) for guide in (False, True))
+    assert (np.isnan(plain) != np.isnan(guided)).mean() > 0.05
 
 
 def test_what_the_library_cannot_hold_is_refused(library: Library) -> None:

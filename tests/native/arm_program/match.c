@@ -8,12 +8,12 @@
 #include "cases.h"
 #include "tandem.h"
 
-/* Fields: [width height disparities threads left_offset left_stride right_offset right_stride] i32; left; right;
+/* Fields: [width height disparities threads left_offset left_stride right_offset right_stride guide] i32; left; right;
  * then what must come out: disparity; confidence. */
 int check_match(int32_t isa, const struct one_case *asked)
 {
     const struct field *field = asked->field;
-    int32_t whole[8];
+    int32_t whole[9];
     memcpy(whole, field[0].bytes, sizeof whole);
     struct tandem_match_job job = {
         .left = field[1].bytes + whole[4],
@@ -26,6 +26,7 @@ int check_match(int32_t isa, const struct one_case *asked)
         .height = whole[1],
         .disparities = whole[2],
         .threads = whole[3],
+        .guide = whole[8],
     };
     job.workspace_bytes = tandem_match_bytes(isa, &job);
     job.workspace = malloc((size_t)job.workspace_bytes);
