@@ -89,17 +89,32 @@ def _depth(data: Data) -> Iterator[Figure]:
         row = means[method, case]
         return f"{row['bad2']:.2f} / {row['fill2']:.2f} / {row['density']:.1f} %"
 
-    for case, count in scenes.items():
-        what = f"`sgbm`, {case}, {count} scenes: bad2 / fill2 / density"
-        yield Figure(what, quality("sgbm", case), f"{anchor}: {quality(anchor, case)}")
+    for method in ("tandem", "sgbm"):
+        for case, count in scenes.items():
+            what = f"`{method}`, {case}, {count} scenes: bad2 / fill2 / density"
+            yield Figure(what, quality(method, case), f"{anchor}: {quality(anchor, case)}")
     what = f"`block`, the paper's matcher, all {scenes.total()} cases: bad2 / fill2 / density"
     yield Figure(what, quality("block", ""), f"{anchor}: {quality(anchor, '')}")
-    for method in ("sgbm", "block"):
+    for method in ("tandem", "sgbm", "block"):
         took, beside = (
             f"{_number(row['ms_per_mp'])} ms, CPU {_number(row['cpu_ms_per_mp'])} ms"
             for row in (means[method, ""], means[anchor, ""])
         )
         yield Figure(f"`{method}`, time for a megapixel, mean of the cases", took, f"{anchor}: {beside}")
+
+
+def _matcher(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for row in data["rows"]:
+        ours, theirs = (
+            f"{_number(row[who]['wall_ms'])} ms, CPU {_number(row[who]['cpu_ms'])} ms" for who in ("ours", "theirs")
+        )
+        above = (
+            f"; {row['ours']['cpu_ms'] / row['limit_ms'] / 2:.1f} times the arithmetic limit" if row["limit_ms"] else ""
+        )
+        yield Figure(
+            f"`{data['matcher']}`, {row['part']}, {row['setting']}", ours + above, f"{row['anchor']}: {theirs}"
+        )
 
 
 def _demo(data: Data) -> Iterator[Figure]:
@@ -266,6 +281,8 @@ _BENCH: Final = "python -m tests.bench."
 
 SOURCES: Final = (
     Source("depth", Topic.DEPTH, "Real pairs with ground truth, clean and as cheap cameras give them. bad2: values that are off by more than 2 px. fill2: the same, each gap filled from its row. density: pixels with a value.", f"{_BENCH}bench_depth --json", _depth, 20),
+    Source("accuracy", Topic.DEPTH, "The default matcher beside both of OpenCV's tuned recipes: the same pairs, rendered rooms with hardly any texture, boards of real rigs.", f"{_BENCH}bench_accuracy --json", _verdicts, 100),
+    Source("matcher", Topic.DEPTH, "The default matcher's time beside OpenCV's, in turns, on two threads.", f"{_BENCH}bench_matcher --json", _matcher, 60),
     Source("demo", Topic.DEPTH, "The demo: a rendered scene of known depth, both programs live.", "phone-host demo --out out/figures/demo --json", _demo, 40),
     Source("sizes", Topic.DEPTH, "Photographs of a rendered scene through `phone-host stereo` and a rig, from start to exit. Time counts other jobs of the machine, CPU time does not.", f"{_BENCH}bench_sizes --quick --json", _sizes, 150),
     Source("rig1", Topic.CALIBRATION, "A published rig, 1280x720.", _CALIBRATE.format(left="simplestereo_rig1/calib/*_L.png", right="simplestereo_rig1/calib/*_R.png", board="7x6", square="60.5mm", name="rig1"), _published, 20),
