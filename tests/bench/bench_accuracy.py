@@ -10,7 +10,8 @@ Figures to reach, all on the real scenes: mean ratio to the reference bad2 <= 0.
 >= 96 %; each kind of case alone <= 0.80 in its mean fill2; no case above 1.00 in fill2. On the boards of real rigs
 (depth_boards): bad2 of every rig <= 1.0 %, of every view <= 4 %, right2 not below the first recipe's. Where the matcher reports its
 confidence: on every scene bad2 falls as less is kept; the area above the oracle's curve is at most 0.35 of random
-order's and below that of OpenCV's uniqueness margin (depth_confidence). Exit 4 when one is missed, 3 when there is no
+order's and below that of OpenCV's uniqueness margin (depth_confidence). How constants are chosen with each scene held
+out: depth_variants. Exit 4 when one is missed, 3 when there is no
 SCAN_DATA.
 """
 

@@ -3,7 +3,7 @@
     variants = {f"cost {cost}": lambda count, cost=cost: MyMatcher(count, cost) for cost in (8, 12, 16)}
     print(leave_one_out(variants, default_cases()))
 
-All cases of a scene are left out together: its JPEG is the same scene. A choice is sound when the held-out scenes choose
+For constants of the C sources: depth_variants. All cases of a scene are left out together: its JPEG is the same scene. A choice is sound when the held-out scenes choose
 alike, and when the score that the choices reach on scenes unseen stays near the best that was possible on each.
 """
 

@@ -76,7 +76,7 @@ class Pair:
     """What is swept."""
 
     width: int = 320
-    height: int = 64
+    height: int = 16
     disparities: int = 64
 
     def __str__(self) -> str:

@@ -6,6 +6,7 @@ With sanitizers in `test_sanitized`; for longer, `python -m tests.native.fuzz_ma
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from phone_host.stereo.native.library import Library, MatchJob, Simd
@@ -33,10 +34,16 @@ def require_sound(library: Library, case: MatchCase, expected: Result | None = N
     assert ((confidence > 0) == ~np.isnan(disparity)).all(), case
 
 
-def test_fixed_cases(library: Library) -> None:
-    """Every kind of content, and sizes around those of registers, strips and tiles."""
-    for case in fixed_cases():
-        require_sound(library, case)
+@pytest.fixture(scope="module")
+def fixed(native_library: Library) -> list[tuple[MatchCase, Result]]:
+    """The fixed cases and what they must give; once for all instruction sets, as plain C is slow with sanitizers."""
+    return [(case, reference(native_library, case)) for case in fixed_cases()]
+
+
+def test_fixed_cases(library: Library, fixed: list[tuple[MatchCase, Result]]) -> None:
+    """Every kind of content, and sizes around those of registers, strips and tiles, with and without the guide."""
+    for case, expected in fixed:
+        require_sound(library, case, expected)
 
 
 def test_random_cases(library: Library) -> None:
