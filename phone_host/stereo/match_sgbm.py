@@ -1,4 +1,4 @@
-"""The default matcher: OpenCV's semi-global matching (Hirschmueller, PAMI 30(2), 2008), with our own checks and finishing steps.
+"""The matcher where the native library is not built: OpenCV's semi-global matching (Hirschmueller, PAMI 30(2), 2008), with our own checks and finishing steps.
 
 docs/decisions/0002-sgbm-tuning.md says what each step gains:
 

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from phone_host.model import RectifiedPair
+from phone_host.stereo.match_tandem import TandemMatcher
 from phone_host.stereo.native.library import Library, MatchJob, Simd
 from tests.native.match_cases import MatchCase, fixed_cases, random_case, result_of, tiles
+from tests.support.planes import noise
 
 CASES = 12
 """Random pairs for each instruction set: few, because sanitizers make them slow; fuzz_match tries more."""
@@ -77,3 +80,20 @@ def test_what_the_library_cannot_hold_is_refused(library: Library) -> None:
     job.workspace_bytes = library.match_bytes(job) - 1
     assert library.handle.tandem_match(library.isa, job) == 3
     assert library.handle.tandem_match(99, job) == 1
+
+
+@pytest.mark.parametrize(
+    "size", [(0, 9, 4), (9, -8, 4), (9, 9, 0), (9, 9, -3), (40_000, 9, 4), (9, 40_000, 4), (9, 9, 4000)]
+)
+def test_sizes_that_nobody_can_match_have_no_workspace(native_library: Library, size: tuple[int, int, int]) -> None:
+    """The library itself refuses such sizes, whoever calls it."""
+    width, height, disparities = size
+    assert native_library.match_bytes(MatchJob(width=width, height=height, disparities=disparities, threads=1)) == -1
+
+
+def test_no_value_points_out_of_the_right_image(native_library: Library) -> None:
+    """Neither the average nor the guide leads beyond the first column: the partner of x is at x - d > -1."""
+    for seed in range(300):
+        left, right = (noise(6, 20, seed=2 * seed + side) for side in (0, 1))
+        found = TandemMatcher(14, native_library, 1).match(RectifiedPair(left, right))
+        assert (np.nan_to_num(found) < np.arange(6) + 1).all(), seed

@@ -22,7 +22,8 @@ static inline void bridge(const struct bridges *job, ptrdiff_t before, ptrdiff_t
         return;
     }
     for (int i = 1; i <= gap; i++) {
-        const int value = start + (2 * rise * i + gap + 1) / (2 * (gap + 1));
+        const int part = 2 * rise * i, half = rise < 0 ? -(gap + 1) : gap + 1;
+        const int value = start + (part + half) / (2 * (gap + 1));
         const ptrdiff_t at = before + i * stride;
         if (job->support == NULL || support_allows(job->support, at, value)) {
             job->steps[at] = (int16_t)value;

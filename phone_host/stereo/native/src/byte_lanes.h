@@ -1,7 +1,7 @@
 /* Several bytes side by side: one register of path costs, one lane a disparity.
  *
- * Each instruction set gives the same results; only the number of lanes differs. Lanes beyond the last disparity hold 255, the
- * greatest cost, which never wins and never changes a neighbour: so results do not depend on the number of lanes.
+ * Each instruction set gives the same results; only the number of lanes differs. Lanes beyond the last disparity cost so much
+ * that they never win and never change a neighbour: so results do not depend on the number of lanes.
  *
  * SPDX-License-Identifier: Apache-2.0
  */

@@ -24,6 +24,8 @@ WORDS_INLINE void sort_two(words *a, words *b)
     *a = low;
 }
 
+static const float LAST_STEP_PX = 15.0f / STEPS_PER_PX; /* less than a pixel */
+
 /* Bring the least value to the front and the greatest to the back. */
 WORDS_INLINE void find_ends(words *value, const int count)
 {
@@ -164,7 +166,8 @@ void ISA_NAME(smooth_rows)(const struct finish *job, int from, int to)
                 }
             }
             for (int x = 0; x < count; x++) {
-                const float value = here[x] + sum[x] / weights[x];
+                const float averaged = here[x] + sum[x] / weights[x], most = (float)(start + x) + LAST_STEP_PX;
+                const float value = averaged < most ? averaged : most; /* its partner lies in the right image */
                 disparity[start + x] = here[x] < 0.0f ? NAN : value;
             }
         }

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The costs of a pixel are half of what the sweeps use, so that the sums of eight paths fit a byte where they matter. */
+/* The costs of a pixel are those of the sweeps without the order of neighbours; paths count half, so that the sums of eight fit a byte where they matter. */
 enum {
     GUIDE_LANES = 32,                /* disparities are padded to multiples of it, on every processor */
     GUIDE_VOLUME = 6 * 1024 * 1024,  /* bytes at most; above it the images are made smaller */

@@ -85,8 +85,8 @@ static void guide_laid_out(struct work *work, uint8_t **at)
  *     check        raw disparities left, right | checked | margins
  *     speckles     parents                     | checked | margins, sizes: in `disparity`
  *     support      costs, distance, flags      | checked | margins, regions and the guide at full size: in `disparity`
- *     votes                                    | checked | margins, two planes of steps: in `disparity`
- *     px           rough                       | margins | steps: in `disparity`
+ *     votes                                    | checked | margins, two more planes of steps: in `disparity`
+ *     px           rough                       | steps, then margins
  *     smooth       rough                       | margins | confidence, disparity
  */
 static size_t laid_out(struct work *work, uint8_t *memory)
@@ -341,10 +341,16 @@ static void do_task(void *context, int step, int task, int thread)
     }
 }
 
+static int is_size(const struct tandem_match_job *job)
+{
+    return job->width >= 1 && job->height >= 1 && job->width <= INT16_MAX && job->height <= INT16_MAX && job->disparities >= 1 &&
+           job->disparities <= MOST_DISPARITIES;
+}
+
 int64_t tandem_match_bytes(int32_t isa, const struct tandem_match_job *job)
 {
     struct work work = {.kernels = tandem_kernels_of(isa), .job = (struct tandem_match_job *)(uintptr_t)job};
-    return work.kernels == NULL ? -1 : (int64_t)laid_out(&work, NULL) + 64;
+    return work.kernels == NULL || !is_size(job) ? -1 : (int64_t)laid_out(&work, NULL) + 64;
 }
 
 int32_t tandem_match(int32_t isa, struct tandem_match_job *job)
@@ -353,8 +359,7 @@ int32_t tandem_match(int32_t isa, struct tandem_match_job *job)
     if (work.kernels == NULL) {
         return TANDEM_NO_SUCH_ISA;
     }
-    if (job->width < 1 || job->height < 1 || job->width > INT16_MAX || job->disparities < 1 ||
-        job->disparities > MOST_DISPARITIES) {
+    if (!is_size(job)) {
         return TANDEM_BAD_SIZE;
     }
     if (job->workspace_bytes < tandem_match_bytes(isa, job)) {

@@ -10,7 +10,7 @@ enum {
     SLAB_MOST = 64,
     ISLAND = 100,     /* px of the guide's size: smaller ones are mismatches */
     FAR_PX = 16,      /* a region so far behind the guide is one period off, or seen through the gaps of an object */
-    FILL_COST = 120,   /* a quarter of 25 px with 8 grey levels each: where the guide costs more, it is not taken */
+    FILL_COST = 120,  /* a quarter of 25 px with 19 grey levels each: where the guide costs more, it is not taken */
     UNSURE = 40,      /* mean margin: below it a region goes if the guide costs less than AS_BAD tenths of what it costs */
     AS_BAD = 12,
     WORSE = 20,       /* where the mean margin is DOUBTFUL */
@@ -162,7 +162,7 @@ static struct region summed(const struct support *job, ptrdiff_t at, int count, 
     struct region sum = {.parent = number, .pixels = count};
     for (ptrdiff_t i = at; i < at + count; i++) {
         sum.margin += job->margin[i];
-        sum.apart += job->apart[i] - AS_FAR;
+        sum.apart += job->apart[i];
         sum.own += job->own[i];
         sum.other += job->other[i];
     }
@@ -172,9 +172,9 @@ static struct region summed(const struct support *job, ptrdiff_t at, int count, 
 /* A region goes unless it explains the images better than the guide: the less sure its values are, the more so. */
 static int goes(const struct region *region)
 {
-    const int32_t pixels = region->pixels;
+    const int64_t pixels = region->pixels;
     const int is_doubtful = region->margin < DOUBTFUL * pixels, is_unsure = region->margin < UNSURE * pixels;
-    const int is_behind = region->apart < -FAR_PX * pixels;
+    const int is_behind = region->apart < (AS_FAR - FAR_PX) * pixels;
     const uint32_t tenths = is_unsure && is_behind ? MUCH_WORSE : is_doubtful ? WORSE : is_unsure ? AS_BAD : 0;
     return 10 * (uint64_t)region->other < tenths * (uint64_t)region->own;
 }
@@ -236,7 +236,8 @@ void support_fill(const struct support *job, int from, int to)
     for (int y = 0; y < job->height; y++) {
         const ptrdiff_t at = (ptrdiff_t)y * width;
         for (int x = from; x < to; x++) {
-            if (job->steps[at + x] < 0 && (job->flags[at + x] & FROM_ALL) == FROM_ALL && job->other[at + x] < FILL_COST) {
+            if (job->steps[at + x] < 0 && (job->flags[at + x] & FROM_ALL) == FROM_ALL && job->other[at + x] < FILL_COST &&
+                job->smooth[at + x] <= x * STEPS_PER_PX) {
                 job->steps[at + x] = job->smooth[at + x];
                 job->margin[at + x] = 0; /* no cost was its own */
             }

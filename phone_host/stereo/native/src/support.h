@@ -36,8 +36,8 @@ enum { DOUBTFUL = 20 /* margins below it are no surer than chance */ };
 struct region {
     int32_t parent;
     int32_t pixels;
-    int32_t margin; /* sums over the pixels */
-    int32_t apart;  /* px that the values are nearer than the guide */
+    uint32_t margin; /* sums over the pixels; of more than 16 million they wrap around */
+    uint32_t apart;  /* px that the values are nearer than the guide, AS_FAR more for each pixel */
     uint32_t own, other;
 };
 

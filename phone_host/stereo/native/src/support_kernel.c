@@ -88,7 +88,8 @@ static inline int16_t even_or(const struct guide_cell *cells, int i, int part, i
     const int16_t high = cells->high[i] > cells->high[i + 1] ? cells->high[i] : cells->high[i + 1];
     const int even = (cells->value[i] * (whole - part) + cells->value[i + 1] * part + whole) / (2 * whole);
     const int plain = nearest < 0 ? NO_STEPS : nearest * (whole / 2);
-    return (int16_t)((low >= 0) & (high - low <= EVEN) ? even : plain);
+    const int is_even = (low >= 0) & (high - low <= EVEN);
+    return (int16_t)(is_even ? even : plain);
 }
 
 /* The pixels between the guide's columns; inlined for the usual factor, so that the compiler divides by shifts. */

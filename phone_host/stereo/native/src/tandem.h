@@ -115,7 +115,7 @@ struct tandem_match_job {
     int32_t reserved;
 };
 
-TANDEM_API int64_t tandem_match_bytes(int32_t isa, const struct tandem_match_job *job); /* of the workspace; -1: no such set */
+TANDEM_API int64_t tandem_match_bytes(int32_t isa, const struct tandem_match_job *job); /* of the workspace; -1: no such set, or a size that tandem_match refuses: sides of 1 to 32767 px, 1 to 2048 disparities */
 TANDEM_API int32_t tandem_match(int32_t isa, struct tandem_match_job *job);
 
 /* What these functions return. */
