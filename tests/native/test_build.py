@@ -79,7 +79,7 @@ def test_an_old_compiler_leaves_out_what_it_does_not_know(tmp_path: Path, monkey
 def test_a_build_that_fails_leaves_its_reason(
     compiler: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reason lies where the library would; an older library is removed, and a later build removes the reason."""
+    """The reason lies where the library would, and an older library is removed."""
     (tmp_path / LIBRARY_FILE).write_bytes(b"of yesterday")
     monkeypatch.setenv("CC", compiler)
     assert build_or_explain(tmp_path) == reason
@@ -87,6 +87,12 @@ def test_a_build_that_fails_leaves_its_reason(
     assert isinstance(found, Missing)
     assert (found.reason, found.remedy[:23]) == (f"not built: {reason}", "install gcc or clang an")
     assert fallback_note(found).startswith(f"own matcher not built: {reason}; sgbm is used; install gcc")
+
+
+def test_a_later_build_removes_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once a compiler is installed, nothing is left of the failure."""
+    monkeypatch.setenv("CC", "false")
+    assert build_or_explain(tmp_path) == "false failed: exit 1"
     monkeypatch.delenv("CC")
     assert isinstance(build_or_explain(tmp_path), Built)
     assert not (tmp_path / REASON_FILE).exists()
