@@ -11,7 +11,7 @@ _MOST: Final = 256
 """Reports that are kept: the median of 256 is uncertain by 8 % of their spread."""
 
 _SILENT: Final = MatchReport()
-"""What a matcher is given that reports nothing."""
+"""What a matcher is given that reports nothing; also a pair of which nothing was corrected."""
 
 
 class MatchedMedians:
@@ -20,11 +20,13 @@ class MatchedMedians:
     def __init__(self) -> None:
         self._reports: list[MatchReport] = []
         self._stride, self._count = 1, 0
+        self._told = False
 
     def add(self, report: MatchReport | None) -> None:
-        """Take one pair's report; None, or one that tells nothing, is passed over."""
-        if report is None or replace(report, searched=None) == _SILENT:  # in which range is no correction
+        """Take one pair's report; None is passed over."""
+        if report is None:
             return
+        self._told = self._told or replace(report, searched=None) != _SILENT  # in which range is no correction
         if self._count % self._stride == 0:
             self._reports.append(report)
             if len(self._reports) > _MOST:
@@ -33,8 +35,8 @@ class MatchedMedians:
         self._count += 1
 
     def report(self) -> MatchReport | None:
-        """Return the median of each figure, without confidence; None if the matcher told nothing."""
-        if not self._reports:
+        """Return the median of each figure, without confidence; None if the matcher told nothing, or corrected nothing."""
+        if not self._told:
             return None
 
         def middle(figure: Callable[[MatchReport], float]) -> float:

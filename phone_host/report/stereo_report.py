@@ -229,7 +229,7 @@ def depth_png_words(missing: int) -> str:
     Args:
         missing: how many it cannot hold.
     """
-    return f"{counted(missing, 'depth')} beyond 65.5 m (or below 1 mm) only in xyz.pfm" if missing else ""
+    return f"{counted(missing, 'depth')} beyond 65.5 m (or below 1 mm) missing from depth.png" if missing else ""
 
 
 def told_name(pair: PairReport | FailedPair, *, by_number: bool) -> str:

@@ -145,3 +145,14 @@ def test_a_run_of_stacked_cameras_tells_the_direction_that_was_corrected() -> No
     words = run_corrected_words(MatchReport(vertical_px=-0.3, shading_percent=9), Epipolar.UP)
     assert words.endswith("moved sideways by 0.30 px, one side 9% more than the other")
     assert "moved down by 0.30 px" in run_corrected_words(MatchReport(vertical_px=-0.3))
+
+
+def test_pairs_of_which_nothing_was_corrected_count_in_the_median() -> None:
+    """One pair in a hundred that was moved by 1.5 px is no run that was moved by 1.5 px."""
+    medians = MatchedMedians()
+    for _ in range(99):
+        medians.add(MatchReport())
+    medians.add(MatchReport(vertical_px=1.5))
+    found = medians.report()
+    assert found is not None
+    assert found.vertical_px == 0.0

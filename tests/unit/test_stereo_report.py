@@ -142,7 +142,7 @@ def test_what_the_headline_tells_is_no_warning_beside_it() -> None:
 def test_depths_beyond_a_16_bit_picture_are_a_note_and_no_warning() -> None:
     """Far points are no fault of the result."""
     lines = pair_lines(replace(_PAIR, written=WrittenPair(files=("depth.png",), points=700, not_in_depth_png=12)), "s")
-    assert "note: 12 depths beyond 65.5 m (or below 1 mm) only in xyz.pfm" in lines
+    assert "note: 12 depths beyond 65.5 m (or below 1 mm) missing from depth.png" in lines
     assert not any(line.startswith("warning") for line in lines)
 
 
