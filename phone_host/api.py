@@ -33,11 +33,14 @@ from common.stamp import HOST_CLOCK
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import NEAR_M
+from phone_host.geometry.se3 import SE3
+from phone_host.geometry.triangulate import Intersections, triangulate
 from phone_host.measure.delays import Series
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import trouble_of
 from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
+from phone_host.output.rig_files.imported import Imported, import_rig
 from phone_host.output.rig_yaml import read_rig
 from phone_host.report.run_json import build
 from phone_host.run.host import Host
@@ -52,7 +55,18 @@ from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectify import Rectifier
 from phone_host.sync.fifo import FifoSettings
 
-__all__ = ["Result", "RunSnapshot", "Scanner", "StereoGeometry", "open_scanner"]
+__all__ = [
+    "SE3",
+    "Imported",
+    "Intersections",
+    "Result",
+    "RunSnapshot",
+    "Scanner",
+    "StereoGeometry",
+    "import_rig",
+    "open_scanner",
+    "triangulate",
+]
 
 _DEPTH = 2
 

@@ -17,10 +17,13 @@ from phone_host.verbs.calibrate_time import arguments as calibrate_time
 from phone_host.verbs.demo import arguments as demo
 from phone_host.verbs.doctor import arguments as doctor
 from phone_host.verbs.keys import arguments as keys
+from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
+from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.run import arguments as run
 from phone_host.verbs.settings import arguments as settings
 from phone_host.verbs.stereo import arguments as stereo
+from phone_host.verbs.target import arguments as target
 
 
 class Arguments(Protocol):
@@ -36,16 +39,19 @@ class Arguments(Protocol):
 _VERBS: Final[dict[str, Arguments]] = {
     "demo": demo,
     "run": run,
+    "target": target,
     "calibrate": calibrate,
     "calibrate-time": calibrate_time,
     "stereo": stereo,
+    "measure": measure,
+    "quality": quality,
     "pair": pair,
     "keys": keys,
     "doctor": doctor,
     "settings": settings,
 }
 
-_NATIVE: Final = frozenset({"calibrate", "stereo"})
+_NATIVE: Final = frozenset({"calibrate", "measure", "quality", "stereo"})
 """Verbs that spend seconds in native code on large images."""
 
 _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.
@@ -53,8 +59,9 @@ _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a
 try it without hardware, in half a minute:
   phone-host demo
 
-your own photographs, taken by two cameras side by side (first of a chessboard, then of the scene):
-  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
+your own photographs, taken by two cameras side by side (first of a chessboard that you print, then of the scene):
+  phone-host target chessboard
+  phone-host calibrate left/ right/ --square 25mm --out rig.yaml
   phone-host stereo left/ right/ --calibration rig.yaml --out scans
 
 two photographs whose rows already match, without a calibration:

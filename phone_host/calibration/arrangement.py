@@ -154,6 +154,9 @@ def _orders(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> Iterator[t
     """Give the pairs with their right corners in each order in which the board's symmetry leaves them, the present one first."""
     quarters = (0,) if (board.columns + board.rows) % 2 else (0, 1, 2, 3) if board.columns == board.rows else (0, 2)
     shape = (board.rows, board.columns, 2)
+    if board.marks is not None:  # they tell the corners apart, and are not read in a mirror
+        yield False, pairs
+        return
     for flip in (Flip.NONE, Flip.H):
         turn = Orientation(0, flip)
         right = [turned_corners(pair.right_px, sizes_px[1], turn, board) for pair in pairs]

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 from common.errors import DataError
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.bundle import Vector
+from phone_host.calibration.fit_quality import LensTrial, Squares
+from phone_host.calibration.next_view import NextView
 from phone_host.calibration.target import Corners
 from phone_host.model import Rectification, Rig
 
@@ -85,7 +88,11 @@ class Calibration:
         baseline_sigma_m: standard deviation of the baseline that the corners' noise leaves, m.
         tilts_deg: (V,) angle between each board and the image plane.
         spread: share of the image's width and height that the corners span, the smaller over both cameras.
-        distortion_terms: number of coefficients estimated for each camera.
+        bends: which coefficients were estimated for the left and for the right camera.
+        squares: how large the squares of boards came out that the rig had not seen.
+        depths: depth and the standard uncertainty that the calibration leaves there, m, for some depths.
+        advice: which view would teach most; None: it cannot be told.
+        trials: how the formulas of the left and of the right lens did that were tried.
     """
 
     rig: Rig
@@ -97,4 +104,8 @@ class Calibration:
     baseline_sigma_m: float
     tilts_deg: Vector
     spread: float
-    distortion_terms: int
+    bends: tuple[Bend, Bend]
+    squares: Squares
+    depths: tuple[tuple[float, float], ...] = ()
+    advice: NextView | None = None
+    trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())

@@ -12,9 +12,12 @@ from common.imagesize.head import MOST_PIXELS
 from common.imagesize.head import size_text as px_text
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
+from phone_host.calibration.causes.looks import Look, SeenLook, look_at
 from phone_host.calibration.out_of_step import FileCorners
 from phone_host.calibration.target import Board, Corners, agree, find_corners
-from phone_host.stereo.images import decode_file, open_image
+from phone_host.calibration.threads import side_by_side
+from phone_host.model import Side
+from phone_host.stereo.images import decode_file, open_image, to_grey
 from phone_host.stereo.view_files import ViewFiles
 
 Size = tuple[int, int]
@@ -31,6 +34,7 @@ class BoardViews:
         rejected: all others.
         sizes_px: width and height of the upright left and right images.
         turned: by which turn and mirroring the left and the right images became upright, as their EXIF headers say.
+        looks: how sharp the board is in each image, and how much light has washed out.
         in_order: the corners in all pictures of both sides, where they were paired by order and the counts differ.
     """
 
@@ -39,6 +43,7 @@ class BoardViews:
     sizes_px: tuple[Size, Size]
     turned: Mounted = (UPRIGHT, UPRIGHT)
     in_order: tuple[tuple[FileCorners, ...], tuple[FileCorners, ...]] = ((), ())
+    looks: tuple[SeenLook, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -49,6 +54,7 @@ class _Seen:
     size_px: Size
     turned: Orientation
     corners: Corners
+    look: Look
 
 
 def look_for_boards(
@@ -58,7 +64,7 @@ def look_for_boards(
     most_pixels: int = MOST_PIXELS,
     mounted: Mounted = (UPRIGHT, UPRIGHT),
 ) -> BoardViews:
-    """Read all pairs and find the board in them, one image after the other.
+    """Read all pairs and find the board in them, several pairs at a time.
 
     Args:
         files: the pairs of files.
@@ -78,17 +84,20 @@ def look_for_boards(
     ]
     seen: list[tuple[str, _Seen, _Seen]] = []
     first_problem: DataError | None = None
-    for name, left, right in files.pairs:
+
+    def look(pair: tuple[str, Path, Path]) -> tuple[_Seen, _Seen] | DataError:
         try:
-            one, other = (
-                _look(path, board, most_pixels, turn) for path, turn in zip((left, right), mounted, strict=True)
-            )
+            one, other = (_look(path, board, most_pixels, turn) for path, turn in zip(pair[1:], mounted, strict=True))
         except DataError as error:
-            first_problem = first_problem or error
-            rejected.append(Rejected(name, Reason.UNREADABLE, error.problem))
+            return error
+        return one, other
+
+    for (name, _, _), found in zip(files.pairs, side_by_side(look, files.pairs, advance), strict=True):
+        if isinstance(found, DataError):
+            first_problem = first_problem or found
+            rejected.append(Rejected(name, Reason.UNREADABLE, found.problem))
         else:
-            seen.append((name, one, other))
-        advance()
+            seen.append((name, *found))
     every = _every_file(files, seen, lambda path, index: _look(path, board, most_pixels, mounted[index]))
     if not seen:
         raise first_problem or DataError(
@@ -103,7 +112,12 @@ def look_for_boards(
         else:
             rejected.append(problem)
     return BoardViews(
-        tuple(pairs), tuple(rejected), (usual[0].size_px, usual[1].size_px), (usual[0].turned, usual[1].turned), every
+        tuple(pairs),
+        tuple(rejected),
+        (usual[0].size_px, usual[1].size_px),
+        (usual[0].turned, usual[1].turned),
+        every,
+        tuple(SeenLook(each.file, side, each.look) for _, *both in seen for side, each in zip(Side, both, strict=True)),
     )
 
 
@@ -132,8 +146,15 @@ def _every_file(
 def _look(path: Path, board: Board, most_pixels: int, mounted: Orientation) -> _Seen:
     """Read one image and find the board in it. The pixels are dropped: 50 megapixels take 150 MB."""
     file = open_image(path, most_pixels, mounted)
-    corners = find_corners(decode_file(file), board)
-    return _Seen(file=path.name, size_px=file.size_px, turned=file.head.orientation, corners=corners)
+    grey = to_grey(decode_file(file))
+    corners = find_corners(grey, board)
+    return _Seen(
+        file=path.name,
+        size_px=file.size_px,
+        turned=file.head.orientation,
+        corners=corners,
+        look=look_at(grey, corners, board),
+    )
 
 
 def _problem(name: str, pair: tuple[_Seen, _Seen], usual: tuple[_Seen, _Seen]) -> Rejected | None:

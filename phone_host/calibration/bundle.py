@@ -2,70 +2,86 @@
 
 `cv2.stereoCalibrate` stops far from the optimum when the views say little. (Measured on a real rig with the board at
 1.3 m: it stopped at a baseline of 78.8 mm or 79.6 mm, depending on its start; the optimum, and the published value, is
-80.17 mm.) It also takes only one image size and gives single bad corners full weight. This module uses
-Levenberg-Marquardt on the exact problem, eliminates the board poses by the Schur complement, uses Huber's weights, and
-computes the covariance, which says how well the views determine the rig.
+80.17 mm.) It also takes only one image size, one lens for both cameras, and gives single bad corners full weight. This
+module uses Levenberg-Marquardt on the exact problem (`geometry.schur`), weighs each camera's corners by that camera's own
+noise and by Huber's weights, and computes the covariance, which says how well the views determine the rig.
 
-Source: B. Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000. Derivatives: `cv2.projectPoints`, `cv2.composeRT`.
+Source: B. Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from phone_host.calibration.bundle_problem import (
+    GLOBALS,
+    LEFT,
+    RIGHT,
+    BundleState,
+    BundleView,
+    RigProblem,
+    Vector,
+    errors_of,
+    project_view,
+)
+from phone_host.geometry.schur import inverse_of, minimise
+from phone_host.geometry.se3 import rotations_of
+from phone_host.model import CameraModel, Lens, Rig
 
-CAMERA_PARAMETERS = 9
-"""fx fy cx cy k1 k2 p1 p2 k3."""
+__all__ = [
+    "BundleResult",
+    "BundleState",
+    "BundleView",
+    "FreeParameters",
+    "Vector",
+    "adjust",
+    "adjust_alone",
+    "adjust_roughly",
+    "alone_state",
+    "fit_poses",
+    "project_view",
+    "rig_of",
+    "rms_px",
+]
 
-_RIG = slice(2 * CAMERA_PARAMETERS, 2 * CAMERA_PARAMETERS + 6)
-_GLOBALS = _RIG.stop
-_MAX_STEPS = 200
-_PASSES = 2  # the second pass has a noise estimate that the first one's outliers no longer inflate
-_CONVERGED = 1e-9  # relative decrease of the cost; the baseline then moves by less than a micrometre
-_DAMPING_START, _DAMPING_LEAST, _DAMPING_MOST = 1e-3, 1e-12, 1e12
-# Huber's threshold in standard deviations: at 2.5, Gaussian noise loses 1 % of its information. The factor turns a median of
-# absolute values into a standard deviation (Gaussian).
-_HUBER_SIGMAS, _MEDIAN_TO_SIGMA = 2.5, 1.4826
+_MOST_PASSES = 4  # each has a noise estimate that the outliers of the one before no longer inflate
+_SAME_NOISE = 0.002  # relative change of the noise estimate below which another pass changes nothing
+_JACKKNIFE_VIEWS = 8  # with fewer, leaving one out leaves too little
+_LEAST_LEFT = 1e-6  # share of what all views know that is left without one: rounding must not make it negative
+_TO_MEAN = 0.5  # how far a scatter that a dozen views show is drawn to its mean
+ROUGHLY = 1e-5
+"""Relative decrease of the cost at which a search may end whose result is only compared."""
+_MEDIAN_TO_SIGMA = 1.4826  # turns a median of absolute values into a standard deviation (Gaussian)
 _LEAST_SIGMA_PX = 0.02  # no corner detector is better; with a test's exact corners this keeps the cost quadratic
 # Where the views do not determine the principal point (all boards parallel), this prior keeps it near the middle: a
 # tenth of the image width, ten times more than lenses are off. Views that do determine it outweigh the prior
 # ten-thousandfold.
 _PRINCIPAL_POINT_SHARE = 0.1
+# Numerator and denominator of the rational lens may grow together without end; real ones' coefficients are a few units.
+_RATIONAL_SIGMA = 3.0
+# Coefficients of published fisheye calibrations are a few hundredths; where boards do not reach, a fit is not free to invent a lens
+# that turns back.
+_FISHEYE_SIGMA = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BundleView:
-    """One pair of board views.
+class FreeParameters:
+    """What is estimated beside the poses of the boards.
 
     Attributes:
-        left_px: (N, 2) float64 corners.
-        right_px: (N, 2) float64 corners in the same order.
+        left: (12,) of the left camera's parameters, in the order of `geometry.lens`.
+        right: (12,) of the right camera's.
+        pose: whether the relative pose is.
     """
 
-    left_px: Vector
-    right_px: Vector
+    left: NDArray[np.bool_]
+    right: NDArray[np.bool_]
+    pose: bool = True
 
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class BundleState:
-    """Everything that is estimated.
-
-    Attributes:
-        left: (9,) float64: fx fy cx cy k1 k2 p1 p2 k3.
-        right: (9,) the same.
-        rotation: (3,) rotation vector, right from left.
-        translation_m: (3,) right from left, m.
-        poses: (V, 6) rotation vector and translation, m, of each board in the left camera's axes.
-    """
-
-    left: Vector
-    right: Vector
-    rotation: Vector
-    translation_m: Vector
-    poses: Vector
+    def flags(self) -> NDArray[np.bool_]:
+        """Return (30,) one flag per shared parameter."""
+        return np.concatenate([self.left, self.right, np.full(6, self.pose)])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -74,17 +90,23 @@ class BundleResult:
 
     Attributes:
         state: the optimum.
-        left_errors_px: (V, N, 2) measured minus projected.
+        left_errors_px: (V, N, 2) measured minus projected; NaN where a corner was not seen.
         right_errors_px: (V, N, 2), the same.
-        baseline_sigma_m: standard deviation of the baseline that the corners' noise leaves, m.
-        covariance: (24, 24) of the rig's parameters, in the order of `globals_of`; 0 for those that are not estimated.
+        covariance: (30, 30) of the shared parameters: both cameras' twelve (`geometry.lens`), a small turn of the right camera about
+            its own axes (rad), the translation (m); 0 for those that are not estimated.
     """
 
     state: BundleState
     left_errors_px: Vector
     right_errors_px: Vector
-    baseline_sigma_m: float = field(default=float("nan"))
-    covariance: Vector = field(default_factory=lambda: np.full((_GLOBALS, _GLOBALS), np.nan))
+    covariance: Vector = field(default_factory=lambda: np.full((GLOBALS, GLOBALS), np.nan))
+
+    @property
+    def baseline_sigma_m(self) -> float:
+        """Standard deviation of the baseline that the corners' noise leaves, m."""
+        direction = self.state.translation_m / np.linalg.norm(self.state.translation_m)
+        variance = float(direction @ self.covariance[-3:, -3:] @ direction)
+        return float(np.sqrt(max(variance, 0.0)))
 
     def rms_px(self) -> float:
         """Return the root mean square distance of all corners of both cameras, px (counted like OpenCV's stereoCalibrate)."""
@@ -92,231 +114,163 @@ class BundleResult:
 
     def view_rms_px(self) -> tuple[Vector, Vector]:
         """Return the root mean square distance of each view, (V,) px, left and right."""
-        left, right = ((errors**2).sum(axis=2).mean(axis=1) for errors in (self.left_errors_px, self.right_errors_px))
-        return np.sqrt(left), np.sqrt(right)
+        left, right = (
+            np.sqrt(np.nanmean((errors**2).sum(axis=2), axis=1))
+            for errors in (self.left_errors_px, self.right_errors_px)
+        )
+        return left, right
+
+
+def rig_of(state: BundleState) -> Rig:
+    """Return the rig of a state."""
+    return Rig(
+        left=state.left,
+        right=state.right,
+        R_right_left=rotations_of(state.rotation),
+        t_right_left_m=state.translation_m,
+    )
 
 
 def rms_px(*errors: Vector) -> float:
-    """Return the root mean square length of (..., 2) errors, px."""
+    """Return the root mean square length of (..., 2) errors, px; NaN is left out."""
     stacked = np.concatenate([e.reshape(-1, 2) for e in errors])
-    return float(np.sqrt((stacked**2).sum(axis=1).mean()))
+    return float(np.sqrt(np.nanmean((stacked**2).sum(axis=1))))
 
 
-def adjust(
-    views: list[BundleView],
-    points_m: Vector,
-    start: BundleState,
-    free_camera: NDArray[np.bool_],
-    sizes_px: tuple[tuple[int, int], tuple[int, int]],
-) -> BundleResult:
+def adjust(views: list[BundleView], points_m: Vector, start: BundleState, free: FreeParameters) -> BundleResult:
     """Find the rig that best explains the corners.
 
     Args:
         views: the pairs, V >= 1.
         points_m: (N, 3) corners in the board's axes.
         start: a state close enough: each camera calibrated alone, the relative pose of any one view.
-        free_camera: (9,) which camera parameters are estimated; the others keep their start values.
-        sizes_px: width and height of the left and the right images.
+        free: what is estimated; all else keeps its start value.
 
     Returns:
         The optimum.
     """
-    free = np.concatenate([free_camera, free_camera, np.ones(6, dtype=bool)])
-    expected, information = _prior(sizes_px)
-    state = start
-    for _ in range(_PASSES):
-        sigma_px = _sigma_px(_errors(views, points_m, state))
-        problem = _Problem(views, points_m, (expected, information * sigma_px**2), _HUBER_SIGMAS * sigma_px)
-        state = _minimise(problem, state, free)
-    errors = _errors(views, points_m, state)
-    sigma_px = _sigma_px(errors)
-    problem = _Problem(views, points_m, (expected, information * sigma_px**2), _HUBER_SIGMAS * sigma_px)
-    covariance = np.zeros((_GLOBALS, _GLOBALS))
-    reduced = problem.normal_equations(state).reduced(0.0, free)[0]
-    covariance[np.ix_(free, free)] = np.linalg.pinv(reduced) * sigma_px**2
-    direction = np.zeros(_GLOBALS)
-    direction[_RIG.stop - 3 :] = state.translation_m / np.linalg.norm(state.translation_m)
-    variance = float(direction @ covariance @ direction)
+    flags, prior, state = free.flags(), _prior(start), start
+    problem = _problem(views, points_m, state, prior)
+    for _ in range(_MOST_PASSES):
+        before = problem.sigmas_px
+        state = minimise(problem, state, flags)
+        problem = _problem(views, points_m, state, prior)
+        if np.allclose(problem.sigmas_px, before, rtol=_SAME_NOISE, atol=0):
+            break
+    system = problem.linearised(state)
+    unknown = int(flags.sum()) + 6 * len(views)
+    corners = system.covariance(flags) * problem.count(state) / max(problem.count(state) - unknown, 1)
+    information = system.reduced(0.0, flags)[0]
+    left, right = errors_of(views, points_m, state)
     return BundleResult(
         state=state,
-        left_errors_px=errors[0],
-        right_errors_px=errors[1],
-        baseline_sigma_m=float(np.sqrt(max(variance, 0.0))),
-        covariance=covariance,
+        left_errors_px=left,
+        right_errors_px=right,
+        covariance=_with_scatter(corners, problem, state, information, flags),
     )
 
 
-def project_view(state: BundleState, pose: Vector, points_m: Vector) -> tuple[Vector, Vector]:
-    """Project a board into both cameras, (N, 2) px each.
+def fit_poses(views: list[BundleView], points_m: Vector, state: BundleState) -> BundleResult:
+    """Fit the boards' poses alone to views of a rig that is known.
 
     Args:
-        state: the rig (its poses are ignored).
-        pose: (6,) rotation vector and translation of the board, m.
+        views: the pairs.
         points_m: (N, 3) corners in the board's axes.
+        state: the rig, with a start for each pose.
     """
-    turned = cv2.composeRT(pose[:3], pose[3:], state.rotation, state.translation_m)
-    left = cv2.projectPoints(points_m, pose[:3], pose[3:], *camera_arrays(state.left))[0]
-    right = cv2.projectPoints(points_m, turned[0], turned[1], *camera_arrays(state.right))[0]
-    return np.asarray(left, np.float64).reshape(-1, 2), np.asarray(right, np.float64).reshape(-1, 2)
+    nothing = FreeParameters(np.zeros(RIGHT.start, bool), np.zeros(RIGHT.start, bool), pose=False)
+    problem = _problem(views, points_m, state, _prior(state))
+    fitted = minimise(problem, state, nothing.flags(), ROUGHLY)
+    left, right = errors_of(views, points_m, fitted)
+    return BundleResult(state=fitted, left_errors_px=left, right_errors_px=right)
 
 
-def camera_arrays(parameters: Vector) -> tuple[Vector, Vector]:
-    """Return the (3, 3) camera matrix and the (5,) distortion made of nine parameters."""
-    fx, fy, cx, cy = parameters[:4]
-    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), parameters[4:].copy()
+def adjust_alone(views: list[Vector], points_m: Vector, start: BundleState, free: NDArray[np.bool_]) -> BundleState:
+    """Adjust a single camera, roughly: the left one of a rig whose right one sees nothing.
+
+    Args:
+        views: (N, 2) corners of each view.
+        points_m: (N, 3) corners in the board's axes.
+        start: a state close enough.
+        free: (12,) which of its parameters are estimated.
+    """
+    unseen = [BundleView(corners, np.full(corners.shape, np.nan)) for corners in views]
+    return adjust_roughly(unseen, points_m, start, FreeParameters(free, np.zeros_like(free), pose=False))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _System:
-    """Normal equations in blocks: G for the globals, P_v for each pose, C_v between them; gradients g and p_v."""
-
-    G: Vector
-    C: Vector
-    P: Vector
-    g: Vector
-    p: Vector
-
-    def reduced(self, damping: float, free: NDArray[np.bool_]) -> tuple[Vector, Vector, Vector]:
-        """Eliminate the poses; return matrix and right side for the free globals, and the inverse pose blocks."""
-        poses = self.P + damping * _diagonals(self.P)
-        inverse = np.linalg.inv(poses)
-        coupled = self.C[:, free] @ inverse
-        matrix = self.G[np.ix_(free, free)] - np.einsum("vij,vkj->ik", coupled, self.C[:, free])
-        matrix = matrix + damping * np.diag(np.diag(self.G)[free])
-        right = self.g[free] - np.einsum("vij,vj->i", coupled, self.p)
-        return np.asarray(matrix, np.float64), np.asarray(right, np.float64), np.asarray(inverse, np.float64)
-
-    def step(self, damping: float, free: NDArray[np.bool_]) -> tuple[Vector, Vector]:
-        """Return the damped step: globals (24,), poses (V, 6)."""
-        matrix, right, inverse = self.reduced(damping, free)
-        step = np.zeros(_GLOBALS)
-        step[free] = np.linalg.solve(matrix, right)
-        poses = np.einsum("vij,vj->vi", inverse, self.p - np.einsum("vij,i->vj", self.C, step))
-        return step, poses
+def adjust_roughly(views: list[BundleView], points_m: Vector, start: BundleState, free: FreeParameters) -> BundleState:
+    """Do what `adjust` does, where the start is close, nothing is wrong any more and no uncertainty is asked for."""
+    return minimise(_problem(views, points_m, start, _prior(start)), start, free.flags(), ROUGHLY)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
-    """What stays fixed during a minimisation. The prior is (expected globals, weight relative to squared pixels)."""
-
-    views: list[BundleView]
-    points_m: Vector
-    prior: tuple[Vector, Vector]
-    threshold_px: float
-
-    def cost(self, state: BundleState) -> float:
-        """Return Huber's cost of all corners plus the prior's; infinite if the state gives non-finite projections."""
-        errors = _errors(self.views, self.points_m, state)
-        lengths = np.concatenate([np.linalg.norm(e.reshape(-1, 2), axis=1) for e in errors])
-        if not np.isfinite(lengths).all():
-            return float("inf")
-        inside = np.minimum(lengths, self.threshold_px)
-        off = self.prior[0] - globals_of(state)
-        return float((inside * (2 * lengths - inside)).sum() + (self.prior[1] * off**2).sum())
-
-    def normal_equations(self, state: BundleState) -> "_System":
-        """Linearise at a state."""
-        count = len(self.views)
-        matrix, gradient = np.diag(self.prior[1]), self.prior[1] * (self.prior[0] - globals_of(state))
-        coupling, poses, pose_gradient = np.zeros((count, _GLOBALS, 6)), np.zeros((count, 6, 6)), np.zeros((count, 6))
-        for index, view in enumerate(self.views):
-            errors, by_globals, by_pose = _linearised(view, self.points_m, state, state.poses[index])
-            weights = np.repeat(_huber_weights(errors, self.threshold_px), 2)[:, np.newaxis]
-            flat = errors.reshape(-1)
-            matrix = matrix + by_globals.T @ (weights * by_globals)
-            gradient = gradient + (weights * by_globals).T @ flat
-            coupling[index] = by_globals.T @ (weights * by_pose)
-            poses[index] = by_pose.T @ (weights * by_pose)
-            pose_gradient[index] = (weights * by_pose).T @ flat
-        return _System(G=matrix, C=coupling, P=poses, g=gradient, p=pose_gradient)
-
-
-def _minimise(problem: _Problem, state: BundleState, free: NDArray[np.bool_]) -> BundleState:
-    """Run Levenberg-Marquardt until the cost stops falling."""
-    damping, cost, system = _DAMPING_START, problem.cost(state), problem.normal_equations(state)
-    for _ in range(_MAX_STEPS):
-        try:
-            tried = _moved(state, *system.step(damping, free))
-            tried_cost = problem.cost(tried)
-        except (np.linalg.LinAlgError, cv2.error):  # the step led to invalid numbers
-            tried, tried_cost = state, np.inf
-        if tried_cost < cost:
-            gain, state, cost = (cost - tried_cost) / cost, tried, tried_cost
-            damping = max(damping / 5, _DAMPING_LEAST)
-            if gain < _CONVERGED:
-                break
-            system = problem.normal_equations(state)
-        else:
-            damping *= 10
-            if damping > _DAMPING_MOST:
-                break
-    return state
-
-
-def _linearised(view: BundleView, points_m: Vector, state: BundleState, pose: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return errors (2N, 2) of both cameras, and the derivatives of the projections (4N,) by the globals (24) and by the pose (6)."""
-    rotation, translation, *parts = cv2.composeRT(pose[:3], pose[3:], state.rotation, state.translation_m)
-    left, by_left = cv2.projectPoints(points_m, pose[:3], pose[3:], *camera_arrays(state.left))
-    right, by_right = cv2.projectPoints(points_m, rotation, translation, *camera_arrays(state.right))
-    # composeRT gives, in this order: d rotation by (r1 t1 r2 t2), then d translation by the same.
-    chain = np.vstack([np.hstack(parts[:4]), np.hstack(parts[4:])])
-    half = 2 * len(points_m)
-    by_globals, by_pose = np.zeros((2 * half, _GLOBALS)), np.zeros((2 * half, 6))
-    by_pose[:half] = by_left[:, :6]
-    by_globals[:half, :CAMERA_PARAMETERS] = by_left[:, 6:]
-    through = by_right[:, :6] @ chain
-    by_pose[half:] = through[:, :6]
-    by_globals[half:, _RIG] = through[:, 6:]
-    by_globals[half:, CAMERA_PARAMETERS : 2 * CAMERA_PARAMETERS] = by_right[:, 6:]
-    projected = np.concatenate([np.asarray(left).reshape(-1, 2), np.asarray(right).reshape(-1, 2)])
-    return np.concatenate([view.left_px, view.right_px]) - projected, by_globals, by_pose
-
-
-def _errors(views: list[BundleView], points_m: Vector, state: BundleState) -> tuple[Vector, Vector]:
-    projected = [project_view(state, pose, points_m) for pose in state.poses]
-    left = np.array([view.left_px - seen[0] for view, seen in zip(views, projected, strict=True)])
-    right = np.array([view.right_px - seen[1] for view, seen in zip(views, projected, strict=True)])
-    return left, right
-
-
-def _huber_weights(errors: Vector, threshold_px: float) -> Vector:
-    lengths = np.linalg.norm(errors, axis=1)
-    return np.asarray(threshold_px / np.maximum(lengths, threshold_px), dtype=np.float64)
-
-
-def _sigma_px(errors: tuple[Vector, Vector]) -> float:
-    """Return the robust standard deviation of one coordinate, px."""
-    values = np.abs(np.concatenate([e.reshape(-1) for e in errors]))
-    return max(float(np.median(values)) * _MEDIAN_TO_SIGMA, _LEAST_SIGMA_PX)
-
-
-def _prior(sizes_px: tuple[tuple[int, int], tuple[int, int]]) -> tuple[Vector, Vector]:
-    """Return the expected globals and their weights: 1 / standard deviation squared."""
-    expected, weight = np.zeros(_GLOBALS), np.zeros(_GLOBALS)
-    for side, (width, height) in enumerate(sizes_px):
-        at = side * CAMERA_PARAMETERS + 2
-        expected[at : at + 2] = (width - 1) / 2, (height - 1) / 2
-        weight[at : at + 2] = (_PRINCIPAL_POINT_SHARE * width) ** -2
-    return expected, weight
-
-
-def globals_of(state: BundleState) -> Vector:
-    """Return the 24 parameters of a rig: left camera, right camera, rotation, translation."""
-    return np.concatenate([state.left, state.right, state.rotation, state.translation_m])
-
-
-def _moved(state: BundleState, step: Vector, poses: Vector) -> BundleState:
-    n = CAMERA_PARAMETERS
-    return replace(
-        state,
-        left=state.left + step[:n],
-        right=state.right + step[n : 2 * n],
-        rotation=state.rotation + step[2 * n : 2 * n + 3],
-        translation_m=state.translation_m + step[2 * n + 3 :],
-        poses=state.poses + poses,
+def alone_state(model: CameraModel, poses: Vector) -> BundleState:
+    """Return a single camera as a rig whose right one sees nothing."""
+    return BundleState(
+        left=model, right=model, rotation=np.zeros(3), translation_m=np.array([-1.0, 0.0, 0.0]), poses=poses
     )
 
 
-def _diagonals(blocks: Vector) -> Vector:
-    """Return (V, 6, 6) blocks with everything except their diagonals set to 0."""
-    return np.asarray(blocks * np.eye(blocks.shape[1]), dtype=np.float64)
+def _problem(views: list[BundleView], points_m: Vector, state: BundleState, prior: tuple[Vector, Vector]) -> RigProblem:
+    """Return the problem with each camera's noise as it is at a state."""
+    sigmas = tuple(_sigma_px(errors) for errors in errors_of(views, points_m, state))
+    return RigProblem(views, points_m, prior, (sigmas[0], sigmas[1]))
+
+
+def _with_scatter(
+    corners: Vector, problem: RigProblem, state: BundleState, information: Vector, free: NDArray[np.bool_]
+) -> Vector:
+    """Return the covariance (30, 30) that the scatter from view to view shows, where it exceeds that of independent corners.
+
+    Errors of a view's corners hang together: a board that is not flat, blur, a detector's bias, a lens that the formula does not
+    quite meet. Then views disagree by more than their corners' scatter says. Each view in turn is left out (to first order),
+    and how far the parameters move shows their real covariance (the jackknife of B. Efron, "The Jackknife, the Bootstrap and
+    Other Resampling Plans", 1982). Some dozen views show it but roughly: in units of the corners' covariance, in which all
+    directions are alike, it is averaged with its own mean over the directions (O. Ledoit and M. Wolf, "A well-conditioned estimator
+    for large-dimensional covariance matrices", 2004), and no direction becomes better known than by the corners.
+
+    Args:
+        corners: (30, 30) the covariance that the corners' scatter gives.
+        problem: the views.
+        state: the optimum.
+        information: (F, F) the inverse of it for the free parameters, before the degrees of freedom are counted.
+        free: (30,) which parameters are estimated.
+    """
+    count = len(problem.views)
+    if count < _JACKKNIFE_VIEWS or not free.any():
+        return corners
+    moves = np.zeros((count, int(free.sum())))
+    for index, (pull, known) in enumerate(zip(*problem.by_view(state), strict=True)):
+        rest = information - known[np.ix_(free, free)]
+        np.fill_diagonal(rest, np.maximum(np.diag(rest), _LEAST_LEFT * np.diag(information)))
+        moves[index] = inverse_of(rest) @ pull[free]
+    sigmas = np.sqrt(np.maximum(np.diag(corners)[free], np.finfo(float).tiny))
+    values, axes = np.linalg.eigh(corners[np.ix_(free, free)] / np.outer(sigmas, sigmas))
+    root = axes * np.sqrt(np.maximum(values, _LEAST_LEFT**2))
+    whitened = (moves / sigmas) @ (axes / np.sqrt(np.maximum(values, _LEAST_LEFT**2)))
+    scatter = (count - 1) / count * whitened.T @ whitened
+    scatter = (1 - _TO_MEAN) * scatter + _TO_MEAN * np.trace(scatter) / len(scatter) * np.eye(len(scatter))
+    shares, directions = np.linalg.eigh(scatter)
+    spread = (root @ directions * np.sqrt(np.maximum(shares, 1.0))) * sigmas[:, np.newaxis]
+    result = np.zeros_like(corners)
+    result[np.ix_(free, free)] = spread @ spread.T
+    return result
+
+
+def _sigma_px(errors: Vector) -> float:
+    """Return the robust standard deviation of one coordinate, px."""
+    seen = np.abs(errors[np.isfinite(errors)])
+    return max(float(np.median(seen)) * _MEDIAN_TO_SIGMA, _LEAST_SIGMA_PX) if seen.size else 1.0
+
+
+def _prior(state: BundleState) -> tuple[Vector, Vector]:
+    """Return the expected shared parameters and their weights: 1 / standard deviation squared."""
+    expected, weight = np.zeros(GLOBALS), np.zeros(GLOBALS)
+    for part, model in ((LEFT, state.left), (RIGHT, state.right)):
+        at = part.start + 2
+        expected[at : at + 2] = (model.width_px - 1) / 2, (model.height_px - 1) / 2
+        weight[at : at + 2] = (_PRINCIPAL_POINT_SHARE * model.width_px) ** -2
+        if model.lens is Lens.RATIONAL:
+            weight[part.start + 8 : part.stop] = _RATIONAL_SIGMA**-2
+        elif model.lens is Lens.FISHEYE:
+            weight[part.start + 4 : part.start + 8] = _FISHEYE_SIGMA**-2
+    return expected, weight

@@ -4,65 +4,67 @@ A core: corners in, values out; no files. Every pair is used or rejected with it
 
 Order: each camera alone (any size, any lens) -> the relative pose that most pairs agree on -> bundle adjustment of all
 (`bundle.py`) -> pairs that do not fit are rejected and the adjustment is repeated until nothing changes. If pairs were
-rejected, all of them get a second chance with a wide lens's distortion.
+rejected, all of them get a second chance with lenses that bend more freely. At last each camera gets the lens that best
+predicts views which it was not fitted to (`lens_choice.py`).
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from common.errors import DataError
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected, Used
+from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import (
     BundleResult,
     BundleState,
     BundleView,
+    FreeParameters,
     Vector,
     adjust,
-    camera_arrays,
-    globals_of,
+    rig_of,
     rms_px,
 )
 from phone_host.calibration.calibrate_alone import (
-    FAR_OFF_PX,
     USUAL_PAIRS,
-    Lens,
     LoneCamera,
     calibrate_alone,
     corners_of,
-    off_words,
     own_errors_px,
     require_enough,
     with_poses,
 )
+from phone_host.calibration.fit_quality import LensTrial
+from phone_host.calibration.held_out import held_out_squares
+from phone_host.calibration.lens_choice import choose_lens, grows, is_fisheye
+from phone_host.calibration.misfits import misfits, rms, vertical_errors_px
+from phone_host.calibration.next_view import next_view
 from phone_host.calibration.relative_pose import prediction_errors_px, states_of
+from phone_host.calibration.rig_sigma import DEPTHS_M, depth_sigma_m, zero_sigma_px
 from phone_host.calibration.target import Board, Corners
-from phone_host.calibration.zero_sigma import zero_sigma_px
-from phone_host.model import CameraModel, Rectification, Rig, Side
-from phone_host.stereo.rectify import across_lines_px, rectify_points, rectify_rig
+from phone_host.geometry.lens import PARAMETERS
+from phone_host.geometry.se3 import SE3, rotations_of
+from phone_host.model import CameraModel, Rig, Side
+from phone_host.stereo.rectify import rectify_rig
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 """Width and height of the left and of the right images, px."""
 
-# Camera parameters in the order of bundle.py: fx fy cx cy k1 k2 p1 p2 k3.
-_RADIAL_1 = np.array([1, 1, 1, 1, 1, 0, 0, 0, 0], dtype=bool)
-_USUAL = np.array([1, 1, 1, 1, 1, 1, 1, 1, 0], dtype=bool)
-_FULL = np.ones(9, dtype=bool)
-# The third radial coefficient bends the corners of the image, which few boards reach. It is used only with many pairs
-# and only if it explains 1 % of the error. Of four real rigs one gains that much (0.182 -> 0.178 px); the others gain
-# 0.8 % or less.
-_FULL_PAIRS, _FULL_GAIN = 10, 0.01
+Bends = tuple[Bend, Bend]
+"""How freely the left and the right lens may bend."""
+
+# With fewer pairs a richer lens explains noise. (From eight on, `lens_choice` asks views that were held out.)
+_FREER_PAIRS = 8
+# Real rigs fit to 0.15 to 0.4 px. Above this, lenses that bend more freely are tried even if all pairs were used.
+_POOR_PX = 0.6
 # By how much the error may grow when rejected pairs come back: a twelfth pair with the same noise changes it by some per
 # cent either way, a pair that does not belong by a multiple.
 _CHANCE_LOSS = 0.05
 
-# A pair is rejected when its error is twice the median pair's, but never below this floor: smaller errors do no harm.
-_OUTLIER_FACTOR, _OUTLIER_FLOOR_PX = 2.0, 0.3
-# Row errors carry a third of the information and scatter more from pair to pair.
-_ROWS_FACTOR = 2.5
 # Limits for the right view predicted from the left one, while the cameras are not yet adjusted to each other.
 _MOVED_FACTOR, _MOVED_FLOOR_PX = 5.0, 3.0
 
@@ -85,24 +87,34 @@ def calibrate(
         The calibration, with every pair used or rejected.
 
     Raises:
-        DataError: fewer than three pairs are left.
+        DataError: fewer than three pairs are left, or no lens explains them.
     """
     points_m = board.points_m()
-    fitted = _best_fit(pairs, points_m, sizes_px)
-    return _summed_up(fitted, points_m=points_m, sizes_px=sizes_px, board_side=board_side)
+    try:
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # on the way; the result is checked
+            fitted = _best_fit(pairs, points_m, sizes_px)
+            return summed_up(fitted, points_m=points_m, board_side=board_side)
+    except (cv2.error, np.linalg.LinAlgError) as error:  # corners of no board leave equations that have no solution
+        raise DataError("no lens explains the views", "take new pairs") from error
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Fitted:
-    """A rig fitted to the pairs that it explains: the optimum, those pairs, the others, and which camera parameters were estimated."""
+class Fitted:
+    """A rig fitted to the pairs that it explains: the optimum, those pairs, the others, and how freely each lens bent."""
 
     result: BundleResult
     kept: list[BoardPair]
     rejected: list[Rejected]
-    free: NDArray[np.bool_]
+    bends: Bends
+    free: FreeParameters
+    trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())
+
+    def views(self) -> list[BundleView]:
+        """The pairs that are used, as the adjustment takes them."""
+        return [BundleView(pair.left_px, pair.right_px) for pair in self.kept]
 
 
-def _fitted(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes, lens: Lens) -> _Fitted:
+def _fitted(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes, bends: Bends) -> Fitted:
     """Fit a rig to the pairs, and reject those that do not fit it.
 
     Raises:
@@ -110,45 +122,106 @@ def _fitted(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes, lens: Len
     """
     kept, rejected = list(pairs), list[Rejected]()
     alone: list[LoneCamera] = []
-    for side, size_px in zip(Side, sizes_px, strict=True):
-        kept, out, camera = calibrate_alone(kept, side, points_m, size_px, lens)
+    for side, size_px, bend in zip(Side, sizes_px, bends, strict=True):
+        kept, out, camera = calibrate_alone(kept, side, points_m, size_px, bend)
         rejected += out
         alone.append(camera)
     left, right = (with_poses(camera, kept, points_m) for camera in alone)
     start, kept, out = _agreed_start(kept, points_m, left, right)
-    rejected += out
-    result, kept, out, free = _adjust_robustly(kept, points_m, start, sizes_px, lens)
-    return _Fitted(result=result, kept=kept, rejected=rejected + out, free=free)
+    fitted = _adjust_robustly(kept, points_m, start, bends)
+    return replace(fitted, rejected=[*rejected, *out, *fitted.rejected])
 
 
-def _best_fit(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> _Fitted:
-    """Fit a rig. If pairs are rejected, judge all of them again with a wide lens's distortion; keep that if it explains more pairs, and no worse.
+def _best_fit(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Fitted:
+    """Fit a rig. If pairs are rejected, judge all of them again with freer lenses; keep those if they explain more pairs, and no worse.
 
     Raises:
         DataError: fewer than three pairs are left.
     """
+    failure: DataError | None = None
+    best: Fitted | None = None
     try:
-        first = _fitted(pairs, points_m, sizes_px, Lens.USUAL)
-    except DataError:
-        second = _with_wide_lens(pairs, points_m, sizes_px)
-        if second is None:
-            raise
-        return second
-    second = _with_wide_lens(pairs, points_m, sizes_px) if first.rejected else None
-    if second is None or len(second.kept) <= len(first.kept):
-        return first
-    return second if second.result.rms_px() <= (1 + _CHANCE_LOSS) * first.result.rms_px() else first
+        best = _fitted(pairs, points_m, sizes_px, (Bend.USUAL, Bend.USUAL))
+    except DataError as error:
+        failure = error
+    for bends in _second_chances(pairs, points_m, sizes_px):
+        if best is not None and not best.rejected and best.result.rms_px() < _POOR_PX:
+            break
+        other = _with_freer_lenses(pairs, points_m, sizes_px, bends)
+        if other is not None and (best is None or _explains_more(other, best)):
+            best = other
+    if best is None:
+        raise failure or DataError("no lens explains the views", "take new pairs")
+    return _with_chosen_lenses(best, pairs, points_m)
 
 
-def _with_wide_lens(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> _Fitted | None:
-    """Fit a rig with a wide lens's distortion; None if there are too few pairs for it or it leads nowhere."""
-    if len(pairs) < _FULL_PAIRS:
-        return None
+def _second_chances(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Iterator[Bends]:
+    """Yield how freely lenses may bend, after the usual way: both wide, then a fisheye where it explains a camera's views far better."""
+    if len(pairs) < _FREER_PAIRS:
+        return
+    yield Bend.WIDE, Bend.WIDE
+    left, right = (
+        Bend.FISHEYE if is_fisheye([corners_of(pair, side) for pair in pairs], points_m, size_px) else Bend.USUAL
+        for side, size_px in zip(Side, sizes_px, strict=True)
+    )
+    if Bend.FISHEYE in {left, right}:
+        yield left, right
+
+
+def _explains_more(other: Fitted, best: Fitted) -> bool:
+    """Return whether another fit explains more pairs and no worse, or as many and clearly better."""
+    error, former = other.result.rms_px(), best.result.rms_px()
+    if len(other.kept) == len(best.kept):
+        return former > _POOR_PX and error < former / 2
+    return len(other.kept) > len(best.kept) and error <= (1 + _CHANCE_LOSS) * former
+
+
+def _with_freer_lenses(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes, bends: Bends) -> Fitted | None:
+    """Fit a rig with lenses that bend more freely; None if it leads nowhere."""
     try:
-        fitted = _fitted(pairs, points_m, sizes_px, Lens.WIDE)
+        fitted = _fitted(pairs, points_m, sizes_px, bends)
     except (DataError, cv2.error, np.linalg.LinAlgError):  # the richer model may fail where the usual one holds
         return None
-    return fitted if _all_invertible(fitted.result.state, sizes_px) else None
+    return fitted if _both_grow(fitted.result.state) else None
+
+
+def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector) -> Fitted:
+    """Give each camera the lens that best predicts views which it was not fitted to, and adjust once more."""
+    state = fitted.result.state
+    relative = SE3(rotations_of(state.rotation), state.translation_m)
+    right_poses = np.array([(relative @ SE3.of(pose)).pose() for pose in state.poses])
+    found = [
+        choose_lens([corners_of(pair, side) for pair in fitted.kept], points_m, model, poses, bend)
+        for side, model, poses, bend in zip(
+            Side, (state.left, state.right), (state.poses, right_poses), fitted.bends, strict=True
+        )
+    ]
+    bends = (found[0][0].bend, found[1][0].bend)
+    fitted = replace(fitted, trials=(tuple(found[0][1]), tuple(found[1][1])))
+    if bends == fitted.bends:
+        return fitted
+    free = FreeParameters(bends[0].free(), bends[1].free())
+    cameras = [
+        trial.model if trial.bend is not bend else model
+        for (trial, _), bend, model in zip(found, fitted.bends, (state.left, state.right), strict=True)
+    ]
+    result = adjust(fitted.views(), points_m, replace(state, left=cameras[0], right=cameras[1]), free)
+    if not _both_grow(result.state) or result.rms_px() > (1 + _CHANCE_LOSS) * fitted.result.rms_px():
+        return fitted
+    chosen = replace(fitted, result=result, bends=bends, free=free)
+    return _with_pairs_that_came_back(chosen, pairs, points_m) if fitted.rejected else chosen
+
+
+def _with_pairs_that_came_back(fitted: Fitted, pairs: list[BoardPair], points_m: Vector) -> Fitted:
+    """Judge all pairs anew by lenses that were chosen after some had been rejected; keep that if it explains more of them, and no worse."""
+    state = fitted.result.state
+    start = replace(state, poses=np.array([fit_pose(points_m, pair.left_px, state.left) for pair in pairs]))
+    try:
+        again = _adjust_robustly(pairs, points_m, start, fitted.bends)
+    except (DataError, cv2.error, np.linalg.LinAlgError):
+        return fitted
+    again = replace(again, trials=fitted.trials)
+    return again if _explains_more(again, fitted) and _both_grow(again.result.state) else fitted
 
 
 def _agreed_start(
@@ -180,129 +253,84 @@ def _agreed_start(
 
 
 def _adjust_robustly(
-    pairs: list[BoardPair], points_m: Vector, start: BundleState, sizes_px: Sizes, lens: Lens
-) -> tuple[BundleResult, list[BoardPair], list[Rejected], NDArray[np.bool_]]:
-    """Adjust, reject the worst pair and adjust again until all fit; then choose the distortion model."""
+    pairs: list[BoardPair], points_m: Vector, start: BundleState, bends: Bends, known: FreeParameters | None = None
+) -> Fitted:
+    """Adjust, reject the worst pair and adjust again until all fit. With `known`, only what it says is estimated."""
     rejected: list[Rejected] = []
     while True:
-        free = _FULL if lens is Lens.WIDE else _USUAL if len(pairs) >= USUAL_PAIRS else _RADIAL_1
-        views = [BundleView(pair.left_px, pair.right_px) for pair in pairs]
-        result = adjust(views, points_m, start, free, sizes_px)
-        misfits = _misfits(pairs, result, points_m, sizes_px)
-        if not misfits:
-            break
-        worst, why = misfits[0]  # one at a time: the worst pair distorts the errors of the others
+        if len(pairs) < USUAL_PAIRS and known is None:
+            bends = (Bend.RADIAL, Bend.RADIAL)
+        free = FreeParameters(bends[0].free(), bends[1].free()) if known is None else known
+        result = adjust([BundleView(pair.left_px, pair.right_px) for pair in pairs], points_m, start, free)
+        found = misfits(pairs, result, points_m)
+        if not found:
+            return Fitted(result=result, kept=pairs, rejected=rejected, bends=bends, free=free)
+        worst, why = found[0]  # one at a time: the worst pair distorts the errors of the others
         rejected.append(why)
         pairs = [pair for index, pair in enumerate(pairs) if index != worst]
         require_enough(pairs, rejected)
         start = replace(result.state, poses=np.delete(result.state.poses, worst, axis=0))
-    if lens is Lens.USUAL and len(pairs) >= _FULL_PAIRS:
-        full = adjust(views, points_m, result.state, _FULL, sizes_px)
-        if full.rms_px() < (1 - _FULL_GAIN) * result.rms_px() and _all_invertible(full.state, sizes_px):
-            return full, pairs, rejected, _FULL
-    return result, pairs, rejected, free
 
 
-def _misfits(
-    pairs: list[BoardPair], result: BundleResult, points_m: Vector, sizes_px: Sizes
-) -> list[tuple[int, Rejected]]:
-    """Find pairs that fit much worse than the others, worst first: by reprojection error, or by rows that do not match."""
-    errors = np.max(result.view_rms_px(), axis=0)
-    usual = float(np.median(errors))
-    by_error = errors / max(_OUTLIER_FACTOR * usual, _OUTLIER_FLOOR_PX)
-    found = [
-        (
-            by_error[index],
-            index,
-            _misfit(pairs[index], result.state, points_m, error_px=float(errors[index]), usual_px=usual),
-        )
-        for index in np.flatnonzero(by_error > 1)
-    ]
-    try:
-        rig = _rig(result.state, sizes_px)
-        rectification = rectify_rig(rig)
-    except DataError:  # swapped, vertical, ...: the same check reports it at the end
-        vertical = np.zeros(len(pairs))
-    else:
-        vertical = np.array([_rms(_vertical_errors_px(pair, rig, rectification)) for pair in pairs])
-    usual = float(np.median(vertical))
-    by_rows = vertical / max(_ROWS_FACTOR * usual, _OUTLIER_FLOOR_PX)
-    found += [
-        (
-            by_rows[index],
-            index,
-            Rejected(
-                pairs[index].name,
-                Reason.MOVED,
-                f"rows of left and right differ by {vertical[index]:.2f} px, others by {usual:.2f} px: board or cameras"
-                " moved between the two exposures",
-            ),
-        )
-        for index in np.flatnonzero(by_rows > 1)
-    ]
-    return [(int(index), why) for _, index, why in sorted(found, key=lambda each: -each[0])]
+def _both_grow(state: BundleState) -> bool:
+    return grows(state.left) and grows(state.right)
 
 
-def _all_invertible(state: BundleState, sizes_px: Sizes) -> bool:
-    """Return whether both radial models grow all the way to the image's corners; if one folds back, the fit has failed."""
-    return all(_grows(parameters, size) for parameters, size in zip((state.left, state.right), sizes_px, strict=True))
+def fit_of_known_lenses(pairs: list[BoardPair], points_m: Vector, rig: Rig, bends: Bends) -> Fitted:
+    """Fit the relative pose alone, and reject pairs that do not fit it.
+
+    Args:
+        pairs: the pairs.
+        points_m: (N, 3) corners in the board's axes.
+        rig: whose lenses are kept.
+        bends: what its lenses are.
+
+    Raises:
+        DataError: fewer than three pairs are left.
+    """
+    require_enough(pairs, [])
+    left, right = (
+        with_poses(LoneCamera(side, model, np.empty((0, 6))), pairs, points_m)
+        for side, model in ((Side.LEFT, rig.left), (Side.RIGHT, rig.right))
+    )
+    start, kept, rejected = _agreed_start(pairs, points_m, left, right)
+    nothing = np.zeros(PARAMETERS, bool)
+    fitted = _adjust_robustly(kept, points_m, start, bends, FreeParameters(nothing, nothing))
+    return replace(fitted, rejected=[*rejected, *fitted.rejected])
 
 
-def _grows(parameters: Vector, size_px: tuple[int, int]) -> bool:
-    fx, fy, cx, cy, k1, k2, _, _, k3 = parameters
-    farthest = math.hypot(max(cx, size_px[0] - cx) / fx, max(cy, size_px[1] - cy) / fy)
-    radii = np.linspace(
-        0, farthest * 1.1, 200
-    )  # the distorted radius is the image's; the true one may be a tenth larger
-    return bool((1 + 3 * k1 * radii**2 + 5 * k2 * radii**4 + 7 * k3 * radii**6 > 0).all())
+def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibration:
+    """Make a rig and its figures from the optimum.
 
-
-def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: float, usual_px: float) -> Rejected:
-    """Say why a pair does not fit: fitting each view alone shows whether corners jump or the board moved."""
-    own = {
-        side: rms_px(own_errors_px(points_m, corners_of(pair, side), parameters))
-        for side, parameters in ((Side.LEFT, state.left), (Side.RIGHT, state.right))
-    }
-    side = max(own, key=lambda each: own[each])
-    # If a view fitted alone already has more than half of the error, the fault is in its corners.
-    if own[side] > error_px / 2:
-        reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
-        detail = f"corners in the {side.value} image are off {off_words(own[side], usual_px)}"
-        if own[side] > FAR_OFF_PX:
-            detail += ": the two images may not belong together"
-    else:
-        reason = Reason.MOVED
-        detail = f"each view fits alone, together they are off {off_words(error_px, usual_px)}: " + (
-            "the two images do not belong together"
-            if error_px > FAR_OFF_PX
-            else "board or cameras moved between the two exposures"
-        )
-    return Rejected(pair.name, reason, detail)
-
-
-def _summed_up(fitted: _Fitted, *, points_m: Vector, sizes_px: Sizes, board_side: Side) -> Calibration:
-    """Make a rig and its figures from the optimum."""
+    Args:
+        fitted: the optimum.
+        points_m: (N, 3) corners in the board's axes.
+        board_side: which camera is the board's.
+    """
     result, pairs = fitted.result, fitted.kept
     state = result.state
     rig = replace(
-        _rig(state, sizes_px),
+        rig_of(state),
+        covariance=result.covariance,
         board_side=board_side,
         rms_left_px=_alone_rms_px(pairs, Side.LEFT, points_m, state.left),
         rms_right_px=_alone_rms_px(pairs, Side.RIGHT, points_m, state.right),
         rms_stereo_px=result.rms_px(),
     )
-    rectification, obstacle = None, None
-    vertical = np.full((len(pairs), len(points_m)), np.nan)
+    rectification, obstacle, advice = None, None, None
+    vertical = [np.full(1, np.nan)] * len(pairs)
+    depths: tuple[tuple[float, float], ...] = ()
     try:
         rectification = rectify_rig(rig)
     except DataError as error:
         obstacle = error
     else:
-        vertical = np.array([_vertical_errors_px(pair, rig, rectification) for pair in pairs])
-        sigma_px = zero_sigma_px(result.covariance, globals_of(state), rig, rectification)
-        rig = replace(rig, zero_sigma_px=sigma_px)
+        vertical = [vertical_errors_px(pair, rig, rectification) for pair in pairs]
+        rig = replace(rig, zero_sigma_px=zero_sigma_px(rig, rectification))
+        depths = tuple((depth_m, depth_sigma_m(rig, rectification, depth_m)) for depth_m in DEPTHS_M)
+        advice = next_view(result, fitted.free, points_m, rectification)
     used = tuple(
-        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=_rms(v))
+        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=rms(v))
         for pair, a, b, v in zip(pairs, *result.view_rms_px(), vertical, strict=True)
     )
     return Calibration(
@@ -311,47 +339,31 @@ def _summed_up(fitted: _Fitted, *, points_m: Vector, sizes_px: Sizes, board_side
         obstacle=obstacle,
         used=used,
         rejected=tuple(fitted.rejected),
-        vertical_px=np.abs(vertical).ravel(),
+        vertical_px=np.abs(np.concatenate(vertical)),
         baseline_sigma_m=result.baseline_sigma_m,
         tilts_deg=np.array([_tilt_deg(pose) for pose in state.poses]),
         spread=min(
-            _spread([corners_of(pair, side) for pair in pairs], size) for side, size in zip(Side, sizes_px, strict=True)
+            _spread([corners_of(pair, side) for pair in pairs], (model.width_px, model.height_px))
+            for side, model in ((Side.LEFT, state.left), (Side.RIGHT, state.right))
         ),
-        distortion_terms=int(fitted.free[4:].sum()),
+        bends=fitted.bends,
+        squares=held_out_squares(pairs, points_m, state, fitted.free),
+        depths=depths,
+        advice=advice,
+        trials=fitted.trials,
     )
 
 
-def _rig(state: BundleState, sizes_px: Sizes) -> Rig:
-    left, right = _model(sizes_px[0], state.left), _model(sizes_px[1], state.right)
-    rotation = np.asarray(cv2.Rodrigues(state.rotation)[0], dtype=np.float64)
-    return Rig(left=left, right=right, R_right_left=rotation, t_right_left_m=state.translation_m)
-
-
-def _model(size_px: tuple[int, int], parameters: Vector) -> CameraModel:
-    matrix, distortion = camera_arrays(parameters)
-    return CameraModel(width_px=size_px[0], height_px=size_px[1], matrix=matrix, distortion=distortion)
-
-
-def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, parameters: Vector) -> float:
-    return rms_px(*(own_errors_px(points_m, corners_of(pair, side), parameters) for pair in pairs))
-
-
-def _vertical_errors_px(pair: BoardPair, rig: Rig, rectification: Rectification) -> Vector:
-    left = rectify_points(pair.left_px, rig.left, rectification.R_left, rectification.geometry)
-    right = rectify_points(pair.right_px, rig.right, rectification.R_right, rectification.geometry)
-    return across_lines_px(left, right, rectification.epipolar)
-
-
-def _rms(values: Vector) -> float:
-    return float(np.sqrt((values**2).mean()))
+def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, model: CameraModel) -> float:
+    return rms_px(*(own_errors_px(points_m, corners_of(pair, side), model) for pair in pairs))
 
 
 def _tilt_deg(pose: Vector) -> float:
     """Return the angle between a board and the left image plane."""
-    normal_z = abs(float(np.asarray(cv2.Rodrigues(pose[:3])[0])[2, 2]))
+    normal_z = abs(float(rotations_of(pose[:3])[2, 2]))
     return math.degrees(math.acos(min(normal_z, 1.0)))
 
 
 def _spread(views: list[Corners], size_px: tuple[int, int]) -> float:
     corners = np.concatenate(views)
-    return float((np.ptp(corners, axis=0) / np.array(size_px)).min())
+    return float(((np.nanmax(corners, axis=0) - np.nanmin(corners, axis=0)) / np.array(size_px)).min())

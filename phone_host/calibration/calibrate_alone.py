@@ -1,17 +1,21 @@
-"""Calibrates one camera alone with OpenCV, without views that are plainly wrong. Gives `calibrate.py` its start."""
+"""Calibrates one camera alone, without views that are plainly wrong. Gives `calibrate.py` its start. Pure."""
 
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Final
 
 import cv2
 import numpy as np
 
 from common.errors import DataError
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
-from phone_host.calibration.bundle import Vector, camera_arrays
+from phone_host.calibration.board_pose import fit_pose
+from phone_host.calibration.bundle import Vector
+from phone_host.calibration.fisheye_start import fisheye_camera
 from phone_host.calibration.target import Corners
-from phone_host.model import Side
+from phone_host.geometry.lens import project
+from phone_host.geometry.se3 import SE3
+from phone_host.model import CameraModel, Side
 
 LEAST_PAIRS = 3
 """Fewer pairs do not determine focal length and distortion (Zhang 2000: two views suffice only without distortion)."""
@@ -23,21 +27,9 @@ USUAL_PAIRS = 5
 _GROSS_FACTOR, _GROSS_FLOOR_PX = 4.0, 1.0
 
 
-class Lens(Enum):
-    """Which distortion is estimated while pairs are judged.
-
-    Attributes:
-        USUAL: k1 k2 p1 p2, as the lenses of webcams and phones need.
-        WIDE: k3 as well. Without it, a wide lens's views of the image's corners look like wrong corners.
-    """
-
-    USUAL = "usual"
-    WIDE = "wide"
-
-
 _STEPS = {
-    Lens.USUAL: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, np.finfo(float).eps),
-    Lens.WIDE: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 300, np.finfo(float).eps),
+    Bend.USUAL: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, np.finfo(float).eps),
+    Bend.WIDE: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 300, np.finfo(float).eps),
 }
 """OpenCV's own limit is 30 steps. With k3 that leaves views of a wide lens off by 10 px, which then look wrong."""
 
@@ -48,10 +40,10 @@ FAR_OFF_PX: Final = 1000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoneCamera:
-    """One camera calibrated alone: its parameters, and the poses (V, 6) of the boards in its axes."""
+    """One camera calibrated alone: its model, and the poses (V, 6) of the boards in its axes."""
 
     side: Side
-    parameters: Vector
+    parameters: CameraModel
     poses: Vector
 
 
@@ -81,7 +73,7 @@ def _misfits(rejected: list[Rejected]) -> bool:
 
 
 def calibrate_alone(
-    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int], lens: Lens = Lens.USUAL
+    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int], bend: Bend = Bend.USUAL
 ) -> tuple[list[BoardPair], list[Rejected], LoneCamera]:
     """Calibrate one camera; reject views that are plainly wrong until none is left.
 
@@ -90,7 +82,7 @@ def calibrate_alone(
         side: which of their views to look at.
         points_m: (N, 3) corners in the board's axes.
         size_px: width and height of the side's images.
-        lens: how its lens may bend.
+        bend: how freely its lens may bend.
 
     Returns:
         The pairs left, those rejected, and the camera with one pose for each pair left.
@@ -102,7 +94,7 @@ def calibrate_alone(
     reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
     while True:
         require_enough(pairs, rejected)
-        camera, errors = _opencv_camera(pairs, side, points_m, size_px, lens)
+        camera, errors = _camera(pairs, side, points_m, size_px, bend)
         limit = max(_GROSS_FACTOR * float(np.median(errors)), _GROSS_FLOOR_PX)
         if errors.max() <= limit:
             return pairs, rejected, camera
@@ -131,25 +123,47 @@ def off_words(error_px: float, usual_px: float) -> str:
     return f"{error}, others {usual}"
 
 
-def _opencv_camera(
-    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int], lens: Lens
+def _camera(
+    pairs: list[BoardPair], side: Side, points_m: Vector, size_px: tuple[int, int], bend: Bend
 ) -> tuple[LoneCamera, Vector]:
-    """OpenCV's calibration of one camera, and each view's root mean square error, px."""
-    flags = cv2.CALIB_ZERO_TANGENT_DIST | (0 if lens is Lens.WIDE else cv2.CALIB_FIX_K3)
-    if len(pairs) < USUAL_PAIRS:
+    """Calibrate one camera from all of the views; return it and each view's root mean square error, px."""
+    views = [corners_of(pair, side) for pair in pairs]
+    if bend is Bend.FISHEYE:
+        model, poses = fisheye_camera(views, points_m, size_px)
+    else:
+        model, poses = _opencv_camera(views, points_m, size_px, bend)
+    errors = [
+        corners - project(SE3.of(pose).apply(points_m), model) for corners, pose in zip(views, poses, strict=True)
+    ]
+    rms = np.array([np.sqrt(np.nanmean((each**2).sum(axis=1))) for each in errors])
+    return LoneCamera(side, model, poses), np.where(np.isfinite(rms), rms, np.inf)
+
+
+def _opencv_camera(
+    views: list[Corners], points_m: Vector, size_px: tuple[int, int], bend: Bend
+) -> tuple[CameraModel, Vector]:
+    """OpenCV's calibration of one camera: its model, and the poses (V, 6)."""
+    flags = cv2.CALIB_ZERO_TANGENT_DIST | (0 if bend is Bend.WIDE else cv2.CALIB_FIX_K3)
+    if len(views) < USUAL_PAIRS:
         flags |= cv2.CALIB_FIX_K2
-    _, matrix, distortion, turns, shifts, _, _, errors = cv2.calibrateCameraExtended(
-        [points_m.astype(np.float32)] * len(pairs),
-        [corners_of(pair, side).astype(np.float32).reshape(-1, 1, 2) for pair in pairs],
+    seen = [np.isfinite(corners).all(axis=1) for corners in views]
+    _, matrix, distortion, turns, shifts = cv2.calibrateCamera(
+        [points_m[known].astype(np.float32) for known in seen],
+        [corners[known].astype(np.float32).reshape(-1, 1, 2) for corners, known in zip(views, seen, strict=True)],
         size_px,
         np.eye(3),
         np.zeros(5),
         flags=flags,
-        criteria=_STEPS[lens],
+        criteria=_STEPS.get(bend, _STEPS[Bend.USUAL]),
     )
-    parameters = np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *np.ravel(distortion)[:5]])
-    poses = np.array([np.concatenate([np.ravel(r), np.ravel(t)]) for r, t in zip(turns, shifts, strict=True)])
-    return LoneCamera(side, parameters.astype(np.float64), poses), np.asarray(errors, dtype=np.float64).ravel()
+    model = CameraModel(
+        width_px=size_px[0],
+        height_px=size_px[1],
+        matrix=np.asarray(matrix, np.float64),
+        distortion=np.ravel(distortion)[:5].astype(np.float64),
+    )
+    poses = [np.concatenate([np.ravel(r), np.ravel(t)]) for r, t in zip(turns, shifts, strict=True)]
+    return model, np.array(poses, np.float64)
 
 
 def with_poses(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> LoneCamera:
@@ -158,14 +172,7 @@ def with_poses(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> 
     return replace(camera, poses=np.array(poses))
 
 
-def fit_pose(points_m: Vector, corners: Corners, parameters: Vector) -> Vector:
-    """Return the (6,) pose of the board that best fits one view."""
-    _, rotation, translation = cv2.solvePnP(points_m, corners, *camera_arrays(parameters), flags=cv2.SOLVEPNP_ITERATIVE)
-    return np.concatenate([np.ravel(rotation), np.ravel(translation)]).astype(np.float64)
-
-
-def own_errors_px(points_m: Vector, corners: Corners, parameters: Vector) -> Vector:
+def own_errors_px(points_m: Vector, corners: Corners, model: CameraModel) -> Vector:
     """Return (N, 2) measured minus projected corners of one view, px, with the board's pose fitted to this view alone."""
-    pose = fit_pose(points_m, corners, parameters)
-    seen = cv2.projectPoints(points_m, pose[:3], pose[3:], *camera_arrays(parameters))[0]
-    return np.asarray(corners - np.asarray(seen).reshape(-1, 2), dtype=np.float64)
+    pose = fit_pose(points_m, corners, model)
+    return np.asarray(corners - project(SE3.of(pose).apply(points_m), model), dtype=np.float64)

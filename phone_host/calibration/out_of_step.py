@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import Vector, project_view, rms_px
-from phone_host.calibration.calibrate_alone import LEAST_PAIRS, LoneCamera, calibrate_alone, fit_pose
+from phone_host.calibration.calibrate_alone import LEAST_PAIRS, LoneCamera, calibrate_alone
 from phone_host.calibration.relative_pose import state_of
 from phone_host.calibration.target import Board, Corners, agree
 from phone_host.model import Side

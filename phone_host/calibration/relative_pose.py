@@ -2,19 +2,19 @@
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from phone_host.calibration.bundle import BundleState, Vector, project_view, rms_px
 from phone_host.calibration.calibrate_alone import LoneCamera
 from phone_host.calibration.target import Corners
+from phone_host.geometry.se3 import SE3
+from phone_host.model import CameraModel
 
 
 def relative_pose(left: Vector, right: Vector) -> tuple[Vector, Vector]:
     """Return the rotation vector and translation, right from left, from two poses (6,) of one board."""
-    inverse = np.asarray(cv2.Rodrigues(left[:3])[0]).T
-    rotation = np.asarray(cv2.Rodrigues(right[:3])[0]) @ inverse
-    return np.ravel(cv2.Rodrigues(rotation)[0]).astype(np.float64), right[3:] - rotation @ left[3:]
+    pose = (SE3.of(right) @ SE3.of(left).inverse()).pose()
+    return pose[:3], pose[3:]
 
 
 def states_of(left: LoneCamera, right: LoneCamera) -> list[BundleState]:
@@ -30,12 +30,12 @@ def states_of(left: LoneCamera, right: LoneCamera) -> list[BundleState]:
     ]
 
 
-def state_of(left: Vector, right: Vector, left_pose: Vector, right_pose: Vector) -> BundleState:
+def state_of(left: CameraModel, right: CameraModel, left_pose: Vector, right_pose: Vector) -> BundleState:
     """Return the rig that one pair gives.
 
     Args:
-        left: (9,) the left camera's parameters.
-        right: (9,) the right camera's.
+        left: the left camera.
+        right: the right camera.
         left_pose: (6,) of the board in the left camera's axes.
         right_pose: (6,) of the same board in the right camera's.
     """

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import SettingsError
+from phone_host.calibration.marked import AprilGrid, Marks, find_marked, plan_of
 from phone_host.model import Image
 from phone_host.stereo.images import to_grey
 
@@ -31,8 +32,16 @@ _NORMALISED = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
 _WAYS = (_NORMALISED, cv2.CALIB_CB_ACCURACY, _NORMALISED | cv2.CALIB_CB_EXHAUSTIVE)
 # Noise and moire can hide squares at full size that are visible at half size.
 _SMALLER = 0.5
-# Larger photographs (12 MPx) take seconds and gain nothing: the refinement works at full size anyway.
+# Photographs (12 MPx) are searched in a pyramid, without the detector's own refinement, which takes four fifths of its
+# time: theirs works at full size. A board in the middle of a room is found at the second size.
 _LARGEST_SEARCHED_PX = 1600
+_PHOTO_SEARCHES = (
+    (800, cv2.CALIB_CB_NORMALIZE_IMAGE),
+    (800, 0),
+    (1600, cv2.CALIB_CB_NORMALIZE_IMAGE),
+    (800, cv2.CALIB_CB_EXHAUSTIVE),
+)
+"""The longer side of the searched image, px, and the way."""
 # Refinement window: a window of more than a third of the distance to the next corner would include that corner's edges.
 _WINDOW_SHARE = 0.3
 _DETECTOR_WEIGHT = 1 / 3  # see find_corners
@@ -41,12 +50,13 @@ _REFINE = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-4)
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A chessboard.
+    """A chessboard, with or without coded marks, or an AprilGrid.
 
     Attributes:
-        columns: inner corners in a row.
-        rows: inner corners in a column.
-        square_m: side of a square, m.
+        columns: inner corners in a row; of an AprilGrid two for each tag.
+        rows: inner corners in a column; likewise.
+        square_m: side of a square, m; of an AprilGrid the side of a tag.
+        marks: the coded marks that tell its corners apart; None: it has none.
 
     Raises:
         SettingsError: no board has such a size.
@@ -55,6 +65,7 @@ class Board:
     columns: int
     rows: int
     square_m: float
+    marks: Marks | None = None
 
     def __post_init__(self) -> None:
         if not all(_LEAST_CORNERS <= count <= _MOST_CORNERS for count in (self.columns, self.rows)):
@@ -70,6 +81,9 @@ class Board:
 
     def points_m(self) -> NDArray[np.float64]:
         """Return the inner corners, row by row, in the board's own plane z = 0: (N, 3) float64, m."""
+        if isinstance(self.marks, AprilGrid):
+            plan = plan_of(self.columns, self.rows, self.marks)
+            return np.column_stack([plan, np.zeros(len(plan))]) * self.square_m
         rows, columns = np.mgrid[0 : self.rows, 0 : self.columns]
         return np.column_stack([columns.ravel(), rows.ravel(), np.zeros(rows.size)]) * self.square_m
 
@@ -89,7 +103,10 @@ def parse_board(corners: str, square_mm: float) -> Board:
     """
     counts = re.fullmatch(r"\s*(\d{1,3})\s*[xX]\s*(\d{1,3})\s*", corners)
     if counts is None:
-        raise SettingsError(f"--board {corners!r} is not a size", "give columns x rows of inner corners, such as 9x6")
+        raise SettingsError(
+            f"--board {corners!r} is not a size",
+            "give columns x rows of inner corners, such as 9x6, or leave it out: it is found in the images",
+        )
     return Board(int(counts[1]), int(counts[2]), square_mm / 1000)
 
 
@@ -106,9 +123,11 @@ def find_corners(image: Image, board: Board) -> Corners:
 
     Returns:
         The corners in the order of `Board.points_m`, with the first inner square white if the board's parity tells;
-        empty if the board was not found.
+        empty if the board was not found. Of a board with marks some may be NaN: not seen.
     """
     grey = to_grey(image)
+    if board.marks is not None:
+        return find_marked(grey, board.columns, board.rows, board.marks)
     found, scale = _search(grey, board)
     if len(found) == 0:
         return found
@@ -155,8 +174,8 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
     Returns:
         The right corners, reordered.
     """
-    if (board.columns + board.rows) % 2 == 1:
-        return right  # the colours have determined the order
+    if board.marks is not None or (board.columns + board.rows) % 2 == 1:
+        return right  # the marks or the colours have determined the order
     reference = left.reshape(board.rows, board.columns, 2)
     grid = right.reshape(board.rows, board.columns, 2)
     turns = (0, 1, 2, 3) if board.rows == board.columns else (0, 2)
@@ -167,19 +186,31 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
 def _search(grey: Image, board: Board) -> tuple[Corners, float]:
     """Return corners in the full image's pixels, and the scale at which they were found."""
     largest = max(grey.shape)
-    first = min(1.0, _LARGEST_SEARCHED_PX / largest)
-    for scale in (first, first * _SMALLER):
-        searched = grey
-        if scale != 1.0:
-            size = (round(grey.shape[1] * scale), round(grey.shape[0] * scale))
-            searched = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        for way in _WAYS:
-            found, corners = cv2.findChessboardCornersSB(searched, (board.columns, board.rows), flags=way)
-            if found:
-                factors = np.array([searched.shape[1] / grey.shape[1], searched.shape[0] / grey.shape[0]])
-                # Pixel centres are integers, so the scale is about the corner of the image at (-0.5, -0.5).
-                return (np.asarray(corners, dtype=np.float64).reshape(-1, 2) + 0.5) / factors - 0.5, scale
-    return np.empty((0, 2)), first
+    if largest > _LARGEST_SEARCHED_PX:
+        searches = [(size / largest, way) for size, way in _PHOTO_SEARCHES]
+    else:
+        searches = [(scale, way) for scale in (1.0, _SMALLER) for way in _WAYS]
+    for scale, way in searches:
+        searched, factors = shrunk(grey, scale)
+        found, corners = cv2.findChessboardCornersSB(searched, (board.columns, board.rows), flags=way)
+        if found:
+            # Pixel centres are integers, so the scale is about the corner of the image at (-0.5, -0.5).
+            return (np.asarray(corners, dtype=np.float64).reshape(-1, 2) + 0.5) / factors - 0.5, scale
+    return np.empty((0, 2)), 1.0
+
+
+def shrunk(grey: Image, scale: float) -> tuple[Image, NDArray[np.float64]]:
+    """Return an image at a smaller size, and by what its columns and rows were really multiplied.
+
+    Args:
+        grey: (H, W) uint8.
+        scale: 0 to 1; 1 gives the image itself.
+    """
+    if scale == 1.0:
+        return grey, np.ones(2)
+    size = (max(1, round(grey.shape[1] * scale)), max(1, round(grey.shape[0] * scale)))
+    small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return small, np.array([size[0] / grey.shape[1], size[1] / grey.shape[0]])
 
 
 def _refine(grey: Image, corners: Corners, board: Board) -> Corners:

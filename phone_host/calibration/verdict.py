@@ -1,17 +1,20 @@
-"""Says in words what a calibration is good for and what to do about it.
+"""Says in words what a calibration is good for, and the one thing that would help most.
 
-The measure is the vertical error after rectification, because a matcher searches along rows. Rows that are off by half
-a pixel cost it more than blur or noise do; at one pixel a 9x7 census finds no partner.
+The measures: the vertical error after rectification, because a matcher searches along rows (rows that are off by half a pixel cost
+it more than blur or noise do; at one pixel a 9x7 census finds no partner); squares of boards that the rig was not fitted to;
+the depth error that the uncertainty of the rig leaves. Each has a limit for good and one for usable. Of those that are exceeded, the
+one by the largest factor gives the remedy: mending another would leave the verdict as it is.
 """
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
+from phone_host.calibration.next_view import DEPTH_M, Kind
 from phone_host.model import Rig
 
 GOOD_PX, USABLE_PX = 0.25, 0.5
@@ -24,13 +27,9 @@ lens's blur covers more of their pixels: limits grow with their size."""
 # Real rigs fit to 0.15 to 0.4 px. Beyond this no tuning helps; something basic is wrong. Grows with the size too.
 _CONTRADICTION_PX = 1.0
 # A baseline known to 1 % gives depth known to 1 %; at 5 % there is practically no scale.
-_BASELINE_GOOD, _BASELINE_USABLE = 0.01, 0.05
+_SHARE_GOOD, _SHARE_USABLE = 0.01, 0.05
 _FEW_PAIRS = 6
-_WANTED_PAIRS = 10
-# Corners that span less leave the polynomial undetermined in the rest of the image.
-_WANTED_SPREAD = 0.6
-# Only foreshortening reveals the focal length: 1 - cos(15 deg) = 3 %.
-_WANTED_TILT_DEG = 15.0
+_WANTED_PAIRS = 15
 _MANY_REJECTED = 1 / 3
 
 
@@ -48,11 +47,26 @@ class Assessment:
 
     Attributes:
         verdict: the verdict.
-        remedies: sentences, the most important first; empty when nothing needs to improve.
+        remedies: the one sentence that helps most; empty when the verdict is good.
     """
 
     verdict: Verdict
     remedies: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Measure:
+    """One measure of a calibration, in units of its limits.
+
+    Attributes:
+        of_good: by which factor it exceeds the limit for good; up to 1: it does not.
+        of_usable: the same of the limit for usable.
+        remedy: what to do about it.
+    """
+
+    of_good: float
+    of_usable: float
+    remedy: str
 
 
 def vertical_p95_px(calibration: Calibration) -> float:
@@ -74,72 +88,93 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessmen
         rejected: all pairs that are not used, including those the calibration never saw.
 
     Returns:
-        The verdict with remedies.
+        The verdict, with the remedy that helps most unless it is good.
     """
-    contradictions = []
-    factor = size_factor(calibration.rig)
-    if calibration.rig.rms_stereo_px > _CONTRADICTION_PX * factor:
-        contradictions.append(
+    if calibration.rig.rms_stereo_px > _CONTRADICTION_PX * size_factor(calibration.rig):
+        contradiction = (
             f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board (inner corners), that"
             " each LEFT image belongs to its RIGHT one, and that neither camera mirrors its image"
         )
+        return Assessment(Verdict.REJECT, (contradiction,))
     if calibration.obstacle is not None:
         obstacle = f"{calibration.obstacle.problem}: {calibration.obstacle.remedy}"
-        return Assessment(Verdict.REJECT, (*contradictions, obstacle))
-    p95_px = vertical_p95_px(calibration)
-    baseline_m = float(np.linalg.norm(calibration.rig.t_right_left_m))
-    open_share = calibration.baseline_sigma_m / baseline_m
-    pairs = len(calibration.used)
-    rejects, limits, hints = contradictions, list[str](), list[str]()
+        return Assessment(Verdict.REJECT, (obstacle,))
+    measures = [_rows(calibration), _baseline(calibration), _depth(calibration), _squares(calibration)]
+    worst = max(measures, key=lambda each: each.of_good)
+    few = len(calibration.used) < _FEW_PAIRS
+    if not few and worst.of_good <= 1:
+        return Assessment(Verdict.GOOD, ())
+    verdict = Verdict.REJECT if max(each.of_usable for each in measures) > 1 else Verdict.USABLE
+    return Assessment(verdict, (_remedy(calibration, rejected, worst),))
+
+
+def _remedy(calibration: Calibration, rejected: tuple[Rejected, ...], worst: _Measure) -> str:
+    """Return what helps most. What made most pairs useless comes first: it would spoil the next ones too."""
+    used = len(calibration.used)
+    if len(rejected) > _MANY_REJECTED * (len(rejected) + used):
+        reason, count = Counter(each.reason for each in rejected).most_common(1)[0]
+        return f"{count} of {len(rejected) + used} pairs were rejected: {reason.value}: {_CURES[reason]}"
+    if used < _FEW_PAIRS and worst.of_usable <= 1:
+        return f"{used} pairs are few: take {_WANTED_PAIRS}"
+    return worst.remedy
+
+
+def _rows(calibration: Calibration) -> _Measure:
+    p95_px, factor = vertical_p95_px(calibration), size_factor(calibration.rig)
     if p95_px > USABLE_PX * factor:
-        rejects.append(
+        remedy = (
             f"rows of the two views differ by {p95_px:.2f} px (95 %): fix focus and zoom, hold board and cameras still in each"
             " pair, glue the print to a flat plate, check --board, and take new pairs"
         )
-    elif p95_px > GOOD_PX * factor:
-        limits.append(
-            f"rows of the two views differ by {p95_px:.2f} px (95 %), {GOOD_PX * factor:.2f} px is good: hold the board still, flat, sharp and"
-            " larger in the image"
+    else:
+        remedy = (
+            f"rows of the two views differ by {p95_px:.2f} px (95 %), {GOOD_PX * factor:.2f} px is good: hold the board still,"
+            " flat, sharp and larger in the image"
         )
-    if open_share > _BASELINE_USABLE:
-        rejects.append(_open_baseline(calibration, baseline_m))
-    elif open_share > _BASELINE_GOOD:
-        limits.append(_open_baseline(calibration, baseline_m))
-    if pairs < _FEW_PAIRS:
-        limits.append(f"{pairs} pairs are few: take 15")
-    elif pairs < _WANTED_PAIRS:
-        hints.append(f"{pairs} pairs are few: take 15")
-    hints += _hints(calibration, rejected)
-    verdict = Verdict.REJECT if rejects else Verdict.USABLE if limits else Verdict.GOOD
-    return Assessment(verdict, (*rejects, *limits, *hints))
+    return _Measure(p95_px / (GOOD_PX * factor), p95_px / (USABLE_PX * factor), remedy)
 
 
-def _open_baseline(calibration: Calibration, baseline_m: float) -> str:
-    return (
-        f"these views leave the baseline open by {calibration.baseline_sigma_m * 1e3:.2f} of {baseline_m * 1e3:.1f} mm: show the"
-        " board nearer and farther, and tilted by 20 to 45 degrees"
+def _baseline(calibration: Calibration) -> _Measure:
+    baseline_m = float(np.linalg.norm(calibration.rig.t_right_left_m))
+    share = calibration.baseline_sigma_m / baseline_m
+    remedy = (
+        f"these views leave the baseline open by {calibration.baseline_sigma_m * 1e3:.2f} of {baseline_m * 1e3:.1f} mm:"
+        f" {_what_to_show(calibration)}"
     )
+    return _Measure(share / _SHARE_GOOD, share / _SHARE_USABLE, remedy)
 
 
-def _hints(calibration: Calibration, rejected: tuple[Rejected, ...]) -> list[str]:
-    """Return what would make the next calibration better; none of it changes the verdict."""
-    hints = []
-    if calibration.spread < _WANTED_SPREAD:
-        hints.append(
-            f"the board covered {calibration.spread:.0%} of an image's width or height only: show it in the corners too"
-        )
-    if calibration.tilts_deg.max() < _WANTED_TILT_DEG:
-        hints.append(
-            f"no board is tilted by more than {calibration.tilts_deg.max():.0f} degrees: tilt it by 20 to 45 degrees, in all"
-            " directions"
-        )
-    if len(rejected) > _MANY_REJECTED * (len(rejected) + len(calibration.used)):
-        reason, count = Counter(each.reason for each in rejected).most_common(1)[0]
-        hints.append(
-            f"{counted(len(rejected), 'pair was', 'pairs were')} rejected, {count} of them: {reason.value}: {_CURES[reason]}"
-        )
-    return hints
+def _depth(calibration: Calibration) -> _Measure:
+    """Judge the depth error at 1 m; a rig that sees nothing there is judged by its baseline and rows alone."""
+    sigma_m = dict(calibration.depths).get(DEPTH_M, math.nan)
+    share = sigma_m / DEPTH_M if math.isfinite(sigma_m) else 0.0
+    remedy = f"these views leave depth open by {share * 1e3:.0f} mm at {DEPTH_M:g} m: {_what_to_show(calibration)}"
+    return _Measure(share / _SHARE_GOOD, share / _SHARE_USABLE, remedy)
 
+
+def _squares(calibration: Calibration) -> _Measure:
+    squares = calibration.squares
+    share = abs(squares.mean_m / squares.true_m - 1) if squares.count else 0.0
+    remedy = (
+        f"squares of boards that were held out measure {squares.mean_m * 1e3:.2f} instead of {squares.true_m * 1e3:.2f} mm:"
+        f" {_what_to_show(calibration)}"
+    )
+    return _Measure(share / _SHARE_GOOD, share / _SHARE_USABLE, remedy)
+
+
+def _what_to_show(calibration: Calibration) -> str:
+    if calibration.advice is None:
+        return _SHOW[Kind.MORE]
+    return _SHOW[calibration.advice.kind]
+
+
+_SHOW = {
+    Kind.TILTED: "take pairs with the board tilted by 20 to 45 degrees, in all directions",
+    Kind.CORNERS: "take pairs with the board in the corners of both images",
+    Kind.NEAR: "take pairs with the board so near that it fills more than half of the image's width",
+    Kind.FAR: "take pairs with the board farther away, at a fifth of the image's width",
+    Kind.MORE: "take more pairs like these",
+}
 
 _CURES = {
     Reason.NO_PARTNER: "give both images of a pair the same number",

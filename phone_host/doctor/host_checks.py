@@ -7,7 +7,7 @@ from typing import Final, assert_never
 
 from common.doctor.finding import Finding, fail, ok, warn
 from common.errors import SettingsError
-from phone_host.stereo.native.library import Library, Missing
+from phone_host.stereo.native.library import VARIABLE, Library, Missing
 from phone_host.stereo.scaled_rig import fits_rig, is_scaling
 
 OPENCV_WHEELS: Final = (
@@ -138,13 +138,19 @@ def check_package(package: Package) -> Finding:
     return ok(package.name, text)
 
 
-def check_native(library: Library | Missing | SettingsError) -> Finding:
-    """Judge the native library: without it everything works, but slower."""
+def check_native(library: Library | Missing | SettingsError, wanted: str = "") -> Finding:
+    """Judge the native library: without it everything works, but slower.
+
+    Args:
+        library: as loaded, why there is none, or what is wrong with the instruction set that is wanted.
+        wanted: value of `TANDEMSCAN_SIMD`, which means nothing without the library.
+    """
     match library:
         case Library():
             return ok("native", f"own matcher: {library.simd.text}")
         case Missing(reason=reason, remedy=remedy):
-            return warn("native", f"own matcher {reason}; sgbm is used", remedy)
+            idle = f"; {VARIABLE}={wanted} has no effect" if wanted else ""
+            return warn("native", f"own matcher {reason}; sgbm is used{idle}", remedy)
         case _:
             return fail("native", library.problem, library.remedy)
 

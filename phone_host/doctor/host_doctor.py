@@ -43,7 +43,7 @@ from phone_host.doctor.host_checks import (
     check_python,
     check_rig,
 )
-from phone_host.stereo.native.library import native
+from phone_host.stereo.native.library import VARIABLE, native
 
 _CONNECT_S: Final = 2.0
 
@@ -115,7 +115,7 @@ def examine(question: Question) -> list[Finding]:
 def native_finding() -> Finding:
     """Check the native library, with which the own matcher computes."""
     try:
-        return check_native(native())
+        return check_native(native(), os.environ.get(VARIABLE, ""))
     except SettingsError as error:
         return check_native(error)
 

@@ -11,7 +11,7 @@ from phone_host.measure.arrangement_doubts import LEAST_SUPPORT, arrangement_dou
 from phone_host.measure.file_remedies import ImageSource
 from phone_host.measure.geometry_doubts import behind, off_middle
 from phone_host.measure.image_trust import ImageFigures, median_figures
-from phone_host.measure.light_doubts import covered_doubts, dark_doubts, unfocused_doubts
+from phone_host.measure.light_doubts import covered_doubts, dark_doubts, is_plain, unfocused_doubts
 from phone_host.measure.search_doubts import ambiguous, is_pattern, too_short
 from phone_host.measure.trust import Concern, Doubt, gravest_first
 from phone_host.model import Arrangement, Evidence
@@ -73,12 +73,21 @@ def _seen(evidence: Evidence, source: ImageSource) -> tuple[Concern, ...]:
     if not support:
         return dark
     light = (*dark, *unfocused_doubts(evidence.left, evidence.right))
+    if not sees and is_plain(evidence.left, evidence.right) and not evidence.density >= _STRANGERS_DENSITY:
+        return light or (_NO_TEXTURE,)  # features of noise agree with nothing: that is no other scene
     mistake = arrangement_doubts(evidence, source)
     if is_pattern(evidence) and not any(item.doubt is Doubt.SAME_IMAGE for item in mistake):
         return *light, *ambiguous(evidence)  # features of a pattern match any repeat: mistakes they show are chance
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)
     return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))
+
+
+_NO_TEXTURE: Final = Concern(
+    Doubt.NO_TEXTURE,
+    "both images show hardly any texture, as of a bare wall: too little for depth, and to judge whether they belong together",
+    "put patterned things into the scene, or turn both cameras towards some",
+)
 
 
 _OTHER_SCENE: Final = Concern(

@@ -9,7 +9,7 @@ from phone_host.model import CutCounts, DepthLimits
 _ENOUGH: Final = 0.15
 """If fewer pixels than this share were matched and then cut, the pairs lack depth because their images do not match."""
 
-_CAUSES: Final = frozenset({Doubt.SEARCH_TOO_SHORT, Doubt.DARK, Doubt.UNFOCUSED})
+_CAUSES: Final = frozenset({Doubt.SEARCH_TOO_SHORT, Doubt.DARK, Doubt.UNFOCUSED, Doubt.NO_TEXTURE})
 """Doubts that explain it."""
 
 _UNMATCHED: Final = Concern(

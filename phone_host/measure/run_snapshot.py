@@ -78,6 +78,7 @@ class RunSnapshot:
         last_s: when the last pair was done, counted from the start of the run, s.
         orientations: what the left and the right camera have been given to be upright.
         matcher_note: what is to be said of the choice of the matcher; empty: nothing.
+        matcher_is_fastest: whether none of ours is faster than the one that runs.
         budget: how the time budget for each pair was held; None: there is none, or no pair yet.
     """
 
@@ -126,6 +127,7 @@ class RunSnapshot:
     last_s: float = 0.0
     orientations: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
     matcher_note: str = ""
+    matcher_is_fastest: bool = False
     budget: BudgetAccount | None = None
 
     @property
@@ -176,7 +178,8 @@ def figures(run: RunSnapshot) -> RunFigures:
         overflow=run.fifo.overflow,
     )
     lost, grabbed = spoiled_on_board(run.link)
-    return replace(known, spoiled=lost / grabbed if grabbed else 0.0, gap_s=run.gap_s)
+    spoiled = lost / grabbed if grabbed else 0.0
+    return replace(known, spoiled=spoiled, gap_s=run.gap_s, matcher_is_fastest=run.matcher_is_fastest)
 
 
 def spoiled_on_board(link: LinkAccount) -> tuple[int, int]:

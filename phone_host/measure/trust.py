@@ -55,6 +55,7 @@ class Doubt(Enum):
     COVERED = "covered"
     DARK = "dark"
     UNFOCUSED = "unfocused"
+    NO_TEXTURE = "no_texture"
     LOW_DENSITY = "low_density"
     LOW_CONSISTENCY = "low_consistency"
     VERTICAL_ERROR = "vertical_error"

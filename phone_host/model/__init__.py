@@ -30,9 +30,12 @@ from phone_host.model.matching import (
     Matched,
     MatchReport,
 )
+from phone_host.model.quality import DisparityPlane, PlaneQuality, Seen, Tiles
 from phone_host.model.rig import (
+    RIG_PARAMETERS,
     UNMEASURED_NS,
     CameraModel,
+    Lens,
     Rectification,
     Rig,
     Side,
@@ -50,6 +53,7 @@ from phone_host.model.run import (
 from phone_host.model.temporal import Searched, SearchedAs, TemporalAccount
 
 __all__ = [
+    "RIG_PARAMETERS",
     "UNMEASURED_NS",
     "Arrangement",
     "BoardFrame",
@@ -66,15 +70,18 @@ __all__ = [
     "DepthAccount",
     "DepthLimits",
     "Disparity",
+    "DisparityPlane",
     "Epipolar",
     "Evidence",
     "Exposure",
     "FramePair",
     "Image",
+    "Lens",
     "MatchReport",
     "Matched",
     "OffMiddle",
     "PairCounts",
+    "PlaneQuality",
     "Processed",
     "Rectification",
     "RectifiedPair",
@@ -83,10 +90,12 @@ __all__ = [
     "Search",
     "Searched",
     "SearchedAs",
+    "Seen",
     "Side",
     "StereoGeometry",
     "Support",
     "TemporalAccount",
+    "Tiles",
     "TimeOffset",
     "Unwritten",
 ]

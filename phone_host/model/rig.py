@@ -1,6 +1,6 @@
 """Two calibrated cameras, and how their images are rectified. No behaviour, no I/O."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
@@ -23,13 +23,24 @@ class Side(Enum):
         return Side.RIGHT if self is Side.LEFT else Side.LEFT
 
 
+RIG_PARAMETERS: Final = 30
+"""Twelve of each camera, six of their relative pose; see `Rig.covariance`."""
+
 REJECTED: Final = "reject"
 """The verdict of a calibration that found its rig unfit."""
 
 
+class Lens(Enum):
+    """Which formula bends the rays of a camera; `geometry.lens` has them."""
+
+    PINHOLE = "pinhole"
+    RATIONAL = "rational"
+    FISHEYE = "fisheye"
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CameraModel:
-    """How one camera projects: OpenCV's pinhole model with its distortion polynomial.
+    """How one camera projects: a lens of OpenCV's, with its coefficients.
 
     The device itself is `common.camera.base.Camera`.
 
@@ -37,13 +48,16 @@ class CameraModel:
         width_px: image width, px.
         height_px: image height, px.
         matrix: (3, 3) float64 camera matrix K, px.
-        distortion: (N,) float64 coefficients k1 k2 p1 p2 k3 ..., N in 4, 5, 8, 12, 14 as OpenCV takes them.
+        distortion: (N,) float64 coefficients as OpenCV takes them. Pinhole: k1 k2 p1 p2 [k3]; rational: k1 k2 p1 p2 k3 k4 k5
+            k6 [s1 ... s4 [tx ty]]; fisheye: k1 k2 k3 k4 of the angle.
+        lens: what the coefficients mean. Pinhole with eight or more coefficients counts as rational.
     """
 
     width_px: int
     height_px: int
     matrix: NDArray[np.float64]
     distortion: NDArray[np.float64]
+    lens: Lens = Lens.PINHOLE
 
 
 UNMEASURED_NS: Final = 16_700_000
@@ -85,6 +99,9 @@ class Rig:
         verdict: how the calibration judged itself (good, usable or reject); empty: not stated.
         left_camera: which camera the left one was, and how it was set; None: not stated.
         right_camera: the same for the right one.
+        covariance: (30, 30) float64 of the parameters: fx fy cx cy and eight coefficients of the left camera (in the order of
+            `geometry.lens`), the same of the right one, a small turn of the right camera about its own axes (rad), the translation
+            (m); 0 for those that were not estimated, NaN = not measured.
         is_cropped: whether images are taken for the middle of those of the calibration, cut px by px.
     """
 
@@ -101,6 +118,7 @@ class Rig:
     verdict: str = ""
     left_camera: RememberedCamera | None = None
     right_camera: RememberedCamera | None = None
+    covariance: NDArray[np.float64] = field(default_factory=lambda: np.full((RIG_PARAMETERS, RIG_PARAMETERS), np.nan))
     is_cropped: bool = False
 
     @property

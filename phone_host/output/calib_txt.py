@@ -84,11 +84,10 @@ def is_calib_txt(path: Path) -> bool:
         return False
     if text.lstrip().startswith("%YAML"):
         return False
-    try:
-        values = _values(text, path)
-    except DataError:  # a key is there twice; who reads it says so
-        return True
-    return not _MIDDLEBURY_KEYS.isdisjoint(values) or any(_KITTI_KEY.fullmatch(key) for key in values)
+    bare = [line for line in text.splitlines() if line.strip()]
+    keys = {found[1] for line in bare if (found := _LINE.fullmatch(line))}
+    has_names = not _MIDDLEBURY_KEYS.isdisjoint(keys) or any(_KITTI_KEY.fullmatch(key) for key in keys)
+    return has_names or _is_bare_kitti(bare)
 
 
 def read_calib_txt(path: Path, prefer: KittiCameras = KittiCameras.GREY) -> CalibTxt:
@@ -120,7 +119,7 @@ def _values(text: str, path: Path) -> dict[str, str]:
     """Return the text behind each key; bare lines of twelve numbers get KITTI's names."""
     values: dict[str, str] = {}
     bare = [line for line in text.splitlines() if line.strip()]
-    if len(bare) in _BARE_KITTI_LINES and all(_are_numbers(line, _PROJECTION_NUMBERS) for line in bare):
+    if _is_bare_kitti(bare):
         return {f"P{index}": line for index, line in enumerate(bare)}
     for line in bare:
         found = _LINE.fullmatch(line)
@@ -130,6 +129,10 @@ def _values(text: str, path: Path) -> dict[str, str]:
             raise DataError(f"{path}: {found[1]} is there twice", _REMEDY)
         values[found[1]] = found[2]
     return values
+
+
+def _is_bare_kitti(lines: list[str]) -> bool:
+    return len(lines) in _BARE_KITTI_LINES and all(_are_numbers(line, _PROJECTION_NUMBERS) for line in lines)
 
 
 def _are_numbers(text: str, count: int) -> bool:

@@ -1,12 +1,13 @@
 """rig.yaml: a calibrated rig as OpenCV FileStorage YAML, readable by `cv2.FileStorage` anywhere.
 
 Keys: format_version (absent: 1); left_image_width, left_image_height, right_image_width, right_image_height (px); M1 D1
-M2 D2 (camera matrices and distortion, left and right); R T (right from left, T in metres); R1 R2 P1 P2 Q
+M2 D2 (camera matrices and distortion, left and right); lens1, lens2 (what the distortion means: pinhole, rational or fisheye;
+absent: pinhole with 4 or 5 coefficients, rational with more); R T (right from left, T in metres); R1 R2 P1 P2 Q
 (rectification); rectified_image_width, rectified_image_height (the size for which P1 and P2 hold); board_side; rms_left
 rms_right rms_stereo (px, .Nan = unknown); zero_sigma (standard uncertainty of the disparity of infinitely far points, px;
 absent or .Nan: not measured); verdict (good, usable, reject; absent: not stated); left_camera, right_camera (see
 `rig_cameras`); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's;
-absent: not measured). This program reads only the rig and computes the rectification from it. R1 to Q are there for
+absent: not measured); how well all of it is known (see `rig_sigmas`); views (see `rig_views`). This program reads only the rig and computes the rectification from it. R1 to Q are there for
 other programs.
 """
 
@@ -24,6 +25,9 @@ from common.versions import RIG_FORMAT
 from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
 from phone_host.output.rig_cameras import read_camera, write_camera
+from phone_host.output.rig_lenses import known_lens, lens_of, require_count, usual_lens
+from phone_host.output.rig_sigmas import read_covariance, write_sigmas
+from phone_host.output.rig_views import RigViews, read_views, write_views
 from phone_host.output.yaml_depth import is_too_deep
 
 REJECTED = "reject"
@@ -31,7 +35,6 @@ REJECTED = "reject"
 
 VERDICTS = ("good", "usable", REJECTED)
 
-_DISTORTION_LENGTHS = (4, 5, 8, 12, 14)  # the lengths that OpenCV's model defines
 _LARGEST_IMAGE_PX = 100_000
 _ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits has this error
 # The two cameras of a scanner never stand farther apart; a larger number is a T in millimetres.
@@ -45,13 +48,14 @@ _MOST_ASIDE = 1.5  # image sizes from the middle to the principal point: even th
 _LARGEST_ERROR_PX = 1e6  # of rms and zero_sigma: calibrations that failed have some thousands
 
 
-def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
+def write_rig(path: Path, rig: Rig, rectification: Rectification, views: RigViews | None = None) -> None:
     """Write a rig and its rectification.
 
     Args:
         path: the file; it appears whole or not at all.
         rig: the two cameras.
         rectification: computed from the same rig.
+        views: what it was computed from; None: not known.
 
     Raises:
         OSError: the file cannot be written.
@@ -63,6 +67,8 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
     storage.write("right_image_width", rig.right.width_px)
     storage.write("right_image_height", rig.right.height_px)
     storage.write("board_side", rig.board_side.value)
+    storage.write("lens1", lens_of(rig.left).value)
+    storage.write("lens2", lens_of(rig.right).value)
     storage.write("M1", rig.left.matrix)
     storage.write("D1", rig.left.distortion.reshape(1, -1))
     storage.write("M2", rig.right.matrix)
@@ -95,6 +101,10 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification) -> None:
     # Written as reals: FileStorage's integers have 32 bits, which is 2 s.
     storage.write("time_offset_ns", float(rig.time_offset.offset_ns))
     storage.write("time_offset_uncertainty_ns", float(rig.time_offset.uncertainty_ns))
+    write_sigmas(storage, rig)
+    if views is not None:
+        storage.writeComment("what the rig was computed from: calibrate --from adds to it")
+        write_views(storage, views)
     write_text(path, storage.releaseAndGetString())
 
 
@@ -130,8 +140,8 @@ def read_rig(path: Path) -> Rig:
     reader.require_known_format()
     baseline_m = reader.baseline("T")
     reader.require_same_baseline("P2", baseline_m)
-    left = reader.camera_model("left_image_width", "left_image_height", "M1", "D1")
-    right = reader.camera_model("right_image_width", "right_image_height", "M2", "D2")
+    left = reader.camera_model("left", "1")
+    right = reader.camera_model("right", "2")
     side = reader.text("board_side", Side.LEFT.value)
     if side not in {choice.value for choice in Side}:
         raise reader.problem("board_side", f"is {side!r}", "write left or right")
@@ -149,7 +159,23 @@ def read_rig(path: Path) -> Rig:
         verdict=reader.verdict(),
         left_camera=reader.camera("left_camera", left),
         right_camera=reader.camera("right_camera", right),
+        covariance=reader.covariance(),
     )
+
+
+def read_rig_views(path: Path) -> RigViews | None:
+    """Read what a rig was computed from.
+
+    Args:
+        path: a rig.yaml that `read_rig` accepts.
+
+    Returns:
+        The views; None if the file has none.
+
+    Raises:
+        DataError: the views are not valid; names file and key.
+    """
+    return _Reader(path).views()
 
 
 def is_rig(path: Path) -> bool:
@@ -161,8 +187,8 @@ def is_rig(path: Path) -> bool:
         return False
 
 
-_MOST_BYTES = 1 << 20
-"""Limit for a rig.yaml, which is about two pages long."""
+_MOST_BYTES = 16 << 20
+"""Limit for a rig.yaml: some pages, and 5 kB for each pair of views."""
 
 
 class _Reader:
@@ -239,8 +265,10 @@ class _Reader:
             raise self.problem(key, f"is {'x'.join(map(str, matrix.shape))}", f"it must be {shape[0]}x{shape[1]}")
         return matrix
 
-    def camera_model(self, width_key: str, height_key: str, matrix_key: str, distortion_key: str) -> CameraModel:
+    def camera_model(self, side: str, number: str) -> CameraModel:
         """Read one camera."""
+        width_key, height_key = f"{side}_image_width", f"{side}_image_height"
+        matrix_key, distortion_key, lens_key = f"M{number}", f"D{number}", f"lens{number}"
         matrix = self._shaped(matrix_key, (3, 3))
         if not (matrix[0, 0] > 0 and matrix[1, 1] > 0) or not np.array_equal(matrix[2], [0, 0, 1]):
             raise self.problem(
@@ -261,15 +289,23 @@ class _Reader:
                 matrix_key, f"has its principal point at {point} px", "calibrate again: it lies near the image's middle"
             )
         distortion = self.matrix(distortion_key)
-        if min(distortion.shape) != 1 or distortion.size not in _DISTORTION_LENGTHS:
-            lengths = ", ".join(map(str, _DISTORTION_LENGTHS))
-            raise self.problem(distortion_key, f"has {distortion.size} values", f"OpenCV's models have {lengths}")
+        lens = known_lens(self.text(lens_key, usual_lens(distortion.size).value), lens_key, self.problem)
+        require_count(distortion, lens, distortion_key, self.problem)
         return CameraModel(
             width_px=width_px,
             height_px=self.size(height_key),
             matrix=matrix,
             distortion=distortion.reshape(-1),
+            lens=lens,
         )
+
+    def covariance(self) -> NDArray[np.float64]:
+        """Read how well the rig is known; NaN if it is missing."""
+        return read_covariance(self._storage.getNode("covariance"), self.problem)
+
+    def views(self) -> RigViews | None:
+        """Read what the rig was computed from; None if it is missing."""
+        return read_views(self._storage, self.problem)
 
     def size(self, key: str) -> int:
         """Read an image's width or height."""

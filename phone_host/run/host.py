@@ -100,11 +100,16 @@ class Host:
         self._camera = OwnCamera(camera, self._queue.add_host, demand, self._queue.own_image_missing)
         self._receiver = Receiver(links, now.random_id(), self._queue)
         rig = None if core is None else core.rig
+        self._matcher_is_fastest = core is not None and core.matcher_is_fastest
         self._rig_rejected = rig is not None and rig.is_rejected
         self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
         interpolator = Interpolator() if settings.interpolate else None
         wanted = settings.budget
-        self._budget = None if core is None or wanted is None else PairBudget(wanted, core)
+        self._budget = (
+            None
+            if core is None or wanted is None
+            else PairBudget(wanted, core, completes=core.wanted.complete and self._files.saves_often)
+        )
         pipeline = Pipeline(
             core,
             settings.board_side,
@@ -120,6 +125,7 @@ class Host:
             pipeline,
             self._ledgerer,
             self._sinks,
+            is_saved=self._files.saves,
             most_pairs=settings.pairs,
             taken=self._receiver.wake,
         )
@@ -281,6 +287,7 @@ class Host:
             last_s=max(0, books.last_done_ns - self.started_ns) / 1e9,
             orientations=self._orientations,
             matcher_note=self._settings.matcher_note,
+            matcher_is_fastest=self._matcher_is_fastest,
             budget=None if self._budget is None else self._budget.account,
         )
 

@@ -34,6 +34,7 @@ from phone_host.report.stereo_report import (
     Size,
     alone_remarks,
 )
+from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
@@ -41,7 +42,7 @@ from phone_host.run.stereo_results import StereoResults
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import density
-from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
+from phone_host.stereo.images import decode_files, open_image, size_px
 from phone_host.stereo.view_files import ViewFiles
 
 _WRITERS: Final = 2
@@ -214,9 +215,7 @@ class _Work:
 
     def __init__(self, job: StereoJob, results: StereoResults, watcher: Watcher) -> None:
         self._job, self._results, self._watcher = job, results, watcher
-        self._core: StereoCore | None = None
-        self._core_px: Size = (0, 0)
-        self._has_no_core = False
+        self._cores = Cores(job.make_core)
         self.thumbnails: dict[str, Picture] = {}
 
     def tried(self, folder: str, left: Path, right: Path) -> PairReport | FailedPair:
@@ -224,7 +223,7 @@ class _Work:
         try:
             return self.computed(folder, left, right)
         except DataError as error:
-            if self._has_no_core:  # no pair can be computed without one
+            if self._cores.has_none:  # no pair can be computed without one
                 raise
             return FailedPair(name=folder, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy)
 
@@ -234,7 +233,7 @@ class _Work:
         self._watcher.say(f"reading{about}")
         limit, (of_left, of_right) = self._job.most_pixels, self._job.mounted
         opened = open_image(left, limit, of_left), open_image(right, limit, of_right)
-        core = self._core_for(*opened)
+        core = self._cores.for_pair(*opened)
         watch.lap("prepare")
         sizes_px = opened[0].size_px, opened[1].size_px
         images = decode_files(*opened, core.reductions(*sizes_px))
@@ -294,18 +293,3 @@ class _Work:
         if folder and (picture := pair_thumbnail(processed)) is not None:
             self.thumbnails[folder] = picture
         return report
-
-    def _core_for(self, left: EncodedFile, right: EncodedFile) -> StereoCore:
-        """Return the core for these images; refuse images that it cannot take, before they are decoded."""
-        is_rectified = self._core is not None and self._core.rig is None
-        if self._core is None or (is_rectified and left.size_px != self._core_px):
-            try:
-                made = self._job.make_core(left.size_px)
-            except DataError:
-                self._has_no_core = self._core is None
-                raise
-            self._core, self._core_px = made, left.size_px
-        if self._core.rig is None:
-            require_same_size(left.size_px, right.size_px, left.name, right.name)
-        self._core.require_sizes(left.size_px, right.size_px)
-        return self._core

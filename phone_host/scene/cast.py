@@ -9,11 +9,11 @@ import math
 from dataclasses import dataclass
 from typing import assert_never
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import CameraModel
+from phone_host.geometry import lens
+from phone_host.model import CameraModel, Lens
 from phone_host.scene.scene_model import Body, Box, Floats, Plane, Pose, Shape, Sphere, Vector
 
 FACES = 8
@@ -25,11 +25,6 @@ NOTHING = -1
 BATCH = 16384
 """Rays handled at a time. The working arrays then stay in the caches, and products of this size are too small for the
 linear algebra library to wake its threads. Measured as the best choice from 8192 up to all rays at once."""
-
-# OpenCV's fixed-point inversion gains about a digit per step at the edge of a webcam's image; its default of 5 steps
-# leaves errors of tenths of a pixel there. The last number is the distance in px between a pixel and its ray's
-# projection.
-_UNDISTORT_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,12 +65,11 @@ def rays_through(model: CameraModel, x: NDArray[np.float64], y: NDArray[np.float
         (3, N) float64 with z = 1.
     """
     k = model.matrix
-    if not np.any(model.distortion):
+    if model.lens is not Lens.FISHEYE and not np.any(model.distortion):
         y_unit = (y - k[1, 2]) / k[1, 1]
         return np.stack([(x - k[0, 2] - k[0, 1] * y_unit) / k[0, 0], y_unit, np.ones_like(x)])
-    pixels = np.stack([x, y], axis=1)[:, None, :]
-    unit = cv2.undistortPointsIter(pixels, k, model.distortion, np.eye(3), np.eye(3), _UNDISTORT_UNTIL)[:, 0]
-    return np.stack([unit[:, 0], unit[:, 1], np.ones_like(x)])
+    rays = lens.rays_through(np.stack([x, y], axis=1), model)
+    return np.stack([rays[:, 0] / rays[:, 2], rays[:, 1] / rays[:, 2], np.ones_like(x)])
 
 
 def project(points_m: Floats, model: CameraModel, pose: Pose) -> NDArray[np.float64]:
@@ -92,12 +86,12 @@ def project(points_m: Floats, model: CameraModel, pose: Pose) -> NDArray[np.floa
     local = pose.R_camera_scene @ (points_m - pose.centre_m[:, None])
     ahead = local[2] > 0.0
     pixels = np.full((2, points_m.shape[1]), np.nan)
-    if not np.any(model.distortion):
+    if model.lens is not Lens.FISHEYE and not np.any(model.distortion):
         across = model.matrix[:2] @ local[:, ahead]
         pixels[:, ahead] = across / local[2, ahead]
     elif np.any(ahead):
         seen = np.ascontiguousarray(local[:, ahead].T)
-        pixels[:, ahead] = cv2.projectPoints(seen, np.zeros(3), np.zeros(3), model.matrix, model.distortion)[0][:, 0].T
+        pixels[:, ahead] = lens.project(seen, model).T
     return pixels
 
 

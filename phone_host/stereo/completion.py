@@ -47,6 +47,10 @@ REACH_SHARE: Final = 0.25
 LEAST_ENDS: Final = 2
 """A hole in which one way alone leads to a value may be anything: a corner, or the margin that only one camera sees."""
 
+ISLAND_SHARE: Final = 0.002
+ALONE_PX: Final = 8
+"""Values that holes surround, twice as wide as this, on less than this share of the image (600 px of 640x480), are specks as often as surfaces: no hole is completed from them."""
+
 MEDIAN_PX: Final = 5
 """Rows and columns decide alone; a median over their neighbours takes out the streaks."""
 
@@ -96,10 +100,21 @@ def completed(left: Image, disparity: Disparity, epipolar: Epipolar = Epipolar.L
     levels, known_px = lying(grey(left), epipolar), lying(disparity, epipolar)
     if not np.isfinite(known_px).any():
         return Completed(disparity=disparity.copy(), mask=np.zeros(disparity.shape, np.bool_))
-    guess = _without_streaks(known_px, _guessed(levels, known_px))
+    guess = _without_streaks(known_px, _guessed(levels, _without_islands(known_px)))
     filled = upright_again(np.where(np.isnan(known_px), guess, known_px), epipolar)
     mask = np.isnan(disparity) & np.isfinite(filled)
     return Completed(disparity=np.where(mask, filled, disparity), mask=mask)
+
+
+def _without_islands(disparity: Disparity) -> Disparity:
+    """Return the disparity without small isolated areas; as it is, if it has no others."""
+    known = np.isfinite(disparity)
+    beside = cv2.dilate(known.astype(np.uint8), np.ones((2 * ALONE_PX + 1, 2 * ALONE_PX + 1), np.uint8))
+    count, area_of = cv2.connectedComponents(beside, connectivity=8)
+    is_small = np.bincount(np.asarray(area_of)[known], minlength=count) < ISLAND_SHARE * disparity.size
+    is_small[0] = False  # the holes
+    islands = is_small[np.asarray(area_of)]
+    return disparity if (islands | ~known).all() else np.where(islands, np.float32(np.nan), disparity)
 
 
 def _guessed(levels: Image, disparity: Disparity) -> Disparity:

@@ -39,6 +39,8 @@ from phone_host.stereo.depth_limits import (
 )
 from phone_host.stereo.images import WHOLE, require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
+from phone_host.stereo.match_told import without_untold
+from phone_host.stereo.matcher_names import FASTEST
 from phone_host.stereo.matcher_protocol import Matcher, matched_by
 from phone_host.stereo.native.library import native
 from phone_host.stereo.points import points_of
@@ -115,6 +117,11 @@ class StereoCore:
         if isinstance(matcher, MatchSettings):
             create_matcher(matcher)  # so is a name or a number that is wrong is told before the first pair comes
 
+    @property
+    def matcher_is_fastest(self) -> bool:
+        """Whether none of our matchers is faster than the one that the core was built with."""
+        return isinstance(self._matcher, MatchSettings) and self._matcher.matcher is FASTEST
+
     def compute(
         self,
         left: Image,
@@ -123,6 +130,7 @@ class StereoCore:
         *,
         whole_px: _Sizes | None = None,
         choice: Choice | None = None,
+        is_saved: bool = True,
     ) -> Processed:
         """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
 
@@ -133,6 +141,7 @@ class StereoCore:
             whole_px: width and height of left and right image before they were decoded smaller by `reductions`, px;
                 None: they were not.
             choice: how to match this pair; None: as the core was built. Only for a core that was built from settings.
+            is_saved: whether anybody will look at completed holes; if not, they are not completed, whatever is wanted.
 
         Returns:
             The rectified pair, its disparity, its cloud (None without geometry), how they were found, and the times of
@@ -151,7 +160,7 @@ class StereoCore:
         confidence = matched.confidence
         if confidence is not None:
             confidence = confidence_of_known(confidence, disparity)
-        filled = _completed(pair, matched.disparity, disparity, ready) if self.wanted.complete else None
+        filled = _completed(pair, matched.disparity, disparity, ready) if self.wanted.complete and is_saved else None
         times = StageTimes(
             rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
         )
@@ -302,7 +311,10 @@ def _match(pair: RectifiedPair, ready: _Ready) -> Matched:
     part, scale, epipolar = ready.part, ready.search.scale, pair.epipolar
     seen = pair if part is None else part.of(pair)
     small = RectifiedPair(reduced(seen.left, scale), reduced(seen.right, scale), epipolar)
-    found = matched_by(ready.matcher, lying_pair(small))
+    lying = lying_pair(small)
+    found = matched_by(ready.matcher, lying)
+    if scale < 1:  # less noise: on a bare wall, both views agree on what is nearest
+        found = without_untold(lying, found)
     height, width = seen.left.shape[:2]
     disparity = to_full_size(upright_again(found.disparity, epipolar), width, height, epipolar)
     if scale < 1 and ready.search.disparities:

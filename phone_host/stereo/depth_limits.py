@@ -150,13 +150,14 @@ def float32_below(value: float) -> np.float32:
     return rounded if float(rounded) <= value else np.nextafter(rounded, np.float32(-np.inf))
 
 
-def crop_inside(crop: Crop, width_px: int, height_px: int) -> Crop:
+def crop_inside(crop: Crop, width_px: int, height_px: int, option: str = "--crop") -> Crop:
     """Return the part of a crop that lies in the image.
 
     Args:
         crop: what the user wants.
         width_px: of the rectified left image, px.
         height_px: the same.
+        option: with which it was given, for the error.
 
     Raises:
         DataError: nothing of it lies in the image.
@@ -165,7 +166,7 @@ def crop_inside(crop: Crop, width_px: int, height_px: int) -> Crop:
     right, bottom = min(crop.x_px + crop.width_px, width_px), min(crop.y_px + crop.height_px, height_px)
     if right <= left or bottom <= top:
         raise DataError(
-            f"--crop {crop.x_px},{crop.y_px},{crop.width_px},{crop.height_px} lies outside the rectified left image of"
+            f"{option} {crop.x_px},{crop.y_px},{crop.width_px},{crop.height_px} lies outside the rectified left image of"
             f" {width_px}x{height_px} px",
             "give X,Y,W,H inside it",
         )

@@ -7,10 +7,10 @@ points back to the camera's own image, undoes the mistake there and rectifies th
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.geometry.lens import project
 from phone_host.model import CameraModel, Rectification, Rig, Side
 from phone_host.stereo.rectify import rectify_points
 
@@ -82,10 +82,7 @@ class ThroughRig:
         geometry = self.rectification.geometry
         slopes = (points_px - np.array([geometry.cx_px, geometry.cy_px])) / geometry.focal_px
         rays = np.column_stack([slopes, np.ones(len(slopes))]) @ rotation  # rows: rotation.T @ ray
-        if not len(rays):
-            return points_px
-        found, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), model.matrix, model.distortion)
-        return np.asarray(found, np.float64).reshape(-1, 2)
+        return project(rays, model)
 
     def rectified(self, points_px: Points, side: Side) -> Points:
         """See PointMaps."""

@@ -25,6 +25,11 @@ _FEWEST: Final = 20
 _TILES: Final = 8
 """The image is cut into 8 by 8 tiles: a chessboard holds most of an image's features and covers little of it."""
 
+_ASIDE: Final = 0.25
+_ALIKE: Final = 0.05
+"""A feature beyond the search counts if a second one within this share of the width has a disparity within that share of it. What is
+near shows several; noise of a bare wall is matched by chance one by one, each in a tile that has nothing else."""
+
 _NEAREST_PERCENTILE: Final = 98
 _MARGIN: Final = 1.05
 _STEP: Final = 16
@@ -67,11 +72,27 @@ def beyond_search(
     """
     if searched < 1 or len(disparities_px) < _FEWEST:
         return math.nan, 0
+    believed = (disparities_px < searched) | _confirmed(left_px, disparities_px, disparities_px >= searched, size_px[0])
+    left_px, disparities_px = left_px[believed], disparities_px[believed]
+    if not len(disparities_px):
+        return math.nan, 0
     nearest = float(np.percentile(disparities_px, _NEAREST_PERCENTILE)) * _MARGIN
     column, row = np.clip(left_px / np.array(size_px) * _TILES, 0, _TILES - 1).astype(np.intp).T
     _, tile, count = np.unique(row * _TILES + column, return_inverse=True, return_counts=True)
     share = float(np.average(disparities_px >= searched, weights=1.0 / count[tile]))
     return share, _STEP * max(1, math.ceil(nearest / _STEP))
+
+
+def _confirmed(
+    left_px: Points, disparities_px: NDArray[np.float64], beyond: NDArray[np.bool_], width_px: int
+) -> NDArray[np.bool_]:
+    """Tell which of the features beyond the search have another one beside them with a like disparity."""
+    found = np.flatnonzero(beyond)
+    aside = np.abs(left_px[found, np.newaxis] - left_px[found]).max(axis=2) <= _ASIDE * width_px
+    alike = np.abs(disparities_px[found, np.newaxis] - disparities_px[found]) <= _ALIKE * width_px
+    confirmed = np.zeros(len(beyond), np.bool_)
+    confirmed[found] = np.count_nonzero(aside & alike, axis=1) > 1  # each is beside itself
+    return confirmed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -54,7 +54,7 @@ class MatchSettings:
     def __post_init__(self) -> None:
         if self.disparities < 1:
             raise SettingsError(
-                f"disparities = {self.disparities} leaves nothing to search",
+                f"--disparities {self.disparities} leaves nothing to search",
                 "give the number of disparities, 1 or more (64 suits most 640 px wide pairs)",
             )
 

@@ -1,9 +1,9 @@
-"""Aligns the right image of a pair with the left one before matching: brightness, contrast and vertical position.
+"""Aligns the right image of a pair with the left one before matching: brightness and contrast of the whole image, and vertical position.
 
 A rectified pair is never perfect: exposures differ, and in a rig that was bumped or has warmed up since its calibration
-the right image sits some tenths of a pixel too high or too low. Each effect takes two numbers for the whole image. They
-are measured from the pair itself, without memory, and left alone where the evidence is weak. Larger faults need a new
-calibration; the matcher cannot fix them.
+the right image sits some tenths of a pixel too high or too low. Levels take two numbers for the whole image here (levels
+that change over the image: `match_levels`), the vertical position one. They are measured from the pair itself, without
+memory, and left alone where the evidence is weak. Larger faults need a new calibration; the matcher cannot fix them.
 """
 
 import math

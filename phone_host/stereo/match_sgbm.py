@@ -157,8 +157,8 @@ class SgbmMatcher:
         searched = -(-wanted // DISPARITY_BLOCK) * DISPARITY_BLOCK
         if searched > GREATEST_SEARCH:
             raise SettingsError(
-                f"disparities = {self._disparities} is more than sgbm can hold ({GREATEST_SEARCH})",
-                "use smaller images, fewer disparities, or --matcher block",
+                f"--disparities {self._disparities} is more than sgbm can hold ({GREATEST_SEARCH})",
+                "use smaller images, a smaller --disparities, or --matcher block",
             )
         engine.setNumDisparities(searched)
         padded = (cv2.copyMakeBorder(image, 0, 0, searched, 0, cv2.BORDER_REPLICATE) for image in (left, right))

@@ -106,8 +106,8 @@ class _Engine:
             )
         if min(self._disparities, width) > GREATEST_SEARCH:
             raise SettingsError(
-                f"disparities = {self._disparities} is more than tandem can hold ({GREATEST_SEARCH})",
-                "use smaller images, fewer disparities, or --matcher block",
+                f"--disparities {self._disparities} is more than tandem can hold ({GREATEST_SEARCH})",
+                "use smaller images, a smaller --disparities, or --matcher block",
             )
 
     def computed(self, left: Image, right: Image, factor: int = 1) -> tuple[Disparity, Confidence]:

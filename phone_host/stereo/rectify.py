@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from phone_host.model import CameraModel, Epipolar, Image, Rectification, RectifiedPair, Rig, Side, StereoGeometry
+from phone_host.geometry.lens import project, rays_through
+from phone_host.model import CameraModel, Epipolar, Image, Lens, Rectification, RectifiedPair, Rig, Side, StereoGeometry
 from phone_host.stereo.images import size_px
 from phone_host.stereo.remap import Maps, remap
 from phone_host.stereo.two_threads import in_two_threads
@@ -37,8 +38,6 @@ _LEAST_BASELINE_M = 5e-4
 """No two cameras stand nearer to each other."""
 
 _RECALIBRATE = "calibrate the rig again"
-# Undistortion is iterative; 5 iterations (OpenCV's default) leave 0.1 px in the corners of a wide lens.
-_UNDISTORT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 _ROUND_TRIP_LIMIT_PX = 0.01
 _SAMPLES_PER_EDGE = 65  # the outline bends slowly: between two of 65 samples it moves by less than 0.01 px
 # A polynomial fitted to points in the middle may fold back near the corners; the usable field of view then ends before
@@ -48,6 +47,9 @@ _FIELD_SHARES = (1.0, 0.97, 0.94, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5)
 _LEAST_SQUEEZE = 0.7
 # Beyond it a pixel at the edge would become a line of pixels. 170 degrees of a usual fisheye lens reach two diagonals.
 _MOST_DIAGONALS = 3.0
+# A rectified image is flat: it grows with the tangent, and a fisheye lens may see beyond 90 degrees. At 65 degrees a pixel covers a
+# sixth of the solid angle of one in the middle.
+_MOST_SLOPE = math.tan(math.radians(65.0))
 _LEAST_SIZE_PX = 32
 _WHOLE_PX = 1e-6  # rounding of ideal cameras' windows, which are whole pixels wide, must not cost a row
 _MOST_KEPT_PIXELS = 4_000_000  # twice 1920 x 1080: what a live camera sends. The maps take 6 bytes per pixel and side.
@@ -257,14 +259,12 @@ class _Remap:
     def _maps(self, top: int, bottom: int) -> Maps:
         """Return where the rows from `top` to `bottom` of the result lie in the image."""
         up = np.array([[1, 0, 0], [0, 1, -top], [0, 0, 1]], np.float64)
-        x, y = cv2.initUndistortRectifyMap(
-            self._model.matrix,
-            self._model.distortion,
-            self._rotation,
-            up @ self._projection,
-            (self._width, bottom - top),
-            cv2.CV_32FC1,
-        )
+        size, new = (self._width, bottom - top), up @ self._projection
+        k, distortion = self._model.matrix, self._model.distortion
+        if self._model.lens is Lens.FISHEYE:
+            x, y = cv2.fisheye.initUndistortRectifyMap(k, distortion, self._rotation, new, size, cv2.CV_32FC1)
+        else:
+            x, y = cv2.initUndistortRectifyMap(k, distortion, self._rotation, new, size, cv2.CV_32FC1)
         if self._shrink > 1:
             x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
         return cv2.convertMaps(x, y, cv2.CV_16SC2)  # half the time of float maps, the same 1/32 px
@@ -317,10 +317,12 @@ def _mean_focal_px(model: CameraModel) -> float:
 
 
 def _rectified_slopes(points_px: NDArray[np.floating], model: CameraModel, rotation: Matrix) -> NDArray[np.float64]:
-    """Return (N, 2) slopes x / z and y / z in the rectified axes."""
-    points = np.asarray(points_px, dtype=np.float64).reshape(-1, 1, 2)
-    slopes = cv2.undistortPointsIter(points, model.matrix, model.distortion, rotation, np.eye(3), _UNDISTORT)
-    return np.asarray(slopes, dtype=np.float64).reshape(-1, 2)
+    """Return (N, 2) slopes x / z and y / z in the rectified axes; NaN for what lies behind them or comes from nowhere."""
+    rays = rays_through(points_px, model) @ rotation.T
+    ahead = rays[:, 2] > 0 if model.lens is Lens.FISHEYE else np.ones(len(rays), np.bool_)
+    slopes = np.full((len(rays), 2), np.nan)
+    np.divide(rays[:, :2], rays[:, 2:], out=slopes, where=ahead[:, np.newaxis])
+    return slopes
 
 
 def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[float, float, float, float]:
@@ -333,6 +335,8 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
         edges = _edges_px(model, share)
         slopes = _rectified_slopes(edges.reshape(-1, 2), model, rotation)
         if _round_trip_error_px(slopes, edges.reshape(-1, 2), model, rotation) > _ROUND_TRIP_LIMIT_PX:
+            continue
+        if model.lens is Lens.FISHEYE and not (np.abs(slopes) <= _MOST_SLOPE).all():
             continue
         if not _is_lens(edges.reshape(-1, 2), model):
             raise DataError(
@@ -355,7 +359,9 @@ def _filled_window(model: CameraModel, rotation: Matrix, side: Side) -> tuple[fl
 
 
 def _is_lens(points_px: NDArray[np.float64], model: CameraModel) -> bool:
-    """Return whether the distortion leaves points at the image's edge about where a pinhole camera sees them."""
+    """Return whether the distortion leaves points at the image's edge about where such a lens sees them."""
+    if model.lens is Lens.FISHEYE:
+        return True  # `rays_through` has found them, and the slopes are limited
     straight = np.linalg.norm((points_px - model.matrix[:2, 2]) / np.diag(model.matrix)[:2], axis=1)
     seen = np.linalg.norm(_rectified_slopes(points_px, model, np.eye(3)), axis=1)
     farthest = _MOST_DIAGONALS * math.hypot(model.width_px, model.height_px) / _mean_focal_px(model)
@@ -378,6 +384,5 @@ def _round_trip_error_px(
     rays = np.column_stack([slopes, np.ones(len(slopes))]) @ rotation  # rows: rotation.T @ ray
     if not np.all(rays[:, 2] > 0):
         return math.inf
-    back, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), model.matrix, model.distortion)
-    error = np.abs(np.asarray(back).reshape(-1, 2) - points_px).max()
+    error = np.abs(project(rays, model) - points_px).max()
     return float(error) if math.isfinite(error) else math.inf

@@ -9,10 +9,11 @@ long as it was the same in both cameras.
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from phone_host.model import CameraModel, Rig, Side, StereoGeometry
+from phone_host.model import RIG_PARAMETERS, CameraModel, Rig, Side, StereoGeometry
 
 _ROUNDING_PX = 1.0
 """A scaled size is whole pixels. Cameras round either way, so the smaller of two sizes may be off by less than this."""
@@ -41,7 +42,23 @@ def scaled_rig(rig: Rig, left_px: tuple[int, int], right_px: tuple[int, int]) ->
         _is_middle((model.width_px, model.height_px), size_px)
         for model, size_px in ((rig.left, left_px), (rig.right, right_px))
     )
-    return replace(rig, left=left, right=right, zero_sigma_px=rig.zero_sigma_px * finer, is_cropped=is_cropped)
+    return replace(
+        rig,
+        left=left,
+        right=right,
+        zero_sigma_px=rig.zero_sigma_px * finer,
+        covariance=_scaled_covariance(rig, left, right),
+        is_cropped=is_cropped,
+    )
+
+
+def _scaled_covariance(rig: Rig, left: CameraModel, right: CameraModel) -> NDArray[np.float64]:
+    """Return the covariance of the scaled parameters: focal lengths and middles are in pixels, a crop only shifts."""
+    factors = np.ones(RIG_PARAMETERS)
+    for at, model, own in ((0, left, rig.left), (RIG_PARAMETERS // 2 - 3, right, rig.right)):
+        scale = model.matrix[(0, 1), (0, 1)] / own.matrix[(0, 1), (0, 1)]
+        factors[at : at + 4] = np.tile(scale, 2)
+    return rig.covariance * np.outer(factors, factors)
 
 
 def scaled_geometry(

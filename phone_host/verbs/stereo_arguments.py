@@ -12,8 +12,40 @@ DEFAULT_NEAR_MM: Final = NEAR_M * 1000
 A nearer limit costs time: the number of disparities is proportional to 1 / z."""
 
 
+PAIRED: Final = (
+    "two files, two folders or two globs; images of folders and globs are paired by the number in the name, else by equal names,"
+    " else in name order"
+)
+"""How LEFT and RIGHT are given, for the verbs that take pairs of images."""
+
+
 def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --calibration, --rectified and their related options."""
+    """Declare --calibration, --rectified and their related options, and those that say which points are written."""
+    add_core_arguments(parser)
+    parser.add_argument(
+        "--far",
+        metavar="MM",
+        help="cut points with a coordinate beyond this (default: where an error of 0.25 px, or the rig's own, makes the depth wrong by 20 %%)",
+    )
+    parser.add_argument(
+        "--crop", metavar="X,Y,W,H", help="only this part of the rectified left image gets depth, px of the full size"
+    )
+    parser.add_argument(
+        "--complete",
+        action="store_true",
+        help="also write completed.pfm: the disparity with its holes completed from their surroundings, and completed.png, which marks them; no other file contains them",
+    )
+    parser.add_argument(
+        "--axes",
+        choices=("camera", "y-up"),
+        default="camera",
+        help="axes of the points in files: the camera's (x right, y down, z forward), or y up and z backward as many viewers expect",
+    )
+
+
+def add_core_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what a stereo core needs: --calibration, --rectified and their related options, and how to match."""
+    parser.set_defaults(far=None, crop=None, complete=False, axes="camera")
     parser.add_argument(
         "--calibration",
         metavar="FILE",
@@ -37,28 +69,9 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"cut what is nearer, and look for nothing nearer; 20cm and 0.2m work, too (default: look from {DEFAULT_NEAR_MM:g} mm on, cut nothing)",
     )
     parser.add_argument(
-        "--far",
-        metavar="MM",
-        help="cut points with a coordinate beyond this (default: where an error of 0.25 px, or the rig's own, makes the depth wrong by 20 %%)",
-    )
-    parser.add_argument(
-        "--crop", metavar="X,Y,W,H", help="only this part of the rectified left image gets depth, px of the full size"
-    )
-    parser.add_argument(
         "--scale",
         metavar="S",
         help="match images of this share of the size, 0.1 to 1; results keep the full size (default: 1, less for large images)",
-    )
-    parser.add_argument(
-        "--complete",
-        action="store_true",
-        help="also write completed.pfm: the disparity with its holes completed from their surroundings, and completed.png, which marks them; no other file contains them",
-    )
-    parser.add_argument(
-        "--axes",
-        choices=("camera", "y-up"),
-        default="camera",
-        help="axes of the points in files: the camera's (x right, y down, z forward), or y up and z backward as many viewers expect",
     )
     parser.add_argument("--focal", metavar="PX", help="focal length of the rectified images, px")
     parser.add_argument("--baseline", metavar="MM", help="distance of the two cameras, for rectified images")

@@ -22,20 +22,29 @@ def pixels(text: str, option: str) -> float:
     return value
 
 
-def point_px(text: str, option: str) -> tuple[float, float]:
-    """Read a place in an image: CX,CY.
+def point_px(text: str, option: str, example: str = "CX,CY in px, for example 319.5,239.5") -> tuple[float, float]:
+    """Read a place in an image: X,Y.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+        example: what would be right, for errors.
 
     Raises:
         SettingsError: it is not two numbers.
     """
     values = [_number(part) for part in text.split(",")]
     if len(values) != 2 or not all(math.isfinite(value) for value in values):
-        raise SettingsError(f"{option} is {text!r}", "give CX,CY in px, for example 319.5,239.5")
+        raise SettingsError(f"{option} is {text!r}", f"give {example}")
     return values[0], values[1]
 
 
-def crop_of(text: str) -> Crop:
-    """Read a crop: X,Y,W,H in whole pixels.
+def crop_of(text: str, option: str = "--crop") -> Crop:
+    """Read a rectangle: X,Y,W,H in whole pixels.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
 
     Raises:
         SettingsError: it is not four whole numbers, or it is empty.
@@ -44,7 +53,7 @@ def crop_of(text: str) -> Crop:
     whole = len(values) == 4 and all(math.isfinite(value) and value == int(value) for value in values)
     if not whole or min(values[:2]) < 0 or min(values[2:]) < 1:
         raise SettingsError(
-            f"--crop is {text!r}", "give X,Y,W,H in whole px of the rectified left image, for example 200,100,640,480"
+            f"{option} is {text!r}", "give X,Y,W,H in whole px of the rectified left image, for example 200,100,640,480"
         )
     x_px, y_px, width_px, height_px = (int(value) for value in values)
     return Crop(x_px=x_px, y_px=y_px, width_px=width_px, height_px=height_px)

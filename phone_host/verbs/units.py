@@ -50,8 +50,12 @@ _MOST_LIMIT_MM: Final = 1e8
 """100 km: no stereo camera sees so far."""
 
 
+_PIXELS: Final = re.compile(r"\s*(\d{1,5})\s*px\s*\*\s*(.+)", re.ASCII | re.IGNORECASE)
+"""A square on a screen: its pixels, times the width of one."""
+
+
 def square_mm(text: str) -> float:
-    """Read --square, the side of a chessboard's square, like `length_mm`.
+    """Read --square, the side of a chessboard's square, like `length_mm`; or pixels times their pitch, such as 120px*0.1794mm.
 
     Args:
         text: what the user wrote.
@@ -62,6 +66,9 @@ def square_mm(text: str) -> float:
     Raises:
         SettingsError: it is no length, or a number without a unit that can only mean metres.
     """
+    on_screen = _PIXELS.fullmatch(text)
+    if on_screen is not None:
+        return int(on_screen[1]) * length_mm(on_screen[2], "--square, the width of a pixel,", "120px*0.1794mm")
     return _not_metres(text, "--square", "25mm", _LEAST_BARE_SQUARE_MM)
 
 

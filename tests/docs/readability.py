@@ -26,7 +26,7 @@ _PASSIVE: Final = re.compile(
 )
 _HELP: Final = """
 import contextlib, importlib, io
-for name, verbs in (("phone_host.cli", ("run", "calibrate", "calibrate-time", "stereo", "demo", "doctor", "pair", "keys")), ("board_agent.cli", ("run", "keys", "pair"))):
+for name, verbs in (("phone_host.cli", ("run", "calibrate", "calibrate-time", "stereo", "quality", "demo", "doctor", "pair", "keys")), ("board_agent.cli", ("run", "keys", "pair"))):
     for verb in verbs:
         out = io.StringIO()
         with contextlib.redirect_stdout(out):

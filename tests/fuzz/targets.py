@@ -4,7 +4,7 @@ A target takes any bytes and raises only if something is wrong. The same functio
 coverage, and in the test suite over the corpus, which holds every input that ever found something.
 """
 
-from tests.fuzz import inputs, protocols
+from tests.fuzz import inputs, protocols, rig_files
 from tests.fuzz.target import Target
 
 TARGETS: dict[str, Target] = {
@@ -22,6 +22,7 @@ TARGETS: dict[str, Target] = {
     "decode": Target("sizes of images, and decoding them", inputs.decoding, inputs.decoding_seeds, 4096, 0.005),
     "mjpeg": Target("images in a server's stream", inputs.mjpeg, inputs.mjpeg_seeds, 8192, 0.01),
     "rig": Target("rig.yaml", inputs.rig, inputs.rig_seeds, 4096, 0.005),
+    "rigfiles": Target("calibrations of other programs", rig_files.rig_files, rig_files.rig_files_seeds, 8192, 0.005),
     "settings": Target("settings files", inputs.settings, inputs.settings_seeds, 2048, 0.005),
     "results": Target("files of results and peers", inputs.results, inputs.results_seeds, 2048, 0.005),
 }

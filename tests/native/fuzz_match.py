@@ -20,7 +20,7 @@ from phone_host.stereo.native.library import Library, load
 from tests.native.conftest import FOLDER
 from tests.native.match_cases import random_case
 from tests.native.test_match import reference, require_sound
-from tests.native.test_sanitized import sanitized
+from tests.native.test_sanitized import built_into
 
 _PROGRESS_S = 30.0
 _MOST_S = 60.0
@@ -85,7 +85,7 @@ def main() -> int:
         return 0
     with tempfile.TemporaryDirectory() as name:
         print("building the library with sanitizers", flush=True)
-        environment = sanitized(Path(name))
+        environment = built_into(Path(name))
         return subprocess.run(
             [sys.executable, "-m", __spec__.name, *sys.argv[1:]], env=environment, check=False
         ).returncode

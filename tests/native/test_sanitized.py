@@ -29,8 +29,12 @@ def runtime(compiler: tuple[str, ...]) -> str:
 
 @pytest.fixture(scope="module")
 def sanitized(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment with the sanitized library, built once."""
+    return built_into(tmp_path_factory.mktemp("sanitized"))
+
+
+def built_into(folder: Path) -> dict[str, str]:
     """Build the library with sanitizers; return the environment in which Python can load it."""
-    folder = tmp_path_factory.mktemp("sanitized")
     compiler = find_compiler()
     preload = runtime(compiler)
     build(folder, FLAGS)

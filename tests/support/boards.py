@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.target import Board
+from phone_host.geometry.lens import rays_through
 from phone_host.model import CameraModel, Image, Rig
 from tests.support.rigs import project_points
 
@@ -52,10 +53,9 @@ def render_board(
     steps_x = (np.arange(model.width_px // coarse) + 0.5) * coarse - 0.5
     steps_y = (np.arange(model.height_px // coarse) + 0.5) * coarse - 0.5
     columns, rows = np.meshgrid(steps_x, steps_y)
-    pixels = np.column_stack([columns.ravel(), rows.ravel()])[:, np.newaxis]
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
-    slopes = cv2.undistortPointsIter(pixels, model.matrix, model.distortion, np.eye(3), np.eye(3), criteria)
-    grid = np.asarray(slopes, dtype=np.float64).reshape(*columns.shape, 2)
+    pixels = np.column_stack([columns.ravel(), rows.ravel()])
+    rays = rays_through(pixels, model)
+    grid = (rays[:, :2] / rays[:, 2:]).reshape(*columns.shape, 2)
     x, y = _squares(grid, rotation, translation_m, board)
     # Something is visible only near the paper: two squares or two solved rays beyond it everything is grey.
     near = (x >= -3) & (x < board.columns + 4) & (y >= -3) & (y < board.rows + 4)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import CameraModel, Epipolar, Rig
+from phone_host.model import CameraModel, Epipolar, Lens, Rig
 from phone_host.scene.scene import unlike_rig as scene_rig
 
 
@@ -44,10 +44,40 @@ class SeenPoints:
 
 def project_points(points_m: NDArray[np.float64], rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where both cameras see points given in the left camera's axes, (N, 2) px each, through the full distortion."""
-    turn = cv2.Rodrigues(rig.R_right_left)[0]
-    left, _ = cv2.projectPoints(points_m, np.zeros(3), np.zeros(3), rig.left.matrix, rig.left.distortion)
-    right, _ = cv2.projectPoints(points_m, turn, rig.t_right_left_m, rig.right.matrix, rig.right.distortion)
-    return np.asarray(left, np.float64).reshape(-1, 2), np.asarray(right, np.float64).reshape(-1, 2)
+    beside = points_m @ rig.R_right_left.T + rig.t_right_left_m
+    return _project(points_m, rig.left), _project(beside, rig.right)
+
+
+def _project(points_m: NDArray[np.float64], model: CameraModel) -> NDArray[np.float64]:
+    """By OpenCV, which is no part of what is tested."""
+    nowhere = np.zeros((3, 1))
+    if model.lens is Lens.FISHEYE:
+        seen = cv2.fisheye.projectPoints(points_m[:, np.newaxis], nowhere, nowhere, model.matrix, model.distortion)[0]
+    else:
+        seen = cv2.projectPoints(points_m, nowhere, nowhere, model.matrix, model.distortion)[0]
+    return np.asarray(seen, np.float64).reshape(-1, 2)
+
+
+def fisheye_rig() -> Rig:
+    """A 640x480 camera with a fisheye lens of 126 degrees on the left; on the right a 1280x720 one with a rational lens, 80 mm away."""
+    left = CameraModel(
+        width_px=640,
+        height_px=480,
+        matrix=np.array([[290.0, 0, 325], [0, 291, 236], [0, 0, 1]]),
+        distortion=np.array([-0.02, 0.004, -0.003, 0.0006]),
+        lens=Lens.FISHEYE,
+    )
+    right = CameraModel(
+        width_px=1280,
+        height_px=720,
+        matrix=np.array([[900.0, 0, 652], [0, 901, 351], [0, 0, 1]]),
+        distortion=np.array([0.9, 0.4, 0.001, -0.0005, 0.02, 1.1, 0.5, 0.06]),
+        lens=Lens.RATIONAL,
+    )
+    rotation = np.asarray(cv2.Rodrigues(np.array([0.02, -0.04, 0.03]))[0], dtype=np.float64)
+    return Rig(
+        left=left, right=right, R_right_left=rotation, t_right_left_m=-rotation @ np.array([0.08, 0.003, -0.004])
+    )
 
 
 def points_seen_by_both(rig: Rig, count: int, seed: int) -> SeenPoints:

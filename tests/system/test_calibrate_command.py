@@ -106,12 +106,11 @@ def test_unlike_cameras_are_calibrated_and_every_pair_is_accounted_for(boards: P
 
 
 def test_the_table_names_every_pair(few: Path, tmp_path: Path) -> None:
-    """Without --json the table shows used and rejected pairs, the verdict and where the files are."""
-    done = _phone_host(
-        "calibrate", few / "left", few / "right", "--board", "9x6", "--square", 25, "--out", tmp_path / "rig.yaml"
-    )
+    """Without --json the table shows the board found, used and rejected pairs, the verdict and where the files are."""
+    done = _phone_host("calibrate", few / "left", few / "right", "--square", 25, "--out", tmp_path / "rig.yaml")
     assert done.returncode == 0, done.stderr
     for word in (
+        "9x6 inner corners, as found in the images",
         "4 pairs used, 2 rejected",
         "unreadable",
         "no partner",
@@ -140,10 +139,16 @@ def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(few: Path, tmp_pa
 
 
 def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> None:
-    """A wrong --board finds nothing: one line on stderr, the reasons as JSON on stdout and in report.json, and an old rig is moved aside."""
+    """No pair shows a board: one line on stderr, the reasons as JSON on stdout and in report.json, and an old rig is moved aside."""
+    for side, name in (("left", "left{}.png"), ("right", "right{:02d}.png")):
+        (tmp_path / side).mkdir()
+        for number in range(4):
+            seen = cv2.imread(str(small / side / name.format(number)), cv2.IMREAD_GRAYSCALE)
+            assert seen is not None
+            cv2.imwrite(str(tmp_path / side / f"{number}.png"), np.full_like(seen, 99))
     (tmp_path / "rig.yaml").write_text("%YAML:1.0\n# of an earlier run")
     done = _phone_host(
-        "calibrate", small / "left", small / "right", "--board", "12x9", "--square", "25mm",
+        "calibrate", tmp_path / "left", tmp_path / "right", "--board", "9x6", "--square", "25mm",
         "--out", tmp_path / "rig.yaml", "--json",
     )  # fmt: skip
     assert done.returncode == 4
@@ -152,24 +157,24 @@ def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> 
     report = _report(done)
     assert report["verdict"] == "reject"
     assert "inner corners" in report["remedy"]
-    assert len(report["pairs"]["rejected"]) == 6
+    assert len(report["pairs"]["rejected"]) == 4
     assert report == json.loads((tmp_path / "report.json").read_text())
     assert not (tmp_path / "rig.yaml").exists()
     assert report["earlier_rig"] == "rig.yaml.old"
     assert "of an earlier run" in (tmp_path / "rig.yaml.old").read_text()
 
 
-def test_views_that_contradict_each_other_are_rejected_with_files(boards: Path, tmp_path: Path) -> None:
-    """Corners of a smaller board, detected here and there on the real one, do not fit: reject, exit 4, and --board is named."""
+@pytest.mark.parametrize("board", ["10x7", "5x4"])
+def test_a_wrong_board_is_told_before_anything_is_searched(few: Path, tmp_path: Path, board: str) -> None:
+    """The images show 9x6 inner corners: a larger or smaller --board is exit 2 in one line, and an earlier rig stays."""
+    (tmp_path / "rig.yaml").write_text("%YAML:1.0\n# of an earlier run")
     done = _phone_host(
-        "calibrate", boards / "left", boards / "right", "--board", "5x4", "--square", "25mm",
-        "--out", tmp_path / "rig.yaml", "--json",
-    )  # fmt: skip
-    assert done.returncode == 4, done.stderr
-    report = _report(done)
-    assert report["verdict"] == "reject"
-    assert "--board" in report["remedy"]
-    assert (tmp_path / "report.json").exists()
+        "calibrate", few / "left", few / "right", "--board", board, "--square", "25mm", "--out", tmp_path / "rig.yaml"
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert f"these boards have 9x6 inner corners, --board says {board}: give --board 9x6" in done.stderr
+    assert (tmp_path / "rig.yaml").exists()
 
 
 def test_usage_errors_are_exit_2(boards: Path, tmp_path: Path) -> None:
@@ -255,7 +260,8 @@ def test_simplestereo_rig_as_published(tmp_path: Path) -> None:
         "--json",
     )
     assert done.returncode == 0, done.stderr
-    assert _report(done)["points"] > 150_000
+    # The instrument and the table: most of the image is a bare wall, which has no depth but for streaks.
+    assert _report(done)["points"] > 120_000
     # The instrument stands where the calibration boards stood: at 1.2 m to 1.4 m.
     depth_m = read_ply(tmp_path / "cloud.ply").points_m[:, 2]
     assert 1.1 < np.median(depth_m[(depth_m > 0.8) & (depth_m < 2)]) < 1.5

@@ -13,7 +13,20 @@ COMMANDS = [
     ("phone_host.cli", []),
     *(
         ("phone_host.cli", [verb])
-        for verb in ("demo", "run", "calibrate", "calibrate-time", "stereo", "doctor", "pair", "keys", "settings")
+        for verb in (
+            "demo",
+            "run",
+            "calibrate",
+            "calibrate-time",
+            "stereo",
+            "measure",
+            "target",
+            "quality",
+            "doctor",
+            "pair",
+            "keys",
+            "settings",
+        )
     ),
     ("phone_host.bench.cli", []),
 ]

@@ -1,22 +1,19 @@
 """The bundle adjustment by itself: from a rough start it finds the rig, and from its own answer it stays there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from phone_host.calibration.bundle import BundleState, BundleView, adjust
-from phone_host.model import CameraModel
+from phone_host.calibration.bend import Bend
+from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.bundle import BundleState, BundleView, FreeParameters, adjust
+from phone_host.calibration.calibrate import calibrate
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 
-SIZES = ((640, 480), (1280, 720))
-FREE = np.array([True] * 8 + [False])
+FREE = FreeParameters(Bend.USUAL.free(), Bend.USUAL.free())
 """All but the third radial term."""
-
-
-def parameters(camera: CameraModel) -> np.ndarray:
-    """A camera as the adjustment holds it: fx fy cx cy k1 k2 p1 p2 k3."""
-    (fx, _, cx), (_, fy, cy), _ = camera.matrix
-    return np.array([fx, fy, cx, cy, *camera.distortion])
 
 
 def test_an_answer_that_cannot_be_bettered_is_kept() -> None:
@@ -24,14 +21,14 @@ def test_an_answer_that_cannot_be_bettered_is_kept() -> None:
     rig, boards = unlike_rig(), poses(6, seed=2)
     views = [BundleView(pair.left_px, pair.right_px) for pair in exact_pairs(rig, boards)]
     state = BundleState(
-        left=parameters(rig.left),
-        right=parameters(rig.right),
+        left=rig.left,
+        right=rig.right,
         rotation=np.array([0.02, -0.05, 0.03]),  # of `unlike_rig`
         translation_m=rig.t_right_left_m,
         poses=boards,
     )
     for _ in range(5):
-        found = adjust(views, BOARD.points_m(), state, FREE, SIZES)
+        found = adjust(views, BOARD.points_m(), state, FREE)
         assert found.rms_px() < 1e-5
         np.testing.assert_allclose(found.state.translation_m, rig.t_right_left_m, atol=1e-7)
         state = found.state
@@ -42,13 +39,36 @@ def test_the_rig_is_found_from_a_rough_start() -> None:
     rig, boards = unlike_rig(), poses(6, seed=2)
     views = [BundleView(pair.left_px, pair.right_px) for pair in exact_pairs(rig, boards, noise_px=0.2, seed=3)]
     rough = BundleState(
-        left=parameters(rig.left) * np.array([1.02, 1.02, *[1.0] * 7]),
-        right=parameters(rig.right),
+        left=replace(rig.left, matrix=rig.left.matrix * np.array([[1.02, 1, 1], [1, 1.02, 1], [1, 1, 1]])),
+        right=rig.right,
         rotation=np.array([0.02, -0.05, 0.03]),
         translation_m=rig.t_right_left_m,
         poses=boards,
     )
-    found = adjust(views, BOARD.points_m(), rough, FREE, SIZES)
+    found = adjust(views, BOARD.points_m(), rough, FREE)
     assert found.rms_px() == pytest.approx(0.2 * np.sqrt(2), rel=0.15)
-    again = adjust(views, BOARD.points_m(), found.state, FREE, SIZES)
+    again = adjust(views, BOARD.points_m(), found.state, FREE)
     np.testing.assert_allclose(again.state.translation_m, found.state.translation_m, atol=1e-6)
+
+
+def test_corners_that_are_not_seen_are_left_out() -> None:
+    """Boards that reach out of one image, with a third of their corners unseen there: the rig comes back all the same, by `adjust` and by `calibrate`."""
+    rig, boards = unlike_rig(), poses(9, seed=2)
+    for camera in (rig.left, rig.right):
+        camera.distortion[4] = 0
+    random, pairs = np.random.default_rng(4), list[BoardPair]()
+    for pair in exact_pairs(rig, boards):
+        left, right = pair.left_px.copy(), pair.right_px.copy()
+        left[random.choice(54, 18, replace=False)] = np.nan
+        right[random.choice(54, 18, replace=False)] = np.nan
+        pairs.append(BoardPair(pair.name, left, right))
+    state = BundleState(
+        left=rig.left, right=rig.right, rotation=np.array([0.021, -0.05, 0.03]), translation_m=rig.t_right_left_m, poses=boards
+    )  # fmt: skip
+    found = adjust([BundleView(pair.left_px, pair.right_px) for pair in pairs], BOARD.points_m(), state, FREE)
+    np.testing.assert_allclose(found.state.translation_m, rig.t_right_left_m, atol=1e-6)
+    assert np.isnan(found.left_errors_px).sum() == 9 * 18 * 2
+    whole = calibrate(pairs, BOARD, ((640, 480), (1280, 720)))
+    np.testing.assert_allclose(whole.rig.t_right_left_m, rig.t_right_left_m, atol=1e-5)
+    assert len(whole.used) == 9
+    assert whole.squares.mean_m == pytest.approx(0.025, rel=1e-5)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.calibrate_alone import off_words
@@ -126,22 +127,28 @@ def test_boards_that_are_all_parallel_are_told() -> None:
     """Boards that face the camera leave the focal length open: a remedy names the tilt."""
     pairs = exact_pairs(_rig(), poses(12, seed=4, tilt_deg=1.0), noise_px=0.2, seed=7)
     judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
-    assert any("tilt" in remedy for remedy in judgement.remedies)
+    assert len(judgement.remedies) == 1
+    assert "tilted" in judgement.remedies[0]
 
 
-def test_a_board_in_the_middle_only_is_told() -> None:
-    """Boards far away cover only the middle: a remedy asks for the corners."""
+def test_boards_that_are_all_far_away_are_told() -> None:
+    """Boards far away cover only the middle and leave the lens open: the one remedy says what to show."""
     pairs = exact_pairs(_rig(), poses(12, seed=4, depth_m=(1.2, 1.3)), noise_px=0.1, seed=7)
     judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
-    assert any("corners" in remedy for remedy in judgement.remedies)
+    assert judgement.verdict is Verdict.USABLE
+    (remedy,) = judgement.remedies
+    assert "leave depth open" in remedy
+    assert ": take pairs with the board" in remedy
 
 
 def test_wild_corners_everywhere_are_no_calibration() -> None:
-    """With 1 px of noise rows cannot meet to half a pixel: reject, with a remedy."""
-    pairs = exact_pairs(_rig(), poses(12, seed=8), noise_px=1.0, seed=8)
-    judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
-    assert judgement.verdict is Verdict.REJECT
-    assert any("take new pairs" in remedy for remedy in judgement.remedies)
+    """With 1 px of noise the views contradict each other, with half of that rows do not meet to half a pixel: reject, with one remedy."""
+    for noise_px, said in ((1.0, "contradict each other"), (0.5, "take new pairs")):
+        pairs = exact_pairs(_rig(), poses(12, seed=8), noise_px=noise_px, seed=8)
+        judgement = judge(calibrate(pairs, BOARD, _SIZES), ())
+        assert judgement.verdict is Verdict.REJECT
+        (remedy,) = judgement.remedies
+        assert said in remedy
 
 
 def test_few_pairs_are_never_good() -> None:
@@ -157,31 +164,46 @@ def test_fewer_than_three_pairs_are_refused(count: int) -> None:
         calibrate(exact_pairs(_rig(), poses(count, seed=1)), BOARD, _SIZES)
 
 
-def test_remedies_fit_what_is_wrong() -> None:
-    """Rows between good and usable, an undetermined baseline, and many rejected pairs each have their remedy; the gravest comes first."""
-    pairs = exact_pairs(_rig(), poses(8, seed=2), noise_px=0.2, seed=2)
-    found = calibrate(pairs, BOARD, _SIZES)
-    judgement = judge(found, ())
-    assert judgement.verdict is Verdict.USABLE
-    assert "hold the board still" in judgement.remedies[0]
-    assert any("8 pairs are few" in remedy for remedy in judgement.remedies)
+def _fine() -> Calibration:
+    return calibrate(exact_pairs(_rig(), poses(10, seed=1)), BOARD, _SIZES)
+
+
+def test_the_one_remedy_is_that_of_the_worst_measure() -> None:
+    """Good carries none; each measure beyond its limit limits the verdict; of several the one that is farthest beyond gives the remedy."""
+    found = _fine()
+    assert judge(found, ()) == Assessment(Verdict.GOOD, ())
+    rows = replace(found, vertical_px=np.full(100, 0.3))
+    assert judge(rows, ()).verdict is Verdict.USABLE
+    assert "rows of the two views differ by 0.30 px" in judge(rows, ()).remedies[0]
+    baseline = replace(rows, baseline_sigma_m=0.002)
+    (remedy,) = judge(baseline, ()).remedies
+    assert "open by 2.00 of 100.3 mm: take pairs with the board" in remedy
+    squares = replace(baseline, squares=replace(found.squares, mean_m=0.026))
+    (remedy,) = judge(squares, ()).remedies
+    assert "measure 26.00 instead of 25.00 mm" in remedy
+    depth = replace(squares, depths=((0.5, 0.001), (1.0, 0.06)))
+    assert judge(depth, ()).verdict is Verdict.REJECT
+    (remedy,) = judge(depth, ()).remedies
+    assert "leave depth open by 60 mm at 1 m" in remedy
+    assert judge(replace(found, baseline_sigma_m=0.006), ()).verdict is Verdict.REJECT
+
+
+def test_what_spoils_pairs_comes_before_what_they_measure() -> None:
+    """Where a third of the pairs was rejected, and the verdict is not good, the most frequent reason is cured first; where all is well nothing is said."""
+    found = _fine()
     unpaired = tuple(Rejected(str(number), Reason.NO_PARTNER, "no partner") for number in range(6))
-    assert any("the same number" in remedy for remedy in judge(found, unpaired).remedies)
-    open_by_half = replace(found, baseline_sigma_m=0.05)
-    assert judge(open_by_half, ()).verdict is Verdict.REJECT
-    assert any("nearer and farther" in remedy for remedy in judge(open_by_half, ()).remedies)
+    assert judge(found, unpaired) == Assessment(Verdict.GOOD, ())
+    (remedy,) = judge(replace(found, vertical_px=np.full(100, 0.3)), unpaired).remedies
+    assert remedy == "6 of 16 pairs were rejected: no partner: give both images of a pair the same number"
 
 
-def test_a_baseline_known_to_two_percent_limits_the_verdict() -> None:
-    """A hundredth is good, a twentieth gives no scale at all; in between the calibration is usable, and says what would improve it."""
-    found = calibrate(exact_pairs(_rig(), poses(10, seed=1)), BOARD, _SIZES)
-    wide = replace(found, spread=0.9, tilts_deg=np.array([30.0]))
-    assert judge(wide, ()) == Assessment(Verdict.GOOD, ())
-    judgement = judge(replace(wide, baseline_sigma_m=0.002), ())
-    assert judgement.verdict is Verdict.USABLE
-    assert len(judgement.remedies) == 1
-    assert "open by 2.00 of 100.3 mm" in judgement.remedies[0]
-    assert "nearer and farther" in judgement.remedies[0]
+def test_what_would_help_most_can_be_told() -> None:
+    """Without advice, as from a rig that cannot be rectified, more pairs are asked for; a calibration says what the next views would bring."""
+    found = _fine()
+    assert found.advice is not None
+    assert found.advice.after_m < found.advice.sigma_m
+    (remedy,) = judge(replace(found, advice=None, baseline_sigma_m=0.002), ()).remedies
+    assert remedy.endswith("take more pairs like these")
 
 
 def test_a_lens_that_takes_all_five_terms_gets_them() -> None:
@@ -189,7 +211,7 @@ def test_a_lens_that_takes_all_five_terms_gets_them() -> None:
     rig = _rig()
     rig.left.distortion[:] = (-0.25, 0.08, 0.0, 0.0, 0.4)
     found = calibrate(exact_pairs(rig, poses(10, seed=3, depth_m=(0.3, 0.4)), noise_px=0.02, seed=1), BOARD, _SIZES)
-    assert found.distortion_terms == 5
+    assert found.bends[0] is Bend.WIDE
     assert found.rig.left.distortion[4] == pytest.approx(0.4, abs=0.05)
     assert found.rejected == ()
 
@@ -236,7 +258,7 @@ def test_a_wide_lens_keeps_its_pairs() -> None:
     rig = _wide_rig()
     found = calibrate(exact_pairs(rig, _wide_poses(rig, 12), noise_px=0.1), BOARD, ((640, 480), (640, 480)))
     assert len(found.used) == 12
-    assert found.distortion_terms == 5
+    assert all(bend is not Bend.USUAL for bend in found.bends)
     assert _baseline_mm(found) == pytest.approx(np.linalg.norm([60, 1, 2]), abs=0.3)
 
 

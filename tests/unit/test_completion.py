@@ -113,6 +113,28 @@ def test_colour_images_count_by_their_grey_levels() -> None:
     assert colour.disparity.tobytes() == completed(image, holed).disparity.tobytes()
 
 
+def test_specks_do_not_spread_over_a_hole() -> None:
+    """A speck of 4 x 4 px amid a hole keeps its value, and the hole around it gets the surface's; a map of specks alone is completed."""
+    truth = slanted()
+    holed = with_hole(truth, slice(20, 60), slice(30, 90))
+    holed[38:42, 58:62] = 60
+    found = completed(_PLAIN, holed)
+    assert (found.disparity[38:42, 58:62] == 60).all()
+    assert np.abs(found.disparity - truth)[found.mask].max() < 0.01
+    alone = np.full_like(truth, np.nan)
+    alone[30:34, 30:34] = alone[30:34, 50:54] = 12
+    assert completed(_PLAIN, alone).mask[30:34, 34:50].all()
+
+
+def test_nothing_is_completed_that_nobody_saves() -> None:
+    """The option holds for saved pairs; the others cost no time."""
+    scene = layers([Layer(disparity=14)])
+    core = StereoCore(MatchSettings(MatcherName.SGBM, 64), None, _GEOMETRY, DepthWanted(complete=True))
+    ticks = count()
+    done = core.compute(scene.pair.left, scene.pair.right, lambda: next(ticks), is_saved=False)
+    assert done.completed is None
+
+
 def processed(*, complete: bool, crop: Crop | None = None) -> Processed:
     """A box before a wall, with depth."""
     scene = layers([Layer(disparity=40, x=140, y=80, width=80, height=80, seed=2), Layer(disparity=14)])

@@ -111,13 +111,28 @@ def test_a_crop_is_only_asked_for_what_lies_in_it(good: Pair) -> None:
     assert not _evidence(_core(searched, wanted=crop), *good).beyond_share > 0.05
 
 
-def test_a_few_features_beyond_the_search_do_not_count() -> None:
-    """Of 100 features all over the image, one beyond, a wrong match, makes 1 or 2 %, and a wider search is not asked for it."""
+def test_single_features_beyond_the_search_do_not_count() -> None:
+    """Of 100 features all over the image, one beyond is a wrong match, and a wider search is not asked for it."""
     places = np.column_stack([np.tile(np.arange(10), 10), np.repeat(np.arange(10), 10)]) * [32.0, 24.0]
     shifts = np.where(np.arange(100) == 5, 200.0, 10.0)
-    share, enough = beyond_search(places, shifts, 32, (320, 240))
-    assert 0 < share < 0.02
+    assert beyond_search(places, shifts, 32, (320, 240)) == (0.0, 16)
+
+
+def test_chance_matches_on_a_bare_wall_are_nothing_near() -> None:
+    """Things fill two tiles; on the wall three features, each alone in its tile, are beyond the search, each elsewhere or farther: not told.
+
+    Two that agree, side by side, are a thing that is near: one tile of four.
+    """
+    things = np.random.default_rng(2).uniform((0, 200), (60, 238), (40, 2))
+    chance = np.array([[150.0, 30.0], [170.0, 40.0], [300.0, 100.0]])
+    shifts = np.concatenate([np.full(40, 12.0), [90.0, 160.0, 91.0]])
+    share, enough = beyond_search(np.vstack([things, chance]), shifts, 32, (320, 240))
+    assert share == 0.0
     assert enough == 16
+    shifts[41] = 92.0
+    share, enough = beyond_search(np.vstack([things, chance]), shifts, 32, (320, 240))
+    assert 0.1 < share < 0.4
+    assert enough == 96  # 90 and 92 with a twentieth more, in steps of 16
 
 
 def test_a_textured_board_in_a_plain_room_is_not_most_of_the_scene() -> None:

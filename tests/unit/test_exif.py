@@ -125,6 +125,30 @@ def test_other_metadata_come_before_or_beside() -> None:
     assert read_head(content[:first_end] + second + content[first_end:], "image").orientation == Orientation(90)
 
 
+@pytest.mark.parametrize(
+    "entry",
+    [
+        struct.pack("<HHI4s", 271, 2, 4, b"abc\0"),
+        struct.pack("<HHIHH", 274, 3, 2, 6, 6),
+        struct.pack("<HHI4s", 274, 2, 2, b"6\0\0\0"),
+    ],
+    ids=["only the maker", "two orientations", "a text"],
+)
+def test_metadata_without_one_orientation_leave_an_image_as_it_is_stored(entry: bytes) -> None:
+    """The standard has one SHORT for the orientation: two of them or a text say nothing, as does no entry at all."""
+    metadata = b"II*\0" + struct.pack("<IH", 8, 1) + entry + struct.pack("<I", 0)
+    assert exif_orientation(metadata, "image") == UPRIGHT
+
+
+@pytest.mark.parametrize(("chunks", "orientation"), [(20, Orientation(90)), (5000, UPRIGHT)])
+def test_the_walk_through_a_webp_has_an_end(chunks: int, orientation: Orientation) -> None:
+    """EXIF is found behind other chunks, but not behind thousands of empty ones, which no still image has."""
+    content = oriented(".webp", picture(48, 32), 6)
+    header_end = 12 + 8 + 10
+    body = content[8:header_end] + struct.pack("<4sI", b"none", 0) * chunks + content[header_end:]
+    assert read_head(b"RIFF" + struct.pack("<I", len(body)) + body, "image").orientation == orientation
+
+
 @given(st.binary(max_size=80), st.integers(0, 60))
 def test_spoiled_metadata_say_nothing(noise: bytes, cut: int) -> None:
     """Any bytes in their place, and metadata that end early, leave an image as it is stored or name an orientation that exists."""

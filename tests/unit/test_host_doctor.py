@@ -140,6 +140,8 @@ def test_a_missing_native_library_is_a_warning_with_its_reason() -> None:
     missing = check_native(Missing(reason="not built: no C compiler", remedy="install gcc"))
     assert (missing.verdict, missing.remedy) == (WARN, "install gcc")
     assert missing.text == "own matcher not built: no C compiler; sgbm is used"
+    idle = check_native(Missing(reason="not built", remedy="install gcc"), "avx2")
+    assert idle.text == "own matcher not built; sgbm is used; TANDEMSCAN_SIMD=avx2 has no effect"
     assert check_native(SettingsError("TANDEMSCAN_SIMD=mmx is no instruction set", "give scalar")).verdict is FAIL
     found = check_native(native())
     assert found.verdict is OK

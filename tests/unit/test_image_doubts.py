@@ -54,6 +54,9 @@ def doubts(found: Evidence) -> list[Doubt]:
 COVERED: Final = Exposure(mean_level=3, bright_level=5, structure=0.3, blur_px=math.nan)
 GOOD: Final = evidence()
 SWAPPED: Final = replace(evidence(right=0, swapped=150, both_turned=150, both_mirrored=150), density=0.05)
+PLAIN: Final = replace(
+    evidence(right=2, tilted=3), left=replace(SHARP, structure=2.8), right=replace(SHARP, structure=2.7), density=0.05
+)
 FOREIGN: Final = OffMiddle(cx_px=602.0, cy_px=183.0, width_px=741, height_px=500)
 BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
 
@@ -91,6 +94,10 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
         (replace(GOOD, left=replace(SHARP, blur_px=1.4), right=replace(SHARP, blur_px=0.7)), []),
         (replace(evidence(right=2, tilted=3), density=0.05), [Doubt.OTHER_SCENE]),
         (replace(evidence(right=2, tilted=3), density=0.5), []),  # the matcher finds what features do not
+        (PLAIN, [Doubt.NO_TEXTURE]),  # two pictures of one bare wall
+        (replace(PLAIN, left=SHARP), [Doubt.OTHER_SCENE]),  # a wall and something else
+        (replace(PLAIN, density=0.5), []),  # its grain is enough for the matcher
+        (replace(PLAIN, supports=GOOD.supports), [Doubt.LOW_DENSITY]),  # some things before it
         (replace(GOOD, density=0.1), [Doubt.LOW_DENSITY]),
         (replace(GOOD, consistency=0.2), [Doubt.LOW_CONSISTENCY]),
         (replace(GOOD, vertical_px=2.1), [Doubt.VERTICAL_ERROR]),

@@ -60,6 +60,14 @@ def test_a_slow_processor_has_a_backlog() -> None:
     assert "fps=10" in fewer
 
 
+def test_whoever_uses_the_fastest_matcher_is_not_told_to_use_a_faster_one() -> None:
+    """The other remedies stay."""
+    slow = figures(period_ms=33, arrival_ms=100, processing_ms=200, match_ms=150)
+    told, spared = judge(slow).remedies, judge(replace(slow, matcher_is_fastest=True)).remedies
+    assert [text for text in told if text not in spared] == [text for text in told if "faster matcher" in text]
+    assert len(spared) == len(told) - 1
+
+
 def test_a_backlog_behind_a_slow_link_names_what_the_link_brings() -> None:
     """The cameras show 30 a second, the link brings 15, each pair takes 100 ms: 15 are offered, and the matcher must get by with 66.7 ms."""
     run = figures(period_ms=100 / 3, arrival_ms=200 / 3, processing_ms=100, match_ms=80)

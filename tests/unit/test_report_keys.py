@@ -16,6 +16,7 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import CutCounts, DepthAccount, DepthLimits, MatchReport, Search, TemporalAccount
+from phone_host.report.quality_json import quality_json
 from phone_host.report.run_json import build
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import FailedPair, SetReport
@@ -23,7 +24,7 @@ from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.phase import Aligning, Alignment, Phase
 from phone_host.sync.quarantine import Suspects
 from tests.docs.commands import ROOT
-from tests.support import bench_results, budget_accounts, run_snapshots
+from tests.support import bench_results, budget_accounts, quality_pages, run_snapshots
 from tests.support.pictures import encoded
 from tests.unit import test_calibrate_verb, test_stereo_report
 
@@ -96,6 +97,13 @@ def test_every_key_of_a_report_of_stereo_is_described() -> None:
     keys = _keys(pair_json(pair)) | _keys(set_json(SetReport(pairs=(pair, failed), by_number=True)))
     assert len(keys - {"total"}) >= 55
     assert keys <= _described("What `--json` prints", "report.json of `stereo`")
+
+
+def test_every_key_of_a_report_of_quality_is_described() -> None:
+    """That of a pair with a plane, and of one that failed."""
+    keys = _keys(quality_json(quality_pages.report(failed=True)))
+    assert len(keys) >= 40
+    assert keys <= _described("What `--json` prints", "report.json of `stereo`", "report.json of `quality`")
 
 
 def test_every_key_of_a_report_of_run_is_described() -> None:

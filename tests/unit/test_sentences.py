@@ -126,6 +126,10 @@ def image_examples() -> Iterator[Concern]:
     yield from image_doubts(replace(good, right=blind, supports=()))
     yield from image_doubts(replace(good, left=replace(sharp, mean_level=9, bright_level=20)))
     yield from image_doubts(replace(good, right=replace(sharp, blur_px=2.5)))
+    plain = replace(sharp, structure=2)
+    yield from image_doubts(
+        replace(good, left=plain, right=plain, density=0.05, supports=support(Arrangement.RIGHT, 0))
+    )
     yield from image_doubts(replace(good, density=0.1))
     yield from image_doubts(replace(good, consistency=0.1))
     yield from image_doubts(replace(good, vertical_px=3.1))

@@ -15,7 +15,10 @@ from common.ledger import BoardMarks
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
+    Bye,
     CameraDescription,
+    Credit,
+    DropReason,
     FrameMessage,
     HostHello,
     Knock,
@@ -27,6 +30,7 @@ from common.protocol.message import (
     Refusal,
     RefusalReason,
     Rung,
+    Steer,
 )
 from common.protocol.wire import (
     MAX_HEADER_BYTES,
@@ -188,6 +192,32 @@ def test_number_of_fields_is_exact(fields: list[Any]) -> None:
     """One field too few or too many makes a header invalid."""
     with pytest.raises(ProtocolError):
         decode(msgpack.packb([PROTOCOL_VERSION, 5, *fields]))
+
+
+@pytest.mark.parametrize(
+    ("message", "more", "said"),
+    [
+        (Credit(7), [0], "1 fields too many"),
+        (Steer(7), [0, 0], "2 fields too many"),
+        (Bye(BoardCounts(grabbed=9, sent=8)), [0], "1 fields too many"),
+    ],
+)
+def test_what_follows_the_last_field_is_refused_and_counted(message: Message, more: list[int], said: str) -> None:
+    """A sound header with something behind it is no message of this version."""
+    header = msgpack.unpackb(encode(message)[0])
+    assert decode(msgpack.packb(header)) == message
+    with pytest.raises(ProtocolError, match=said):
+        decode(msgpack.packb([*header, *more]))
+
+
+def test_drops_are_pairs_of_a_reason_and_a_count() -> None:
+    """A reason without its count is refused, and the field is named: the third of a goodbye, the fifth of its header."""
+    reason = next(iter(DropReason))
+    sound = Bye(BoardCounts(grabbed=9, sent=8, dropped=((reason, 1),)))
+    *before, drops = msgpack.unpackb(encode(sound)[0])
+    assert decode(msgpack.packb([*before, drops])) == sound
+    with pytest.raises(ProtocolError, match="field 5 is no list of drops"):
+        decode(msgpack.packb([*before, drops[:1]]))
 
 
 def test_payload_has_a_limit() -> None:

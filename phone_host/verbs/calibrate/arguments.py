@@ -2,39 +2,71 @@
 
 import argparse
 from pathlib import Path
+from typing import Final
 
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
 
 SUMMARY = "calibrate two cameras from pictures of a chessboard"
 
-EXAMPLES = """  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
+EXAMPLES = """  phone-host calibrate left/ right/ --square 25mm --out rig.yaml    # the board's size is found in the pictures
+  phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
   phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
   phone-host calibrate left/ right/ --board 9x6 --square 25mm --rotate-right 180 --out rig.yaml    # right camera on its head
+  phone-host calibrate more-left/ more-right/ --from rig.yaml --out rig.yaml    # adds pictures to an earlier calibration
+  phone-host calibrate left/ right/ --from rig.yaml --pose-only --out rig.yaml    # a camera was moved, its lens is the same
+  phone-host calibrate --import camchain.yaml --out rig.yaml    # the calibration of another program; rig.yaml needs no pictures
+  phone-host calibrate --import rig.yaml --export ros --export colmap --out rig.yaml    # ros/ and colmap/ beside rig.yaml
 """
+
+EXPORTS: Final = ("ros", "kalibr", "opencv", "opencv-xml", "colmap", "euroc", "middlebury", "kitti")
+"""The kinds of `output.rig_files.imported.RigKind` that --export writes. Here, because that module is not light."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     parser.add_argument(
         "images",
-        nargs="+",
+        nargs="*",
         metavar="LEFT RIGHT",
         help="pictures of the left and of the right camera: two folders or two globs; each left picture is paired with the"
         " right one that has the same number in its name. Pictures are turned upright by their EXIF orientation",
     )
-    parser.add_argument("--board", required=True, metavar="9x6", help="inner corners of the chessboard: columns x rows")
+    parser.add_argument(
+        "--board",
+        metavar="9x6",
+        help="inner corners of the chessboard: columns x rows. Without it they are found in the pictures. Boards with marks, of"
+        " which a part is enough: charuco:10x8:25mm:18mm:5x5 (squares, their side, a mark's side, ArUco family) or"
+        " aprilgrid:6x6:30mm:9mm (tags, their side, the gap)",
+    )
     parser.add_argument(
         "--square",
-        required=True,
         metavar="25mm",
-        help="side of one square: 25mm, 2.5cm or 0.025m; a number alone means mm",
+        help="side of one square: 25mm, 2.5cm or 0.025m; a number alone means mm. Measure it on paper with a ruler; on a"
+        " screen it is its pixels times the width of a pixel, such as '120px*0.1794mm'",
     )
+    parser.add_argument(
+        "--baseline",
+        metavar="80mm",
+        help="distance of the two lenses, as you measure it with a ruler: it shows whether --square is right",
+    )
+    parser.add_argument(
+        "--from",
+        dest="earlier",
+        type=Path,
+        metavar="rig.yaml",
+        help="add these pictures to those of an earlier calibration; --board and --square are then as they were",
+    )
+    parser.add_argument(
+        "--pose-only",
+        action="store_true",
+        help="with --from: keep its lenses, compute only how the cameras stand to each other, from these pictures alone",
+    )
+    _add_file_arguments(parser)
     parser.add_argument(
         "--board-side",
         choices=("left", "right"),
-        default="left",
-        help="which of the two is the board's camera (default left)",
+        help="which of the two is the board's camera (default left, or as in --from)",
     )
     add_orientation_arguments(parser)
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
@@ -44,4 +76,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="rig.yaml",
         help="file for the calibration; report.json is written beside it",
+    )
+
+
+def _add_file_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--import",
+        dest="imported",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="in place of pictures: a calibration of ROS (left.yaml right.yaml), Kalibr, OpenCV (YAML or XML, one file or two),"
+        " COLMAP (cameras.txt images.txt), EuRoC (two sensor.yaml), Middlebury, ETH3D or KITTI (calib.txt), a rig.yaml, or the"
+        " folder that holds them; which it is, the content tells",
+    )
+    parser.add_argument(
+        "--unit",
+        metavar="1mm",
+        help="for --import: what 1 in the file's lengths is, where that is not 1 m, such as 25mm for squares",
+    )
+    parser.add_argument(
+        "--size",
+        metavar="WxH",
+        help="for --import: size of the images in px where the files do not state it; WxH,WxH if left and right differ",
+    )
+    parser.add_argument(
+        "--export",
+        dest="exports",
+        action="append",
+        choices=EXPORTS,
+        default=[],
+        metavar="KIND",
+        help=f"also write the calibration as files of another program, into a folder KIND beside --out: {', '.join(EXPORTS)};"
+        " may be repeated",
     )

@@ -1,6 +1,7 @@
 """phone-host calibrate: calibrate two cameras from pictures of a chessboard."""
 
 import argparse
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,21 +10,32 @@ from typing import Any
 from common.errors import DataError, UnavailableError
 from common.places import Kind, kind_of, make_folder
 from common.program.terminal import say
-from phone_host.calibration.arrangement import Misplaced, is_contradicted, misplaced
-from phone_host.calibration.board_pairs import Calibration, Reason
+from phone_host.calibration.arrangement import Misplaced, is_contradicted
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
-from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
+from phone_host.calibration.causes.mistakes import Finding
+from phone_host.calibration.causes.name import BoardSession, name_mistake
 from phone_host.calibration.out_of_step import out_of_step
-from phone_host.calibration.target import Board, parse_board
 from phone_host.calibration.verdict import Assessment, Verdict, judge
-from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
+from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import REJECTED, is_rig, read_rig, write_rig
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files
+from phone_host.verbs.calibrate.board import Known, board_in
+from phone_host.verbs.calibrate.cause import calibrated_as_last, cause_report, with_cause
+from phone_host.verbs.calibrate.earlier import (
+    Session,
+    asked_of,
+    calibrated,
+    notes,
+    saved_views,
+    session_of,
+    with_earlier_cameras,
+)
 from phone_host.verbs.calibrate.figures import (
     pairing_notes,
     rejections,
@@ -33,10 +45,11 @@ from phone_host.verbs.calibrate.figures import (
     unwritten,
 )
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
+from phone_host.verbs.calibrate.importing import export_lines, import_calibration, require_pictures, write_exports
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
-from phone_host.verbs.units import square_mm
+from phone_host.verbs.units import baseline_mm
 
 _CHECK_FAILED = 4
 _NOT_FOUND = frozenset({Reason.NOT_FOUND_LEFT, Reason.NOT_FOUND_RIGHT, Reason.NOT_FOUND_BOTH})
@@ -47,8 +60,11 @@ _COUNT_CORNERS = (
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find the chessboard in all pairs, calibrate, judge and write."""
-    board = parse_board(options.board, square_mm(options.square))
+    """Find the chessboard in all pairs, calibrate, judge and write; or import what another program calibrated."""
+    if options.imported:
+        return import_calibration(options)
+    require_pictures(options)
+    asked = asked_of(options)
     mounted = orientations(options)
     require_file(options.out)
     if kind_of(options.out) is not Kind.MISSING and not is_rig(options.out):
@@ -57,44 +73,70 @@ def run(options: argparse.Namespace) -> int:
     keep_other_report(options.out.parent, "calibrate")
     claim_names(options.out.parent, options.out, "report.json")
     beside = cameras_beside(files, mounted)
-    views, found, wrong = _calibrated(files, board, options, mounted)
+    session, known = session_of(
+        options, asked, lambda named: board_in(files, named, most_pixels(None, options.max_megapixels))
+    )
+    views, found, finding, pairs = _calibrated(files, session, options, mounted)
+    wrong = None if finding is None else finding.misplaced
     hint = "" if wrong is None else arrangement_hint(views, mounted, wrong)
     if isinstance(found, DataError):
-        return _report_failure(files, views, DataError(found.problem, hint or found.remedy), options)
+        remedy = hint or ("" if finding is None else f"{finding.sentence}: {finding.remedy}") or found.remedy
+        return _report_failure(files, views, known, DataError(found.problem, remedy), options)
     if beside is not None:
         require_sizes(*beside, views.sizes_px)
     rejected = (*views.rejected, *found.rejected)
     judgement = _advised(judge(found, rejected), found, wrong, hint)
-    rig = replace(
-        with_cameras(found.rig, None if beside is None else beside[1], mounted), verdict=judgement.verdict.value
-    )
-    report = report_of(files, views, rejected, found, judgement)
-    report |= _write_rig(options.out, replace(found, rig=rig))
+    if wrong is None and finding is not None and found.obstacle is None:
+        judgement = with_cause(judgement, finding)
+    rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
+    rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict.value)
+    report = report_of(files, views, rejected, found, judgement) | known.as_report() | cause_report(finding, hint)
+    report |= _write_rig(options.out, replace(found, rig=rig), saved_views(session, found, pairs))
+    exported: list[str] = []
+    if found.rectification is not None:
+        report |= write_exports(options, rig, found.rectification)
+        exported = export_lines(report)
     _write_report(options.out, report)
-    _tell(options, report, [*pairing_notes(files), *summary(report, views, found, rejected, options.out)])
+    said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
+    _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported])
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
 def _calibrated(
-    files: ViewFiles, board: Board, options: argparse.Namespace, mounted: Mounted
-) -> tuple[BoardViews, Calibration | DataError, Misplaced | None]:
-    """Search all images and calibrate; return why there is no calibration if there is none, and which side seems turned or mirrored."""
-    limit = most_pixels(None, options.max_megapixels)
+    files: ViewFiles, session: Session, options: argparse.Namespace, mounted: Mounted
+) -> tuple[BoardViews, Calibration | DataError, Finding | None, list[BoardPair]]:
+    """Search all images and calibrate.
+
+    Returns:
+        The views; the calibration, or why there is none; what is wrong with the session; and the pairs as they were used.
+    """
+    limit, board = most_pixels(None, options.max_megapixels), session.board
     with step_bar("finding the board", len(files.pairs)) as step:
         views = look_for_boards(files, board, step, limit, mounted)
         step.say("fitting the rig")
         shifted = out_of_step(*views.in_order, board, views.sizes_px)
         if shifted is not None:
-            return views, out_of_step_error(shifted), None
+            return views, out_of_step_error(shifted), None, list(views.pairs)
         found: Calibration | DataError
+        pairs = list(views.pairs)
         try:
-            found = calibrate(list(views.pairs), board, views.sizes_px, Side(options.board_side))
+            found = calibrated(session, pairs, views.sizes_px)
         except DataError as failure:
             found = failure
-        return views, found, misplaced(list(views.pairs), board, views.sizes_px, found)
+        step.say("looking for mistakes")
+        baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
+        taken = BoardSession(
+            pairs=views.pairs, board=board, sizes_px=views.sizes_px, looks=views.looks, baseline_m=baseline_m
+        )
+        finding = name_mistake(taken, found)
+        if session.rig is not None:  # the earlier pairs stood otherwise, or its lenses are kept
+            return views, found, finding, pairs
+        return views, *calibrated_as_last(taken, found, finding, session.side)
 
 
-def _report_failure(files: ViewFiles, views: BoardViews, failure: DataError, options: argparse.Namespace) -> int:
+def _report_failure(
+    files: ViewFiles, views: BoardViews, known: Known, failure: DataError, options: argparse.Namespace
+) -> int:
     """Write and print the report of a calibration that gave no rig.
 
     Raises:
@@ -102,9 +144,13 @@ def _report_failure(files: ViewFiles, views: BoardViews, failure: DataError, opt
     """
     unseen = sum(each.reason in _NOT_FOUND for each in views.rejected)
     error = DataError(failure.problem, _COUNT_CORNERS) if 2 * unseen > len(files.pairs) else failure
-    report = report_of_failure(files, views, error) | _write_rig(options.out, None)
+    report = report_of_failure(files, views, error) | known.as_report() | _write_rig(options.out, None)
     _write_report(options.out, report)
-    _tell(options, report, [*pairing_notes(files), *rejections(views.rejected), *unwritten(report, options.out)])
+    _tell(
+        options,
+        report,
+        [*pairing_notes(files), known.as_line(), *rejections(views.rejected), *unwritten(report, options.out)],
+    )
     raise error
 
 
@@ -121,10 +167,10 @@ def _advised(judgement: Assessment, found: Calibration, wrong: Misplaced | None,
         return judgement
     if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
         return Assessment(Verdict.REJECT, (hint,))  # all else follows from it
-    return Assessment(judgement.verdict, (hint, *judgement.remedies))
+    return Assessment(judgement.verdict, (hint,))
 
 
-def _write_rig(out: Path, calibration: Calibration | None) -> dict[str, str]:
+def _write_rig(out: Path, calibration: Calibration | None, views: RigViews | None = None) -> dict[str, str]:
     """Write rig.yaml. Unless the new rig is of use, move that of an earlier run aside, so that nobody takes the one for the other.
 
     Returns:
@@ -139,7 +185,7 @@ def _write_rig(out: Path, calibration: Calibration | None) -> dict[str, str]:
             out.replace(aside)
             moved = {"earlier_rig": aside.name}
         if calibration is not None and calibration.rectification is not None:
-            write_rig(out, calibration.rig, calibration.rectification)
+            write_rig(out, calibration.rig, calibration.rectification, views)
         else:
             out.unlink(missing_ok=True)
     except OSError as error:

@@ -10,11 +10,13 @@ from common.errors import DataError
 from common.orientation import UPRIGHT
 from common.versions import REPORT_FORMAT
 from common.words import counted
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import BoardViews, turn_text
+from phone_host.calibration.fit_quality import LensTrial
 from phone_host.calibration.verdict import Assessment
 from phone_host.declared_settings import NEAR_M
-from phone_host.model import Rectification
+from phone_host.model import Rectification, Rig
 from phone_host.output.rig_yaml import REJECTED
 from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_error_px
 from phone_host.stereo.reproject import disparities_for_near
@@ -108,10 +110,48 @@ def _figures(calibration: Calibration) -> dict[str, Any]:
             else f"{calibration.rectification.width_px}x{calibration.rectification.height_px}",
         },
         "board_side": rig.board_side.value,
-        "distortion_coefficients": calibration.distortion_terms,
+        "lens": {
+            side: {"kind": bend.lens.value, "coefficients": bend.terms, "tried": _tried(trials)}
+            for side, bend, trials in zip(("left", "right"), calibration.bends, calibration.trials, strict=True)
+        },
+        "distortion_coefficients": max(bend.terms for bend in calibration.bends),
+        "sigmas": _sigmas(rig),
+        "depth_sigmas": [
+            {"depth_mm": round(depth_m * 1e3), "depth_sigma_mm": _rounded(sigma_m * 1e3, 3)}
+            for depth_m, sigma_m in calibration.depths
+        ],
+        "squares_mm": {
+            "given": round(calibration.squares.true_m * 1e3, 4),
+            "mean": _rounded(calibration.squares.mean_m * 1e3, 4),
+            "sigma": _rounded(calibration.squares.sigma_m * 1e3, 4),
+        },
         "board_spread": round(calibration.spread, 3),
         "largest_tilt_deg": round(float(calibration.tilts_deg.max()), 1),
     }
+
+
+def _tried(trials: tuple[LensTrial, ...]) -> list[dict[str, Any]]:
+    """Return how each formula that was tried predicts views that it has not seen."""
+    return [
+        {"kind": each.bend.lens.value, "coefficients": each.bend.terms, "held_out_px": round(each.rms_px, 4)}
+        for each in trials
+    ]
+
+
+def _sigmas(rig: Rig) -> dict[str, Any]:
+    """Return the standard uncertainty of every parameter; null where it was not estimated."""
+    sigmas = np.sqrt(np.diag(rig.covariance).clip(min=0))
+    known: list[float | None] = [float(f"{sigma:.4g}") if sigma > 0 else None for sigma in sigmas]
+    cameras = {
+        side: {
+            "focal_px": known[at : at + 2],
+            "principal_point_px": known[at + 2 : at + 4],
+            "coefficients": known[at + 4 : at + 12],
+        }
+        for side, at in (("left", 0), ("right", 12))
+    }
+    turn_deg = [float(f"{math.degrees(sigma):.4g}") for sigma in sigmas[24:27]]
+    return {**cameras, "rotation_deg": turn_deg, "translation_mm": [float(f"{s * 1e3:.4g}") for s in sigmas[27:]]}
 
 
 def _rounded(value: float, digits: int) -> float | None:
@@ -179,6 +219,19 @@ def summary(
         rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
     rows.append(f"baseline {report['baseline_mm']:.2f} +- {_sigma_mm(calibration.baseline_sigma_m)} mm")
     rows.append("         compare it with a ruler: it shows a wrong --square")
+    rows += _lens_rows(calibration)
+    if calibration.depths:
+        errors = ", ".join(
+            f"{_sigma_mm(sigma_m)} mm at {depth_m:g} m"
+            for depth_m, sigma_m in calibration.depths
+            if math.isfinite(sigma_m)
+        )
+        rows.append(f"depth    +- {errors} by the calibration alone")
+    squares = calibration.squares
+    if squares.count:
+        rows.append(
+            f"squares  {squares.mean_m * 1e3:.2f} +- {_sigma_mm(squares.sigma_m)} mm on boards that were held out, {squares.true_m * 1e3:.2f} mm true"
+        )
     if report["zero_sigma_px"] is not None:
         far_m = report["depth_limit_m"]
         far = f"{far_m:.0f}" if far_m >= _WHOLE_METRES else f"{far_m:.1f}"
@@ -186,6 +239,17 @@ def summary(
     rows.append(f"verdict  {report['verdict']}")
     rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
     return [*rows, *_written(report, calibration, out)]
+
+
+def _lens_rows(calibration: Calibration) -> list[str]:
+    """Return one line on the lenses, if one of them is not the usual one."""
+    if all(bend in {Bend.RADIAL, Bend.USUAL} for bend in calibration.bends):
+        return []
+    kinds = (
+        f"{side} {bend.lens.value}, {bend.terms} coefficients"
+        for side, bend in zip(("left", "right"), calibration.bends, strict=True)
+    )
+    return [f"lens     {'; '.join(kinds)}"]
 
 
 def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> list[str]:

@@ -78,6 +78,8 @@ def run(options: argparse.Namespace) -> int:
     for uri in uris:
         tell_insecure(uri)
     links = open_links(uris, keys)
+    if core is not None and options.complete and (options.out is None or not options.save_every):
+        say("phone-host: --complete does nothing here: no pair is saved; give --out DIR and --save-every N", sys.stderr)
     signals = StopSignals()
     if options.out is not None:
         keep_other_report(options.out, "run")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
-from phone_host.verbs.stereo_arguments import add_stereo_arguments
+from phone_host.verbs.stereo_arguments import PAIRED, add_stereo_arguments
 
 SUMMARY = "compute disparity and point clouds of pairs of images"
 
@@ -24,8 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "images",
         nargs="+",
         metavar="LEFT RIGHT",
-        help="images of the left and of the right camera: two files, two folders or two globs; images of folders and globs"
-        " are paired by the number in the name, else by equal names, else in name order",
+        help=f"images of the left and of the right camera: {PAIRED}",
     )
     add_stereo_arguments(parser)
     add_orientation_arguments(parser)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import SettingsError
-from common.places import resolved
 from common.program.terminal import say
 from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.json_text import json_text
@@ -17,14 +16,15 @@ from phone_host.report.stereo_lines import pair_lines, set_lines
 from phone_host.report.stereo_report import Size
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.stereo_job import StereoJob, run_stereo
-from phone_host.run.stereo_results import NAMES, require_writable
+from phone_host.run.stereo_results import NAMES
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
-from phone_host.stereo.view_files import ViewFiles, pair_files
+from phone_host.stereo.view_files import pair_files
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
+from phone_host.verbs.output_folders import unwritable
+from phone_host.verbs.result_places import require_place
 from phone_host.verbs.stereo.next_commands import Typed, next_commands
 from phone_host.verbs.stereo_options import build_core, output_options
 
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         )
     matcher = options.matcher or default_matcher().value
     files = pair_files(*two_lists(options.images))
-    _require_place(options.out, files)
+    require_place(options.out, files, NAMES, "stereo")
     job = StereoJob(
         files=files,
         out=options.out,
@@ -90,25 +90,3 @@ def _typed(options: argparse.Namespace) -> Typed:
         rig=options.calibration if is_rig else "",
         folder=Path.cwd(),
     )
-
-
-def _require_place(out: Path, files: ViewFiles) -> None:
-    """Refuse a results folder that cannot be written to, holds the photographs or would lose them."""
-    require_folder(out)
-    try:
-        require_writable(out)
-    except OSError as error:
-        raise unwritable(out, error) from error
-    folders = {resolved(path).parent for path in _images(files)}
-    if resolved(out) in folders:
-        raise SettingsError(
-            f"--out {out} is the folder of the images, where later runs would take pictures of depth for photographs",
-            f"give a folder of its own, such as --out {out / 'scan'}",
-        )
-    for _, left, right in files.pairs:
-        spare_inputs(out, NAMES, {"LEFT": left, "RIGHT": right})
-    keep_other_report(out, "stereo")
-
-
-def _images(files: ViewFiles) -> Sequence[Path]:
-    return [path for _, left, right in files.pairs for path in (left, right)]

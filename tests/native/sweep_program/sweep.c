@@ -50,7 +50,7 @@ int main(int argc, char **argv)
     uint8_t *left = malloc(pixels), *right = malloc(pixels), *margin = malloc(pixels);
     int16_t *steps[2] = {malloc(2 * pixels), malloc(2 * pixels)};
     struct sweep sweep = {.width = width, .height = height, .disparities = disparities, .own_stride = width, .other_stride = width,
-                          .begin = 0, .end = height, .margin = margin, .scratch = aligned_alloc(64, scratch)};
+                          .row_step = 1, .rows = height, .begin = 0, .end = height, .margin = margin, .scratch = aligned_alloc(64, scratch)};
     if (left == NULL || right == NULL || margin == NULL || steps[0] == NULL || steps[1] == NULL || sweep.scratch == NULL) {
         fputs("error: no memory\n", stderr);
         return 1;

@@ -9,8 +9,7 @@
 
 enum {
     GAP = 16, /* px: three of four such pixels are right within 2 px; wider gaps do worse */
-    GAP_STEP = STEPS_PER_PX,
-    MOST_COLUMNS = 64 /* at a time */
+    GAP_STEP = STEPS_PER_PX
 };
 
 /* Close the gap between two known pixels of a line if they agree: the disparity of a plane is linear. `stride` leads from one to the next. */
@@ -52,7 +51,7 @@ void bridge_rows(const struct bridges *job, int from, int to)
 void bridge_columns(const struct bridges *job, int from, int to)
 {
     const int count = to - from;
-    int16_t known[MOST_COLUMNS]; /* the last row with a value; before the first one: far above, so that no gap is bridged */
+    int16_t known[SLAB]; /* the last row with a value; before the first one: far above, so that no gap is bridged */
     for (int x = 0; x < count; x++) {
         known[x] = -GAP - 2;
     }

@@ -14,6 +14,7 @@ struct support;
 struct speckles {
     int width, height;
     int band;               /* rows of one */
+    int area;               /* islands of up to so many px go */
     int16_t *steps;         /* (height, width): 1/16 px, NO_STEPS = none; changed */
     int32_t *parent, *size; /* (height, width): of the runs of pixels that hang together; a run has the number of its first pixel */
     int32_t *run_of;        /* two rows for each thread */

@@ -93,7 +93,7 @@ void ISA_NAME(check_rows)(const struct finish *job, int from, int to)
     const int width = job->width;
     for (int y = from; y < to; y++) {
         int16_t *checked = job->checked + (ptrdiff_t)y * width;
-        const int16_t *right = job->right + (ptrdiff_t)y * width;
+        const int16_t *right = job->right + (ptrdiff_t)(y / RIGHT_STEP) * width;
         median_row(job->left, width, job->height, y, checked);
         for (int x = 0; x < width; x++) {
             const int steps = checked[x], there = (x * STEPS_PER_PX - steps + STEPS_PER_PX / 2) >> 4;

@@ -8,9 +8,12 @@
 #define TANDEM_IS_AVX2 1
 #endif
 #include "byte_lanes.h"
+#include "costs.h"
 #include "guide.h"
 #include "kernels.h"
+#include "layout.h"
 #include "match.h"
+#include "parabola.h"
 #include "prefilter.h"
 
 enum { ROWS = 4, SLANTS = 3, MOST_GUIDE_CHUNKS = MOST_DISPARITIES / 2 / BYTES + 1 };
@@ -30,15 +33,6 @@ struct guide_room {
     uint8_t *low, *high, *best_sum;
     uint16_t *best;
 };
-
-static size_t padded(size_t size) { return (size + 127) / 64 * 64; }
-
-static uint8_t *taken(uint8_t **free_from, size_t size)
-{
-    uint8_t *part = *free_from;
-    *free_from += padded(size);
-    return part;
-}
 
 static size_t laid_out(struct guide_room *room, const struct guide *job)
 {
@@ -133,11 +127,6 @@ static void prepare(const struct guide_room *room, uint8_t *image, int is_turned
     prefilter_row(rows, room->width, is_turned, planes, pitch);
 }
 
-BYTES_INLINE bytes beyond(bytes value, const uint8_t *lows, const uint8_t *highs)
-{
-    return bytes_max(bytes_minus(value, bytes_load(highs)), bytes_minus(bytes_load(lows), value));
-}
-
 BYTES_INLINE void cost_row(const struct guide_room *room, int k, int y, const int chunks)
 {
     const size_t own_pitch = room->own_pitch, other_pitch = room->other_pitch;
@@ -158,12 +147,7 @@ BYTES_INLINE void cost_row(const struct guide_room *room, int k, int y, const in
         }
         for (int c = 0; c < chunks; c++) {
             const uint8_t *there = other + c * BYTES;
-            const bytes grey = beyond(value[GREY], there + GREY_LOW * other_pitch, there + GREY_HIGH * other_pitch);
-            const bytes slope_there = bytes_load(there + SLOPE * other_pitch);
-            const bytes slope = bytes_min(
-                beyond(value[SLOPE], there + SLOPE_LOW * other_pitch, there + SLOPE_HIGH * other_pitch),
-                bytes_max(bytes_minus(slope_there, value[SLOPE_HIGH]), bytes_minus(value[SLOPE_LOW], slope_there)));
-            const bytes all = bytes_plus(grey, slope); /* without the order of neighbours: with it twice as much was wrong on boards */
+            const bytes all = grey_and_slope(value, there, other_pitch); /* without the order of neighbours: with it twice as much was wrong on boards */
             bytes_store(cost + c * BYTES, bytes_min(all, cap));
         }
         if (unused > 0) {
@@ -325,9 +309,7 @@ static void write_row(const struct guide *job, const struct guide_room *room, in
         const int least = room->right_least[width - 1 - there];
         if (least == sum || (d < last && x + 1 < width && total[slanted] == least) || (d > 0 && total[-slanted] == least)) {
             const int is_inside = d > 0 && d < last;
-            const int a = is_inside ? room->low[x] - sum : 0, b = is_inside ? room->high[x] - sum : 0, bend = a + b;
-            const float over = (float)((a - b) * STEPS_PER_PX + bend), under = (float)(bend > 0 ? 2 * bend : 1);
-            const int found = d * STEPS_PER_PX + (int)(over / under);
+            const int found = parabola_steps(d, is_inside ? room->low[x] : sum, sum, is_inside ? room->high[x] : sum);
             steps[x] = (int16_t)(found * job->factor <= (job->disparities - 1) * STEPS_PER_PX ? found : NO_STEPS);
         }
     }

@@ -8,14 +8,15 @@
 #include "finish.h"
 #include "guide.h"
 #include "kernels.h"
+#include "layout.h"
 #include "match.h"
 #include "support.h"
 
 enum {
     STRIP = 256,   /* rows of one sweep; strips are cut by the image's height alone, so that results do not depend on threads */
     WARM_UP = 24,  /* rows that a strip's vertical path begins earlier: older rows hardly count */
-    BAND = VOTE_ROWS, /* rows of one task after the sweeps */
-    SLAB = 64,     /* columns of one task */
+    SPECKLE_AREA = 42,  /* islands of up to 42 px are mismatches more often than objects */
+    GUIDE_ISLAND = 100, /* the same in the guide, px of its size */
     VOTES = 3      /* rounds: each carries a surface three pixels further; more close holes that are better left */
 };
 
@@ -28,7 +29,7 @@ struct work {
     const struct tandem_kernels *kernels;
     struct tandem_match_job *job;
     struct finish finish;
-    int strips, threads;
+    int left_strips, right_strips, threads;
     size_t scratch_bytes;
     uint8_t *scratch; /* one for each thread or task of the sweeps, whichever are fewer */
     int16_t *left, *right;
@@ -41,14 +42,11 @@ struct work {
     uint8_t *support_scratch; /* one for each thread */
 };
 
-static uint8_t *taken(uint8_t **at, size_t size)
-{
-    uint8_t *part = *at;
-    *at += (size + 127) / 64 * 64;
-    return part;
-}
+static int strips_of(int rows) { return (rows + STRIP - 1) / STRIP; }
 
-static int strips_of(int height) { return (height + STRIP - 1) / STRIP; }
+static int right_rows_of(int height) { return (height + RIGHT_STEP - 1) / RIGHT_STEP; }
+
+static int sweeps_of(const struct work *work) { return work->left_strips + work->right_strips; }
 
 /* Lay out what guide and support need beyond the planes of the rest. */
 static void guide_laid_out(struct work *work, uint8_t **at)
@@ -94,8 +92,9 @@ static size_t laid_out(struct work *work, uint8_t *memory)
     struct tandem_match_job *job = work->job;
     const size_t width = (size_t)job->width, height = (size_t)job->height, pixels = width * height;
     uint8_t *at = memory;
-    work->strips = strips_of(job->height);
-    const int tasks = 2 * work->strips, threads = job->threads < 1 ? 1 : job->threads;
+    work->left_strips = strips_of(job->height);
+    work->right_strips = strips_of(right_rows_of(job->height));
+    const int tasks = sweeps_of(work), threads = job->threads < 1 ? 1 : job->threads;
     work->threads = threads < MOST_THREADS ? threads : MOST_THREADS;
     const int sweepers = work->threads < tasks ? work->threads : tasks;
     work->scratch_bytes = (work->kernels->sweep_scratch(job->width, job->disparities) + 127) / 64 * 64;
@@ -113,6 +112,7 @@ static size_t laid_out(struct work *work, uint8_t *memory)
         .width = job->width,
         .height = job->height,
         .band = BAND,
+        .area = SPECKLE_AREA,
         .steps = work->finish.checked,
         .parent = (int32_t *)(void *)work->finish.rough,
         .size = (int32_t *)(void *)job->disparity,
@@ -131,7 +131,8 @@ static size_t laid_out(struct work *work, uint8_t *memory)
 static void sweep_task(struct work *work, int task, int thread)
 {
     const struct tandem_match_job *job = work->job;
-    const int is_right = task & 1, strip = task / 2;
+    const int is_right = task >= work->left_strips, strip = is_right ? task - work->left_strips : task;
+    const int rows = is_right ? right_rows_of(job->height) : job->height, strips = is_right ? work->right_strips : work->left_strips;
     struct sweep sweep = {
         .own = is_right ? job->right : job->left,
         .other = is_right ? job->left : job->right,
@@ -142,13 +143,16 @@ static void sweep_task(struct work *work, int task, int thread)
         .disparities = job->disparities,
         .is_right = is_right,
         .is_upward = is_right, /* two views, two directions: mistakes that one direction makes are not made twice */
-        .begin = strip * job->height / work->strips,
-        .end = (strip + 1) * job->height / work->strips,
+        .row_step = is_right ? RIGHT_STEP : 1,
+        .rows = rows,
+        .begin = strip * rows / strips,
+        .end = (strip + 1) * rows / strips,
         .steps = is_right ? work->right : work->left,
         .margin = work->finish.confidence,
-        .scratch = work->scratch + (size_t)(work->threads < 2 * work->strips ? thread : task) * work->scratch_bytes,
+        .scratch = work->scratch + (size_t)(work->threads < sweeps_of(work) ? thread : task) * work->scratch_bytes,
     };
-    sweep.first = sweep.begin > WARM_UP ? sweep.begin - WARM_UP : 0;
+    const int warm_up = WARM_UP / sweep.row_step;
+    sweep.first = sweep.begin > warm_up ? sweep.begin - warm_up : 0;
     work->kernels->sweep(&sweep);
 }
 
@@ -235,10 +239,13 @@ static void guide_task(struct work *work)
             }
         }
     }
-    /* Its volume, of 32 bytes a pixel at least, is not needed any more. */
-    const size_t pixels = (size_t)guide->small_width * (size_t)guide->small_height;
-    struct region_run *runs = (struct region_run *)(void *)(guide->scratch + (pixels * sizeof(struct region) + 63) / 64 * 64);
-    support_drop_islands(guide, (struct region *)(void *)guide->scratch, runs);
+    /* Its islands go, too. Its volume, of 32 bytes a pixel at least, is not needed any more. */
+    const int width = guide->small_width, height = guide->small_height;
+    int32_t *memory = (int32_t *)(void *)guide->scratch, pixels = width * height;
+    const struct speckles islands = {.width = width, .height = height, .band = height, .area = GUIDE_ISLAND, .steps = guide->steps,
+                                     .parent = memory, .size = memory + pixels, .run_of = memory + 2 * pixels};
+    speckles_label_rows(&islands, 0, height, 0);
+    speckles_drop_rows(&islands, 0, height);
 }
 
 enum step {
@@ -268,7 +275,7 @@ static int tasks_of(void *context, int step)
     const int is_guided = work->job->guide != 0;
     switch (step) {
     case SWEEP:
-        return 2 * work->strips + is_guided;
+        return sweeps_of(work) + is_guided;
     case JOIN:
         return 1;
     case REGIONS:

@@ -23,6 +23,12 @@ enum {
 
 enum { MOST_DISPARITIES = 2048, STEPS_PER_PX = 16, NO_STEPS = -16 };
 
+/* The right view only confirms the left one's values: every second row does that as well as all (decision 0036). */
+enum { RIGHT_STEP = 2 };
+
+/* Rows and columns of one task after the sweeps, at most. */
+enum { BAND = 16, SLAB = 64 };
+
 /* One view's disparities, for a strip of rows. */
 struct sweep {
     const uint8_t *own;   /* the view's image, (height, width), rows `stride` bytes apart */
@@ -32,9 +38,11 @@ struct sweep {
     int disparities;
     int is_right;   /* 1: the view is the right one; its pixel x shows the left image's x + d */
     int is_upward;  /* 1: rows are worked on from the last to the first */
-    int first;      /* row, counted in the direction of work, with which the paths begin */
-    int begin, end; /* rows, counted so, that are written */
-    int16_t *steps;  /* (height, width): 1/16 px */
+    int row_step;   /* 1 or 2: from one row that is worked on to the next */
+    int rows;       /* that are worked on in all */
+    int first;      /* of them, counted in the direction of work, with which the paths begin */
+    int begin, end; /* of them, counted so, that are written */
+    int16_t *steps;  /* (rows, width): 1/16 px */
     uint8_t *margin; /* (height, width): how much more the next best disparity costs, beyond the neighbours of the best */
     uint8_t *scratch; /* sweep_scratch() bytes, aligned to 64 */
 };
@@ -42,7 +50,8 @@ struct sweep {
 /* A band of rows in the steps after the sweeps; see finish_kernel.c. Planes are (height, width), packed. */
 struct finish {
     int width, height;
-    const int16_t *left, *right; /* disparities of the two views, 1/16 px */
+    const int16_t *left;  /* disparities of the left view, 1/16 px */
+    const int16_t *right; /* those of the right one, every RIGHT_STEP-th row: (rows, width) */
     const uint8_t *told; /* (height,): whether the row's texture can say anything */
     int16_t *checked;    /* disparities that are confirmed, NO_STEPS elsewhere; in the end their margins, 0 elsewhere */
     float *rough;        /* px; NONE_PX where there is none; holds GUARD more rows and columns on each side */
@@ -60,8 +69,6 @@ struct vote {
     int16_t *to;
     uint8_t *margin; /* of the values; 0 where a vote decided */
 };
-
-enum { VOTE_ROWS = 16 /* that vote_rows is given at most */ };
 
 enum {
     GUARD = 4,

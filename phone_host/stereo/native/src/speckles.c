@@ -6,10 +6,7 @@
 
 #include "match.h"
 
-enum {
-    SPECKLE_AREA = 30, /* islands of up to 30 px are mismatches more often than objects */
-    SPECKLE_STEP = STEPS_PER_PX
-};
+enum { SPECKLE_STEP = STEPS_PER_PX };
 
 static inline int32_t root_of(int32_t *parent, int32_t run)
 {
@@ -127,7 +124,7 @@ void speckles_drop_rows(const struct speckles *job, int from, int to)
             while (job->parent[root] != root) { /* other bands read, too: nothing is shortened here */
                 root = job->parent[root];
             }
-            if (job->size[root] <= SPECKLE_AREA) {
+            if (job->size[root] <= job->area) {
                 for (; x < end; x++) {
                     row[x] = NO_STEPS;
                 }

@@ -7,22 +7,18 @@
 #include <string.h>
 
 enum {
-    SLAB_MOST = 64,
-    ISLAND = 100,     /* px of the guide's size: smaller ones are mismatches */
     FAR_PX = 16,      /* a region so far behind the guide is one period off, or seen through the gaps of an object */
-    FILL_COST = 120,  /* a quarter of 25 px with 19 grey levels each: where the guide costs more, it is not taken */
+    FILL_COST = 135,  /* a quarter of 25 px with 21 grey levels each: where the guide costs more, it is not taken */
     UNSURE = 40,      /* mean margin: below it a region goes if the guide costs less than AS_BAD tenths of what it costs */
-    AS_BAD = 12,
+    AS_BAD = 11,
     WORSE = 20,       /* where the mean margin is DOUBTFUL */
     MUCH_WORSE = 30   /* where it is behind the guide */
 };
 
-static inline int distance(int a, int b) { return a < b ? b - a : a - b; }
-
 /* Down, then up, through some columns. */
 static void pass_columns(const struct support *job, int from, int to)
 {
-    uint8_t state[SLAB_MOST], step[SLAB_MOST];
+    uint8_t state[SLAB], step[SLAB];
     const int count = to - from, width = job->width;
     memset(state, 0, sizeof state);
     for (int y = 0; y < job->height; y++) {
@@ -67,18 +63,13 @@ static void join(struct region *regions, int32_t one, int32_t other)
     }
 }
 
-/* Join the runs of a row with those above that they touch. `row` is NULL, or runs hang together only where its values are near. */
-static void join_rows(struct region *regions, const struct region_run *here, int count, const struct region_run *above, int count_above,
-                      const int16_t *row, int width)
+/* Join the runs of a row with those above that they touch. */
+static void join_rows(struct region *regions, const struct region_run *here, int count, const struct region_run *above, int count_above)
 {
     for (int i = 0, j = 0; i < count && j < count_above;) {
         const int from = here[i].from > above[j].from ? here[i].from : above[j].from;
         const int to = here[i].to < above[j].to ? here[i].to : above[j].to;
-        int touches = from < to && row == NULL;
-        for (int x = from; row != NULL && x < to && !touches; x++) {
-            touches = distance(row[x], row[x - width]) <= STEPS_PER_PX;
-        }
-        if (touches) {
+        if (from < to) {
             join(regions, here[i].region, above[j].region);
         }
         if (here[i].to < above[j].to) {
@@ -87,15 +78,6 @@ static void join_rows(struct region *regions, const struct region_run *here, int
             j++;
         }
     }
-}
-
-/* The end of the run of islands' pixels that begins at x. */
-static int end_of_values(const int16_t *row, int x, int width)
-{
-    for (x++; x < width && row[x] >= 0 && distance(row[x], row[x - 1]) <= STEPS_PER_PX;) {
-        x++;
-    }
-    return x;
 }
 
 static int next_set(const uint8_t *row, int x, int width)
@@ -111,50 +93,6 @@ static int next_set(const uint8_t *row, int x, int width)
         x++;
     }
     return x;
-}
-
-void support_drop_islands(const struct guide *guide, struct region *regions, struct region_run *runs)
-{
-    const int width = guide->small_width, height = guide->small_height;
-    struct region_run *here = runs, *above = runs + width + 1;
-    int32_t made = 0;
-    int count_above = 0;
-    for (int y = 0; y < height; y++) {
-        const int16_t *row = guide->steps + (ptrdiff_t)y * width;
-        int count = 0;
-        for (int x = 0, end; x < width; x = end) {
-            end = x + 1;
-            if (row[x] >= 0) {
-                end = end_of_values(row, x, width);
-                regions[made] = (struct region){.parent = made, .own = (uint32_t)(end - x)};
-                here[count++] = (struct region_run){x, end, made++};
-            }
-        }
-        join_rows(regions, here, count, above, count_above, row, width);
-        struct region_run *swap = here;
-        here = above;
-        above = swap;
-        count_above = count;
-    }
-    for (int32_t i = 0; i < made; i++) {
-        const int32_t root = root_of(regions, i);
-        regions[root].own += root == i ? 0 : regions[i].own;
-    }
-    made = 0;
-    for (int y = 0; y < height; y++) {
-        int16_t *row = guide->steps + (ptrdiff_t)y * width;
-        for (int x = 0, end; x < width; x = end) {
-            end = x + 1;
-            if (row[x] >= 0) {
-                end = end_of_values(row, x, width);
-                if (regions[root_of(regions, made++)].own <= ISLAND) {
-                    for (int i = x; i < end; i++) {
-                        row[i] = NO_STEPS;
-                    }
-                }
-            }
-        }
-    }
 }
 
 static struct region summed(const struct support *job, ptrdiff_t at, int count, int32_t number)
@@ -199,7 +137,7 @@ void support_regions(const struct support *job)
             regions[made] = summed(job, at + x, end - x, made);
             here[count++] = (struct region_run){x, end, made++};
         }
-        join_rows(regions, here, count, above, count_above, NULL, width);
+        join_rows(regions, here, count, above, count_above);
         struct region_run *swap = here;
         here = above;
         above = swap;

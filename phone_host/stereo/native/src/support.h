@@ -11,8 +11,6 @@
 #include "guide.h"
 #include "match.h"
 
-enum { SUPPORT_BAND = 16 /* rows that support_cost_rows is given at most */ };
-
 /* What is known of a pixel, and from which sides the guide leads to it, without a break, from a value that confirms the guide. */
 enum support_flag {
     CONFIRMS = 1,
@@ -31,7 +29,7 @@ enum { AGREE = 12, NEARLY = 8, APART = 24 };
 
 enum { NOT_APART = 0, AS_FAR = 128, DROPPED = 255 };
 
-enum { DOUBTFUL = 20 /* margins below it are no surer than chance */ };
+enum { DOUBTFUL = 19 /* margins below it are no surer than chance */ };
 
 struct region {
     int32_t parent;
@@ -72,8 +70,5 @@ static inline int support_allows(const struct support *job, ptrdiff_t at, int va
 
 void support_regions(const struct support *job);
 void support_fill(const struct support *job, int from, int to);
-
-/* Drop the islands of the guide that are too small to be a surface; `regions` holds a region for each of its pixels, `runs` 2 (small_width + 1). */
-void support_drop_islands(const struct guide *guide, struct region *regions, struct region_run *runs);
 
 #endif

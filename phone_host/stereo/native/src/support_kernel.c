@@ -7,6 +7,7 @@
 
 #include "flood.h"
 #include "kernels.h"
+#include "layout.h"
 #include "prefilter.h"
 #include "support.h"
 
@@ -18,7 +19,7 @@ enum {
     SLIDE = 3,       /* parts: the guide is tried this far to both sides, too, for it was matched at half the size */
     EVEN = 32,       /* 1/16 px of the guide: four of its pixels that differ by more lie on two surfaces */
     FITS = 4,        /* the value; the guide, as it is and slid to both sides */
-    LINES = SUPPORT_BAND + 2 * REACH,
+    LINES = BAND + 2 * REACH,
     ZERO_SLOPE = 128,
     SPAN = 32        /* columns for which costs are computed, or not, together */
 };
@@ -43,13 +44,6 @@ struct fit_room {
 struct span {
     int from, to;
 };
-
-static uint8_t *taken(uint8_t **free_from, size_t size)
-{
-    uint8_t *part = *free_from;
-    *free_from += (size + 127) / 64 * 64;
-    return part;
-}
 
 static size_t laid_out(struct fit_room *room, int columns, uint8_t *scratch)
 {

@@ -23,9 +23,9 @@ enum {
     COLUMNS = 128,
     BLOCK = 16, /* pixels whose votes are counted at a time, if any of them needs it */
     PITCH = COLUMNS + 32,
-    ROWS = VOTE_ROWS + 2 * REACH,
+    ROWS = BAND + 2 * REACH,
     ROOM = ROWS * PITCH,
-    COMPLETE = VOTE_ROWS * PITCH
+    COMPLETE = BAND * PITCH
 };
 
 /* What some pixels see. A pixel of the image has the index of the first value of its window, which is REACH rows above it and REACH columns to

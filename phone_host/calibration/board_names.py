@@ -1,0 +1,70 @@
+"""Boards as people write them: inner corners of a chessboard, a ChArUco board, an AprilGrid. Pure."""
+
+import re
+from typing import Final
+
+from common.errors import SettingsError
+from phone_host.calibration.marked import AprilGrid, Charuco, MarkFamily
+from phone_host.calibration.target import Board, parse_board
+
+_FAMILIES: Final = {"4x4": MarkFamily.ARUCO_4X4, "5x5": MarkFamily.ARUCO_5X5, "6x6": MarkFamily.ARUCO_6X6}
+_LENGTH: Final = r"(\d+(?:\.\d+)?)\s*mm"
+_CHARUCO: Final = re.compile(rf"charuco:(\d{{1,3}})x(\d{{1,3}}):{_LENGTH}:{_LENGTH}:([456]x[456])", re.IGNORECASE)
+_GRID: Final = re.compile(rf"aprilgrid:(\d{{1,2}})x(\d{{1,2}}):{_LENGTH}:{_LENGTH}", re.IGNORECASE)
+_LEAST_TAGS: Final = 2
+
+
+def named_board(text: str, square_mm: float | None) -> Board:
+    """Read a board.
+
+    Args:
+        text: inner corners such as "9x6"; "charuco:10x8:25mm:18mm:5x5" (squares, side of a square, side of a mark, ArUco
+            family); or "aprilgrid:6x6:30mm:9mm" (tags, side of a tag, gap between two).
+        square_mm: side of a square, or of a tag, as it was measured; None: as the board's name says.
+
+    Raises:
+        SettingsError: it names no board, or a chessboard without a square.
+    """
+    name = text.strip().lower()
+    if name.startswith("charuco"):
+        return _charuco(name, square_mm)
+    if name.startswith("aprilgrid"):
+        return _april_grid(name, square_mm)
+    if square_mm is None:
+        raise no_square()
+    return parse_board(text, square_mm)
+
+
+def no_square() -> SettingsError:
+    """Make the error for a chessboard whose square is not known: how to measure it, on paper and on a screen."""
+    return SettingsError(
+        "--square is missing: the side of one square",
+        "measure ten squares with a ruler and divide, as in --square 25mm; on a screen, pixels times the width of one, as"
+        " in --square '120px*0.1794mm'",
+    )
+
+
+def _charuco(name: str, square_mm: float | None) -> Board:
+    found = _CHARUCO.fullmatch(name)
+    if found is None or found[5] not in _FAMILIES or not 0.3 <= float(found[4]) / float(found[3]) <= 0.9:
+        raise SettingsError(
+            f"--board {name!r} is no ChArUco board",
+            "give squares, side of a square, side of a mark and family, as in charuco:10x8:25mm:18mm:5x5",
+        )
+    side, mark = float(found[3]), float(found[4])
+    marks = Charuco(_FAMILIES[found[5]], mark / side)
+    return Board(int(found[1]) - 1, int(found[2]) - 1, (square_mm or side) / 1000, marks)
+
+
+def _april_grid(name: str, square_mm: float | None) -> Board:
+    found = _GRID.fullmatch(name)
+    if (
+        found is None
+        or min(int(found[1]), int(found[2])) < _LEAST_TAGS
+        or not 0.1 <= float(found[4]) / float(found[3]) <= 1
+    ):
+        raise SettingsError(
+            f"--board {name!r} is no AprilGrid", "give tags, side of a tag and gap, as in aprilgrid:6x6:30mm:9mm"
+        )
+    side, gap = float(found[3]), float(found[4])
+    return Board(2 * int(found[1]), 2 * int(found[2]), (square_mm or side) / 1000, AprilGrid(gap / side))

@@ -1,0 +1,60 @@
+"""The pose of a board that best explains one camera's view of it. Pure."""
+
+from typing import Final
+
+import cv2
+import numpy as np
+
+from phone_host.calibration.bundle import BundleView, Vector, alone_state, fit_poses
+from phone_host.calibration.target import Corners
+from phone_host.geometry.lens import rays_through
+from phone_host.geometry.se3 import SE3, rotations_of
+from phone_host.model import CameraModel, Lens
+
+_LEAST_FORWARD: Final = 0.1
+"""Cosine: rays more than 84 degrees from the middle of the board have no slope that a pose could start from."""
+
+_LEAST_CORNERS: Final = 4
+
+
+def fit_pose(points_m: Vector, corners: Corners, model: CameraModel) -> Vector:
+    """Return the (6,) pose of the board that best fits one view.
+
+    Args:
+        points_m: (N, 3) corners in the board's axes.
+        corners: (N, 2) px; NaN where one was not seen.
+        model: the camera.
+    """
+    seen = np.isfinite(corners).all(axis=1)
+    if model.lens is not Lens.FISHEYE:
+        _, rotation, translation = cv2.solvePnP(
+            points_m[seen], corners[seen], model.matrix, model.distortion, flags=cv2.SOLVEPNP_ITERATIVE
+        )
+        return np.concatenate([np.ravel(rotation), np.ravel(translation)]).astype(np.float64)
+    state = alone_state(model, rough_pose(points_m, corners, model)[np.newaxis])
+    alone = BundleView(corners, np.full(corners.shape, np.nan))
+    pose: Vector = fit_poses([alone], points_m, state).state.poses[0]
+    return pose
+
+
+def rough_pose(points_m: Vector, corners: Corners, model: CameraModel) -> Vector:
+    """Return a (6,) pose that fits the rays of the corners, without weighing them by their pixels.
+
+    Raises:
+        cv2.error: fewer than four corners have rays.
+    """
+    rays = rays_through(corners, model)
+    usable = np.isfinite(rays).all(axis=1)
+    if usable.sum() < _LEAST_CORNERS:
+        raise cv2.error("the view has no rays that a pose could start from")
+    rays = rays[usable] / np.linalg.norm(rays[usable], axis=1, keepdims=True)
+    # A fisheye lens may see the board aside of its own image plane: look towards the board instead.
+    towards = rays.mean(axis=0) / np.linalg.norm(rays.mean(axis=0))
+    axis = np.cross(towards, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    turn = rotations_of(axis / sine * np.arctan2(sine, towards[2]) if sine > 0 else np.zeros(3))
+    ahead = rays @ turn.T
+    slopes = ahead[:, :2] / np.maximum(ahead[:, 2:], _LEAST_FORWARD)
+    _, rotation, translation = cv2.solvePnP(points_m[usable], slopes, np.eye(3), None, flags=cv2.SOLVEPNP_ITERATIVE)
+    pose = np.concatenate([np.ravel(rotation), np.ravel(translation)]).astype(np.float64)
+    return (SE3(turn.T, np.zeros(3)) @ SE3.of(pose)).pose()

@@ -1,0 +1,214 @@
+"""Finds out which chessboard the images show: how many inner corners, by a vote of some of them.
+
+The detector grows a lattice from its strongest corners as far as it goes. Glare, a hand or a cut edge end it early in some
+images; what many images agree on, weighted by its corners, is the board. Sizes are compared without regard to which count
+comes first, because a board may be held either way.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import cv2
+
+from common.errors import DataError, SettingsError, TandemError
+from common.imagesize.head import MOST_PIXELS
+from phone_host.calibration.marks_seen import marks_seen
+from phone_host.calibration.target import shrunk
+from phone_host.calibration.threads import side_by_side
+from phone_host.model import Image
+from phone_host.stereo.images import decode_file, open_image, to_grey
+from phone_host.stereo.view_files import ViewFiles
+
+_SEARCHED_PX: Final = 800
+"""Longer side. Of 174 images of four real rigs 133 give the right size so, in 15 to 40 ms each."""
+
+_SEED: Final = (3, 3)
+"""The smallest lattice from which the detector may grow; what is no larger may be any pattern."""
+
+_SAMPLE: Final = 24
+"""At most so many images are asked: 12 photographs of 12 MPx take 1.5 s on two cores."""
+
+_BATCH: Final = 6
+_MARKED: Final = 4
+"""So many images are searched for coded marks."""
+
+_CLEAR_VOTES, _CLEAR_SHARE = 4, 0.6
+"""With so many images, and this share of all corners, the vote is over."""
+
+_LEAST_VOTES: Final = 2
+_LEAST_SHARE: Final = 0.5
+"""Below, the images do not agree. Of a real rig with a small, dark board the right size has three quarters."""
+
+Size = tuple[int, int]
+"""Inner corners: the larger count first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vote:
+    """What some images show.
+
+    Attributes:
+        asked: how many images were searched.
+        sizes: how many images show which lattice.
+    """
+
+    asked: int
+    sizes: Counter[Size]
+
+    @property
+    def leader(self) -> Size | None:
+        """The size on which the images agree; None if they do not."""
+        if not self.sizes:
+            return None
+        best = max(self.sizes, key=self._weight)
+        is_clear = self.sizes[best] >= min(_LEAST_VOTES, self.asked) and self._share(best) >= _LEAST_SHARE
+        return best if is_clear else None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether more images would hardly change it."""
+        best = self.leader
+        return best is not None and self.sizes[best] >= _CLEAR_VOTES and self._share(best) >= _CLEAR_SHARE
+
+    def _weight(self, size: Size) -> int:
+        return self.sizes[size] * size[0] * size[1]
+
+    def _share(self, size: Size) -> float:
+        return self._weight(size) / sum(map(self._weight, self.sizes))
+
+
+def size_seen(grey: Image) -> Size | None:
+    """Return the inner corners of the chessboard in an image; None if there is none.
+
+    Args:
+        grey: (H, W) uint8.
+
+    Returns:
+        The two counts, the larger first. It may be a part of the board.
+    """
+    small, _ = shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))
+    found, _, meta = cv2.findChessboardCornersSBWithMeta(
+        small, _SEED, flags=cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
+    )
+    if not found or meta is None:
+        return None
+    rows, columns = meta.shape[:2]
+    size = max(rows, columns), min(rows, columns)
+    return None if size == _SEED else size
+
+
+def vote(images: Iterator[Path], look: Callable[[Path], Size | None]) -> Vote:
+    """Ask images until the answer is clear.
+
+    Args:
+        images: which, the most different first.
+        look: what an image shows.
+    """
+    sizes, asked = Counter[Size](), 0
+    for batch in _batches(images):
+        found = side_by_side(look, batch)
+        asked += len(batch)
+        sizes.update(size for size in found if size is not None)
+        if Vote(asked, sizes).is_over:
+            break
+    return Vote(asked, sizes)
+
+
+def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
+    """Find out which chessboard the images show.
+
+    Args:
+        files: the pairs of files.
+        most_pixels: an image that claims more is passed over.
+
+    Returns:
+        Its inner corners, the larger count first.
+
+    Raises:
+        DataError: the images show none, do not agree, or none of them is an image.
+    """
+    # First: the corners of a ChArUco board look like those of a chessboard, until a hand hides some.
+    marks = marks_seen(side_by_side(lambda path: _small(path, most_pixels), list(_sample(files))[:_MARKED]))
+    if marks:
+        raise DataError(f"these images show no chessboard, but {marks}", "name that board with --board; see --help")
+    result = vote(_sample(files), lambda path: _size_in(path, most_pixels))
+    if result.leader is not None:
+        return result.leader
+    if not result.sizes:
+        _require_an_image(list(_sample(files)), most_pixels)
+        raise DataError(
+            f"no chessboard is seen in {result.asked} images",
+            "take pictures with the whole board sharp and evenly lit, with a white margin around it",
+        )
+    seen = " ".join(f"{size_text(size)} ({count})" for size, count in result.sizes.most_common(3))
+    raise DataError(
+        f"the images do not agree on the board's size: inner corners {seen}",
+        f"name it with --board, such as --board {size_text(max(result.sizes))}, and show the whole board in each picture",
+    )
+
+
+def require_size(files: ViewFiles, given: Size, most_pixels: int = MOST_PIXELS) -> None:
+    """Check in some images that a board has the size that was given; what cannot be told passes.
+
+    Args:
+        files: the pairs of files.
+        given: columns and rows of inner corners, as the user gives them.
+        most_pixels: an image that claims more is passed over.
+
+    Raises:
+        SettingsError: the images show another board.
+    """
+    wanted = max(given), min(given)
+    result = vote(_sample(files), lambda path: _size_in(path, most_pixels))
+    seen = result.leader
+    if seen is None or seen == wanted or result.sizes[wanted] * _CLEAR_VOTES >= result.sizes[seen]:
+        return
+    if result.sizes[seen] <= result.asked / _CLEAR_VOTES:
+        return  # most images show nothing: a few may be wrong
+    raise SettingsError(
+        f"these boards have {size_text(seen)} inner corners, --board says {size_text(given)}",
+        f"give --board {size_text(seen)}, or leave --board out",
+    )
+
+
+def size_text(size: Size) -> str:
+    """Write a size as `--board` takes it."""
+    return f"{size[0]}x{size[1]}"
+
+
+def _size_in(path: Path, most_pixels: int) -> Size | None:
+    image = _small(path, most_pixels)
+    return None if image is None else size_seen(image)
+
+
+def _small(path: Path, most_pixels: int) -> Image | None:
+    """Decode an image no larger than needed; None if it cannot be read: whoever reads all of them says so."""
+    try:
+        file = open_image(path, most_pixels)
+        reduction = max((each for each in (1, 2, 4, 8) if max(file.size_px) / each >= _SEARCHED_PX), default=1)
+        return to_grey(decode_file(file, reduction))
+    except TandemError:
+        return None
+
+
+def _require_an_image(paths: list[Path], most_pixels: int) -> None:
+    """Say what is wrong with the first file if none of them can be read."""
+    if all(_small(path, most_pixels) is None for path in paths):
+        decode_file(open_image(paths[0], most_pixels))
+
+
+def _batches(images: Iterator[Path]) -> Iterator[list[Path]]:
+    """Give at most `_SAMPLE` images, some at a time."""
+    sample = [path for path, _ in zip(images, range(_SAMPLE), strict=False)]
+    for start in range(0, len(sample), _BATCH):
+        yield sample[start : start + _BATCH]
+
+
+def _sample(files: ViewFiles) -> Iterator[Path]:
+    """Give images of both sides, spread over the session whatever its length: neighbours look alike."""
+    paths = [path for _, left, right in files.pairs for path in (left, right)]
+    step = next((each for each in (7, 11, 13, 17, 19, 23) if len(paths) % each), 1)
+    yield from (paths[index * step % len(paths)] for index in range(len(paths)))

@@ -1,0 +1,307 @@
+"""A rig in which every pair may deviate from the others, in each way that a mistake makes it: the loosened rig. Pure.
+
+First one stiff rig is fitted to all pairs. Then each pair gets twelve deviations of its own: the right camera turned, the
+board moved between the two exposures, the focal length of either camera, and rows displaced in proportion to their number
+(a rolling shutter before something that moves). How much they would lower the squares, and which way, is known to second
+order at the stiff optimum, with lenses and board poses eliminated. So any rule about them ("turned a little more with each
+pair") is weighed in closed form:
+
+    squares(rule) = squares(stiff) - g^T A (A^T L A)^-1 A^T g
+
+with g the gradient of the deviations, L their information, and A the rule (Gauss-Newton; the rule's numbers are small).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.causes.lone import LENS, Vector, camera_arrays
+
+TURN, MOVE, FOCUS_LEFT, FOCUS_RIGHT, ROWS_LEFT, ROWS_RIGHT = (
+    slice(0, 3),
+    slice(3, 6),
+    slice(6, 7),
+    slice(7, 8),
+    slice(8, 10),
+    slice(10, 12),
+)
+"""Places of a pair's deviations: the right camera's turn (rad, in its axes), the board's shift before the right camera
+(m, in the left one's axes), the logarithms of the focal lengths' factors, and the rows' displacement from the first to the last, px."""
+
+DEVIATIONS: Final = 12
+_LENSES: Final = 2 * LENS
+_POSE: Final = slice(_LENSES, _LENSES + 6)
+_OWN: Final = slice(_LENSES + 6, _LENSES + 6 + DEVIATIONS)
+"""Places of a pair's parameters: lenses, pose, deviations."""
+
+_PRIOR: Final = np.array([0.03] * 3 + [0.03] * 3 + [0.05] * 2 + [10.0] * 4)
+"""Mistakes are no larger: 2 degrees, 30 mm, 5 %, 10 px. It keeps what the views do not tell apart finite."""
+
+_PRINCIPAL_POINT_SHARE: Final = 0.1
+_MOST_STEPS: Final = 40
+_CONVERGED: Final = 1e-5
+_LEAST_SIGMA_PX: Final = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Stiff:
+    """A stiff rig.
+
+    Attributes:
+        left: (9,) the left lens.
+        right: (9,) the right one.
+        rotation: (3,) rotation vector, right from left.
+        translation_m: (3,) right from left, m.
+        poses: (V, 6) of the boards in the left camera's axes.
+    """
+
+    left: Vector
+    right: Vector
+    rotation: Vector
+    translation_m: Vector
+    poses: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Loosened:
+    """One stiff rig, and what the pairs' deviations from it would change.
+
+    Attributes:
+        count: V, how many pairs there are.
+        gradient: (12 V,) of the deviations, in the order above, pair by pair; px^2 per unit.
+        information: (12 V, 12 V), px^2 per unit^2: lenses and poses are eliminated.
+        squares_px2: the sum of squared residuals of the stiff rig, x and y of all corners.
+        numbers: how many coordinates went into it.
+        state: the stiff rig: lenses, poses, rotation and translation.
+    """
+
+    count: int
+    gradient: Vector
+    information: Vector
+    squares_px2: float
+    numbers: int
+    state: Stiff
+
+
+def loosen(
+    pairs: list[BoardPair],
+    points_m: Vector,
+    start: Stiff,
+    free_camera: NDArray[np.bool_],
+    *,
+    sizes_px: tuple[tuple[int, int], ...],
+    given: Vector | None = None,
+) -> Loosened:
+    """Fit one stiff rig to all pairs, and find what each pair's deviations would change.
+
+    Args:
+        pairs: the corners, V pairs.
+        points_m: (N, 3) corners in the board's axes.
+        start: lenses, poses and a rig near enough.
+        free_camera: (9,) which parameters of a lens are estimated.
+        sizes_px: width and height of the left and of the right images.
+        given: (V, 12) deviations that the pairs are known to have; None: they have none. What is found comes on top.
+
+    Raises:
+        numpy.linalg.LinAlgError: the views leave something undetermined.
+    """
+    problem = _Problem(
+        pairs,
+        np.zeros((len(pairs), DEVIATIONS)) if given is None else given,
+        points_m,
+        np.flatnonzero(np.concatenate([free_camera, free_camera])),
+        _lens_prior(sizes_px),
+        np.array([size[1] for size in sizes_px], float),
+    )
+    state, damping, system = start, 1e-6, problem.at(start)
+    for _ in range(_MOST_STEPS):
+        tried = problem.stepped(system, state, damping)
+        after = problem.at(tried)
+        if not np.isfinite(after.squares) or after.squares > system.squares:
+            damping *= 100
+            if damping > 1:
+                break
+            continue
+        gain = (system.squares - after.squares) / max(after.squares, 1e-12)
+        state, system, damping = tried, after, max(damping / 10, 1e-9)
+        if gain < _CONVERGED:
+            break
+    return problem.loosened(system, state)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _System:
+    """Normal equations of each pair, (V, 36, 36) and (V, 36): parameters are lenses (18), pose (6), deviations (12)."""
+
+    matrices: Vector
+    gradients: Vector
+    squares: float
+    numbers: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reduced:
+    """The same over all pairs, with the poses eliminated: parameters are free lenses (n) and all deviations (12 V)."""
+
+    matrix: Vector
+    right: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Problem:
+    """What stays fixed. The prior is (expected lenses, weights); `free` lists the lenses' parameters that are estimated."""
+
+    pairs: list[BoardPair]
+    given: Vector
+    points_m: Vector
+    free: NDArray[np.intp]
+    prior: tuple[Vector, Vector]
+    heights: Vector
+
+    def at(self, state: Stiff) -> _System:
+        """Linearise at a stiff rig."""
+        both = [
+            _linearised(pair, self.points_m, state, np.concatenate([pose, given]), self.heights)
+            for pair, pose, given in zip(self.pairs, state.poses, self.given, strict=True)
+        ]
+        return _System(
+            np.array([jacobian.T @ jacobian for _, jacobian in both]),
+            np.array([jacobian.T @ error for error, jacobian in both]),
+            float(sum(error @ error for error, _ in both)),
+            sum(int(np.isfinite(view).sum()) for pair in self.pairs for view in (pair.left_px, pair.right_px)),
+        )
+
+    def stepped(self, system: _System, state: Stiff, damping: float) -> Stiff:
+        """Return the stiff rig after one damped step: all pairs deviate alike."""
+        reduced, lenses = self._reduced(system, state, damping), len(self.free)
+        alike = np.zeros((len(reduced.right), lenses + 6))
+        alike[:lenses, :lenses] = np.eye(lenses)
+        alike[lenses:, lenses:] = np.tile(np.eye(DEVIATIONS)[:, :6], (len(self.pairs), 1))
+        matrix = alike.T @ reduced.matrix @ alike
+        step = alike @ np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), alike.T @ reduced.right)
+        lens = np.zeros(_LENSES)
+        lens[self.free] = step[:lenses]
+        same = step[lenses : lenses + DEVIATIONS]
+        poses = []
+        for index, (block, gradient) in enumerate(zip(system.matrices, system.gradients, strict=True)):
+            rest = block[_POSE, :_LENSES] @ lens + block[_POSE, _OWN] @ same
+            damped = block[_POSE, _POSE] + damping * np.diag(np.diag(block[_POSE, _POSE]))
+            poses.append(state.poses[index] + np.linalg.solve(damped, gradient[_POSE] - rest))
+        at = _right_pose(np.zeros(6), same, state)
+        return replace(
+            state,
+            left=state.left + lens[:LENS],
+            right=state.right + lens[LENS:],
+            rotation=at[:3],
+            translation_m=at[3:],
+            poses=np.array(poses),
+        )
+
+    def loosened(self, system: _System, state: Stiff) -> Loosened:
+        """Eliminate lenses and poses."""
+        reduced, lenses = self._reduced(system, state, 0.0), len(self.free)
+        across = reduced.matrix[lenses:, :lenses]
+        through = np.linalg.solve(reduced.matrix[:lenses, :lenses], across.T).T
+        return Loosened(
+            count=len(self.pairs),
+            gradient=np.asarray(reduced.right[lenses:] - through @ reduced.right[:lenses], np.float64),
+            information=np.asarray(reduced.matrix[lenses:, lenses:] - through @ across.T, np.float64),
+            squares_px2=system.squares,
+            numbers=system.numbers,
+            state=state,
+        )
+
+    def _reduced(self, system: _System, state: Stiff, damping: float) -> _Reduced:
+        count, lenses = len(self.pairs), len(self.free)
+        rest = np.concatenate([self.free, np.arange(_OWN.start, _OWN.stop)])
+        size = lenses + DEVIATIONS * count
+        matrix, right = np.zeros((size, size)), np.zeros(size)
+        for index, (block, gradient) in enumerate(zip(system.matrices, system.gradients, strict=True)):
+            poses = block[_POSE, _POSE] + damping * np.diag(np.diag(block[_POSE, _POSE]))
+            through = np.linalg.solve(poses, block[_POSE][:, rest]).T
+            places = np.concatenate([np.arange(lenses), lenses + DEVIATIONS * index + np.arange(DEVIATIONS)])
+            matrix[np.ix_(places, places)] += block[np.ix_(rest, rest)] - through @ block[_POSE][:, rest]
+            right[places] += gradient[rest] - through @ gradient[_POSE]
+        noise_px2 = min(max(system.squares / system.numbers, _LEAST_SIGMA_PX**2), 1.0)
+        expected, weight = self.prior
+        off = expected - np.concatenate([state.left, state.right])
+        places = np.arange(lenses)
+        matrix[places, places] += noise_px2 * weight[self.free]
+        right[:lenses] += noise_px2 * (weight * off)[self.free]
+        places = np.arange(lenses, size)
+        matrix[places, places] += noise_px2 * np.tile(_PRIOR**-2.0, count)
+        return _Reduced(matrix, right)
+
+
+def _linearised(
+    pair: BoardPair, points_m: Vector, state: Stiff, own_values: Vector, heights: Vector
+) -> tuple[Vector, Vector]:
+    """Return errors (4 N,) of both views, and their projections' derivatives (4 N, 36), for a pair's pose and deviations (18,)."""
+    pose, given = own_values[:6], own_values[6:]
+    half = 2 * len(points_m)
+    jacobian = np.zeros((2 * half, _OWN.stop))
+    left, by_left = cv2.projectPoints(points_m, pose[:3], pose[3:], *camera_arrays(state.left))
+    left_px = np.asarray(left, np.float64).reshape(-1, 2)
+    jacobian[:half, :LENS], jacobian[:half, _POSE] = by_left[:, 6:], by_left[:, :6]
+    at = _right_pose(pose, given, state)
+    right, by_right = cv2.projectPoints(points_m, at[:3], at[3:], *camera_arrays(state.right))
+    right_px = np.asarray(right, np.float64).reshape(-1, 2)
+    jacobian[half:, LENS:_LENSES] = by_right[:, 6:]
+    through = by_right[:, :6] @ _chain(pose, given, state)
+    jacobian[half:, _POSE] = through[:, :6]
+    own = jacobian[:, _OWN]
+    own[half:, :6] = through[:, 6:]
+    errors = []
+    for rows, seen, lens, height, focus, displaced, measured in (
+        (slice(0, half), left_px, state.left, heights[0], FOCUS_LEFT, ROWS_LEFT, pair.left_px),
+        (slice(half, None), right_px, state.right, heights[1], FOCUS_RIGHT, ROWS_RIGHT, pair.right_px),
+    ):
+        from_middle = seen - lens[2:4]
+        factor = float(np.exp(given[focus][0]))
+        shares = from_middle[:, 1:] / height
+        own[rows, focus] = (factor * from_middle).reshape(-1, 1)
+        own[rows, displaced] = np.kron(shares, np.eye(2))
+        # What moves a corner is scaled with it; that a scaled corner lies in another row is of second order.
+        jacobian[rows, : _OWN.start] *= factor
+        own[rows, :6] *= factor
+        errors.append((measured - lens[2:4] - factor * from_middle - shares * given[displaced]).ravel())
+    for half_rows, at_column in ((slice(0, half), 2), (slice(half, None), LENS + 2)):
+        jacobian[half_rows, at_column : at_column + 2] = np.tile(np.eye(2), (len(points_m), 1))
+    together = np.concatenate(errors)
+    unseen = np.isnan(together)  # it says nothing about anything
+    jacobian[unseen], together[unseen] = 0.0, 0.0
+    return together, jacobian
+
+
+def _right_pose(pose: Vector, deviation: Vector, state: Stiff) -> Vector:
+    """Return the board's pose (6,) in the right camera's axes: moved, then seen by the turned right camera."""
+    moved = pose[3:] + deviation[MOVE]
+    rotation, translation = cv2.composeRT(pose[:3], moved, state.rotation, state.translation_m)[:2]
+    rotation, translation = cv2.composeRT(rotation, translation, deviation[TURN], np.zeros(3))[:2]
+    return np.concatenate([np.ravel(rotation), np.ravel(translation)]).astype(np.float64)
+
+
+def _chain(pose: Vector, given: Vector, state: Stiff) -> Vector:
+    """Return (6, 12) derivatives of the right pose by the left one and by turn and move."""
+    seen = cv2.composeRT(pose[:3], pose[3:] + given[MOVE], state.rotation, state.translation_m)
+    turned = cv2.composeRT(seen[0], seen[1], given[TURN], np.zeros(3))
+    # composeRT gives, in this order: d rotation by (r1 t1 r2 t2), then d translation by the same.
+    by_left = np.vstack([np.hstack(seen[2:4]), np.hstack(seen[6:8])])
+    by_seen = np.vstack([np.hstack(turned[2:4]), np.hstack(turned[6:8])])
+    by_turn = np.vstack([turned[4], turned[8]])
+    through = by_seen @ by_left
+    return np.asarray(np.hstack([through, by_turn, through[:, 3:]]), np.float64)
+
+
+def _lens_prior(sizes_px: tuple[tuple[int, int], ...]) -> tuple[Vector, Vector]:
+    """Return the expected lenses and their weights: only the principal points, as in the bundle adjustment."""
+    expected, weight = np.zeros(_LENSES), np.zeros(_LENSES)
+    for side, (width, height) in enumerate(sizes_px):
+        at = side * LENS + 2
+        expected[at : at + 2] = (width - 1) / 2, (height - 1) / 2
+        weight[at : at + 2] = (_PRINCIPAL_POINT_SHARE * width) ** -2.0
+    return expected, weight

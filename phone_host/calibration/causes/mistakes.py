@@ -1,0 +1,99 @@
+"""The mistakes that are told apart in a session of board views, and what is said about one. No behaviour."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from phone_host.calibration.arrangement import Misplaced
+from phone_host.calibration.causes.lone import Vector
+from phone_host.calibration.verdict import Verdict
+
+
+class Mistake(Enum):
+    """What is wrong with a session.
+
+    Attributes:
+        SWAPPED: the right camera stands to the left of the left one.
+        MIRRORED: one camera mirrors its images.
+        TURNED: one camera's images are turned by a quarter.
+        UPSIDE_DOWN: one camera stands on its head.
+        PARTNERS: images of two moments make a pair.
+        SQUARE: the squares have another size than --square says, or are no squares.
+        SKEW: the board moved between the two exposures of a pair.
+        BLUR: the images are blurred.
+        GLARE: light washes squares out.
+        ROWS: the board moved while rows were exposed one after the other.
+        FOCUS: focus or zoom changed between views.
+        UNSTIFF: the cameras turned against each other between views.
+    """
+
+    SWAPPED = "swapped sides"
+    MIRRORED = "mirrored camera"
+    TURNED = "turned camera"
+    UPSIDE_DOWN = "upside-down camera"
+    PARTNERS = "wrong partners"
+    SQUARE = "wrong square"
+    SKEW = "not the same moment"
+    BLUR = "blurred"
+    GLARE = "glare"
+    ROWS = "rolling shutter"
+    FOCUS = "focus changed"
+    UNSTIFF = "rig not stiff"
+
+
+class Course(Enum):
+    """How two cameras turned against each other: steadily, at once, or this way and that."""
+
+    DRIFT = "steadily"
+    KNOCK = "at once"
+    LOOSE = "this way and that"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Turned:
+    """How much two cameras turned against each other during a session.
+
+    Attributes:
+        course: how.
+        turn_rad: (3,) from the first to the last view, in the right camera's axes (x right, y down, z forward), rad; LOOSE: the
+            standard deviation of a view.
+        sigma_rad: (3,) its standard deviation, by the scatter of the views, rad.
+        begins: the first view after a knock, counted from 0; -1 otherwise.
+        names: of the V views that tell it.
+        turns_rad: (V, 3) of each of them.
+        lens: (9,) the right camera's parameters, in the order of `lone`.
+        rows_px: by how much rows of left and right differ for it, px of the right image.
+        depth_at_1_m_m: by how much depth at 1 m is wrong for it, m.
+    """
+
+    course: Course
+    turn_rad: Vector
+    sigma_rad: Vector
+    begins: int
+    names: tuple[str, ...]
+    turns_rad: Vector
+    lens: Vector
+    rows_px: float
+    depth_at_1_m_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Finding:
+    """A mistake, and what names its place.
+
+    Attributes:
+        mistake: which.
+        sentence: what is wrong, with its figures, in one sentence without a full stop.
+        remedy: what to do.
+        misplaced: the side and the turn, for MIRRORED, TURNED and UPSIDE_DOWN.
+        turned: for UNSTIFF.
+        most: the best verdict that such a session may get.
+        explained_px: how much of the views' contradiction it explains, root mean square, px; NaN: it was found otherwise.
+    """
+
+    mistake: Mistake
+    sentence: str
+    remedy: str
+    misplaced: Misplaced | None = None
+    turned: Turned | None = None
+    most: Verdict = Verdict.GOOD
+    explained_px: float = float("nan")

@@ -1,0 +1,260 @@
+"""Names the mistake of a session of board views, or none. Pure.
+
+From the plainest to the finest: what the images look like; which pictures belong together; how the cameras stand to each
+other; how the pairs deviate from one stiff rig; and whether the squares can be as large as was said.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+
+from common.errors import DataError
+from common.orientation import Flip, Orientation
+from common.words import counted
+from phone_host.calibration.arrangement import Misplaced, misplaced
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
+from phone_host.calibration.calibrate import Sizes
+from phone_host.calibration.causes.deviating import deviation
+from phone_host.calibration.causes.lone import both_alone
+from phone_host.calibration.causes.looks import SeenLook
+from phone_host.calibration.causes.mistakes import Finding, Mistake
+from phone_host.calibration.causes.partners import wrong_partners
+from phone_host.calibration.target import Board
+from phone_host.calibration.verdict import REFERENCE_PX, Verdict, size_factor
+from phone_host.model import Side
+
+_SPOILED_SHARE: Final = 0.2
+"""A session is blurred or glaring if this share of its images is."""
+
+_BLURRED_EDGE_PX: Final = 6.0
+"""For images of up to 1280 px. Sharp edges are 1.5 to 3.5 px wide in the images of four real rigs; a blur of sigma gives 2.5 sigma."""
+
+_WASHED: Final = 0.08
+"""Share of a board's edges. In the images of four real rigs none is above 0.03."""
+
+_MORE_BRIGHT: Final = 0.02
+"""Share of an image by which one without a board is brighter than its side usually is."""
+
+_CONTRADICTION_PX: Final = 1.0
+"""As in the verdict: real rigs fit to 0.15 to 0.4 px."""
+
+_LARGEST_BOARD_M, _SMALLEST_BOARD_M = 2.0, 0.03
+_BASELINE_OFF: Final = 0.03
+"""A ruler between two lenses is off by less."""
+
+_STRETCHED: Final = 0.01
+"""Pixels of all usual cameras are square to 0.1 %, and so are prints to scale."""
+
+_ALIKE: Final = 0.3
+"""Two cameras before one stretched print err alike to this share."""
+
+_EXPLAINED_SHARE: Final = 0.35
+"""Of the squares of each view alone: a good session's cannot be explained so."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BoardSession:
+    """What a session of board views gives.
+
+    Attributes:
+        pairs: the corners, in the order in which they were taken.
+        board: the board.
+        sizes_px: width and height of the left and of the right images.
+        looks: of all images that could be read.
+        baseline_m: the distance of the cameras as the user measured it, m; NaN: not told.
+    """
+
+    pairs: tuple[BoardPair, ...]
+    board: Board
+    sizes_px: Sizes
+    looks: tuple[SeenLook, ...] = ()
+    baseline_m: float = math.nan
+
+
+def name_mistake(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+    """Name what is wrong with a session.
+
+    Args:
+        session: the session.
+        found: what `calibrate` made of it.
+
+    Returns:
+        The mistake with its figures; None if the views tell of none.
+    """
+    return (
+        _absurd_square(session)
+        or _in_a_mirror(session)
+        or _spoiled(session)
+        or _exchanged(session, found)
+        or _placed(session, found)
+        or _swapped(found)
+        or _stretched(session)
+        or deviation(session.pairs, session.board, session.sizes_px)
+        or _other_square(session, found)
+    )
+
+
+def _in_a_mirror(session: BoardSession) -> Finding | None:
+    """Name a side whose coded marks are seen in the mirror only."""
+    for side in Side:
+        own = [each for each in session.looks if each.side is side]
+        if own and 2 * sum(each.look.is_mirrored for each in own) > len(own):
+            return Finding(
+                mistake=Mistake.MIRRORED,
+                sentence=f"the marks in the {side.value} images are mirrored",
+                remedy="switch mirroring off in that camera",
+                misplaced=Misplaced(side=side, turn=Orientation(0, Flip.H)),
+            )
+    return None
+
+
+def _spoiled(session: BoardSession) -> Finding | None:
+    """Name blur or glare, if many images have it."""
+    looks = session.looks
+    blurred, glaring = list[str](), list[str]()
+    for side, size in zip(Side, session.sizes_px, strict=True):
+        own = [each for each in looks if each.side is side]
+        seen = [each.look.bright for each in own if math.isfinite(each.look.edge_px)]
+        usual = float(np.median(seen)) if seen else 0.0
+        limit_px = _BLURRED_EDGE_PX * max(1.0, max(size) / REFERENCE_PX)
+        blurred += [each.name for each in own if each.look.edge_px > limit_px]
+        glaring += [
+            each.name
+            for each in own
+            if each.look.washed > _WASHED or (math.isnan(each.look.edge_px) and each.look.bright > usual + _MORE_BRIGHT)
+        ]
+    for mistake, names, what, remedy in (
+        (
+            Mistake.GLARE,
+            glaring,
+            "light washes squares out",
+            "turn the board away from the lamp or the window, or light it from the side",
+        ),
+        (Mistake.BLUR, blurred, "the board is blurred", "hold the board still, give more light, and check the focus"),
+    ):
+        if len(names) >= max(2, _SPOILED_SHARE * len(looks)):
+            number = f"{len(names)} of {counted(len(looks), 'image')}"
+            return Finding(mistake=mistake, sentence=f"{what} in {number}, such as {names[0]}", remedy=remedy)
+    return None
+
+
+def _exchanged(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+    """Name pictures that belong to another pair's partner."""
+    misfits = (Reason.MOVED, Reason.CORNERS_LEFT, Reason.CORNERS_RIGHT)
+    if (
+        isinstance(found, Calibration)
+        and not any(each.reason in misfits for each in found.rejected)
+        and found.rig.rms_stereo_px <= _CONTRADICTION_PX * size_factor(found.rig)
+    ):
+        return None  # all pairs fit one rig
+    wrong = wrong_partners(list(session.pairs), session.board, session.sizes_px)
+    if not wrong:
+        return None
+    shown = ", ".join(f"left {left} with right {right}" for left, right in wrong[:4]) + (", ..." if wrong[4:] else "")
+    return Finding(
+        mistake=Mistake.PARTNERS,
+        sentence=f"{counted(len(wrong), 'left picture has', 'left pictures have')} the wrong partner: {shown} belong together",
+        remedy="give both images of a pair the same number",
+    )
+
+
+def _placed(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+    """Name a turned or mirrored side; who knows the options given writes the sentence."""
+    wrong = misplaced(list(session.pairs), session.board, session.sizes_px, found)
+    if wrong is None:
+        return None
+    if wrong.is_mirrored:
+        mistake, state = Mistake.MIRRORED, "mirrored"
+    elif wrong.turn.rotate_deg == 180:
+        mistake, state = Mistake.UPSIDE_DOWN, "upside down"
+    else:
+        mistake, state = Mistake.TURNED, "turned by a quarter"
+    return Finding(
+        mistake=mistake,
+        sentence=f"the {wrong.side.value} images are {state} against the others",
+        remedy="turn them back",
+        misplaced=wrong,
+    )
+
+
+def _swapped(found: Calibration | DataError) -> Finding | None:
+    if isinstance(found, DataError) or found.obstacle is None:
+        return None
+    x, y, z = -found.rig.R_right_left.T @ found.rig.t_right_left_m
+    if x < 0 and abs(x) > max(abs(y), abs(z)):
+        return Finding(mistake=Mistake.SWAPPED, sentence=found.obstacle.problem, remedy=found.obstacle.remedy)
+    return None
+
+
+def _absurd_square(session: BoardSession) -> Finding | None:
+    """Name a square that no board has: it is told first, because nothing else depends on the scale."""
+    board = session.board
+    longest_m = max(board.columns, board.rows) * board.square_m
+    if _SMALLEST_BOARD_M <= longest_m <= _LARGEST_BOARD_M:
+        return None
+    return Finding(
+        mistake=Mistake.SQUARE,
+        sentence=f"with squares of {board.square_m * 1e3:g} mm the board would be {longest_m:.2g} m long",
+        remedy="check the unit of --square",
+        most=Verdict.REJECT,
+    )
+
+
+def _other_square(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+    """Name a square that cannot be as long as --square says, or that is no square."""
+    board = session.board
+    if isinstance(found, DataError):
+        return None
+    baseline_m = float(np.linalg.norm(found.rig.t_right_left_m))
+    factor = session.baseline_m / baseline_m
+    sigma = 3 * found.baseline_sigma_m / baseline_m
+    if math.isfinite(factor) and abs(factor - 1) > _BASELINE_OFF + sigma:
+        return Finding(
+            mistake=Mistake.SQUARE,
+            sentence=(
+                f"the cameras would be {baseline_m * 1e3:.1f} mm apart, and you measured {session.baseline_m * 1e3:.1f} mm:"
+                f" squares of {board.square_m * factor * 1e3:.2f} mm would fit, --square says {board.square_m * 1e3:g} mm"
+            ),
+            remedy="measure ten squares together with a ruler",
+            most=Verdict.REJECT,
+        )
+    # All boards upright: the lenses take the stretch, both the same.
+    left, right = (lens.matrix[0, 0] / lens.matrix[1, 1] - 1 for lens in (found.rig.left, found.rig.right))
+    stretch = float(left + right) / 2
+    if abs(stretch) > _STRETCHED and abs(left - right) < _ALIKE * abs(stretch):
+        return _no_squares(stretch)
+    return None
+
+
+def _stretched(session: BoardSession) -> Finding | None:
+    """Name squares that are no squares: a board that is longer explains more, however each is turned."""
+    board, sizes_px = session.board, session.sizes_px
+    try:
+        fits = [
+            both_alone(list(session.pairs), board.points_m() * [1 + stretch, 1.0, 1.0], sizes_px)
+            for stretch in (-_STRETCHED, 0.0, _STRETCHED)
+        ]
+    except cv2.error:
+        return None
+    if any(fit is None for fit in fits):
+        return None
+    lenses = [(left, right) for _, left, right in (fit for fit in fits if fit is not None)]
+    less, as_said, more = (left.squares_px2 + right.squares_px2 for left, right in lenses)
+    bend = less - 2 * as_said + more
+    stretch = _STRETCHED * (less - more) / (2 * bend) if bend > 0 else 0.0
+    remaining = as_said - (less - more) ** 2 / (8 * bend) if bend > 0 else as_said
+    if abs(stretch) < _STRETCHED or remaining > (1 - _EXPLAINED_SHARE) * as_said:
+        return None
+    return _no_squares(stretch)
+
+
+def _no_squares(stretch: float) -> Finding:
+    return Finding(
+        mistake=Mistake.SQUARE,
+        sentence=f"the board's squares are no squares: they are {abs(stretch):.1%} {'wider' if stretch > 0 else 'lower'} than they should be",
+        remedy='print the board without "fit to page", and measure a square both ways',
+        most=Verdict.REJECT,
+    )

@@ -1,0 +1,85 @@
+"""Measures the squares of boards that a rig has not seen. Pure.
+
+The boards are dealt out in parts; each part is measured by a rig fitted to the others. So an error that a rig makes
+everywhere, of scale or of depth, shows in millimetres, while the rows of a rig fitted to the same views may still meet.
+"""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.bundle import BundleState, BundleView, FreeParameters, Vector, adjust_roughly, rig_of
+from phone_host.calibration.fit_quality import Squares
+from phone_host.model import Rectification, Rig
+from phone_host.stereo.rectify import rectify_points, rectify_rig
+
+_PARTS: Final = 5
+_LEAST_PAIRS: Final = 6
+_NEIGHBOUR: Final = 1.01
+"""Corners whose distance is the least one, up to a hundredth, span one square."""
+
+
+def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleState, free: FreeParameters) -> Squares:
+    """Measure the squares of every pair by a rig that has not seen it.
+
+    Args:
+        pairs: the pairs that are used.
+        points_m: (N, 3) corners in the board's axes.
+        state: the rig fitted to all of them.
+        free: what was estimated.
+    """
+    true_m = float(np.min(np.linalg.norm(np.diff(points_m, axis=0), axis=1)))
+    sides: list[Vector] = []
+    parts = min(_PARTS, len(pairs)) if len(pairs) >= _LEAST_PAIRS else 0
+    for part in range(parts):
+        out = np.arange(len(pairs)) % parts == part
+        kept = [BundleView(pair.left_px, pair.right_px) for pair, held in zip(pairs, out, strict=True) if not held]
+        rig = rig_of(adjust_roughly(kept, points_m, replace(state, poses=state.poses[~out]), free))
+        try:
+            rectification = rectify_rig(rig)
+        except DataError:
+            continue
+        held = [pair for pair, is_held in zip(pairs, out, strict=True) if is_held]
+        sides += [square_sides_m(pair, points_m, rig, rectification) for pair in held]
+    found = np.concatenate(sides) if sides else np.empty(0)
+    if not found.size:
+        return Squares(true_m=true_m, mean_m=float("nan"), sigma_m=float("nan"), count=0)
+    return Squares(true_m=true_m, mean_m=float(found.mean()), sigma_m=float(found.std()), count=found.size)
+
+
+def square_sides_m(pair: BoardPair, points_m: Vector, rig: Rig, rectification: Rectification) -> Vector:
+    """Return the sides of the squares between neighbouring corners, (M,) m, as a rig measures them.
+
+    Args:
+        pair: the corners; NaN where one is not seen.
+        points_m: (N, 3) corners in the board's axes.
+        rig: the rig.
+        rectification: of the rig.
+    """
+    geometry = rectification.geometry
+    at = np.full((2, len(points_m), 2), np.nan)
+    for index, (corners, model, turn) in enumerate(
+        ((pair.left_px, rig.left, rectification.R_left), (pair.right_px, rig.right, rectification.R_right))
+    ):
+        seen = np.isfinite(corners).all(axis=1)
+        at[index, seen] = rectify_points(corners[seen], model, turn, geometry)
+    axis = 1 if rectification.epipolar.is_vertical else 0
+    depth = geometry.focal_px * geometry.baseline_m / (at[0, :, axis] - at[1, :, axis])
+    middle = at[0].copy()
+    middle[:, 1 - axis] = at[:, :, 1 - axis].mean(axis=0)  # rows that do not quite meet: between the two
+    slopes = (middle - np.array([geometry.cx_px, geometry.cy_px])) / geometry.focal_px
+    points = np.column_stack([slopes, np.ones(len(slopes))]) * depth[:, np.newaxis]
+    first, second = _neighbours(points_m)
+    sides = np.linalg.norm(points[first] - points[second], axis=1)
+    return np.asarray(sides[np.isfinite(sides)], np.float64)
+
+
+def _neighbours(points_m: Vector) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    apart = np.linalg.norm(points_m[:, np.newaxis] - points_m[np.newaxis], axis=2)
+    least = apart[apart > 0].min()
+    first, second = np.nonzero(np.triu(apart <= least * _NEIGHBOUR, 1))
+    return first, second

@@ -1,0 +1,204 @@
+"""Boards with coded marks, of which a part is enough: ChArUco boards and AprilGrids. Their corners in an image. Pure.
+
+Each corner is known by the marks beside it, so no view is ambiguous, and what is hidden is NaN. Corners are those of the
+chessboard, or where the tags of an AprilGrid touch the small black squares between them: saddle points, which an edge of
+light does not shift. The marks' own corners only say where to look: they lie half a pixel inside the mark.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Image
+
+Corners = NDArray[np.float64]
+
+_SEARCHED_PX: Final = 1600
+"""Longer side: marks are read in an image no larger; corners are refined in the whole one."""
+
+LEAST_SEEN: Final = 8
+"""Fewer corners hardly determine where the board is: two marks may give four in a line."""
+
+_GRID_WINDOW: Final = 0.3
+"""Of the gap between two tags: beyond are the next edges."""
+
+_REFINE: Final = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-4)
+_LEAST_PX, _MOST_PX = 2, 30
+_NEIGHBOURS: Final = 9
+_ASTRAY: Final = 0.02
+"""Share of the distance to the next corners: a lens bends the small piece of board around a corner by far less. At least half a pixel."""
+
+_LEAST_ASTRAY_PX: Final = 0.5
+
+
+class MarkFamily(Enum):
+    """A family of coded marks; the value is OpenCV's number of it."""
+
+    ARUCO_4X4 = cv2.aruco.DICT_4X4_1000
+    ARUCO_5X5 = cv2.aruco.DICT_5X5_1000
+    ARUCO_6X6 = cv2.aruco.DICT_6X6_1000
+    APRILTAG_36H11 = cv2.aruco.DICT_APRILTAG_36h11
+
+
+@dataclass(frozen=True, slots=True)
+class Charuco:
+    """The marks of a ChArUco board: their family, and the side of a mark as a share of a square's side."""
+
+    family: MarkFamily
+    mark_share: float
+
+
+@dataclass(frozen=True, slots=True)
+class AprilGrid:
+    """The tags of an AprilGrid, four corners each: the gap between two tags as a share of a tag's side."""
+
+    gap_share: float
+
+
+Marks = Charuco | AprilGrid
+
+
+def grid_lines(count: int, marks: AprilGrid) -> Corners:
+    """Return where the corners of an AprilGrid lie along one of its sides, (count,), in sides of a tag; two for each tag."""
+    tag = np.arange(count) // 2
+    return np.asarray(tag * (1 + marks.gap_share) + np.arange(count) % 2, np.float64)
+
+
+def find_marked(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
+    """Find the corners of a board with marks.
+
+    Args:
+        grey: (H, W) uint8.
+        columns: corners in a row.
+        rows: corners in a column.
+        marks: the board's marks.
+
+    Returns:
+        (columns * rows, 2) px, row by row, NaN where one is not seen; (0, 2) if fewer than eight are.
+    """
+    scale = min(1.0, _SEARCHED_PX / max(grey.shape))
+    small = grey
+    if scale < 1:
+        size = (round(grey.shape[1] * scale), round(grey.shape[0] * scale))
+        small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.uint8)
+    factors = np.array([small.shape[1] / grey.shape[1], small.shape[0] / grey.shape[0]])
+    rough, window = (
+        _charuco(small, columns, rows, marks)
+        if isinstance(marks, Charuco)
+        else _april_grid(small, columns, rows, marks)
+    )
+    seen = np.isfinite(rough).all(axis=1)
+    if seen.sum() < LEAST_SEEN:
+        return np.empty((0, 2))
+    found = np.full((columns * rows, 2), np.nan)
+    whole = (rough[seen] + 0.5) / factors - 0.5
+    reach = int(np.clip(window / factors.mean(), _LEAST_PX, _MOST_PX))
+    smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
+    refined = cv2.cornerSubPix(smooth, whole.astype(np.float32).reshape(-1, 1, 2), (reach, reach), (-1, -1), _REFINE)
+    refined = np.asarray(refined, np.float64).reshape(-1, 2)
+    # A corner that runs away was none: hidden by a finger, or a mark misread.
+    near = np.linalg.norm(refined - whole, axis=1) <= reach
+    refined[~near] = np.nan
+    found[seen] = refined
+    found[_astray(found, plan_of(columns, rows, marks))] = np.nan
+    return found if np.isfinite(found[:, 0]).sum() >= LEAST_SEEN else np.empty((0, 2))
+
+
+def plan_of(columns: int, rows: int, marks: Marks) -> Corners:
+    """Return where the corners lie on the board, (columns * rows, 2), in sides of a square or of a tag."""
+    x, y = (
+        grid_lines(count, marks) if isinstance(marks, AprilGrid) else np.arange(count, dtype=np.float64)
+        for count in (columns, rows)
+    )
+    return np.column_stack([each.ravel() for each in np.meshgrid(x, y)])
+
+
+def _astray(found: Corners, plan: Corners) -> NDArray[np.bool_]:
+    """Return which corners are not where their neighbours say: the edge of a hand has drawn them away."""
+    astray = np.zeros(len(found), np.bool_)
+    seen = np.flatnonzero(np.isfinite(found).all(axis=1))
+    if len(seen) <= LEAST_SEEN:
+        return astray
+    for index in seen:
+        distance = np.linalg.norm(plan[seen] - plan[index], axis=1)
+        near = seen[np.argsort(distance)[1 : 1 + _NEIGHBOURS]]
+        view, _ = cv2.findHomography(plan[near], found[near], cv2.LMEDS)
+        if np.ndim(view) == 0:  # they lie in one line
+            continue
+        told = np.asarray(cv2.perspectiveTransform(plan[index][np.newaxis, np.newaxis], view)).reshape(2)
+        spacing = float(np.median(np.linalg.norm(found[near] - found[index], axis=1)))
+        astray[index] = np.linalg.norm(told - found[index]) > max(_LEAST_ASTRAY_PX, _ASTRAY * spacing)
+    return astray
+
+
+def is_mirrored(grey: Image, columns: int, rows: int, marks: Marks) -> bool:
+    """Return whether the board is seen in the mirrored image. Marks are never read in a mirror."""
+    return len(find_marked(np.ascontiguousarray(grey[:, ::-1]), columns, rows, marks)) > 0
+
+
+def _charuco(grey: Image, columns: int, rows: int, marks: Charuco) -> tuple[Corners, float]:
+    """Return corners, NaN where not seen, and by how many px they may be refined."""
+    dictionary = cv2.aruco.getPredefinedDictionary(marks.family.value)
+    board = cv2.aruco.CharucoBoard((columns + 1, rows + 1), 1.0, marks.mark_share, dictionary)
+    corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(grey)
+    found = np.full((columns * rows, 2), np.nan)
+    if np.ndim(corners) == 0 or len(corners) == 0:  # OpenCV gives None where there is nothing
+        return found, 0.0
+    found[np.asarray(ids).ravel()] = np.asarray(corners, np.float64).reshape(-1, 2)
+    # No farther than the next mark: it fills the white square but for its rim.
+    return found, _spacing(found, columns, rows) * (1 - marks.mark_share) / 2
+
+
+def _april_grid(grey: Image, columns: int, rows: int, marks: AprilGrid) -> tuple[Corners, float]:
+    across, down = columns // 2, rows // 2
+    tags = _tags(grey, across * down)
+    grid = np.full((rows, columns, 2), np.nan)
+    upward = _is_upward(tags, across)
+    for number, corners in tags.items():
+        row, column = divmod(number, across)
+        top, left = 2 * (down - 1 - row if upward else row), 2 * column
+        grid[top, left], grid[top, left + 1] = corners[0], corners[1]
+        grid[top + 1, left + 1], grid[top + 1, left] = corners[2], corners[3]
+    sides = [np.linalg.norm(corners[1] - corners[0]) for corners in tags.values()]
+    side = float(np.median(sides)) if sides else 0.0
+    return grid.reshape(-1, 2), side * marks.gap_share * _GRID_WINDOW
+
+
+def _tags(grey: Image, most: int) -> dict[int, Corners]:
+    """Return the four corners of each tag, clockwise from its upper left one. Kalibr prints tags with a border of two bits, others of one."""
+    dictionary = cv2.aruco.getPredefinedDictionary(MarkFamily.APRILTAG_36H11.value)
+    for border in (2, 1):
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.markerBorderBits = border
+        corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(grey)
+        if len(corners):
+            numbers = [int(number) for number in np.asarray(ids).ravel()]
+            return {
+                number: np.asarray(four, np.float64).reshape(4, 2)
+                for number, four in zip(numbers, corners, strict=True)
+                if number < most
+            }
+    return {}
+
+
+def _is_upward(tags: dict[int, Corners], across: int) -> bool:
+    """Return whether rows are numbered from the lowest one, as Kalibr does: the next row's tag lies above, seen by the tag itself."""
+    votes = 0
+    for number, corners in tags.items():
+        if number + across in tags:
+            down = corners[3] - corners[0]
+            votes += 1 if (tags[number + across].mean(axis=0) - corners.mean(axis=0)) @ down < 0 else -1
+    return votes > 0
+
+
+def _spacing(found: Corners, columns: int, rows: int) -> float:
+    """Return the least distance of neighbouring corners that are seen, px; 0 if no two are."""
+    grid = found.reshape(rows, columns, 2)
+    steps = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).ravel() for axis in (0, 1)]
+    together = np.concatenate(steps)
+    together = together[np.isfinite(together)]
+    return float(together.min()) if together.size else 0.0

@@ -1,0 +1,89 @@
+"""Finds pairs that do not fit the others, and says why. Pure."""
+
+import numpy as np
+
+from common.errors import DataError
+from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
+from phone_host.calibration.bundle import BundleResult, BundleState, Vector, rig_of, rms_px
+from phone_host.calibration.calibrate_alone import FAR_OFF_PX, corners_of, off_words, own_errors_px
+from phone_host.model import Rectification, Rig, Side
+from phone_host.stereo.rectify import across_lines_px, rectify_points, rectify_rig
+
+# A pair is rejected when its error is twice the median pair's, but never below this floor: smaller errors do no harm.
+_OUTLIER_FACTOR, _OUTLIER_FLOOR_PX = 2.0, 0.3
+# Row errors carry a third of the information and scatter more from pair to pair.
+_ROWS_FACTOR = 2.5
+
+
+def misfits(pairs: list[BoardPair], result: BundleResult, points_m: Vector) -> list[tuple[int, Rejected]]:
+    """Find pairs that fit much worse than the others, worst first: by reprojection error, or by rows that do not match."""
+    errors = np.fmax(*result.view_rms_px())
+    usual = float(np.median(errors))
+    by_error = errors / max(_OUTLIER_FACTOR * usual, _OUTLIER_FLOOR_PX)
+    found = [
+        (
+            by_error[index],
+            index,
+            _misfit(pairs[index], result.state, points_m, error_px=float(errors[index]), usual_px=usual),
+        )
+        for index in np.flatnonzero(by_error > 1)
+    ]
+    try:
+        rig = rig_of(result.state)
+        rectification = rectify_rig(rig)
+    except DataError:  # swapped, vertical, ...: the same check reports it at the end
+        vertical = np.zeros(len(pairs))
+    else:
+        vertical = np.array([rms(vertical_errors_px(pair, rig, rectification)) for pair in pairs])
+    usual = float(np.median(vertical))
+    by_rows = vertical / max(_ROWS_FACTOR * usual, _OUTLIER_FLOOR_PX)
+    found += [
+        (
+            by_rows[index],
+            index,
+            Rejected(
+                pairs[index].name,
+                Reason.MOVED,
+                f"rows of left and right differ by {vertical[index]:.2f} px, others by {usual:.2f} px: board or cameras"
+                " moved between the two exposures",
+            ),
+        )
+        for index in np.flatnonzero(by_rows > 1)
+    ]
+    return [(int(index), why) for _, index, why in sorted(found, key=lambda each: -each[0])]
+
+
+def _misfit(pair: BoardPair, state: BundleState, points_m: Vector, *, error_px: float, usual_px: float) -> Rejected:
+    """Say why a pair does not fit: fitting each view alone shows whether corners jump or the board moved."""
+    own = {
+        side: rms_px(own_errors_px(points_m, corners_of(pair, side), camera))
+        for side, camera in ((Side.LEFT, state.left), (Side.RIGHT, state.right))
+    }
+    side = max(own, key=lambda each: own[each])
+    # If a view fitted alone already has more than half of the error, the fault is in its corners.
+    if own[side] > error_px / 2:
+        reason = Reason.CORNERS_LEFT if side is Side.LEFT else Reason.CORNERS_RIGHT
+        detail = f"corners in the {side.value} image are off {off_words(own[side], usual_px)}"
+        if own[side] > FAR_OFF_PX:
+            detail += ": the two images may not belong together"
+    else:
+        reason = Reason.MOVED
+        detail = f"each view fits alone, together they are off {off_words(error_px, usual_px)}: " + (
+            "the two images do not belong together"
+            if error_px > FAR_OFF_PX
+            else "board or cameras moved between the two exposures"
+        )
+    return Rejected(pair.name, reason, detail)
+
+
+def vertical_errors_px(pair: BoardPair, rig: Rig, rectification: Rectification) -> Vector:
+    """Return (M,) how far the M corners that both cameras see lie beside each other's row after rectification, px."""
+    seen = np.isfinite(pair.left_px).all(axis=1) & np.isfinite(pair.right_px).all(axis=1)
+    left = rectify_points(pair.left_px[seen], rig.left, rectification.R_left, rectification.geometry)
+    right = rectify_points(pair.right_px[seen], rig.right, rectification.R_right, rectification.geometry)
+    return across_lines_px(left, right, rectification.epipolar)
+
+
+def rms(values: Vector) -> float:
+    """Return the root mean square of values; NaN if there are none."""
+    return float(np.sqrt((values**2).mean())) if values.size else float("nan")

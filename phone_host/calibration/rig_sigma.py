@@ -1,0 +1,125 @@
+"""What the uncertainty of a rig's parameters does to disparity and depth. Pure.
+
+The covariance of the parameters is carried through to first order:
+
+    variance of a disparity = J C J^T,  J = its derivative by the parameters.
+
+J is exact: how a point's pixels move with the true cameras (`geometry.lens`), and how the rectification that was computed from
+the estimated ones carries that to the rectified images. A point at infinity has D = d + doffs = 0 in an exact rig; in a
+calibrated one its sigma, the noise of zero, decides how far the rig can see, because depth is f b / D.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.calibration.bundle_problem import GLOBALS, LEFT, RIG, RIGHT
+from phone_host.geometry.lens import project_linearised
+from phone_host.geometry.se3 import cross_matrices
+from phone_host.model import CameraModel, Epipolar, Rectification, Rig
+
+Floats = NDArray[np.float64]
+
+DEPTHS_M: Final = (0.3, 0.5, 1.0, 2.0)
+"""Depths at which a calibration states its depth error."""
+
+_COLUMNS, _ROWS = 9, 7
+"""Points over the image. The error bends as slowly as the lens: a finer grid changes the result by less than a tenth."""
+
+
+def zero_sigma_px(rig: Rig, rectification: Rectification) -> float:
+    """Return the standard uncertainty of the disparity of infinitely far points.
+
+    Args:
+        rig: with its covariance.
+        rectification: of that rig.
+
+    Returns:
+        Root mean square over the rectified image, px of that image; NaN if the covariance is not known.
+    """
+    return _disparity_sigma_px(rig, rectification, np.inf)
+
+
+def depth_sigma_m(rig: Rig, rectification: Rectification, depth_m: float) -> float:
+    """Return the standard uncertainty of depths that the calibration alone leaves, m.
+
+    Args:
+        rig: with its covariance.
+        rectification: of that rig.
+        depth_m: of the points, m.
+
+    Returns:
+        Root mean square over the rectified image, m; NaN if the covariance is not known or both cameras see nothing so near.
+    """
+    geometry = rectification.geometry
+    sigma_px = _disparity_sigma_px(rig, rectification, depth_m)
+    return depth_m**2 / (geometry.focal_px * geometry.baseline_m) * sigma_px
+
+
+def baseline_sigma_m(rig: Rig) -> float:
+    """Return the standard uncertainty of the baseline, m; NaN if the covariance is not known."""
+    direction = rig.t_right_left_m / np.linalg.norm(rig.t_right_left_m)
+    variance = float(direction @ rig.covariance[-3:, -3:] @ direction)
+    return float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else float("nan")
+
+
+def _disparity_sigma_px(rig: Rig, rectification: Rectification, depth_m: float) -> float:
+    if not np.isfinite(rig.covariance).all():
+        return float("nan")
+    jacobian = disparity_derivatives(rig, rectification, depth_m)
+    variances = np.einsum("ni,ij,nj->n", jacobian, rig.covariance, jacobian)
+    return float(np.sqrt(variances.clip(min=0).mean())) if len(variances) else float("nan")
+
+
+def disparity_derivatives(rig: Rig, rectification: Rectification, depth_m: float) -> Floats:
+    """Return the derivatives of disparities by the true parameters, (N, 30), px per unit, at points spread over what both cameras see.
+
+    Args:
+        rig: the cameras as they are estimated.
+        rectification: of that rig.
+        depth_m: of the points, m; may be infinite.
+    """
+    slopes = _slopes(rectification)
+    is_far = not np.isfinite(depth_m)
+    if not is_far:  # what the right camera does not see has no disparity
+        axis, geometry = (1 if rectification.epipolar.is_vertical else 0), rectification.geometry
+        pixels = slopes[:, axis] * geometry.focal_px + (geometry.cy_px if axis else geometry.cx_px)
+        towards = -1.0 if rectification.epipolar is Epipolar.DOWN else 1.0
+        matched = pixels - towards * geometry.focal_px * geometry.baseline_m / depth_m
+        slopes = slopes[(matched >= 0) & (matched < (rectification.height_px if axis else rectification.width_px))]
+    points = np.column_stack([slopes, np.ones(len(slopes))]) * (1.0 if is_far else depth_m)
+    left = points @ rectification.R_left  # rows: R_left^T p, from the rectified axes to the left camera's
+    turned = left @ rig.R_right_left.T
+    right = turned + (0.0 if is_far else rig.t_right_left_m)
+    axis = 1 if rectification.epipolar.is_vertical else 0
+    result = np.zeros((len(points), GLOBALS))
+    by_values, _ = _rectified_derivatives(left, rig.left, rectification.R_left, rectification)
+    result[:, LEFT] = by_values[:, axis]
+    by_values, by_point = _rectified_derivatives(right, rig.right, rectification.R_right, rectification)
+    result[:, RIGHT] = -by_values[:, axis]
+    by_turn = by_point @ -cross_matrices(turned)
+    result[:, RIG.start : RIG.start + 3] = -by_turn[:, axis]
+    if not is_far:
+        result[:, RIG.start + 3 :] = -by_point[:, axis]
+    return result
+
+
+def _rectified_derivatives(
+    points: Floats, model: CameraModel, rotation: Floats, rectification: Rectification
+) -> tuple[Floats, Floats]:
+    """Return the derivatives of rectified pixels by the true camera's parameters (N, 2, 12) and by the true point (N, 2, 3)."""
+    _, by_point, by_values = project_linearised(points, model)
+    depths = points @ rotation[2]  # along the rectified axis
+    by_slope = by_point @ rotation.T[:, :2] * depths[:, np.newaxis, np.newaxis]
+    back = np.linalg.inv(by_slope) * rectification.geometry.focal_px
+    return back @ by_values, back @ by_point
+
+
+def _slopes(rectification: Rectification) -> Floats:
+    """Return slopes (N, 2) spread evenly over the rectified image."""
+    geometry = rectification.geometry
+    columns = (np.arange(_COLUMNS) + 0.5) / _COLUMNS * rectification.width_px
+    rows = (np.arange(_ROWS) + 0.5) / _ROWS * rectification.height_px
+    x, y = (axis.ravel() for axis in np.meshgrid(columns, rows))
+    return np.column_stack([x - geometry.cx_px, y - geometry.cy_px]) / geometry.focal_px

@@ -1,0 +1,139 @@
+"""Least squares with many small blocks that only meet in shared parameters: Levenberg-Marquardt on the Schur complement. Pure.
+
+In a calibration the cameras are shared and each board pose is a block; in a reconstruction it may be the other way round. The
+normal equations are
+
+    [ S    C^T ] [ shared ]   [ s ]
+    [ C    B   ] [ blocks ] = [ b ]      B block diagonal,
+
+so the blocks are eliminated one by one, and the cost grows linearly with their number.
+
+Source: B. Triggs et al., "Bundle Adjustment - A Modern Synthesis", 2000, section 6.
+"""
+
+from dataclasses import dataclass
+from typing import Final, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+State = TypeVar("State")
+
+_MOST_STEPS: Final = 200
+CONVERGED: Final = 1e-9
+"""Relative decrease of the cost at which the search ends; the baseline of a rig then moves by less than a micrometre."""
+
+_DAMPING_START, _DAMPING_LEAST, _DAMPING_MOST = 1e-3, 1e-12, 1e12
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class NormalEquations:
+    """Normal equations in blocks.
+
+    Attributes:
+        shared: (G, G) of the shared parameters.
+        coupling: (V, G, B) between them and each block.
+        blocks: (V, B, B) of each block.
+        shared_right: (G,) right side.
+        blocks_right: (V, B) right side of each block.
+    """
+
+    shared: Floats
+    coupling: Floats
+    blocks: Floats
+    shared_right: Floats
+    blocks_right: Floats
+
+    def reduced(self, damping: float, free: Flags) -> tuple[Floats, Floats, Floats]:
+        """Eliminate the blocks.
+
+        Args:
+            damping: share of the diagonal that is added to it.
+            free: (G,) which shared parameters are estimated.
+
+        Returns:
+            Matrix (F, F) and right side (F,) of the free parameters, and the inverse blocks (V, B, B).
+
+        Raises:
+            np.linalg.LinAlgError: a block is singular.
+        """
+        inverse = np.linalg.inv(self.blocks + damping * self.blocks * np.eye(self.blocks.shape[1]))
+        coupling = self.coupling[:, free]
+        matrix = self.shared[np.ix_(free, free)] + damping * np.diag(np.diag(self.shared)[free])
+        right = self.shared_right[free]
+        for across, inverted, gradient in zip(coupling, inverse, self.blocks_right, strict=True):
+            eliminated = across @ inverted
+            matrix = matrix - eliminated @ across.T
+            right = right - eliminated @ gradient
+        return np.asarray(matrix, np.float64), np.asarray(right, np.float64), np.asarray(inverse, np.float64)
+
+    def step(self, damping: float, free: Flags) -> tuple[Floats, Floats]:
+        """Return the damped step: shared parameters (G,), 0 for those that are not free, and blocks (V, B).
+
+        Raises:
+            np.linalg.LinAlgError: the equations are singular.
+        """
+        matrix, right, inverse = self.reduced(damping, free)
+        step = np.zeros(len(free))
+        step[free] = np.linalg.solve(matrix, right)
+        return step, np.einsum("vij,vj->vi", inverse, self.blocks_right - np.einsum("vij,i->vj", self.coupling, step))
+
+    def covariance(self, free: Flags) -> Floats:
+        """Return the (G, G) covariance of the shared parameters, 0 for those that are not free, if the residuals have variance 1."""
+        result = np.zeros(self.shared.shape)
+        result[np.ix_(free, free)] = inverse_of(self.reduced(0.0, free)[0])
+        return result
+
+
+def inverse_of(matrix: Floats) -> Floats:
+    """Return the pseudo-inverse (F, F) of a symmetric matrix whose rows may differ in unit: scaled to a unit diagonal first."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    inverse = np.linalg.pinv(matrix * np.outer(scale, scale), hermitian=True)
+    return np.asarray(inverse * np.outer(scale, scale), np.float64)
+
+
+class Problem(Protocol[State]):
+    """What is minimised."""
+
+    def cost(self, state: State) -> float:
+        """Return the cost of a state; infinite if its numbers are invalid."""
+
+    def linearised(self, state: State) -> NormalEquations:
+        """Return the normal equations at a state."""
+
+    def moved(self, state: State, shared: Floats, blocks: Floats) -> State:
+        """Return a state after a step: shared parameters (G,), blocks (V, B)."""
+
+
+def minimise(problem: Problem[State], state: State, free: Flags, converged: float = CONVERGED) -> State:
+    """Run Levenberg-Marquardt until the cost stops falling.
+
+    Args:
+        problem: what is minimised.
+        state: where to start.
+        free: (G,) which shared parameters are estimated; blocks always are.
+        converged: relative decrease of the cost at which the search ends.
+
+    Returns:
+        The best state found.
+    """
+    damping, cost, system = _DAMPING_START, problem.cost(state), problem.linearised(state)
+    for _ in range(_MOST_STEPS):
+        try:
+            tried = problem.moved(state, *system.step(damping, free))
+            tried_cost = problem.cost(tried)
+        except np.linalg.LinAlgError:
+            tried, tried_cost = state, np.inf
+        if tried_cost < cost:
+            gain, state, cost = (cost - tried_cost) / cost, tried, tried_cost
+            damping = max(damping / 5, _DAMPING_LEAST)
+            if gain < converged:
+                break
+            system = problem.linearised(state)
+        else:
+            damping *= 10
+            if damping > _DAMPING_MOST:
+                break
+    return state

@@ -1,0 +1,117 @@
+"""The views in rig.yaml from which a rig was computed, so that a later calibration can add others: the map `views`.
+
+It holds board_columns and board_rows (inner corners), square (m), names (one text per pair), left and right (corners, px, one
+row per pair: x y x y ..., .Nan where one is not seen). A rig without the map cannot be added to.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+
+Problem = Callable[[str, str, str], DataError]
+"""Makes the error of a key, from what is wrong with it and the remedy."""
+
+KEY: Final = "views"
+_REMEDY: Final = "calibrate again from all pictures"
+_MOST_CORNERS: Final = 10_000
+_MOST_VIEWS: Final = 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RigViews:
+    """What a rig was computed from.
+
+    Attributes:
+        columns: inner corners of the board in a row.
+        rows: inner corners in a column.
+        square_m: side of a square, m.
+        names: of V pairs.
+        left_px: (V, N, 2) corners; NaN where one is not seen.
+        right_px: (V, N, 2), in the same order.
+    """
+
+    columns: int
+    rows: int
+    square_m: float
+    names: tuple[str, ...]
+    left_px: NDArray[np.float64]
+    right_px: NDArray[np.float64]
+
+
+def write_views(storage: cv2.FileStorage, views: RigViews) -> None:
+    """Write the views.
+
+    Args:
+        storage: a rig.yaml, open for writing.
+        views: what the rig was computed from.
+    """
+    storage.startWriteStruct(KEY, cv2.FileNode_MAP)
+    storage.write("board_columns", views.columns)
+    storage.write("board_rows", views.rows)
+    storage.write("square", views.square_m)
+    storage.startWriteStruct("names", cv2.FileNode_SEQ)
+    for name in views.names:
+        storage.write("", name)
+    storage.endWriteStruct()
+    # float32: a ten-thousandth of a pixel, half the digits
+    storage.write("left", views.left_px.reshape(len(views.names), -1).astype(np.float32))
+    storage.write("right", views.right_px.reshape(len(views.names), -1).astype(np.float32))
+    storage.endWriteStruct()
+
+
+def read_views(storage: cv2.FileStorage, problem: Problem) -> RigViews | None:
+    """Read the views, and check them.
+
+    Args:
+        storage: a rig.yaml.
+        problem: makes errors that name file and key.
+
+    Returns:
+        The views; None if the file has none.
+
+    Raises:
+        DataError: they are not valid.
+    """
+    node = storage.getNode(KEY)
+    if node.empty():
+        return None
+    if not node.isMap():
+        raise problem(KEY, "is no map", _REMEDY)
+    counts = [_whole(node, key, problem) for key in ("board_columns", "board_rows")]
+    square = node.getNode("square")
+    square_m = square.real() if square.isReal() or square.isInt() else np.nan
+    if not 0 < square_m < 10:
+        raise problem(f"{KEY}.square", "is no length", _REMEDY)
+    listed = node.getNode("names")
+    names = tuple(listed.at(i).string() for i in range(listed.size())) if listed.isSeq() else ()
+    if not 0 < len(names) <= _MOST_VIEWS:
+        raise problem(f"{KEY}.names", "names no pairs", _REMEDY)
+    corners = []
+    for key in ("left", "right"):
+        found = node.getNode(key)
+        values = found.mat() if found.isMap() else None
+        if values is None or values.shape != (len(names), 2 * counts[0] * counts[1]) or np.isinf(values).any():
+            raise problem(f"{KEY}.{key}", "does not hold the corners of each pair", _REMEDY)
+        corners.append(np.asarray(values, np.float64).reshape(len(names), -1, 2))
+    return RigViews(
+        columns=counts[0],
+        rows=counts[1],
+        square_m=float(square_m),
+        names=names,
+        left_px=corners[0],
+        right_px=corners[1],
+    )
+
+
+def _whole(node: cv2.FileNode, key: str, problem: Problem) -> int:
+    found = node.getNode(key)
+    value = found.real() if found.isInt() else np.nan
+    if not 1 <= value <= _MOST_CORNERS:
+        raise problem(f"{KEY}.{key}", "is no number of corners", _REMEDY)
+    return int(value)

@@ -1,0 +1,139 @@
+"""Measures points of one pair of image files. The root of `measure`."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from common import now
+from common.errors import DataError, SettingsError
+from common.imagesize.head import size_text
+from common.orientation import Orientation
+from phone_host.measure.trust import Concern
+from phone_host.model import Disparity, RectifiedPair, StereoGeometry
+from phone_host.run.stereo_job import Watcher
+from phone_host.run.stereo_trust import judge_pair
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.images import decode_files, open_image, require_same_size, size_px
+from phone_host.stereo.measured_point import MeasuredPoint, measured_point
+from phone_host.stereo.point_match import PointMatch, match_point
+from phone_host.stereo.rectify import Rectifier, rectify_points
+
+Point = tuple[float, float]
+Size = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointJob:
+    """What to measure.
+
+    Attributes:
+        left: image file of the left camera.
+        right: image file of the right camera.
+        points_px: x and y of points in the upright left image, px.
+        make_core: makes the stereo core for images of this size (width and height of the left one, px).
+        most_pixels: an image that claims more is refused.
+        mounted: by which turns the images become upright, after what their EXIF headers say.
+    """
+
+    left: Path
+    right: Path
+    points_px: tuple[Point, ...]
+    make_core: Callable[[Size], StereoCore]
+    most_pixels: int
+    mounted: tuple[Orientation, Orientation]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """What was measured.
+
+    Attributes:
+        points: one for each point asked for, in their order.
+        zero_sigma_px: the rig's uncertainty of the disparity of infinitely far points that was reckoned with, px; NaN: not known.
+        doubts: reasons not to trust it that do not rule it out.
+    """
+
+    points: tuple[MeasuredPoint, ...]
+    zero_sigma_px: float
+    doubts: tuple[Concern, ...]
+
+
+def measure_points(job: PointJob, watcher: Watcher) -> Measured:
+    """Measure points.
+
+    Args:
+        job: what to measure.
+        watcher: is told how far it is.
+
+    Raises:
+        SettingsError: a point lies outside the left image.
+        DataError: the pair cannot be computed, cannot be right, or a point has no match.
+    """
+    watcher.say("reading")
+    opened = tuple(
+        open_image(path, job.most_pixels, turn) for path, turn in zip((job.left, job.right), job.mounted, strict=True)
+    )
+    left_px, right_px = (image.size_px for image in opened)
+    for point in job.points_px:
+        if not all(0 <= at <= size - 1 for at, size in zip(point, left_px, strict=True)):
+            raise SettingsError(
+                f"--points {point_text(point)} lies outside the left image of {size_text(left_px)} px",
+                "give X,Y inside it; the centre of the first pixel is 0,0",
+            )
+    core = job.make_core(left_px)
+    if core.rig is None:
+        require_same_size(left_px, right_px, str(job.left), str(job.right))
+    core.require_sizes(left_px, right_px)
+    images = decode_files(opened[0], opened[1], core.reductions(left_px, right_px))
+    watcher.say("matching")
+    processed = core.compute(*images, now.monotonic_ns, whole_px=(left_px, right_px))
+    geometry, disparity, search = processed.geometry, processed.disparity, processed.search
+    if geometry is None or disparity is None or search is None:
+        raise SettingsError("there are no millimetres without focal length and baseline", "give --calibration")
+    watcher.say("checking")
+    concerns = judge_pair(core, processed, job.mounted).concerns
+    blocking = next((concern for concern in concerns if concern.doubt.blocks), None)
+    if blocking is not None:
+        why = f"these images cannot be measured, because {blocking.sentence} ({blocking.remedy})"
+        raise DataError(why, "mend that, then measure again")
+    watcher.say("measuring")
+    seen = _Seen(
+        processed.pair, disparity, geometry, 1 / search.scale, core.rectifier_for(size_px(processed.pair.left))
+    )
+    zero_sigma_px = math.nan if seen.rectifier is None else seen.rectifier.rig.zero_sigma_px
+    return Measured(tuple(_measured(point, seen, zero_sigma_px) for point in job.points_px), zero_sigma_px, concerns)
+
+
+def point_text(point_px: Point) -> str:
+    """Return a point as the user writes it: X,Y."""
+    return f"{point_px[0]:g},{point_px[1]:g}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """A matched pair, and how many of its px one px of the matched images is."""
+
+    pair: RectifiedPair
+    disparity: Disparity
+    geometry: StereoGeometry
+    step_px: float
+    rectifier: Rectifier | None
+
+
+def _measured(asked_px: Point, seen: _Seen, zero_sigma_px: float) -> MeasuredPoint:
+    at_px, rectifier = asked_px, seen.rectifier
+    if rectifier is not None:
+        turn = rectifier.rectification.R_left
+        [(x, y)] = rectify_points(np.array([asked_px]), rectifier.rig.left, turn, seen.geometry).tolist()
+        at_px = (x, y)
+    match = match_point(seen.pair, seen.disparity, at_px, seen.step_px)
+    if not isinstance(match, PointMatch):
+        said = f"--points {point_text(asked_px)} {match.value}"
+        raise DataError(said, "choose a point on a surface with texture, away from its edges")
+    point = measured_point(at_px, match, seen.geometry, seen.pair.epipolar, zero_sigma_px)
+    if not np.isfinite(point.point_m).all():
+        raise DataError(f"--points {point_text(asked_px)} cannot be told from infinity", "choose a nearer point")
+    return point

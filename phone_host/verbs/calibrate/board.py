@@ -1,0 +1,113 @@
+"""The board of phone-host calibrate: named by the user and checked in the images, or found in them."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from phone_host.calibration.board_names import named_board, no_square
+from phone_host.calibration.board_size import require_size, size_in_files, size_text
+from phone_host.calibration.marked import Charuco
+from phone_host.calibration.target import Board
+from phone_host.run.progress_bar import busy_bar
+from phone_host.stereo.view_files import ViewFiles
+from phone_host.verbs.units import square_mm
+
+AUTO: Final = "auto"
+
+
+class Origin(Enum):
+    """Who says how many corners the board has."""
+
+    OPTION = "option"
+    IMAGES = "images"
+    EARLIER = "earlier calibration"
+
+
+_SAID: Final = {
+    Origin.OPTION: "as --board says",
+    Origin.IMAGES: "as found in the images",
+    Origin.EARLIER: "as in the earlier calibration",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """What the options say of the board.
+
+    Attributes:
+        board: the board; None: it is to be found.
+        square_mm: side of its squares, mm.
+    """
+
+    board: Board | None
+    square_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """The board, and who said its size."""
+
+    board: Board
+    origin: Origin
+
+    def as_report(self) -> dict[str, Any]:
+        """Return it for report.json."""
+        return {
+            "board": {
+                "inner_corners": size_text((self.board.columns, self.board.rows)),
+                "from": self.origin.value,
+                "square_mm": round(self.board.square_m * 1e3, 6),
+            }
+        }
+
+    def as_line(self) -> str:
+        """Return it for the summary."""
+        if self.board.marks is not None:
+            kind = "ChArUco board" if isinstance(self.board.marks, Charuco) else "AprilGrid"
+            size = size_text((self.board.columns, self.board.rows))
+            return f"board    {kind} of {size} corners, as --board says; squares of {self.board.square_m * 1e3:g} mm"
+        said = _SAID[self.origin]
+        size = size_text((self.board.columns, self.board.rows))
+        return f"board    {size} inner corners, {said}; squares of {self.board.square_m * 1e3:g} mm"
+
+
+def named(board: str, square: str | None) -> Named:
+    """Read --board and --square.
+
+    Args:
+        board: "auto", inner corners such as "9x6", or the name of a board with marks.
+        square: side of one square with its unit; None: not given.
+
+    Raises:
+        SettingsError: one of the two is not valid, or a chessboard has no square.
+    """
+    side_mm = None if square is None else square_mm(square)
+    if board.strip().lower() == AUTO:
+        if side_mm is None:
+            raise no_square()
+        Board(3, 3, side_mm / 1000)  # refuses a square that no board has before images are read
+        return Named(None, side_mm)
+    known = named_board(board, side_mm)
+    return Named(known, known.square_m * 1e3)
+
+
+def board_in(files: ViewFiles, named: Named, most_pixels: int) -> Known:
+    """Find the board's size in some images, or check there the one that was named.
+
+    Args:
+        files: the pairs of files.
+        named: what the options say.
+        most_pixels: an image that claims more is passed over.
+
+    Raises:
+        DataError: no size was named, and the images do not tell it.
+        SettingsError: the images show a board of another size than was named.
+    """
+    with busy_bar("looking at the board"):
+        if named.board is not None:
+            if named.board.marks is not None:
+                return Known(named.board, Origin.OPTION)
+            require_size(files, (named.board.columns, named.board.rows), most_pixels)
+            return Known(named.board, Origin.OPTION)
+        columns, rows = size_in_files(files, most_pixels)
+    return Known(Board(columns, rows, named.square_mm / 1000), Origin.IMAGES)

@@ -1,0 +1,1 @@
+"""phone-host measure: its options (light), and its command."""

@@ -1,0 +1,124 @@
+"""phone-host measure: the distance of points, and between them."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from common.program.terminal import say
+from common.versions import REPORT_FORMAT
+from phone_host.output.json_text import json_text
+from phone_host.run.point_job import Measured, PointJob, measure_points, point_text
+from phone_host.run.progress_bar import step_bar
+from phone_host.settings import most_pixels
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_matcher
+from phone_host.stereo.measured_point import Within, path_between
+from phone_host.verbs.orientation_arguments import orientations
+from phone_host.verbs.stereo_numbers import point_px
+from phone_host.verbs.stereo_options import build_core
+
+_NOISE: Final = "noise of both images"
+_ZERO: Final = "the rig's zero (zero_sigma)"
+_LEFT_OUT: Final = ("the baseline's own uncertainty", "how exactly the points were picked")
+_EVEN: Final = 0.05
+"""Limits that differ by less than this share of themselves are written as one number."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Match the pair, intersect the rays of each point, and print what came of it."""
+    points = tuple(point_px(text, "--points", "X,Y in px, for example 312,240") for text in options.points)
+    job = PointJob(
+        left=Path(options.left),
+        right=Path(options.right),
+        points_px=points,
+        make_core=lambda size_px: _core(options, size_px),
+        most_pixels=most_pixels(None, options.max_megapixels),
+        mounted=orientations(options),
+    )
+    with step_bar("reading", None) as watcher:
+        found = measure_points(job, watcher)
+    if options.json:
+        print(json_text(_report(options, points, found)))
+    else:
+        say(_lines(points, found))
+    return 0
+
+
+def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:
+    matcher = options.matcher or default_matcher().value
+    core, _ = build_core(options, options.calibration, matcher, size_px, Path(options.left))
+    assert core is not None, "a calibration always makes one"
+    return core
+
+
+def _included(found: Measured) -> tuple[list[str], list[str]]:
+    """Return which parts of the uncertainty are included, and which are not."""
+    known = not math.isnan(found.zero_sigma_px)
+    return [_NOISE, *([_ZERO] if known else [])], [*([] if known else [_ZERO]), *_LEFT_OUT]
+
+
+def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> dict[str, Any]:
+    included, left_out = _included(found)
+    return {
+        "format_version": REPORT_FORMAT,
+        "command": "measure",
+        "left": options.left,
+        "right": options.right,
+        "calibration": options.calibration,
+        "points": [
+            {
+                "at_px": list(at_px),
+                "distance_mm": _values(point.distance),
+                "point_mm": [round(float(value) * 1e3, 3) for value in point.point_m],
+                "sigma_mm": [
+                    round(float(value) * 1e3, 3) for value in np.sqrt(np.diag(point.covariance_m2) + point.zero_m**2)
+                ],
+                "rays_miss_px": round(point.miss_px, 3),
+                "noise_factor": round(point.noise_factor, 3),
+            }
+            for at_px, point in zip(points_px, found.points, strict=True)
+        ],
+        "between": [
+            {"from_point": number, "to_point": number + 1, "length_mm": _values(length)}
+            for number, length in enumerate(path_between(found.points), start=1)
+        ],
+        "uncertainty": {"level": 0.95, "includes": included, "leaves_out": left_out},
+        "doubts": [{"sentence": concern.sentence, "remedy": concern.remedy} for concern in found.doubts],
+    }
+
+
+def _values(length: Within) -> dict[str, float | None]:
+    limits = {"value": length.value_m, "low": length.low_m, "high": length.high_m}
+    return {name: round(value * 1e3, 3) if math.isfinite(value) else None for name, value in limits.items()}
+
+
+def _lines(points_px: tuple[tuple[float, float], ...], found: Measured) -> list[str]:
+    included, left_out = _included(found)
+    lines = []
+    for number, (at_px, point) in enumerate(zip(points_px, found.points, strict=True), start=1):
+        x, y, z = point.point_m * 1e3
+        lines.append(
+            f"point {number}  at {point_text(at_px)} px: {_text(point.distance)} away; x {x:.1f}, y {y:.1f}, z {z:.1f} mm"
+        )
+    lines += [
+        f"{number} to {number + 1}   {_text(length)}"
+        for number, length in enumerate(path_between(found.points), start=1)
+    ]
+    lines += [f"doubt    {concern.sentence} {concern.remedy}" for concern in found.doubts]
+    lines.append(f"95 % of the cases lie between these limits; they include {' and '.join(included)}")
+    lines.append(f"not included: {', '.join(left_out)}")
+    return lines
+
+
+def _text(length: Within) -> str:
+    """Return a length with its limits: as one number where they lie evenly."""
+    value, low, high = (each * 1e3 for each in (length.value_m, length.low_m, length.high_m))
+    digits = 2 if value - low < 0.1 else 1 if value - low < 10 else 0
+    below, above = value - low, high - value
+    if above - below <= _EVEN * above:
+        return f"{value:.{digits}f} +- {max(below, above):.{digits}f} mm"
+    upper = f"{high:.{digits}f} mm" if math.isfinite(high) else "infinity"
+    return f"{value:.{digits}f} mm ({low:.{digits}f} mm to {upper})"

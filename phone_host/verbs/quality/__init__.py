@@ -1,0 +1,1 @@
+"""phone-host quality: its options (light), and its command."""

@@ -1,0 +1,109 @@
+"""phone-host quality: measure how good a rig's depth is, on pairs of images of a flat wall or board."""
+
+import argparse
+from typing import Final
+
+from common.errors import SettingsError
+from common.program.terminal import say
+from phone_host.calibration.target import Board, parse_board
+from phone_host.output.json_text import json_text
+from phone_host.report.quality_json import quality_json
+from phone_host.report.quality_lines import quality_lines
+from phone_host.report.stereo_report import Size
+from phone_host.run.progress_bar import step_bar
+from phone_host.run.quality_job import NAMES, QualityJob, run_quality
+from phone_host.settings import most_pixels
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_matcher, default_note
+from phone_host.stereo.view_files import ViewFiles, pair_files
+from phone_host.verbs.globs import two_lists
+from phone_host.verbs.orientation_arguments import orientations
+from phone_host.verbs.output_folders import unwritable
+from phone_host.verbs.result_places import require_place
+from phone_host.verbs.stereo_numbers import crop_of
+from phone_host.verbs.stereo_options import build_core
+from phone_host.verbs.units import limit_mm, square_mm
+
+_CHECK_FAILED: Final = 4
+
+
+def run(options: argparse.Namespace) -> int:
+    """Pair the files, measure them, and print what came of it."""
+    if not options.calibration and not options.rectified:
+        raise SettingsError(
+            "neither --calibration nor --rectified is given",
+            "give the rig.yaml of `phone-host calibrate`, or --rectified --focal PX --baseline MM",
+        )
+    board = _board(options)
+    roi = None if options.roi is None else crop_of(options.roi, "--roi")
+    matcher = options.matcher or default_matcher().value
+    files = pair_files(*two_lists(options.images))
+    distances_m = _distances_m(options, files)
+    require_place(options.out, files, NAMES, "quality")
+    job = QualityJob(
+        files=files,
+        out=options.out,
+        make_core=lambda size_px: _core(options, matcher, size_px, files),
+        matcher=matcher,
+        matcher_note="" if options.matcher else default_note(),
+        distances_m=distances_m,
+        board=board,
+        roi=roi,
+        most_pixels=most_pixels(None, options.max_megapixels),
+        mounted=orientations(options),
+    )
+    count = len(files.pairs)
+    try:
+        with step_bar("reading", count if count > 1 else None) as watcher:
+            report = run_quality(job, watcher)
+    except OSError as error:
+        raise unwritable(options.out, error) from error
+    if options.json:
+        print(json_text(quality_json(report)))
+    else:
+        say(quality_lines(report, str(options.out)))
+    return 0 if report.is_sound else _CHECK_FAILED
+
+
+def _board(options: argparse.Namespace) -> Board | None:
+    """Read --board and --square.
+
+    Raises:
+        SettingsError: only one of them is given, one is invalid, or --distance is given, too.
+    """
+    if options.board is None and options.square is None:
+        return None
+    if options.board is None or options.square is None:
+        raise SettingsError("only one of --board and --square is given", "give both, such as --board 9x6 --square 25mm")
+    if options.distance is not None:
+        raise SettingsError(
+            "--distance and --board contradict each other: both give the true distance", "give only one of the two"
+        )
+    return parse_board(options.board, square_mm(options.square))
+
+
+def _distances_m(options: argparse.Namespace, files: ViewFiles) -> tuple[float, ...]:
+    """Read --distance: nothing, one for all pairs, or one for each.
+
+    Raises:
+        SettingsError: one is invalid, or there are neither one nor as many as pairs.
+    """
+    if options.distance is None:
+        return ()
+    found = tuple(limit_mm(one, "--distance", "1200mm") / 1000 for one in options.distance.split(","))
+    if len(found) not in {1, len(files.pairs)}:
+        raise SettingsError(
+            f"--distance has {len(found)} values, and there are {len(files.pairs)} pairs",
+            "give one for all, or one for each in the order of their names, such as 500mm,1m,2m",
+        )
+    return found
+
+
+def _core(options: argparse.Namespace, matcher: str, size_px: Size, files: ViewFiles) -> StereoCore:
+    core, _ = build_core(options, options.calibration or "", matcher, size_px, files.pairs[0][1])
+    if core is None or core.geometry is None:
+        raise SettingsError(
+            "the images have neither a focal length nor a baseline, so there are no distances",
+            "add --focal PX and --baseline MM, or give --calibration",
+        )
+    return core

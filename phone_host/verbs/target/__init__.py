@@ -1,0 +1,1 @@
+"""phone-host target: its options (light), and its command."""

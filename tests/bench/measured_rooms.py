@@ -1,0 +1,118 @@
+"""Points of rendered rooms, measured as `phone-host measure` does, beside the exact truth: the work of bench_measure."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from phone_host.model import Rig
+from phone_host.scene.cast import cast, rays_through
+from phone_host.scene.scene import rotation
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_matcher
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.measured_point import MeasuredPoint, Within, distance_between, measured_point
+from phone_host.stereo.point_match import PointMatch, match_point
+from phone_host.stereo.rectify import Rectifier, rectify_points
+from phone_host.stereo.reproject import disparities_for_near
+from tests.bench.trust_rooms import Room, room
+
+NEAR_M = 0.5
+"""Rooms are made so that nothing is nearer."""
+
+_FAR_OFF = 3.0
+"""Three times the stated reach is six standard deviations: what no noise does."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One length that was measured, or a point that was not.
+
+    Attributes:
+        seed: of the room.
+        what: "distance" from the camera, "length" between two points, or the reason why a point was refused.
+        true_m: the truth, m; NaN for a refused point.
+        error_m: measured minus true, m.
+        reach_m: half of the stated 95 %, m.
+        inside: whether the truth lies inside the stated 95 %.
+        far_off: whether it is off by three times the stated reach.
+    """
+
+    seed: int
+    what: str
+    true_m: float = math.nan
+    error_m: float = math.nan
+    reach_m: float = math.nan
+    inside: bool = False
+    far_off: bool = False
+
+
+def room_rows(seed: int, points: int, zero_sigma_px: float = 0.0) -> list[Row]:
+    """Measure random points of a room.
+
+    Args:
+        seed: of the room and the points.
+        points: how many are tried.
+        zero_sigma_px: the rig that is measured with is turned about its vertical axis by chance, so that its zero is off by
+            this standard deviation, which it states; 0: it is exact and states nothing.
+    """
+    made = replace(room(seed), lower_px=0.0)  # an exact rig has no rows that are off
+    random = np.random.default_rng([seed, 31])
+    rig = _off(made.rig, float(random.normal()) * zero_sigma_px, zero_sigma_px) if zero_sigma_px else made.rig
+    return list(_rows(made, rig, random, points))
+
+
+def _off(rig: Rig, zero_px: float, zero_sigma_px: float) -> Rig:
+    """Return a rig whose right camera is turned so that disparities are off by some px."""
+    focal_px = float(min(rig.left.matrix[0, 0], rig.right.matrix[0, 0]))
+    turn = rotation((0.0, 1.0, 0.0), zero_px / focal_px)
+    return replace(
+        rig, R_right_left=turn @ rig.R_right_left, t_right_left_m=turn @ rig.t_right_left_m, zero_sigma_px=zero_sigma_px
+    )
+
+
+def _rows(made: Room, rig: Rig, random: np.random.Generator, points: int) -> Iterator[Row]:
+    [(left, right)] = made.pairs(1)
+    rectifier = Rectifier(rig)
+    count = disparities_for_near(rectifier.geometry, NEAR_M, rectifier.rectification.width_px)
+    core = StereoCore(MatchSettings(default_matcher(), count), rectifier)
+    done = core.compute(left, right, lambda: 0)
+    assert done.disparity is not None
+    assert done.geometry is not None
+    assert done.search is not None
+    at = random.uniform(0, [rig.left.width_px - 1, rig.left.height_px - 1], (points, 2))
+    rays = rays_through(rig.left, at[:, 0], at[:, 1])
+    true_m = (cast(made.scene.bodies, np.zeros(3), rays).depth * rays).T
+    rectified = rectify_points(at, rig.left, rectifier.rectification.R_left, done.geometry)
+    before: tuple[MeasuredPoint, np.ndarray[tuple[int], np.dtype[np.float64]]] | None = None
+    for (x, y), point_m in zip(rectified.tolist(), true_m, strict=True):
+        match = match_point(done.pair, done.disparity, (x, y), 1 / done.search.scale)
+        if not isinstance(match, PointMatch):
+            yield Row(made.seed, match.name.lower())
+            continue
+        found = measured_point((x, y), match, done.geometry, done.pair.epipolar, rig.zero_sigma_px)
+        if not np.isfinite(found.point_m).all():
+            yield Row(made.seed, "infinite")
+            continue
+        yield _row(made.seed, "distance", found.distance, float(np.linalg.norm(point_m)))
+        if before is not None:
+            apart_m = float(np.linalg.norm(point_m - before[1]))
+            yield _row(made.seed, "length", distance_between(before[0], found), apart_m)
+            before = None
+        else:
+            before = found, point_m
+
+
+def _row(seed: int, what: str, found: Within, true_m: float) -> Row:
+    low, high = found.low_m, found.high_m
+    reach = (found.value_m - low) if true_m < found.value_m else (high - found.value_m)
+    return Row(
+        seed,
+        what,
+        true_m,
+        float(found.value_m - true_m),
+        float(high - low) / 2,
+        inside=bool(low <= true_m <= high),
+        far_off=bool(abs(found.value_m - true_m) > _FAR_OFF * reach),
+    )

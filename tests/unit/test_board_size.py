@@ -1,0 +1,111 @@
+"""The chessboard's size is found in the images; a size that they contradict is refused with the one that they show."""
+
+from collections import Counter
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from common.errors import DataError, SettingsError
+from phone_host.calibration.board_size import Vote, require_size, size_in_files, size_seen
+from phone_host.calibration.target import Board
+from phone_host.calibration.threads import side_by_side
+from phone_host.stereo.view_files import ViewFiles, pair_files
+from tests.support.boards import poses, render_pair
+from tests.support.pictures import encoded
+from tests.support.rigs import small_rig
+
+_BOARD = Board(8, 5, 0.028)
+_POSES = poses(3, seed=8, depth_m=(0.45, 0.5))
+
+
+def _files(folder: Path, board: Board) -> ViewFiles:
+    for side in ("left", "right"):
+        (folder / side).mkdir()
+    for index, pose in enumerate(_POSES):
+        for side, image in zip(("left", "right"), render_pair(small_rig(), pose, board), strict=True):
+            (folder / side / f"{index}.png").write_bytes(encoded(".png", image))
+    return pair_files(str(folder / "left"), str(folder / "right"))
+
+
+def test_the_size_is_that_which_the_images_show(tmp_path: Path) -> None:
+    """Any board, either way up, without being told; its own size and its turned size pass, another is refused in one line."""
+    files = _files(tmp_path, _BOARD)
+    assert size_in_files(files) == (8, 5)
+    require_size(files, (8, 5))
+    require_size(files, (5, 8))
+    with pytest.raises(
+        SettingsError, match=r"^these boards have 8x5 inner corners, --board says 9x6: give --board 8x5"
+    ):
+        require_size(files, (9, 6))
+    with pytest.raises(SettingsError, match="have 8x5 inner corners, --board says 6x4"):  # it would fit inside
+        require_size(files, (6, 4))
+
+
+def test_images_without_a_board_name_no_size(tmp_path: Path) -> None:
+    """Grey images and files that are no image: a size that was given passes, because nothing contradicts it."""
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        (tmp_path / side / "0.png").write_bytes(encoded(".png", np.full((120, 160), 99, np.uint8)))
+        (tmp_path / side / "1.png").write_bytes(b"no image")
+    files = pair_files(str(tmp_path / "left"), str(tmp_path / "right"))
+    require_size(files, (9, 6))
+    with pytest.raises(DataError, match="no chessboard is seen in 4 images: take pictures"):
+        size_in_files(files)
+
+
+def test_files_that_are_no_images_are_named(tmp_path: Path) -> None:
+    """Where no file can be read, the first one is the reason, not a missing board."""
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        (tmp_path / side / "0.png").write_text("a text")
+    with pytest.raises(DataError, match=r"left/0\.png is no image"):
+        size_in_files(pair_files(str(tmp_path / "left"), str(tmp_path / "right")))
+
+
+def test_a_board_of_marks_is_told_from_a_chessboard(tmp_path: Path) -> None:
+    """Where a chessboard is looked for and only coded marks are seen, they are named."""
+    made = cv2.aruco.CharucoBoard((7, 5), 0.03, 0.022, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100))
+    image = cv2.resize(made.generateImage((420, 300), marginSize=20), (640, 480))
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        (tmp_path / side / "0.png").write_bytes(encoded(".png", np.asarray(image, np.uint8)))
+    with pytest.raises(DataError, match="no chessboard, but marks of the family ArUco 5x5: name that board"):
+        size_in_files(pair_files(str(tmp_path / "left"), str(tmp_path / "right")))
+
+
+def test_a_photograph_is_searched_small() -> None:
+    """What is seen does not depend on the image's size: a board of 8 by 5 in an image four times as large."""
+    image = render_pair(small_rig(), _POSES[0], _BOARD)[0]
+    large = np.asarray(cv2.resize(image, None, fx=4, fy=4, interpolation=cv2.INTER_CUBIC), np.uint8)
+    assert size_seen(image) == size_seen(large) == (8, 5)
+    assert size_seen(np.full((240, 320), 200, np.uint8)) is None
+
+
+@pytest.mark.parametrize(
+    ("sizes", "asked", "leader", "is_over"),
+    [
+        ({(9, 6): 4}, 6, (9, 6), True),
+        ({(9, 6): 25, (5, 3): 9, (7, 3): 4}, 60, (9, 6), True),  # a real rig with a small, dark board
+        ({(9, 6): 1, (7, 5): 1}, 6, None, False),  # one vote each
+        ({(9, 6): 3, (10, 7): 3, (8, 6): 3}, 12, None, False),  # no agreement
+        ({}, 6, None, False),
+        ({(9, 6): 1}, 1, (9, 6), False),
+    ],
+)
+def test_the_vote(
+    sizes: dict[tuple[int, int], int], asked: int, leader: tuple[int, int] | None, *, is_over: bool
+) -> None:
+    """Votes count by their corners; one image of many decides nothing."""
+    vote = Vote(asked, Counter(sizes))
+    assert (vote.leader, vote.is_over) == (leader, is_over)
+
+
+def test_several_at_a_time_keep_their_order_and_the_first_error_ends_them() -> None:
+    """Results come in the order of the things, each is counted, and what one raises is raised."""
+    counted: list[int] = []
+    assert side_by_side(lambda each: each * each, range(9), lambda: counted.append(1)) == [n * n for n in range(9)]
+    assert len(counted) == 9
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(lambda each: 1 // each, [1, 0, 2])

@@ -1,0 +1,112 @@
+"""phone-host calibrate --import and --export in this process: what is written, and what is refused before anything is."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from phone_host.cli import main
+from phone_host.output.rig_files.imported import import_rig
+from phone_host.output.rig_yaml import read_rig
+from tests.unit.test_report_keys import _described, _keys
+from tests.unit.test_rig_files import KALIBR
+
+_UPRIGHT = KALIBR.replace("- [0.0, -1.0, 0.0, 0.0]", "- [1, 0, 0, -0.12]").replace(
+    "- [1.0, 0.0, 0.0, -0.12]", "- [0, 1, 0, 0]"
+)
+
+
+@pytest.fixture
+def chain(tmp_path: Path) -> Path:
+    """A camchain of two parallel cameras 120 mm apart."""
+    path = tmp_path / "camchain.yaml"
+    path.write_text(_UPRIGHT)
+    return path
+
+
+def _told(capsys: pytest.CaptureFixture[str], *words: str | Path) -> dict[str, Any]:
+    assert main([*map(str, words), "--json"]) == 0
+    told: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return told
+
+
+def test_an_imported_chain_becomes_rig_yaml(chain: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """rig.yaml and report.json appear; baseline, kind and sizes are told."""
+    out = tmp_path / "new" / "rig.yaml"
+    told = _told(capsys, "calibrate", "--import", chain, "--out", out)
+    assert told == json.loads((tmp_path / "new" / "report.json").read_text())
+    assert (told["command"], told["imported"]["kind"], told["baseline_mm"]) == ("calibrate", "kalibr", 120.0)
+    assert told["sizes"] == {"left": "640x480", "right": "640x480"}
+    np.testing.assert_allclose(read_rig(out).t_right_left_m, [-0.12, 0, 0])
+
+
+def test_a_rig_is_exported_into_folders_beside_it(
+    chain: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each kind gets a folder; rig.yaml, which is imported and --out at once, and its report stay as they are."""
+    out = tmp_path / "rig.yaml"
+    _told(capsys, "calibrate", "--import", chain, "--out", out)
+    before = out.read_bytes(), (tmp_path / "report.json").read_bytes()
+    words = ["--export", "ros", "--export", "kalibr", "--export", "ros", "--export", "euroc"]
+    _told(capsys, "calibrate", "--import", out, *words, "--out", out)
+    told = _told(capsys, "calibrate", "--import", out, *words, "--out", out)  # which replaces them
+    assert _keys(told) - set(told["exported"]) <= _described("What `--json` prints", "report.json of `calibrate`")
+    assert sorted(told["exported"]) == ["euroc", "kalibr", "ros"]
+    assert (out.read_bytes(), (tmp_path / "report.json").read_bytes()) == before
+    for kind in ("ros", "kalibr", "euroc"):
+        found = import_rig((tmp_path / kind,))
+        assert found.kind.value == kind
+        np.testing.assert_allclose(found.rig.right.matrix, read_rig(out).right.matrix)
+    assert main(["calibrate", "--import", str(out), "--export", "colmap", "--out", str(out)]) == 0
+    assert f"exported colmap: {tmp_path / 'colmap' / 'cameras.txt'}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ([], 2, "neither pictures nor --import"),
+        (["l", "r", "--board", "9x6"], 2, "--square is missing"),
+        (["l", "r", "--board", "9x6", "--square", "25mm", "--unit", "1mm"], 2, "--unit without --import"),
+        (["l", "r", "--import", "C"], 2, "--import and pictures contradict"),
+        (["--board", "9x6", "--import", "C"], 2, "--import and --board contradict"),
+        (["--import", "C", "--unit", "squares"], 2, "--unit is 'squares'"),
+        (["--import", "C", "--size", "640"], 2, "--size is '640'"),
+        (["--import", "C", "--size", "640x480,1x1,2x2"], 2, "--size is"),
+        (["--import", "C", "--size", "320x240"], 4, "is for images of 640x480 px, and --size says otherwise"),
+        (["--import", "C", "--unit", "1km"], 2, "--unit is"),
+        (["--import", "C", "--unit", "1mm"], 4, "puts the cameras 0.00012 m apart"),
+        (["--import", "C", "C", "C"], 2, "--import has 3 files"),
+        (["--import", "missing.yaml"], 4, "missing.yaml cannot be read"),
+    ],
+)
+def test_what_makes_no_sense_is_told_in_one_line(
+    words: list[str], code: int, said: str, chain: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit 2 for options, 4 for files; nothing is written."""
+    tmp_path = chain.parent
+    given = [str(chain) if word == "C" else word for word in words]
+    assert main(["calibrate", *given, "--out", str(tmp_path / "rig.yaml")]) == code
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["camchain.yaml"]
+
+
+def test_nothing_foreign_is_replaced(chain: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither the imported file nor another one becomes rig.yaml, and an export spares what it did not write."""
+    assert main(["calibrate", "--import", str(chain), "--out", str(chain)]) == 2
+    assert "is the file that is imported" in capsys.readouterr().err
+    letter = tmp_path / "letter.txt"
+    letter.write_text("dear")
+    assert main(["calibrate", "--import", str(chain), "--out", str(letter)]) == 3
+    (tmp_path / "kalibr").mkdir()
+    theirs = tmp_path / "kalibr" / "camchain.yaml"
+    theirs.write_text(_UPRIGHT)
+    for given, code in ((chain, 3), (theirs, 2)):
+        assert (
+            main(["calibrate", "--import", str(given), "--export", "kalibr", "--out", str(tmp_path / "rig.yaml")])
+            == code
+        )
+    assert (letter.read_text(), theirs.read_text(), chain.read_text()) == ("dear", _UPRIGHT, _UPRIGHT)

@@ -1,0 +1,158 @@
+"""Mistakes of a session of board views are told apart by what two cameras see; good sessions accuse nobody."""
+
+import math
+import os
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from phone_host.calibration.calibrate import calibrate
+from phone_host.calibration.causes.deviating import deviation
+from phone_host.calibration.causes.looks import look_at
+from phone_host.calibration.causes.mistakes import Course, Finding, Mistake
+from phone_host.calibration.causes.partners import wrong_partners
+from phone_host.calibration.causes.unturned import unturned
+from phone_host.calibration.target import find_corners
+from phone_host.calibration.verdict import Assessment, Verdict
+from phone_host.verbs.calibrate.cause import cause_report, with_cause
+from tests.support.boards import BOARD, poses, render_pair
+from tests.support.cause_judge import finding_of
+from tests.support.cause_real import judged as judged_real
+from tests.support.cause_real import real_pairs, variants
+from tests.support.cause_sessions import MAKERS, Made, good, good_pictures, partners, unstiff
+from tests.support.rigs import small_rig
+
+
+def _random(seed: int) -> np.random.Generator:
+    return np.random.default_rng([7, seed])
+
+
+def _unstiff(course: Course) -> tuple[Made, Finding]:
+    """The first made session whose cameras turn in a way, and what is named."""
+    word = {Course.DRIFT: "drift", Course.KNOCK: "knock", Course.LOOSE: "loose"}[course]
+    made = next(made for made in (unstiff(_random(seed)) for seed in range(30)) if made.truth.startswith(word))
+    found = deviation(tuple(made.pairs), made.board, made.sizes_px)
+    assert found is not None
+    return made, found
+
+
+@pytest.mark.parametrize("mistake", list(Mistake))
+def test_each_mistake_is_named(mistake: Mistake) -> None:
+    """A session of random cameras and boards with one mistake: its name, a sentence with figures and a remedy are given."""
+    found = finding_of(MAKERS[mistake](_random(1)))
+    assert found is not None
+    assert found.mistake is mistake
+    assert found.sentence
+    assert found.remedy
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_good_session_accuses_nobody(seed: int) -> None:
+    """Noise, a board that is not flat, and one pair in which it moved are no mistake of the session."""
+    assert finding_of(good(_random(seed))) is None
+
+
+def test_good_pictures_are_neither_blurred_nor_glaring() -> None:
+    """Rendered images with the softness and noise of a webcam."""
+    assert finding_of(good_pictures(_random(2))) is None
+
+
+@pytest.mark.parametrize("course", [Course.DRIFT, Course.KNOCK])
+def test_a_turn_is_measured_and_undone(course: Course) -> None:
+    """The angle is that of the truth within three standard deviations and a tenth; without it the rig is that of the last view."""
+    made, found = _unstiff(course)
+    degrees = float(made.truth.split()[1])
+    assert found.mistake is Mistake.UNSTIFF
+    assert found.turned is not None
+    assert found.turned.course is course
+    angle = math.degrees(float(np.linalg.norm(found.turned.turn_rad)))
+    sigma = math.degrees(float(np.linalg.norm(found.turned.sigma_rad)))
+    assert angle == pytest.approx(degrees, abs=3 * sigma + 0.1 * degrees)
+    stiff = calibrate(unturned(made.pairs, found.turned), made.board, made.sizes_px)
+    loose = calibrate(made.pairs, made.board, made.sizes_px)
+    assert len(stiff.used) == len(made.pairs)
+    off = [
+        math.degrees(math.acos(min(1.0, (np.trace(each.rig.R_right_left.T @ made.rig.R_right_left) - 1) / 2)))
+        for each in (stiff, loose)
+    ]
+    assert off[0] < 0.5 * off[1] or off[0] < 0.02
+
+
+def test_a_loose_rig_is_told_from_a_board_that_moved() -> None:
+    """Cameras that wobble about the middle of their bar: the scatter is that of the truth."""
+    made, found = _unstiff(Course.LOOSE)
+    assert found.turned is not None
+    assert found.turned.course is Course.LOOSE
+    truth = math.radians(float(made.truth.split()[1]))
+    assert float(np.linalg.norm(found.turned.turn_rad)) == pytest.approx(truth * math.sqrt(3), rel=0.4)
+
+
+def test_the_true_partners_are_named() -> None:
+    """Two right pictures are exchanged: each left one is told its own."""
+    made = next(made for made in (partners(_random(seed)) for seed in range(30)) if made.truth == "two exchanged")
+    found = wrong_partners(made.pairs, made.board, made.sizes_px)
+    assert len(found) == 2
+    assert found[0] == found[1][::-1]
+
+
+def test_a_blurred_edge_is_as_wide_as_its_blur() -> None:
+    """A step blurred by a Gaussian rises to its height within sqrt(2 pi) sigmas at its steepest slope; a sharp one within a pixel or two."""
+    image = render_pair(small_rig(), poses(1, seed=8, depth_m=(0.3, 0.31))[0])[0]
+    corners = find_corners(image, BOARD)
+    sharp = look_at(image, corners, BOARD)
+    soft = look_at(np.asarray(cv2.GaussianBlur(image, (0, 0), 2.0), np.uint8), corners, BOARD)
+    assert sharp.edge_px < 2.5
+    assert soft.edge_px == pytest.approx(math.sqrt(2 * math.pi) * 2.0, rel=0.2)
+    assert sharp.washed == soft.washed == 0
+    assert math.isnan(look_at(image, np.empty((0, 2)), BOARD).edge_px)
+    bright = image.copy()
+    bright[:, : int(corners[:, 0].mean())] = 255
+    assert look_at(bright, corners, BOARD).washed > 0.3
+
+
+def test_a_mistake_is_the_first_remedy_and_caps_the_verdict() -> None:
+    """A rig whose bar is loose is at most usable; what was rejected stays so."""
+    finding = Finding(mistake=Mistake.UNSTIFF, sentence="they turned", remedy="tighten it", most=Verdict.USABLE)
+    assert with_cause(Assessment(Verdict.GOOD, ()), finding) == Assessment(Verdict.USABLE, ("they turned: tighten it",))
+    assert with_cause(Assessment(Verdict.REJECT, ("x",)), finding).verdict is Verdict.REJECT
+    assert cause_report(None, "") == {"cause": None}
+    told = cause_report(replace(finding, turned=_unstiff(Course.DRIFT)[1].turned), "")["cause"]
+    assert told["name"] == "rig not stiff"
+    assert told["turned"]["course"] == "steadily"
+
+
+_WANTED = {
+    "knocked by 0.18 degrees": Mistake.UNSTIFF,
+    "zoomed by 2 %": Mistake.FOCUS,
+    "mirrored": Mistake.MIRRORED,
+    "on its head": Mistake.UPSIDE_DOWN,
+    "sides swapped": Mistake.SWAPPED,
+    "two exchanged": Mistake.PARTNERS,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.data
+@pytest.mark.skipif(not os.environ.get("SCAN_DATA"), reason="SCAN_DATA is not set: no real images")
+def test_a_real_session_and_the_mistakes_made_on_it() -> None:
+    """OpenCV's sample pairs tell of no mistake; made on their corners, each is named."""
+    for what, pairs, board, sizes_px in variants("opencv_stereo_calib"):
+        found = judged_real(pairs, board, sizes_px)
+        assert (None if found is None else found.mistake) is _WANTED.get(what)
+
+
+@pytest.mark.slow
+@pytest.mark.data
+@pytest.mark.skipif(not os.environ.get("SCAN_DATA"), reason="SCAN_DATA is not set: no real images")
+def test_a_real_rig_that_turned_is_told() -> None:
+    """The cameras of simplestereo_rig1 turned about their x axis, 15 standard deviations in 15 views; without it the pairs fit better."""
+    pairs, board, sizes_px = real_pairs("simplestereo_rig1")
+    found = deviation(pairs, board, sizes_px)
+    assert found is not None
+    assert found.turned is not None
+    assert found.turned.course is Course.DRIFT
+    assert abs(found.turned.turn_rad[0]) > 5 * found.turned.sigma_rad[0]
+    before = calibrate(list(pairs), board, sizes_px).rig.rms_stereo_px
+    assert calibrate(unturned(list(pairs), found.turned), board, sizes_px).rig.rms_stereo_px < 0.97 * before

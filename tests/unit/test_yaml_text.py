@@ -1,0 +1,119 @@
+"""The part of YAML in which calibrations are written: values as the format defines them, one line of error for anything else."""
+
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import DataError
+from phone_host.output.rig_files.tree import Tree
+from phone_host.output.rig_files.xml_text import read_xml
+from phone_host.output.rig_files.yaml_text import read_yaml
+
+
+@pytest.mark.parametrize(
+    ("text", "tree"),
+    [
+        ("a: 1\nb: two words # a comment\n", {"a": "1", "b": "two words"}),
+        ("%YAML:1.0\n---\na: 1\n...\n", {"a": "1"}),
+        ("a:\n  b: 1\n  c:\n    d: 2\ne: 3", {"a": {"b": "1", "c": {"d": "2"}}, "e": "3"}),
+        ("a:\n- 1\n- 2\nb: 3", {"a": ["1", "2"], "b": "3"}),
+        ("a:\n  - [1, 2]\n  - [3, 4]", {"a": [["1", "2"], ["3", "4"]]}),
+        ("a: [1,\n    2,  # why\n  3]\nb: 4", {"a": ["1", "2", "3"], "b": "4"}),
+        ("a: {b: 1, c: [2]}", {"a": {"b": "1", "c": ["2"]}}),
+        ("- x: 1\n  y: 2\n- x: 3", [{"x": "1", "y": "2"}, {"x": "3"}]),
+        ("M: !!opencv-matrix\n   rows: 1\n   data: [ 1., 2. ]", {"M": {"rows": "1", "data": ["1.", "2."]}}),
+        ("a: 'it: # is'\nb: \"x\"", {"a": "it: # is", "b": "x"}),
+        ("a:\nb: 1", {"a": "", "b": "1"}),
+        ("\ufeffa: []", {"a": []}),
+        ("""a: ["x, y", '[z]', w]""", {"a": ["x, y", "[z]", "w"]}),
+        ("""a: {"b:c": 'd}', 'e': "f"}""", {"a": {"b:c": "d}", "e": "f"}}),
+    ],
+)
+def test_values_are_those_that_the_format_defines(text: str, tree: Tree) -> None:
+    """Maps, lists, brackets over several lines, tags, quotes and comments, as YAML 1.1 has them."""
+    assert read_yaml(text, "f") == tree
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "holds nothing"),
+        ("a: [1, 2", "line 1 opens a bracket that is never closed"),
+        ("a: 1]", "line 1 closes a bracket"),
+        ("a: 1\na: 2", "line 2 has the key a a second time"),
+        ("a: {b: 1, b: 2}", "line 1 has the key b a second time"),
+        ("a: &x 1\nb: *x", "line 1 begins a value with &"),
+        ("a: |\n  text", "line 1 begins a value with |"),
+        ("a: 1\n---\nb: 2", "line 2 begins a second document"),
+        ("a:\n\tb: 1", "line 2 is indented by a tab"),
+        ("a: 'x", "line 1 opens a quote"),
+        ("a: [1,\t'x]", "line 1 opens a quote"),
+        ("a: 1\nb: {c: 1, d}", "line 2 has a key without a value"),
+        ("a: 1\n   b: 2", "line 2 stands at no level"),
+        ("a: 1\nword", "line 2 is no `key: value`"),
+        ("a: ['x' y]", "line 1 lacks a comma or ]"),
+        ("a: [1] 2", "line 1 goes on behind its last bracket"),
+        ("a: " + "[" * 60 + "]" * 60, "brackets"),
+        ("".join(" " * level + "a:\n" for level in range(60)), "levels deep"),
+    ],
+)
+def test_what_is_not_read_is_refused_with_its_line(text: str, said: str) -> None:
+    """Anchors, several documents, broken brackets and the like end in one line that names file and line."""
+    with pytest.raises(DataError) as caught:
+        read_yaml(text, "rig.yml")
+    assert said in caught.value.problem
+    assert caught.value.problem.startswith("rig.yml")
+
+
+@given(st.text(alphabet="ab:-[]{},#'\" \n\t&1.", max_size=60))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    """Whatever stands in the file, there is a value or a DataError, never another exception."""
+    with suppress(DataError):
+        assert isinstance(read_yaml(text, "f"), str | list | dict)
+
+
+_WORDS = st.text(alphabet="abcxyz019.", min_size=1, max_size=6)
+_TREES = st.recursive(
+    _WORDS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text("abc", min_size=1), inner, max_size=4)
+)
+
+
+def _flow(tree: Tree) -> str:
+    if isinstance(tree, list):
+        return f"[{', '.join(map(_flow, tree))}]"
+    if isinstance(tree, dict):
+        return "{" + ", ".join(f"{key}: {_flow(value)}" for key, value in tree.items()) + "}"
+    return tree
+
+
+@given(st.dictionaries(st.text("abc", min_size=1), _TREES, min_size=1, max_size=4))
+def test_what_is_written_in_brackets_is_read_back(tree: dict[str, Tree]) -> None:
+    """Nested lists and maps on one line each give the same values."""
+    assert read_yaml("\n".join(f"{key}: {_flow(value)}" for key, value in tree.items()), "f") == tree
+
+
+def test_xml_of_filestorage_gives_the_same_values() -> None:
+    """A matrix is a map of rows, cols and data, a list has elements called _."""
+    text = (
+        '<?xml version="1.0"?><opencv_storage><w>640</w><s>640 480</s><l><_>1</_><_>2</_></l>'
+        '<M type_id="opencv-matrix"><rows>1</rows><cols>2</cols><dt>d</dt><data>\n 1. 2.</data></M></opencv_storage>'
+    )
+    matrix: dict[str, Tree] = {"rows": "1", "cols": "2", "dt": "d", "data": "1. 2."}
+    assert read_xml(text, "f") == {"w": "640", "s": "640 480", "l": ["1", "2"], "M": matrix}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<a><b></a>", "is no XML"),
+        ("<a><b>1</b><b>2</b></a>", "the key b twice"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>', "declares a document type"),
+        ("<a>" * 50 + "</a>" * 50, "levels deep"),
+    ],
+)
+def test_other_xml_is_refused(text: str, said: str) -> None:
+    """Broken XML, keys that are there twice and entities are told in one line."""
+    with pytest.raises(DataError, match=said):
+        read_xml(text, "f")
