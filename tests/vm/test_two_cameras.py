@@ -108,6 +108,7 @@ def test_both_stream_at_once_and_one_is_pulled(
 ) -> None:
     """Two agents stream from one camera each; replugging one at another port does not disturb the other one's stream."""
     guest.configure(f"v4l2:{FIRST}?{OPTIONS}")
+    guest.sh("rm -f /run/second")
     other = f"board-agent run --camera 'v4l2:{SECOND}?{OPTIONS}' --link ipc:///run/second --json > /run/second.json"
     starts = pair.second.starts
     # The test before has just plugged it in: a camera that is not ready yet is awaited, as the service does.
@@ -117,6 +118,8 @@ def test_both_stream_at_once_and_one_is_pulled(
     pid = agent.stdout.readline().decode().strip()
     with streaming(guest, film.right, tmp_path / "out") as stream:
         stream.more(10, "beside the other camera")
+        # A camera streams before its agent has taken it over; the agent's door opens after that.
+        until(lambda: guest.code("test -S /run/second") == 0, "the second agent serves")
         until(lambda: pair.second.starts > starts and pair.second.streaming, "the second camera streams")
         until(lambda: pair.first.streaming, "the first camera streams beside it")
         losses = pair.second.starts
