@@ -6,12 +6,14 @@ comes first; `order_by_colour` and `agree` ensure that.
 
 import re
 from dataclasses import dataclass
+from typing import Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import SettingsError
+from phone_host.calibration.corner_fit import FittedCorners, fit_corners, steps_between
 from phone_host.calibration.marked import AprilGrid, Marks, find_marked, plan_of
 from phone_host.model import Image
 from phone_host.stereo.images import to_grey
@@ -25,27 +27,27 @@ _SMALLEST_SQUARE_M = 0.0005
 
 _LARGEST_SQUARE_M = 2.0
 
-# Sector-based detection (Duda and Frese, BMVC 2018), with and without contrast normalisation: glare on paper defeats
-# one, weak contrast the other; EXHAUSTIVE finds a few more and misses a few others. Measured on 174 images of four real
-# rigs: the first way finds 164, all ways together 174.
-_NORMALISED = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
-_WAYS = (_NORMALISED, cv2.CALIB_CB_ACCURACY, _NORMALISED | cv2.CALIB_CB_EXHAUSTIVE)
+# OpenCV's two searches. The first follows the outlines of black squares: a few ms, and on 174 images of four real rigs it
+# finds all boards. The second (sectors; Duda and Frese, BMVC 2018), ten times slower, finds blurred, distorted and glaring
+# ones: with and without contrast normalisation, because glare defeats one and weak contrast the other; EXHAUSTIVE finds a few
+# more and misses a few others. Both only say where to look: corners are fitted (`corner_fit`).
+_OUTLINES: Final = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
+_SECTORS: Final = (
+    cv2.CALIB_CB_NORMALIZE_IMAGE,
+    0,
+    cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE,
+)
 # Noise and moire can hide squares at full size that are visible at half size.
 _SMALLER = 0.5
-# Photographs (12 MPx) are searched in a pyramid, without the detector's own refinement, which takes four fifths of its
-# time: theirs works at full size. A board in the middle of a room is found at the second size.
+# Photographs (12 MPx) are searched in a pyramid. A board in the middle of a room is found at the second size.
 _LARGEST_SEARCHED_PX = 1600
-_PHOTO_SEARCHES = (
+_PHOTO_SECTORS = (
     (800, cv2.CALIB_CB_NORMALIZE_IMAGE),
     (800, 0),
     (1600, cv2.CALIB_CB_NORMALIZE_IMAGE),
     (800, cv2.CALIB_CB_EXHAUSTIVE),
 )
 """The longer side of the searched image, px, and the way."""
-# Refinement window: a window of more than a third of the distance to the next corner would include that corner's edges.
-_WINDOW_SHARE = 0.3
-_DETECTOR_WEIGHT = 1 / 3  # see find_corners
-_REFINE = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +115,6 @@ def parse_board(corners: str, square_mm: float) -> Board:
 def find_corners(image: Image, board: Board) -> Corners:
     """Find the inner corners of a board in an image.
 
-    If the detector succeeds at full size, its corners and those of a gradient refinement are averaged with weights 1 to
-    2, because their errors are independent enough. Stereo RMS of four real rigs: 0.141 0.188 0.221 0.174 px; refined
-    corners alone 0.159 0.192 0.214 0.180 px, the detector's alone 0.183 0.276 0.328 0.206 px.
-
     Args:
         image: (H, W) grey or (H, W, 3) BGR, uint8.
         board: what to look for.
@@ -128,12 +126,8 @@ def find_corners(image: Image, board: Board) -> Corners:
     grey = to_grey(image)
     if board.marks is not None:
         return find_marked(grey, board.columns, board.rows, board.marks)
-    found, scale = _search(grey, board)
-    if len(found) == 0:
-        return found
-    refined = _refine(grey, found, board)
-    corners = found * _DETECTOR_WEIGHT + refined * (1 - _DETECTOR_WEIGHT) if scale == 1.0 else refined
-    return order_by_colour(corners, grey, board)
+    corners = _search(grey, board)
+    return order_by_colour(corners, grey, board) if len(corners) else corners
 
 
 def order_by_colour(corners: Corners, grey: Image, board: Board) -> Corners:
@@ -183,20 +177,54 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
     return np.ascontiguousarray(best.reshape(-1, 2))
 
 
-def _search(grey: Image, board: Board) -> tuple[Corners, float]:
-    """Return corners in the full image's pixels, and the scale at which they were found."""
+def _search(grey: Image, board: Board) -> Corners:
+    """Return the corners in one of the orders a search may give; empty if the board was not found."""
     largest = max(grey.shape)
-    if largest > _LARGEST_SEARCHED_PX:
-        searches = [(size / largest, way) for size, way in _PHOTO_SEARCHES]
-    else:
-        searches = [(scale, way) for scale in (1.0, _SMALLER) for way in _WAYS]
-    for scale, way in searches:
+    is_photo = largest > _LARGEST_SEARCHED_PX
+    size = board.columns, board.rows
+    for scale in [each / largest for each in (800, 1600)] if is_photo else [1.0]:
         searched, factors = shrunk(grey, scale)
-        found, corners = cv2.findChessboardCornersSB(searched, (board.columns, board.rows), flags=way)
+        found, rough = cv2.findChessboardCorners(searched, size, flags=_OUTLINES)
         if found:
-            # Pixel centres are integers, so the scale is about the corner of the image at (-0.5, -0.5).
-            return (np.asarray(corners, dtype=np.float64).reshape(-1, 2) + 0.5) / factors - 0.5, scale
-    return np.empty((0, 2)), 1.0
+            fitted = _fitted(grey, searched, factors, _as_corners(rough), board)
+            if _is_chessboard(fitted, board):
+                return fitted.px
+    ways = [(side / largest, way) for side, way in _PHOTO_SECTORS]
+    for scale, way in ways if is_photo else [(scale, way) for scale in (1.0, _SMALLER) for way in _SECTORS]:
+        searched, factors = shrunk(grey, scale)
+        found, rough = cv2.findChessboardCornersSB(searched, size, flags=way)
+        if found:
+            fitted = _fitted(grey, searched, factors, _as_corners(rough), board)
+            return np.where(np.isfinite(fitted.px), fitted.px, _enlarged(_as_corners(rough), factors))
+    return np.empty((0, 2))
+
+
+def _as_corners(found: NDArray[np.floating]) -> Corners:
+    return np.asarray(found, np.float64).reshape(-1, 2)
+
+
+def _enlarged(corners: Corners, factors: NDArray[np.float64]) -> Corners:
+    """Return the full image's pixels. Pixel centres are integers, so the scale is about the image's corner at (-0.5, -0.5)."""
+    return np.asarray((corners + 0.5) / factors - 0.5, np.float64)
+
+
+def _fitted(
+    grey: Image, searched: Image, factors: NDArray[np.float64], rough: Corners, board: Board
+) -> FittedCorners:
+    """Fit corners where they were found, then in the full image if that is larger."""
+    shape = (board.rows, board.columns, 2)
+    fitted = fit_corners(searched, rough, *steps_between(rough.reshape(shape)))
+    if searched is grey:
+        return fitted
+    start = _enlarged(np.where(np.isfinite(fitted.px), fitted.px, rough), factors)
+    return fit_corners(grey, start, *steps_between(start.reshape(shape)))
+
+
+def _is_chessboard(fitted: FittedCorners, board: Board) -> bool:
+    """Return whether edges cross at every corner, black to white and white to black by turns."""
+    turns = (-1.0) ** np.add.outer(np.arange(board.rows), np.arange(board.columns)).ravel()
+    is_light = fitted.contrast * turns > 0
+    return bool(np.isfinite(fitted.px).all() and (is_light.all() or not is_light.any()))
 
 
 def shrunk(grey: Image, scale: float) -> tuple[Image, NDArray[np.float64]]:
@@ -211,18 +239,6 @@ def shrunk(grey: Image, scale: float) -> tuple[Image, NDArray[np.float64]]:
     size = (max(1, round(grey.shape[1] * scale)), max(1, round(grey.shape[0] * scale)))
     small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     return small, np.array([size[0] / grey.shape[1], size[1] / grey.shape[0]])
-
-
-def _refine(grey: Image, corners: Corners, board: Board) -> Corners:
-    grid = corners.reshape(board.rows, board.columns, 2)
-    spacings = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
-    window = max(2, int(min(spacings) * _WINDOW_SHARE))
-    # A light blur removes noise from the gradients: a tenth less reprojection error on real rigs.
-    smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
-    refined = cv2.cornerSubPix(
-        smooth, corners.astype(np.float32).reshape(-1, 1, 2), (window, window), (-1, -1), _REFINE
-    )
-    return np.asarray(refined, dtype=np.float64).reshape(-1, 2)
 
 
 def _brightness(grid: Corners, column: int, grey: Image) -> float:
