@@ -17,12 +17,13 @@ import numpy as np
 from common.errors import DataError
 from common.orientation import Flip, Orientation
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
-from phone_host.calibration.bundle import Vector
-from phone_host.calibration.calibrate import Sizes, calibrate
+from phone_host.calibration.bundle import Vector, rig_of
+from phone_host.calibration.calibrate import Sizes, fit_rig
 from phone_host.calibration.calibrate_alone import calibrate_alone, with_poses
 from phone_host.calibration.relative_pose import prediction_errors_px, states_of
 from phone_host.calibration.target import Board, Corners, agree
 from phone_host.model import Rig, Side
+from phone_host.stereo.rectify import rectify_rig
 
 _ROLLED_DEG: Final = 45.0
 """Nearer to a quarter turn than to none."""
@@ -147,7 +148,7 @@ def _explaining(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> tuple[
     )
     best = min(others, key=lambda each: each[0], default=plain)
     _, mirrored, tried = best if best[0] * _CLEARLY < plain[0] else plain
-    return mirrored, calibrate(tried, board, sizes_px).rig
+    return mirrored, rig_of(fit_rig(tried, board, sizes_px).result.state)
 
 
 def _orders(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> Iterator[tuple[bool, list[BoardPair]]]:
@@ -225,10 +226,11 @@ def _works(pairs: list[BoardPair], board: Board, sizes_px: Sizes, tried: Misplac
         sides[index] = turned_corners(sides[index], sizes_px[index], tried.turn, board)
         turned.append(BoardPair(pair.name, sides[0], agree(sides[0], sides[1], board)))
     try:
-        found = calibrate(turned, board, (sizes[0], sizes[1]))
+        found = fit_rig(turned, board, (sizes[0], sizes[1]))
+        rectify_rig(rig_of(found.result.state))
     except DataError:
         return False
-    return found.rectification is not None and 2 * len(found.used) > len(pairs)
+    return 2 * len(found.kept) > len(pairs)
 
 
 def _roll_deg(rotation: Vector) -> float:

@@ -10,6 +10,7 @@ predicts views which it was not fitted to (`lens_choice.py`).
 
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import cv2
@@ -61,12 +62,30 @@ Bends = tuple[Bend, Bend]
 _FREER_PAIRS = 8
 # Real rigs fit to 0.15 to 0.4 px. Above this, lenses that bend more freely are tried even if all pairs were used.
 _POOR_PX = 0.6
+# Above this share of the image's width no lens is worth choosing: left and right contradict each other.
+_HOPELESS_SHARE = 0.01
 # By how much the error may grow when rejected pairs come back: a twelfth pair with the same noise changes it by some per
 # cent either way, a pair that does not belong by a multiple.
 _CHANCE_LOSS = 0.05
 
 # Limits for the right view predicted from the left one, while the cameras are not yet adjusted to each other.
 _MOVED_FACTOR, _MOVED_FLOOR_PX = 5.0, 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Fitted:
+    """A rig fitted to the pairs that it explains: the optimum, those pairs, the others, and how freely each lens bent."""
+
+    result: BundleResult
+    kept: list[BoardPair]
+    rejected: list[Rejected]
+    bends: Bends
+    free: FreeParameters
+    trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())
+
+    def views(self) -> list[BundleView]:
+        """The pairs that are used, as the adjustment takes them."""
+        return [BundleView(pair.left_px, pair.right_px) for pair in self.kept]
 
 
 def calibrate(
@@ -90,28 +109,36 @@ def calibrate(
         DataError: fewer than three pairs are left, or no lens explains them.
     """
     points_m = board.points_m()
+    with _unexplained():
+        best = _best_fit(pairs, points_m, sizes_px)
+        is_hopeless = best.result.rms_px() > _HOPELESS_SHARE * max(size[0] for size in sizes_px)
+        fitted = best if is_hopeless else _with_chosen_lenses(best, pairs, points_m)
+        return summed_up(fitted, points_m=points_m, board_side=board_side)
+
+
+def fit_rig(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> Fitted:
+    """Fit a rig as `calibrate` does, without choosing lenses and without figures.
+
+    Args:
+        pairs: corners of each pair, any number.
+        board: the board.
+        sizes_px: width and height of the left and of the right images.
+
+    Raises:
+        DataError: fewer than three pairs are left, or no lens explains them.
+    """
+    with _unexplained():
+        return _best_fit(pairs, board.points_m(), sizes_px)
+
+
+@contextmanager
+def _unexplained() -> Iterator[None]:
+    """Name what corners of no board lead to: equations that have no solution."""
     try:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # on the way; the result is checked
-            fitted = _best_fit(pairs, points_m, sizes_px)
-            return summed_up(fitted, points_m=points_m, board_side=board_side)
-    except (cv2.error, np.linalg.LinAlgError) as error:  # corners of no board leave equations that have no solution
+            yield
+    except (cv2.error, np.linalg.LinAlgError) as error:
         raise DataError("no lens explains the views", "take new pairs") from error
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Fitted:
-    """A rig fitted to the pairs that it explains: the optimum, those pairs, the others, and how freely each lens bent."""
-
-    result: BundleResult
-    kept: list[BoardPair]
-    rejected: list[Rejected]
-    bends: Bends
-    free: FreeParameters
-    trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())
-
-    def views(self) -> list[BundleView]:
-        """The pairs that are used, as the adjustment takes them."""
-        return [BundleView(pair.left_px, pair.right_px) for pair in self.kept]
 
 
 def _fitted(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes, bends: Bends) -> Fitted:
@@ -152,7 +179,7 @@ def _best_fit(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Fitt
             best = other
     if best is None:
         raise failure or DataError("no lens explains the views", "take new pairs")
-    return _with_chosen_lenses(best, pairs, points_m)
+    return best
 
 
 def _second_chances(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Iterator[Bends]:
