@@ -54,8 +54,12 @@ _DAMPING: Final = 1e-3
 _MOST_STEP: Final = np.array([1.0, 1.0, 0.2, 0.2, 0.5])
 """Of the corner, px, the directions, rad, and the logarithm of the width: beyond, the derivatives say nothing."""
 
+_LEAST_CONTRAST: Final = 2.0
+"""Grey levels: what differs less from its surroundings is no square."""
+
 _WIDTHS_PX: Final = (0.3, 12.0)
 _PARAMETERS: Final = 9
+_TINY: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +67,7 @@ class FittedCorners:
     """Corners of one image.
 
     Attributes:
-        px: (N, 2) where they are; NaN where the fit ran away: there is no such corner.
+        px: (N, 2) where they are; NaN where the fit ran away or found no contrast: there is no such corner.
         sigma_px: (N,) standard deviation of one coordinate by the image's noise; NaN likewise.
         contrast: (N,) half of the difference of white and black, grey levels; its sign alternates between neighbours.
     """
@@ -81,6 +85,16 @@ class _Patches:
     y: Singles
     values: Singles
     weights: Singles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equations:
+    """The normal equations: what is left of the pixels (N, K), weighted derivatives (N, K, 9), matrix (N, 9, 9), right side (N, 9)."""
+
+    errors: Singles
+    weighted: Singles
+    matrix: Singles
+    right: Singles
 
 
 def fit_corners(grey: Image, start: Floats, along: Floats, down: Floats) -> FittedCorners:
@@ -101,18 +115,16 @@ def fit_corners(grey: Image, start: Floats, along: Floats, down: Floats) -> Fitt
     values[:, 2] = np.arctan2(along[:, 1], along[:, 0])
     values[:, 3] = np.arctan2(down[:, 1], down[:, 0])
     values[:, 5:7] = _levels(values, patches)
+    equations = _equations(values, patches)
     for _ in range(_MOST_STEPS):
-        errors, jacobian = _linearised(values, patches)
-        weighted = jacobian * patches.weights[..., np.newaxis]
-        matrix = np.swapaxes(weighted, 1, 2) @ jacobian
-        right = (np.swapaxes(weighted, 1, 2) @ errors[..., np.newaxis])[..., 0]
-        step = _step(matrix, right)
+        step = _step(equations)
         values += step
         values[:, 4] = np.clip(values[:, 4], *np.log(_WIDTHS_PX))
         if np.abs(step[:, :2]).max() < _STILL_PX:
             break
-    astray = np.linalg.norm(values[:, :2] - start, axis=1) > reach
-    fitted = FittedCorners(values[:, :2], _sigma_px(patches, errors, weighted, matrix), values[:, 5])
+        equations = _equations(values, patches)
+    astray = (np.linalg.norm(values[:, :2] - start, axis=1) > reach) | (np.abs(values[:, 5]) < _LEAST_CONTRAST)
+    fitted = FittedCorners(values[:, :2], _sigma_px(patches, equations), values[:, 5])
     fitted.px[astray], fitted.sigma_px[astray] = np.nan, np.nan
     return fitted
 
@@ -134,7 +146,7 @@ def _cut(grey: Image, start: Floats, along: Floats, down: Floats) -> tuple[_Patc
     """Return the pixels near the edges of each corner, and how far the shorter edge is followed, (N,) px."""
     lengths = np.stack([np.linalg.norm(along, axis=1), np.linalg.norm(down, axis=1)], axis=1)
     reach = np.clip(_REACH_SHARE * lengths, _LEAST_REACH_PX, _MOST_REACH_PX)
-    edges = np.stack([along, down], axis=1) / np.maximum(lengths, 1e-9)[..., np.newaxis]  # (N, 2, 2), unit vectors
+    edges = np.stack([along, down], axis=1) / np.maximum(lengths, _TINY)[..., np.newaxis]  # (N, 2, 2), unit vectors
     window = int(np.ceil((np.abs(edges) * reach[..., np.newaxis]).sum(axis=1).max()))
     steps = np.arange(-window, window + 1)
     offset_x, offset_y = (each.ravel() for each in np.meshgrid(steps, steps))
@@ -173,16 +185,19 @@ def _smoothed(grey: Image, columns: NDArray[np.intp], rows: NDArray[np.intp]) ->
 
 def _levels(values: Floats, patches: _Patches) -> Floats:
     """Return contrast and brightness that fit best, (N, 2)."""
-    pattern = _linearised(np.concatenate([values[:, :5], np.tile([1.0, 0, 0, 0], (len(values), 1))], axis=1), patches)
-    shape = -(pattern[0] - patches.values)
-    sums = [(patches.weights * each).sum(axis=1) for each in (np.ones_like(shape), shape, shape**2)]
-    both = [(patches.weights * each * patches.values).sum(axis=1) for each in (np.ones_like(shape), shape)]
-    below = np.maximum(sums[0] * sums[2] - sums[1] ** 2, 1e-9)
-    contrast = (sums[0] * both[1] - sums[1] * both[0]) / below
-    return np.stack([contrast, (both[0] - contrast * sums[1]) / np.maximum(sums[0], 1e-9)], axis=1)
+    plain = values.copy()
+    plain[:, 5:] = [1, 0, 0, 0]
+    weights, pattern = patches.weights, patches.values - _linearised(plain, patches)[0]
+    whole = np.maximum(weights.sum(axis=1), _TINY)
+    means = [(weights * each).sum(axis=1) / whole for each in (pattern, patches.values)]
+    spread = (weights * pattern**2).sum(axis=1) / whole - means[0] ** 2
+    contrast = ((weights * pattern * patches.values).sum(axis=1) / whole - means[0] * means[1]) / np.maximum(
+        spread, _TINY
+    )
+    return np.stack([contrast, means[1] - contrast * means[0]], axis=1)
 
 
-def _linearised(values: Floats, patches: _Patches) -> tuple[Floats, Floats]:
+def _linearised(values: Floats, patches: _Patches) -> tuple[Singles, Singles]:
     """Return what the model leaves of the pixels, (N, K), and its derivatives by the parameters, (N, K, 9).
 
     Parameters: the corner x, y; the edges' directions, rad; the logarithm of their width; contrast, brightness, and the fall of
@@ -214,21 +229,28 @@ def _linearised(values: Floats, patches: _Patches) -> tuple[Floats, Floats]:
     return patches.values - light * squares, jacobian
 
 
-def _step(matrix: Floats, right: Floats) -> Floats:
+def _equations(values: Floats, patches: _Patches) -> _Equations:
+    errors, jacobian = _linearised(values, patches)
+    weighted = jacobian * patches.weights[..., np.newaxis]
+    turned = np.swapaxes(weighted, 1, 2)
+    return _Equations(errors, weighted, turned @ jacobian, (turned @ errors[..., np.newaxis])[..., 0])
+
+
+def _step(equations: _Equations) -> Floats:
     """Return a damped step of all parameters, (N, 9), no longer than the derivatives hold."""
-    diagonal = np.einsum("nii->ni", matrix)
-    damped = matrix + (_DAMPING * diagonal + 1e-9)[..., np.newaxis] * np.eye(_PARAMETERS)
-    step = np.linalg.solve(damped, right[..., np.newaxis])[..., 0]
+    diagonal = np.einsum("nii->ni", equations.matrix)
+    damped = equations.matrix + (_DAMPING * diagonal + _TINY)[..., np.newaxis] * np.eye(_PARAMETERS)
+    step = np.linalg.solve(damped, equations.right[..., np.newaxis])[..., 0]
     step[:, :5] = np.clip(step[:, :5], -_MOST_STEP, _MOST_STEP)
     return np.asarray(step, np.float64)
 
 
-def _sigma_px(patches: _Patches, errors: Floats, weighted: Floats, matrix: Floats) -> Floats:
+def _sigma_px(patches: _Patches, equations: _Equations) -> Floats:
     """Return the standard deviation of one coordinate, (N,) px: that of weighted least squares, noise as it remains."""
-    weights = patches.weights
+    weights, weighted = patches.weights, equations.weighted
     used = (weights > 0).sum(axis=1)
-    variance = (weights * errors**2).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9)
+    variance = (weights * equations.errors**2).sum(axis=1) / np.maximum(weights.sum(axis=1), _TINY)
     variance = variance * used / np.maximum(used - _PARAMETERS, 1) * _NOISE_GAIN
-    inverse = np.linalg.inv(matrix + 1e-9 * np.eye(_PARAMETERS))
+    inverse = np.linalg.inv(equations.matrix + _TINY * np.eye(_PARAMETERS))
     spread = (inverse @ (np.swapaxes(weighted, 1, 2) @ weighted) @ inverse)[:, :2, :2]
     return np.asarray(np.sqrt(variance * np.einsum("nii->n", spread) / 2), np.float64)

@@ -199,7 +199,7 @@ def _search(grey: Image, board: Board) -> Corners:
     return np.empty((0, 2))
 
 
-def _as_corners(found: NDArray[np.floating]) -> Corners:
+def _as_corners(found: object) -> Corners:
     return np.asarray(found, np.float64).reshape(-1, 2)
 
 
@@ -208,9 +208,7 @@ def _enlarged(corners: Corners, factors: NDArray[np.float64]) -> Corners:
     return np.asarray((corners + 0.5) / factors - 0.5, np.float64)
 
 
-def _fitted(
-    grey: Image, searched: Image, factors: NDArray[np.float64], rough: Corners, board: Board
-) -> FittedCorners:
+def _fitted(grey: Image, searched: Image, factors: NDArray[np.float64], rough: Corners, board: Board) -> FittedCorners:
     """Fit corners where they were found, then in the full image if that is larger."""
     shape = (board.rows, board.columns, 2)
     fitted = fit_corners(searched, rough, *steps_between(rough.reshape(shape)))

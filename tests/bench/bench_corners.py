@@ -9,7 +9,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Final
 
 import cv2
@@ -59,16 +59,12 @@ class Condition:
 def conditions() -> Iterator[tuple[str, Condition]]:
     """Give what is varied, and how."""
     usual = Condition()
-    for name, values in (
-        ("blur_px", (0.0, 0.5, 1.0, 1.5, 2.0)),
-        ("noise", (0.0, 2.0, 4.0, 6.0)),
-        ("tilt_deg", (0.0, 30.0, 45.0, 60.0)),
-        ("quality", (95, 85, 75, 60)),
-        ("contrast", (0.5, 0.25)),
-        ("square_px", (8.0, 12.0, 20.0, 40.0, 80.0)),
-    ):
-        for value in values:
-            yield f"{name} {value:g}", replace(usual, **{name: value})
+    yield from ((f"blur {each:g} px", replace(usual, blur_px=each)) for each in (0.0, 0.5, 1.0, 1.5, 2.0))
+    yield from ((f"noise {each:g}", replace(usual, noise=each)) for each in (0.0, 2.0, 4.0, 6.0))
+    yield from ((f"tilt {each:g} degrees", replace(usual, tilt_deg=each)) for each in (0.0, 30.0, 45.0, 60.0))
+    yield from ((f"JPEG quality {each}", replace(usual, quality=each)) for each in (95, 85, 75, 60))
+    yield from ((f"contrast {each:g}", replace(usual, contrast=each)) for each in (0.5, 0.25))
+    yield from ((f"squares of {each:g} px", replace(usual, square_px=each)) for each in (8.0, 12.0, 20.0, 40.0, 80.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +92,11 @@ def measured(condition: Condition, views: int, seed: int) -> dict[str, Score]:
         sigmas.append(fitted.sigma_px)
         window = max(2, int(0.3 * min(np.linalg.norm(each, axis=1).min() for each in steps)))
         refined = cv2.cornerSubPix(
-            cv2.GaussianBlur(image, (0, 0), 1.0), start.astype(np.float32).reshape(-1, 1, 2), (window, window), (-1, -1), _UNTIL
+            cv2.GaussianBlur(image, (0, 0), 1.0),
+            start.astype(np.float32).reshape(-1, 1, 2),
+            (window, window),
+            (-1, -1),
+            _UNTIL,
         )
         errors["cornerSubPix"].append(refined.reshape(-1, 2) - truth)
         found, corners = cv2.findChessboardCornersSB(
@@ -134,9 +134,10 @@ def _view(condition: Condition, random: np.random.Generator) -> tuple[Image, Flo
     )
     azimuth, turn = random.uniform(0, 2 * np.pi), random.uniform(-0.4, 0.4)
     tilt = np.radians(condition.tilt_deg)
-    rotation = cv2.Rodrigues(tilt * np.array([np.cos(azimuth), np.sin(azimuth), 0]))[0] @ cv2.Rodrigues(
-        np.array([0, 0, turn])
-    )[0]
+    rotation = (
+        cv2.Rodrigues(tilt * np.array([np.cos(azimuth), np.sin(azimuth), 0]))[0]
+        @ cv2.Rodrigues(np.array([0, 0, turn]))[0]
+    )
     depth_m = _FOCAL_PX * _BOARD.square_m / condition.square_px
     board_m = _BOARD.points_m()
     centre = np.array([*random.uniform(-0.01, 0.01, 2), 1.0]) * depth_m
@@ -162,7 +163,18 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    table = Table("condition", "cornerSubPix: RMS px", "p95", "sectors: RMS", "p95", "found", "ours: RMS", "p95", "bias", "error / sigma")
+    table = Table(
+        "condition",
+        "cornerSubPix: RMS px",
+        "p95",
+        "sectors: RMS",
+        "p95",
+        "found",
+        "ours: RMS",
+        "p95",
+        "bias",
+        "error / sigma",
+    )
     rows = {}
     for index, (name, condition) in enumerate(conditions()):
         if options.only not in name:
@@ -177,9 +189,11 @@ def main() -> int:
             f"{own.sigmas:.2f}",
         )
     if options.json:
-        from dataclasses import asdict
-
-        print(json.dumps({"machine": str(machine()), "rows": {k: {n: asdict(s) for n, s in v.items()} for k, v in rows.items()}}))
+        print(
+            json.dumps(
+                {"machine": str(machine()), "rows": {k: {n: asdict(s) for n, s in v.items()} for k, v in rows.items()}}
+            )
+        )
     else:
         print(f"{machine()}, OpenCV {cv2.__version__}")
         Console(width=150).print(table)
