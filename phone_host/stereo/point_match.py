@@ -45,6 +45,17 @@ _GRID_SIGMA_PX: Final = 0.013
 """Rectification reads images at steps of 1/32 px: each is off by up to 1/64 px, uniformly, which is 0.009 px; two images."""
 
 
+_PLAIN_REACH_PX: Final = 6
+"""Where the point's own pixel has no disparity, one so far from it may stand for it. Corners of plain squares lie nearer to what is matched."""
+
+_PLAIN_OTHER: Final = 0.02
+"""Of the disparities in a window. If more lie on another surface, pixels without one may be hidden from the other camera; if
+fewer do, they are plain parts of this surface."""
+
+_PLAIN_FOUND: Final = 0.25
+"""Share of the window that must have disparities to tell that."""
+
+
 class Unmatched(Enum):
     """Why a point has no match; the value says it to the user."""
 
@@ -92,7 +103,7 @@ def match_point(
     x, y = at_px
     if not (0 <= x <= width - 1 and 0 <= y <= height - 1):
         return Unmatched.OUTSIDE
-    start_px = _nearby(disparity, x, y)
+    start_px = _nearby(disparity, x, y, step_px)
     if not np.isfinite(start_px):
         return Unmatched.NO_DISPARITY
     window = PointWindow(pair, at_px, start_px, step_px)
@@ -126,11 +137,18 @@ def _fitted(window: PointWindow, at_px: tuple[float, float], start_px: float, st
     )
 
 
-def _nearby(disparity: Disparity, x: float, y: float) -> float:
-    """Return the median disparity of the nearest pixels; NaN if the nearest one of all has none."""
+def _nearby(disparity: Disparity, x: float, y: float, step_px: float) -> float:
+    """Return the median disparity around the pixel that is nearest of those that have one; NaN if none is near."""
     column, row = round(x), round(y)
+    reach = 0 if np.isfinite(disparity[row, column]) else round(_PLAIN_REACH_PX * step_px)
+    top, left = max(row - reach, 0), max(column - reach, 0)
+    rows, columns = np.nonzero(np.isfinite(disparity[top : row + reach + 1, left : column + reach + 1]))
+    if not rows.size:
+        return float("nan")
+    nearest = int(np.argmin((rows + top - y) ** 2 + (columns + left - x) ** 2))
+    row, column = int(rows[nearest]) + top, int(columns[nearest]) + left
     around = disparity[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
-    return float(np.nanmedian(around)) if np.isfinite(disparity[row, column]) else float("nan")
+    return float(np.nanmedian(around))
 
 
 def _same_surface(disparity: Disparity, window: PointWindow, start_px: float, step_px: float) -> Mask:
@@ -142,8 +160,11 @@ def _same_surface(disparity: Disparity, window: PointWindow, start_px: float, st
     normal = np.einsum("iyx,jyx->ij", design * near, design) + np.eye(2) * _SLOPE_PRIOR_PX**2
     slopes = np.linalg.solve(normal, np.einsum("iyx,yx->i", design, np.where(near, beside, 0.0)))
     plane = np.einsum("i,iyx->yx", slopes, design)
-    same = (found & (np.abs(beside - plane) <= _SAME_SURFACE_PX * step_px)).astype(np.uint8)
-    inner = cv2.erode(same, np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8), borderValue=1)
+    same = found & (np.abs(beside - plane) <= _SAME_SURFACE_PX * step_px)
+    count = np.count_nonzero(found)
+    if count >= _PLAIN_FOUND * found.size and count - np.count_nonzero(same) <= _PLAIN_OTHER * count:
+        same |= ~found
+    inner = cv2.erode(same.astype(np.uint8), np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8), borderValue=1)
     middle = np.unravel_index(int(np.argmin(window.dx**2 + window.dy**2)), inner.shape)
     _, parts = cv2.connectedComponents(inner, connectivity=4)
     return np.asarray((parts == parts[middle]) & (inner[middle] > 0), np.bool_)
