@@ -48,12 +48,8 @@ _GRID_SIGMA_PX: Final = 0.013
 _PLAIN_REACH_PX: Final = 6
 """Where the point's own pixel has no disparity, one so far from it may stand for it. Corners of plain squares lie nearer to what is matched."""
 
-_PLAIN_OTHER: Final = 0.02
-"""Of the disparities in a window. If more lie on another surface, pixels without one may be hidden from the other camera; if
-fewer do, they are plain parts of this surface."""
-
 _PLAIN_FOUND: Final = 0.25
-"""Share of the window that must have disparities to tell that."""
+"""Share of the window that must lie on the point's surface before pixels without disparity may be plain parts of it."""
 
 
 class Unmatched(Enum):
@@ -161,10 +157,17 @@ def _same_surface(disparity: Disparity, window: PointWindow, start_px: float, st
     slopes = np.linalg.solve(normal, np.einsum("iyx,yx->i", design, np.where(near, beside, 0.0)))
     plane = np.einsum("i,iyx->yx", slopes, design)
     same = found & (np.abs(beside - plane) <= _SAME_SURFACE_PX * step_px)
-    count = np.count_nonzero(found)
-    if count >= _PLAIN_FOUND * found.size and count - np.count_nonzero(same) <= _PLAIN_OTHER * count:
-        same |= ~found
+    same |= _plain(found, same)
     inner = cv2.erode(same.astype(np.uint8), np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8), borderValue=1)
     middle = np.unravel_index(int(np.argmin(window.dx**2 + window.dy**2)), inner.shape)
     _, parts = cv2.connectedComponents(inner, connectivity=4)
     return np.asarray((parts == parts[middle]) & (inner[middle] > 0), np.bool_)
+
+
+def _plain(found: Mask, same: Mask) -> Mask:
+    """Return the pixels without disparity that meet no other surface: plain parts of this one. Where two surfaces meet, one hides the other."""
+    if np.count_nonzero(same) < _PLAIN_FOUND * same.size:
+        return np.zeros_like(same)
+    _, parts = cv2.connectedComponents((~found).astype(np.uint8), connectivity=8)
+    beside = cv2.dilate((found & ~same).astype(np.uint8), np.ones((3, 3), np.uint8))
+    return np.asarray(~found & ~np.isin(parts, np.unique(parts[beside > 0])), np.bool_)
