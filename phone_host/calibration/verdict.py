@@ -92,7 +92,7 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessmen
     """
     if calibration.rig.rms_stereo_px > _CONTRADICTION_PX * size_factor(calibration.rig):
         contradiction = (
-            f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board (inner corners), that"
+            f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board, that"
             " each LEFT image belongs to its RIGHT one, and that neither camera mirrors its image"
         )
         return Assessment(Verdict.REJECT, (contradiction,))
@@ -183,9 +183,9 @@ _CURES = {
     Reason.TURNED: (
         "hold each camera the same way in all images; if only a phone's EXIF tag differs, remove the tag from all of them"
     ),
-    Reason.NOT_FOUND_LEFT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
-    Reason.NOT_FOUND_RIGHT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
-    Reason.NOT_FOUND_BOTH: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
+    Reason.NOT_FOUND_LEFT: "show the board sharp and evenly lit, a chessboard whole, and check --board",
+    Reason.NOT_FOUND_RIGHT: "show the board sharp and evenly lit, a chessboard whole, and check --board",
+    Reason.NOT_FOUND_BOTH: "show the board sharp and evenly lit, a chessboard whole, and check --board",
     Reason.CORNERS_LEFT: "avoid glare and blur",
     Reason.CORNERS_RIGHT: "avoid glare and blur",
     Reason.MOVED: "hold the board still, or put it down, until both cameras have their image",
