@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     exported: list[str] = []
     if found.rectification is not None:
         report |= write_exports(options, rig, found.rectification)
-        exported = export_lines(report)
+        exported = export_lines(report, found.rectification)
     _write_report(options.out, report)
     said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
     _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported])

@@ -16,8 +16,9 @@ from phone_host.calibration.earlier_views import board_of, new_ones, pairs_of, t
 from phone_host.calibration.pose_only import solve_pose
 from phone_host.calibration.target import Board
 from phone_host.model import CameraModel, Rig, Side
+from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.output.rig_views import RigViews
-from phone_host.output.rig_yaml import read_rig, read_rig_views
+from phone_host.output.rig_yaml import read_rig_views
 from phone_host.settings import most_pixels
 from phone_host.stereo.scaled_rig import is_scaling, scaled_rig
 from phone_host.stereo.view_files import ViewFiles
@@ -70,7 +71,7 @@ def asked_of(options: argparse.Namespace) -> Asked:
         if options.pose_only:
             raise SettingsError("--pose-only keeps the lenses of an earlier calibration", "name it: --from rig.yaml")
         return Asked(named=named(options.board or AUTO, options.square))
-    rig, views = read_rig(options.earlier), read_rig_views(options.earlier)
+    rig, views = read_own_rig(options.earlier), read_rig_views(options.earlier)
     if views is None and not options.pose_only:
         raise DataError(
             f"{options.earlier} does not hold the corners it was computed from",
