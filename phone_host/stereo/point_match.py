@@ -122,7 +122,8 @@ def _fitted(window: PointWindow, at_px: tuple[float, float], start_px: float, st
     if window.likeness(theta) < _LEAST_LIKENESS:
         return Unmatched.UNLIKE
     covariance = window.covariance(theta)
-    if not (0 < covariance[0, 0] <= _LARGEST_SIGMA_PX**2 and 0 < covariance[1, 1] < np.inf):
+    is_known = 0 < covariance[0, 0] <= _LARGEST_SIGMA_PX**2 and 0 < covariance[1, 1] < np.inf
+    if not (is_known and np.linalg.det(covariance) > 0):
         return Unmatched.UNSURE
     return PointMatch(
         right_px=np.array(at_px) + window.axes @ theta[:2],
