@@ -40,8 +40,7 @@ from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import trouble_of
 from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
-from phone_host.output.rig_files.imported import Imported, import_rig
-from phone_host.output.rig_yaml import read_rig
+from phone_host.output.rig_files.imported import Imported, import_rig, read_own_rig
 from phone_host.report.run_json import build
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
@@ -123,7 +122,7 @@ def open_scanner(
     given = dict(locals())
     _check_numbers(pairs=pairs, save_every=save_every, tolerance_ms=tolerance_ms, wait_s=wait_s, near_m=near_m)
     uris = _addresses(link)
-    known = read_rig(Path(rig)) if isinstance(rig, str | Path) else rig
+    known = read_own_rig(Path(rig)) if isinstance(rig, str | Path) else rig
     if known is not None and geometry is not None:
         raise SettingsError("rig and geometry are both given", "leave geometry out: the rig has its own")
     side = _side(board_side, known)

@@ -1,7 +1,7 @@
 """Boards as people write them: inner corners of a chessboard, a ChArUco board, an AprilGrid. Pure."""
 
 import re
-from typing import Final
+from typing import Final, assert_never
 
 from common.errors import SettingsError
 from phone_host.calibration.marked import AprilGrid, Charuco, MarkFamily
@@ -12,6 +12,8 @@ _LENGTH: Final = r"(\d+(?:\.\d+)?)\s*mm"
 _CHARUCO: Final = re.compile(rf"charuco:(\d{{1,3}})x(\d{{1,3}}):{_LENGTH}:{_LENGTH}:([456]x[456])", re.IGNORECASE)
 _GRID: Final = re.compile(rf"aprilgrid:(\d{{1,2}})x(\d{{1,2}}):{_LENGTH}:{_LENGTH}", re.IGNORECASE)
 _LEAST_TAGS: Final = 2
+_MOST_STRETCH: Final = 0.1
+"""Printed "fit to page" a board is up to 7 % smaller."""
 
 
 def named_board(text: str, square_mm: float | None) -> Board:
@@ -23,7 +25,7 @@ def named_board(text: str, square_mm: float | None) -> Board:
         square_mm: side of a square, or of a tag, as it was measured; None: as the board's name says.
 
     Raises:
-        SettingsError: it names no board, or a chessboard without a square.
+        SettingsError: it names no board, a chessboard without a square, or a side that is far from the measured one.
     """
     name = text.strip().lower()
     if name.startswith("charuco"):
@@ -33,6 +35,25 @@ def named_board(text: str, square_mm: float | None) -> Board:
     if square_mm is None:
         raise no_square()
     return parse_board(text, square_mm)
+
+
+def board_name(board: Board) -> str:
+    """Write a board as `named_board` reads it.
+
+    Args:
+        board: with or without marks.
+    """
+    side_mm = board.square_m * 1e3
+    match board.marks:
+        case None:
+            return f"{board.columns}x{board.rows}"
+        case Charuco(family, share):
+            words = next(word for word, each in _FAMILIES.items() if each is family)
+            return f"charuco:{board.columns + 1}x{board.rows + 1}:{side_mm:.8g}mm:{side_mm * share:.8g}mm:{words}"
+        case AprilGrid(share):
+            return f"aprilgrid:{board.columns // 2}x{board.rows // 2}:{side_mm:.8g}mm:{side_mm * share:.8g}mm"
+        case _:
+            assert_never(board.marks)
 
 
 def no_square() -> SettingsError:
@@ -53,7 +74,7 @@ def _charuco(name: str, square_mm: float | None) -> Board:
         )
     side, mark = float(found[3]), float(found[4])
     marks = Charuco(_FAMILIES[found[5]], mark / side)
-    return Board(int(found[1]) - 1, int(found[2]) - 1, (square_mm or side) / 1000, marks)
+    return Board(int(found[1]) - 1, int(found[2]) - 1, _side_mm(side, square_mm) / 1000, marks)
 
 
 def _april_grid(name: str, square_mm: float | None) -> Board:
@@ -67,4 +88,20 @@ def _april_grid(name: str, square_mm: float | None) -> Board:
             f"--board {name!r} is no AprilGrid", "give tags, side of a tag and gap, as in aprilgrid:6x6:30mm:9mm"
         )
     side, gap = float(found[3]), float(found[4])
-    return Board(2 * int(found[1]), 2 * int(found[2]), (square_mm or side) / 1000, AprilGrid(gap / side))
+    return Board(2 * int(found[1]), 2 * int(found[2]), _side_mm(side, square_mm) / 1000, AprilGrid(gap / side))
+
+
+def _side_mm(named_mm: float, square_mm: float | None) -> float:
+    """Return the side as it was measured, or as the name says; a print may be enlarged or shrunk a little.
+
+    Raises:
+        SettingsError: the two are no one board's.
+    """
+    if square_mm is None:
+        return named_mm
+    if abs(square_mm / named_mm - 1) > _MOST_STRETCH:
+        raise SettingsError(
+            f"--square is {square_mm:g} mm, and --board says {named_mm:g} mm",
+            "measure it again, or leave --square out if --board is right",
+        )
+    return square_mm

@@ -106,7 +106,7 @@ def look_for_boards(
     usual = _usual([left for _, left, _ in seen]), _usual([right for _, _, right in seen])
     pairs = []
     for name, left_seen, right_seen in seen:
-        problem = _problem(name, (left_seen, right_seen), usual)
+        problem = _problem(name, (left_seen, right_seen), usual, board)
         if problem is None:
             pairs.append(BoardPair(name, left_seen.corners, agree(left_seen.corners, right_seen.corners, board)))
         else:
@@ -157,20 +157,23 @@ def _look(path: Path, board: Board, most_pixels: int, mounted: Orientation) -> _
     )
 
 
-def _problem(name: str, pair: tuple[_Seen, _Seen], usual: tuple[_Seen, _Seen]) -> Rejected | None:
+def _problem(name: str, pair: tuple[_Seen, _Seen], usual: tuple[_Seen, _Seen], board: Board) -> Rejected | None:
     for side, seen, others in zip(("left", "right"), pair, usual, strict=True):
         unlike = _unlike(seen, others, side)
         if unlike is not None:
             return Rejected(name, *unlike)
+    lacking = (
+        "the board is not seen whole and sharp" if board.marks is None else "too few of the board's marks are seen"
+    )
     match len(pair[0].corners) > 0, len(pair[1].corners) > 0:
         case True, True:
             return None
         case False, True:
-            return Rejected(name, Reason.NOT_FOUND_LEFT, "the board is not seen whole and sharp in the left image")
+            return Rejected(name, Reason.NOT_FOUND_LEFT, f"{lacking} in the left image")
         case True, False:
-            return Rejected(name, Reason.NOT_FOUND_RIGHT, "the board is not seen whole and sharp in the right image")
+            return Rejected(name, Reason.NOT_FOUND_RIGHT, f"{lacking} in the right image")
         case _:
-            return Rejected(name, Reason.NOT_FOUND_BOTH, "the board is not seen whole and sharp in either image")
+            return Rejected(name, Reason.NOT_FOUND_BOTH, f"{lacking} in either image")
 
 
 def _unlike(seen: _Seen, others: _Seen, side: str) -> tuple[Reason, str] | None:

@@ -1,8 +1,11 @@
 """Finds out which cameras took the images of a calibration: a run saves that beside them, in cameras.json."""
 
 import os
+from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from common.camera_identity import UNKNOWN_CAMERA, RememberedCamera
 from common.errors import DataError, SettingsError
@@ -16,6 +19,9 @@ from phone_host.stereo.view_files import ViewFiles
 
 Size = tuple[int, int]
 Cameras = tuple[RememberedCamera, RememberedCamera]
+
+_FIRST: Final = 5
+"""Pairs whose headers tell the size of all: one of another size among them is an exception."""
 
 
 def cameras_beside(files: ViewFiles, mounted: tuple[Orientation, Orientation]) -> tuple[Path, Cameras] | None:
@@ -46,7 +52,7 @@ def cameras_beside(files: ViewFiles, mounted: tuple[Orientation, Orientation]) -
             f"the images beside {path} were saved upright, and would be turned once more",
             "leave out --rotate-left, --rotate-right, --flip-left and --flip-right",
         )
-    sizes_px = _first_sizes(files)
+    sizes_px = first_sizes(files)
     if sizes_px is not None:
         require_sizes(path, cameras, sizes_px)
     return path, cameras
@@ -98,11 +104,19 @@ def _folders(files: ViewFiles) -> list[Path]:
     return list(dict.fromkeys(Path(os.path.commonpath(group)) for group in groups if group))
 
 
-def _first_sizes(files: ViewFiles) -> tuple[Size, Size] | None:
-    """Return the sizes of the first pair that can be read; None if none can."""
-    for _, left, right in files.pairs:
-        try:
-            return open_image(left, MOST_PIXELS).size_px, open_image(right, MOST_PIXELS).size_px
-        except DataError:
-            continue
-    return None
+def first_sizes(
+    files: ViewFiles, most_pixels: int = MOST_PIXELS, mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+) -> tuple[Size, Size] | None:
+    """Return the sizes that most of the first pairs have, upright; None if none of them can be read.
+
+    Args:
+        files: the images.
+        most_pixels: an image that claims more is passed over.
+        mounted: how the two cameras are mounted.
+    """
+    sizes = Counter[tuple[Size, Size]]()
+    for _, *both in files.pairs[:_FIRST]:
+        with suppress(DataError):
+            left, right = (open_image(path, most_pixels, turn) for path, turn in zip(both, mounted, strict=True))
+            sizes[left.size_px, right.size_px] += 1
+    return sizes.most_common(1)[0][0] if sizes else None

@@ -1,10 +1,12 @@
 """Views of an earlier calibration, as rig.yaml keeps them, and those of a new one. Pure."""
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from common.errors import DataError
+from common.errors import DataError, SettingsError
+from phone_host.calibration.board_names import board_name, named_board
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.target import Board
 from phone_host.output.rig_views import RigViews
@@ -22,8 +24,23 @@ def pairs_of(views: RigViews) -> list[BoardPair]:
 
 
 def board_of(views: RigViews) -> Board:
-    """Return the board that they show."""
-    return Board(views.columns, views.rows, views.square_m)
+    """Return the board that they show.
+
+    Raises:
+        DataError: its name contradicts its corners.
+    """
+    plain = Board(views.columns, views.rows, views.square_m)
+    if not views.board:
+        return plain
+    try:
+        board = replace(named_board(views.board, plain.square_m * 1e3), square_m=plain.square_m)
+    except SettingsError:
+        board = None
+    if board is None or replace(board, marks=None) != plain:
+        raise DataError(
+            f"views.board of the earlier calibration is {views.board!r}", "calibrate from all pictures together"
+        )
+    return board
 
 
 def together(earlier: list[BoardPair], later: list[BoardPair]) -> list[BoardPair]:
@@ -77,4 +94,5 @@ def views_of(calibration: Calibration, pairs: list[BoardPair], board: Board) -> 
         names=tuple(pair.name for pair in kept),
         left_px=np.array([pair.left_px for pair in kept]),
         right_px=np.array([pair.right_px for pair in kept]),
+        board=board_name(board),
     )

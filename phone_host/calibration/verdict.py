@@ -27,7 +27,9 @@ lens's blur covers more of their pixels: limits grow with their size."""
 # Real rigs fit to 0.15 to 0.4 px. Beyond this no tuning helps; something basic is wrong. Grows with the size too.
 _CONTRADICTION_PX = 1.0
 # A baseline known to 1 % gives depth known to 1 %; at 5 % there is practically no scale.
-_SHARE_GOOD, _SHARE_USABLE = 0.01, 0.05
+SHARE_GOOD, _SHARE_USABLE = 0.01, 0.05
+"""Limits of the uncertainty of baseline and depth, and of what squares are off, as shares."""
+
 _FEW_PAIRS = 6
 _WANTED_PAIRS = 15
 _MANY_REJECTED = 1 / 3
@@ -92,7 +94,7 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessmen
     """
     if calibration.rig.rms_stereo_px > _CONTRADICTION_PX * size_factor(calibration.rig):
         contradiction = (
-            f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board (inner corners), that"
+            f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board, that"
             " each LEFT image belongs to its RIGHT one, and that neither camera mirrors its image"
         )
         return Assessment(Verdict.REJECT, (contradiction,))
@@ -141,7 +143,7 @@ def _baseline(calibration: Calibration) -> _Measure:
         f"these views leave the baseline open by {calibration.baseline_sigma_m * 1e3:.2f} of {baseline_m * 1e3:.1f} mm:"
         f" {_what_to_show(calibration)}"
     )
-    return _Measure(share / _SHARE_GOOD, share / _SHARE_USABLE, remedy)
+    return _Measure(share / SHARE_GOOD, share / _SHARE_USABLE, remedy)
 
 
 def _depth(calibration: Calibration) -> _Measure:
@@ -149,7 +151,7 @@ def _depth(calibration: Calibration) -> _Measure:
     sigma_m = dict(calibration.depths).get(DEPTH_M, math.nan)
     share = sigma_m / DEPTH_M if math.isfinite(sigma_m) else 0.0
     remedy = f"these views leave depth open by {share * 1e3:.0f} mm at {DEPTH_M:g} m: {_what_to_show(calibration)}"
-    return _Measure(share / _SHARE_GOOD, share / _SHARE_USABLE, remedy)
+    return _Measure(share / SHARE_GOOD, share / _SHARE_USABLE, remedy)
 
 
 def _squares(calibration: Calibration) -> _Measure:
@@ -159,7 +161,7 @@ def _squares(calibration: Calibration) -> _Measure:
         f"squares of boards that were held out measure {squares.mean_m * 1e3:.2f} instead of {squares.true_m * 1e3:.2f} mm:"
         f" {_what_to_show(calibration)}"
     )
-    return _Measure(share / _SHARE_GOOD, share / _SHARE_USABLE, remedy)
+    return _Measure(share / SHARE_GOOD, share / _SHARE_USABLE, remedy)
 
 
 def _what_to_show(calibration: Calibration) -> str:
@@ -183,9 +185,9 @@ _CURES = {
     Reason.TURNED: (
         "hold each camera the same way in all images; if only a phone's EXIF tag differs, remove the tag from all of them"
     ),
-    Reason.NOT_FOUND_LEFT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
-    Reason.NOT_FOUND_RIGHT: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
-    Reason.NOT_FOUND_BOTH: "show the whole board, sharp and evenly lit, and check --board (inner corners)",
+    Reason.NOT_FOUND_LEFT: "show the board sharp and evenly lit, a chessboard whole, and check --board",
+    Reason.NOT_FOUND_RIGHT: "show the board sharp and evenly lit, a chessboard whole, and check --board",
+    Reason.NOT_FOUND_BOTH: "show the board sharp and evenly lit, a chessboard whole, and check --board",
     Reason.CORNERS_LEFT: "avoid glare and blur",
     Reason.CORNERS_RIGHT: "avoid glare and blur",
     Reason.MOVED: "hold the board still, or put it down, until both cameras have their image",

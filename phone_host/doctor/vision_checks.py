@@ -18,7 +18,7 @@ from phone_host.camera.factory import camera_orientation
 from phone_host.camera.http_uri import is_http
 from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
 from phone_host.model import Side
-from phone_host.output.rig_yaml import read_rig
+from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.frame_sink import NoFrames
@@ -86,7 +86,7 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
         SettingsError: the URI is invalid.
     """
     try:
-        rig = read_rig(Path(calibration))
+        rig = read_own_rig(Path(calibration))
         Rectifier(rig)
     except TandemError as error:
         return RigReadings(calibration, error.problem, error.remedy)

@@ -1,4 +1,4 @@
-"""calib.txt: the calibration of rectified images as the data sets Middlebury, ETH3D and KITTI write it. Only read.
+"""calib.txt: the calibration of rectified images as the data sets Middlebury, ETH3D and KITTI write it. Read here; `rig_files.rectified` writes it.
 
 Middlebury (2014, version 3, 2021) and ETH3D: lines `key=value`; cam0 and cam1 are camera matrices `[f 0 cx; 0 f cy; 0 0
 1]` in px, doffs is the x of cam1's principal point minus that of cam0's, baseline is in mm, and width, height and ndisp

@@ -1,6 +1,6 @@
 """The views in rig.yaml from which a rig was computed, so that a later calibration can add others: the map `views`.
 
-It holds board_columns and board_rows (inner corners), square (m), names (one text per pair), left and right (corners, px, one
+It holds board (as `--board` names it), board_columns and board_rows (inner corners), square (m), names (one text per pair), left and right (corners, px, one
 row per pair: x y x y ..., .Nan where one is not seen). A rig without the map cannot be added to.
 """
 
@@ -34,6 +34,7 @@ class RigViews:
         names: of V pairs.
         left_px: (V, N, 2) corners; NaN where one is not seen.
         right_px: (V, N, 2), in the same order.
+        board: the board as `--board` names it, with its marks; empty: a chessboard.
     """
 
     columns: int
@@ -42,6 +43,7 @@ class RigViews:
     names: tuple[str, ...]
     left_px: NDArray[np.float64]
     right_px: NDArray[np.float64]
+    board: str = ""
 
 
 def write_views(storage: cv2.FileStorage, views: RigViews) -> None:
@@ -52,6 +54,7 @@ def write_views(storage: cv2.FileStorage, views: RigViews) -> None:
         views: what the rig was computed from.
     """
     storage.startWriteStruct(KEY, cv2.FileNode_MAP)
+    storage.write("board", views.board)
     storage.write("board_columns", views.columns)
     storage.write("board_rows", views.rows)
     storage.write("square", views.square_m)
@@ -106,6 +109,7 @@ def read_views(storage: cv2.FileStorage, problem: Problem) -> RigViews | None:
         names=names,
         left_px=corners[0],
         right_px=corners[1],
+        board=node.getNode("board").string() if node.getNode("board").isString() else "",
     )
 
 

@@ -24,6 +24,7 @@ def quality_json(report: QualityReport) -> dict[str, Any]:
         "headline": sentence,
         "matcher": report.matcher,
         "planes": len(planes),
+        "interrupted_of": report.interrupted_of or None,
         "sigma_px": report.sigma_px,
         "focal_px": planes[0].geometry.focal_px if planes else None,
         "baseline_m": planes[0].geometry.baseline_m if planes else None,

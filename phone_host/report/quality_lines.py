@@ -4,6 +4,8 @@ import math
 from typing import Final
 
 from phone_host.report.quality_report import (
+    MAPS_LEFT_OUT,
+    MOST_MAPS,
     NO_TRUTH,
     MeasuredPair,
     QualityReport,
@@ -47,6 +49,8 @@ def quality_lines(report: QualityReport, out: str) -> list[str]:
         lines.append(f"note: the corners alone have a bias of {signed(100 * mean, 2)}%: {whose}")
     if report.planes and not report.knows_truth:
         lines.append(f"note: {NO_TRUTH}")
+    if len(report.measured) > MOST_MAPS:
+        lines.append(f"note: {MAPS_LEFT_OUT}")
     return [*lines, f"written to {out}: report.json, index.html"]
 
 

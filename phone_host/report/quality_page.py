@@ -13,6 +13,8 @@ from phone_host.report.page_frame import HALF_PX, document, section, table, two_
 from phone_host.report.page_links import FileLink, files_section, list_section
 from phone_host.report.quality_lines import COLUMNS, quality_row
 from phone_host.report.quality_report import (
+    MAPS_LEFT_OUT,
+    MOST_MAPS,
     NO_TRUTH,
     MeasuredPair,
     QualityReport,
@@ -41,7 +43,6 @@ _FITTED: Final = (
     "A plane in space is a plane in disparity (d = a x + b y + c), and there noise is the same everywhere, so the plane is"
     " fitted there."
 )
-_MOST_MAPS: Final = 30  # pairs; each takes 140 KB of the page
 _LEAST_OFFSET_MM, _LEAST_SCATTER_PX = 0.5, 0.1  # smaller differences are not worth strong colours
 
 
@@ -59,8 +60,8 @@ def quality_page(report: QualityReport) -> str:
     remarks = [remark.text for remark in report.remarks]
     if report.planes and not report.knows_truth:
         remarks.append(NO_TRUTH)
-    if len(report.measured) > _MOST_MAPS:
-        remarks.append(f"maps are those of the first {_MOST_MAPS} pairs; report.json has the tiles of all")
+    if len(report.measured) > MOST_MAPS:
+        remarks.append(MAPS_LEFT_OUT)
     for pair in report.measured:
         problem = flaw(pair.quality)
         remarks += [f"{pair.name}: {one.text}" for one in (*([problem] if problem else []), *pair.remarks)]
@@ -70,7 +71,7 @@ def quality_page(report: QualityReport) -> str:
         list_section("Remarks", remarks),
         _all_pairs(report),
         _over_depth(report),
-        *(_pair(pair, is_only=count == 1) for pair in report.measured[:_MOST_MAPS]),
+        *(_pair(pair, is_only=count == 1) for pair in report.measured[:MOST_MAPS]),
         section("What the figures mean", _FITTED, table(("figure", "meaning"), _MEANINGS)),
         files_section((FileLink("report.json", "all figures, with those of every tile"),)),
     ]

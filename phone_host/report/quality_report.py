@@ -5,7 +5,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
 import numpy as np
@@ -16,6 +16,11 @@ from phone_host.report.report_page import Headline
 from phone_host.report.stereo_report import FailedPair, Remark, Size
 
 NO_TRUTH: Final = "give --distance, measured along the left camera's axis, or --board and --square, to learn the bias"
+
+MOST_MAPS: Final = 30
+"""Pairs that the page shows maps of; each takes 140 KB of it."""
+
+MAPS_LEFT_OUT: Final = f"maps are those of the first {MOST_MAPS} pairs; report.json has the tiles of all"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -67,6 +72,7 @@ class QualityReport:
         left_alone: left images without a partner.
         right_alone: the same for right ones.
         remarks: told once.
+        interrupted_of: how many pairs were to be measured when the command was interrupted; 0: it was not.
     """
 
     pairs: tuple[MeasuredPair | FailedPair, ...]
@@ -74,6 +80,7 @@ class QualityReport:
     left_alone: tuple[str, ...] = ()
     right_alone: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
+    interrupted_of: int = 0
 
     @property
     def measured(self) -> tuple[MeasuredPair, ...]:
@@ -151,6 +158,10 @@ def flaw(quality: PlaneQuality) -> Remark | None:
 def quality_verdict(report: QualityReport) -> tuple[Headline, str]:
     """Return how the measurement went, and the first sentence of terminal and page."""
     planes, count = report.planes, len(report.pairs)
+    if report.interrupted_of:
+        verdict, sentence = quality_verdict(replace(report, interrupted_of=0))
+        stopped = f"Interrupted after {count} of {counted(report.interrupted_of, 'pair')}."
+        return Headline.WARNING if verdict is Headline.GOOD else verdict, f"{stopped} {sentence}"
     if not planes:
         first = report.pairs[0]
         if isinstance(first, FailedPair):

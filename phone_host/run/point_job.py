@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -20,9 +21,13 @@ from phone_host.stereo.images import decode_files, open_image, require_same_size
 from phone_host.stereo.measured_point import MeasuredPoint, measured_point
 from phone_host.stereo.point_match import PointMatch, match_point
 from phone_host.stereo.rectify import Rectifier, rectify_points
+from phone_host.stereo.wide_limits import Wide, why_wide
 
 Point = tuple[float, float]
 Size = tuple[int, int]
+
+ELSEWHERE: Final = "choose a point on a surface with texture, away from its edges and not too far"
+"""What helps a point that cannot be measured."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,16 +52,34 @@ class PointJob:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FoundPoint:
+    """A point that was measured, and why its limits lie far apart; None: they do not."""
+
+    point: MeasuredPoint
+    wide: Wide | None
+
+
+@dataclass(frozen=True, slots=True)
+class MissedPoint:
+    """A point that was not, and why."""
+
+    problem: str
+
+
+Outcome = FoundPoint | MissedPoint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Measured:
     """What was measured.
 
     Attributes:
-        points: one for each point asked for, in their order.
+        points: one for each point asked for, in their order; one at least was found.
         zero_sigma_px: the rig's uncertainty of the disparity of infinitely far points that was reckoned with, px; NaN: not known.
         doubts: reasons not to trust it that do not rule it out.
     """
 
-    points: tuple[MeasuredPoint, ...]
+    points: tuple[Outcome, ...]
     zero_sigma_px: float
     doubts: tuple[Concern, ...]
 
@@ -70,7 +93,7 @@ def measure_points(job: PointJob, watcher: Watcher) -> Measured:
 
     Raises:
         SettingsError: a point lies outside the left image.
-        DataError: the pair cannot be computed, cannot be right, or a point has no match.
+        DataError: the pair cannot be computed, cannot be right, or none of the points can be measured.
     """
     watcher.say("reading")
     opened = tuple(
@@ -104,7 +127,17 @@ def measure_points(job: PointJob, watcher: Watcher) -> Measured:
         processed.pair, disparity, geometry, 1 / search.scale, core.rectifier_for(size_px(processed.pair.left))
     )
     zero_sigma_px = math.nan if seen.rectifier is None else seen.rectifier.rig.zero_sigma_px
-    return Measured(tuple(_measured(point, seen, zero_sigma_px) for point in job.points_px), zero_sigma_px, concerns)
+    points = tuple(_measured(point, seen, zero_sigma_px) for point in job.points_px)
+    _require_one(job.points_px, points)
+    return Measured(points, zero_sigma_px, concerns)
+
+
+def _require_one(asked_px: tuple[Point, ...], points: tuple[Outcome, ...]) -> None:
+    """Raise unless a point was measured."""
+    missed = [each.problem for each in points if isinstance(each, MissedPoint)]
+    if len(missed) == len(points):
+        said = "; ".join(f"{point_text(at_px)} {why}" for at_px, why in zip(asked_px, missed, strict=True))
+        raise DataError(f"--points {said}", ELSEWHERE)
 
 
 def point_text(point_px: Point) -> str:
@@ -123,7 +156,7 @@ class _Seen:
     rectifier: Rectifier | None
 
 
-def _measured(asked_px: Point, seen: _Seen, zero_sigma_px: float) -> MeasuredPoint:
+def _measured(asked_px: Point, seen: _Seen, zero_sigma_px: float) -> Outcome:
     at_px, rectifier = asked_px, seen.rectifier
     if rectifier is not None:
         turn = rectifier.rectification.R_left
@@ -131,9 +164,9 @@ def _measured(asked_px: Point, seen: _Seen, zero_sigma_px: float) -> MeasuredPoi
         at_px = (x, y)
     match = match_point(seen.pair, seen.disparity, at_px, seen.step_px)
     if not isinstance(match, PointMatch):
-        said = f"--points {point_text(asked_px)} {match.value}"
-        raise DataError(said, "choose a point on a surface with texture, away from its edges")
-    point = measured_point(at_px, match, seen.geometry, seen.pair.epipolar, zero_sigma_px)
+        return MissedPoint(match.value)
+    epipolar = seen.pair.epipolar
+    point = measured_point(at_px, match, seen.geometry, epipolar, zero_sigma_px)
     if not np.isfinite(point.point_m).all():
-        raise DataError(f"--points {point_text(asked_px)} cannot be told from infinity", "choose a nearer point")
-    return point
+        return MissedPoint("cannot be told from infinity")
+    return FoundPoint(point, why_wide(point, match, epipolar))

@@ -6,7 +6,7 @@ that shows no plane is reported as that.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -31,6 +31,7 @@ from phone_host.report.quality_report import MeasuredPair, QualityReport
 from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size, alone_remarks
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
+from phone_host.run.kept import kept_if_interrupted
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_remarks import turned_remarks
 from phone_host.run.stereo_trust import judge_pair
@@ -86,7 +87,7 @@ class QualityJob:
 
 
 def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
-    """Measure all pairs, and write report.json and index.html.
+    """Measure all pairs, and write report.json and index.html; after Ctrl-C those of the pairs so far.
 
     Args:
         job: what to do.
@@ -104,17 +105,24 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
     keep_freed_memory()
     cores, is_only = Cores(job.make_core), len(job.files.pairs) == 1
     pairs: list[MeasuredPair | FailedPair] = []
-    for index, (_, left, right) in enumerate(job.files.pairs):
-        try:
-            pairs.append(_measured(job, cores, index, watcher))
-        except DataError as error:
-            if is_only or cores.has_none:
-                raise
-            failed = FailedPair(
-                name=left.name, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy
-            )
-            pairs.append(failed)
-        watcher()
+
+    def write_so_far() -> None:
+        so_far = replace(_report(job, pairs), interrupted_of=len(job.files.pairs))
+        if so_far.measured:
+            _write(job.out, so_far)
+
+    with kept_if_interrupted(write_so_far):
+        for index, (_, left, right) in enumerate(job.files.pairs):
+            try:
+                pairs.append(_measured(job, cores, index, watcher))
+            except DataError as error:
+                if is_only or cores.has_none:
+                    raise
+                failed = FailedPair(
+                    name=left.name, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy
+                )
+                pairs.append(failed)
+            watcher()
     report = _report(job, pairs)
     if not report.measured:
         first = report.pairs[0]

@@ -4,9 +4,8 @@ A pair that cannot be computed ends the work only if it is the only one; of seve
 Wrong settings and a results folder that cannot be written to end the work at once.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Protocol
@@ -18,7 +17,6 @@ from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
-from common.unfinished import unfinished
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
@@ -36,6 +34,7 @@ from phone_host.report.stereo_report import (
 )
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
+from phone_host.run.kept import kept_if_interrupted
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
@@ -111,7 +110,13 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
             _, left, right = job.files.pairs[0]
             return _set(job, (work.computed("", left, right),))
         pairs: list[PairReport | FailedPair] = []
-        with _kept_if_interrupted(job, results, work, pairs):
+
+        def write_so_far() -> None:
+            so_far = replace(_set(job, tuple(pairs)), interrupted_of=len(job.files.pairs))
+            if so_far.computed:
+                _write_set(job, results, work, so_far)
+
+        with kept_if_interrupted(write_so_far):
             for number, (name, left, right) in enumerate(job.files.pairs):
                 folder = f"pair-{int(name) if job.files.by_number else number:06d}"
                 pairs.append(work.tried(folder, left, right))
@@ -130,26 +135,6 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
 def _write_set(job: StereoJob, results: StereoResults, work: "_Work", report: SetReport) -> None:
     results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
     results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
-
-
-@contextmanager
-def _kept_if_interrupted(
-    job: StereoJob, results: StereoResults, work: "_Work", pairs: Sequence[PairReport | FailedPair]
-) -> Iterator[None]:
-    """Write the report and the page of the pairs so far if Ctrl-C ends the block, in Python or out of native code."""
-
-    def write() -> None:
-        report = replace(_set(job, tuple(pairs)), interrupted_of=len(job.files.pairs))
-        if report.computed:
-            _write_set(job, results, work, report)
-
-    try:
-        with unfinished(write):
-            yield
-    except KeyboardInterrupt:
-        with suppress(OSError):
-            write()
-        raise
 
 
 def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetReport:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from common import now
-from common.errors import DataError
+from common.errors import DataError, SettingsError
 from common.frame import SpoiledImageError
 from common.program.logs import event
 from phone_host.model import FramePair, Result
@@ -88,7 +88,7 @@ class Worker:
     def _process(self, pair: FramePair, dequeued_ns: int) -> None:
         try:
             processed = self._pipeline.process(pair, is_saved=self._is_saved(self._ledgerer.processed))
-        except DataError as error:
+        except (DataError, SettingsError) as error:  # or a --crop that lies outside images of this size
             self._note_failed(error)
             return
         if self.has_given_up:
@@ -104,7 +104,7 @@ class Worker:
         if self._most_pairs and number + 1 >= self._most_pairs:
             self.finished.set()
 
-    def _note_failed(self, error: DataError) -> None:
+    def _note_failed(self, error: DataError | SettingsError) -> None:
         """Count a pair that could not be processed.
 
         Spoiled images never end a run, because their sender must not be able to end it. A rig that fits no pair does.

@@ -20,7 +20,7 @@ from typing import Final
 
 import numpy as np
 
-from common.errors import DataError
+from common.errors import SettingsError
 from phone_host.model import CloudImage, Crop, CutCounts, DepthLimits, Disparity, StereoGeometry
 
 DISPARITY_ERROR_PX: Final = 0.25
@@ -160,12 +160,12 @@ def crop_inside(crop: Crop, width_px: int, height_px: int, option: str = "--crop
         option: with which it was given, for the error.
 
     Raises:
-        DataError: nothing of it lies in the image.
+        SettingsError: nothing of it lies in the image.
     """
     left, top = max(crop.x_px, 0), max(crop.y_px, 0)
     right, bottom = min(crop.x_px + crop.width_px, width_px), min(crop.y_px + crop.height_px, height_px)
     if right <= left or bottom <= top:
-        raise DataError(
+        raise SettingsError(
             f"{option} {crop.x_px},{crop.y_px},{crop.width_px},{crop.height_px} lies outside the rectified left image of"
             f" {width_px}x{height_px} px",
             "give X,Y,W,H inside it",

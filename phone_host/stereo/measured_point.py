@@ -13,9 +13,7 @@ Distances from the camera are Gaussian in their inverse, because disparity is, s
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -145,8 +143,3 @@ def distance_between(one: MeasuredPoint, other: MeasuredPoint) -> Within:
         variance = float(np.linalg.eigvalsh(covariance)[-1])
     reach_m = SIGMAS_95 * math.sqrt(variance)
     return Within(length_m, max(length_m - reach_m, 0.0), length_m + reach_m)
-
-
-def path_between(points: Sequence[MeasuredPoint]) -> list[Within]:
-    """Return the distances from each point to the next."""
-    return [distance_between(one, other) for one, other in pairwise(points)]

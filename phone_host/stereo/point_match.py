@@ -45,6 +45,13 @@ _GRID_SIGMA_PX: Final = 0.013
 """Rectification reads images at steps of 1/32 px: each is off by up to 1/64 px, uniformly, which is 0.009 px; two images."""
 
 
+_PLAIN_REACH_PX: Final = 6
+"""Where the point's own pixel has no disparity, one so far from it may stand for it. Corners of plain squares lie nearer to what is matched."""
+
+_PLAIN_FOUND: Final = 0.25
+"""Share of the window that must lie on the point's surface before pixels without disparity may be plain parts of it."""
+
+
 class Unmatched(Enum):
     """Why a point has no match; the value says it to the user."""
 
@@ -92,7 +99,7 @@ def match_point(
     x, y = at_px
     if not (0 <= x <= width - 1 and 0 <= y <= height - 1):
         return Unmatched.OUTSIDE
-    start_px = _nearby(disparity, x, y)
+    start_px = _nearby(disparity, x, y, step_px)
     if not np.isfinite(start_px):
         return Unmatched.NO_DISPARITY
     window = PointWindow(pair, at_px, start_px, step_px)
@@ -115,7 +122,8 @@ def _fitted(window: PointWindow, at_px: tuple[float, float], start_px: float, st
     if window.likeness(theta) < _LEAST_LIKENESS:
         return Unmatched.UNLIKE
     covariance = window.covariance(theta)
-    if not (0 < covariance[0, 0] <= _LARGEST_SIGMA_PX**2 and 0 < covariance[1, 1] < np.inf):
+    is_known = 0 < covariance[0, 0] <= _LARGEST_SIGMA_PX**2 and 0 < covariance[1, 1] < np.inf
+    if not (is_known and np.linalg.det(covariance) > 0):
         return Unmatched.UNSURE
     return PointMatch(
         right_px=np.array(at_px) + window.axes @ theta[:2],
@@ -126,11 +134,18 @@ def _fitted(window: PointWindow, at_px: tuple[float, float], start_px: float, st
     )
 
 
-def _nearby(disparity: Disparity, x: float, y: float) -> float:
-    """Return the median disparity of the nearest pixels; NaN if the nearest one of all has none."""
+def _nearby(disparity: Disparity, x: float, y: float, step_px: float) -> float:
+    """Return the median disparity around the pixel that is nearest of those that have one; NaN if none is near."""
     column, row = round(x), round(y)
+    reach = 0 if np.isfinite(disparity[row, column]) else round(_PLAIN_REACH_PX * step_px)
+    top, left = max(row - reach, 0), max(column - reach, 0)
+    rows, columns = np.nonzero(np.isfinite(disparity[top : row + reach + 1, left : column + reach + 1]))
+    if not rows.size:
+        return float("nan")
+    nearest = int(np.argmin((rows + top - y) ** 2 + (columns + left - x) ** 2))
+    row, column = int(rows[nearest]) + top, int(columns[nearest]) + left
     around = disparity[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
-    return float(np.nanmedian(around)) if np.isfinite(disparity[row, column]) else float("nan")
+    return float(np.nanmedian(around))
 
 
 def _same_surface(disparity: Disparity, window: PointWindow, start_px: float, step_px: float) -> Mask:
@@ -142,8 +157,18 @@ def _same_surface(disparity: Disparity, window: PointWindow, start_px: float, st
     normal = np.einsum("iyx,jyx->ij", design * near, design) + np.eye(2) * _SLOPE_PRIOR_PX**2
     slopes = np.linalg.solve(normal, np.einsum("iyx,yx->i", design, np.where(near, beside, 0.0)))
     plane = np.einsum("i,iyx->yx", slopes, design)
-    same = (found & (np.abs(beside - plane) <= _SAME_SURFACE_PX * step_px)).astype(np.uint8)
-    inner = cv2.erode(same, np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8), borderValue=1)
+    same = found & (np.abs(beside - plane) <= _SAME_SURFACE_PX * step_px)
+    same |= _plain(found, same)
+    inner = cv2.erode(same.astype(np.uint8), np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8), borderValue=1)
     middle = np.unravel_index(int(np.argmin(window.dx**2 + window.dy**2)), inner.shape)
     _, parts = cv2.connectedComponents(inner, connectivity=4)
     return np.asarray((parts == parts[middle]) & (inner[middle] > 0), np.bool_)
+
+
+def _plain(found: Mask, same: Mask) -> Mask:
+    """Return the pixels without disparity that meet no other surface: plain parts of this one. Where two surfaces meet, one hides the other."""
+    if np.count_nonzero(same) < _PLAIN_FOUND * same.size:
+        return np.zeros_like(same)
+    _, parts = cv2.connectedComponents((~found).astype(np.uint8), connectivity=8)
+    beside = cv2.dilate((found & ~same).astype(np.uint8), np.ones((3, 3), np.uint8))
+    return np.asarray(~found & ~np.isin(parts, np.unique(parts[beside > 0])), np.bool_)

@@ -12,7 +12,7 @@ from phone_host.declared_settings import NEAR_M
 from phone_host.model import Rig, Side, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import KittiCameras, is_calib_txt, read_calib_txt
-from phone_host.output.rig_yaml import read_rig
+from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
@@ -84,7 +84,7 @@ def build_core(
         )
         return core, None
     if calibration:
-        rig = read_rig(Path(calibration))
+        rig = read_own_rig(Path(calibration))
         refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
         return StereoCore(
             _matcher(chosen, options.disparities, temporal=temporal), Rectifier(rig), None, wanted

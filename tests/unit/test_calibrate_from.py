@@ -9,17 +9,21 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
+from phone_host.calibration.board_names import board_name, named_board
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.earlier_views import pairs_of, together, views_of
+from phone_host.calibration.earlier_views import board_of, pairs_of, together, views_of
 from phone_host.calibration.pose_only import solve_pose
+from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict, judge
 from phone_host.geometry.se3 import rotations_of, vectors_of
 from phone_host.model import Lens, Rig, Side, TimeOffset
+from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
+from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.verbs.calibrate.arguments import add_arguments
-from phone_host.verbs.calibrate.board import Known, Origin
+from phone_host.verbs.calibrate.board import Known, Named, Origin
 from phone_host.verbs.calibrate.command import run
 from phone_host.verbs.calibrate.earlier import Session, asked_of, calibrated, notes, session_of
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
@@ -134,18 +138,84 @@ def test_what_contradicts_the_earlier_calibration_is_refused(tmp_path: Path) -> 
     board = ("--board", "9x6", "--square", "25mm")
     for given, said in (
         (("--pose-only", *board), "--pose-only keeps the lenses of an earlier calibration: name it: --from rig.yaml"),
-        (("--from", path, "--board", "8x6", "--square", "25mm"), "--board and --square differ"),
-        (("--from", path, "--board", "9x6"), "--square is missing"),
+        (("--from", path, "--board", "8x6", "--square", "25mm"), "--board says 8x6, and the pictures of"),
+        (("--from", path, "--board", "9x6", "--square", "30mm"), "--square says 30 mm, and the pictures of"),
+        (("--from", path, "--square", "30mm"), "leave --square out and show the same board"),
+        (("--from", path, "--pose-only", "--board", "8x6"), "--square is missing"),
         ((), "--square is missing"),
         (("--board", "9x6"), "--square is missing"),
     ):
         with pytest.raises(SettingsError) as caught:
             _session(_options(tmp_path, *given))
         assert said in str(caught.value)
-    assert _session(_options(tmp_path, "--from", path, "--pose-only")).board == BOARD
+    for given in (("--pose-only",), ("--board", "9x6"), ("--board", "auto"), ("--square", "25mm")):
+        assert _session(_options(tmp_path, "--from", path, *given)).board == BOARD
+    small = ("--pose-only", "--board", "8x6", "--square", "30mm")
+    assert _session(_options(tmp_path, "--from", path, *small)).board == Board(8, 6, 0.03)
     bare = str(_written(tmp_path, pairs, with_views=False))
     with pytest.raises(DataError, match="does not hold the corners it was computed from"):
         _session(_options(tmp_path, "--from", bare))
+
+
+def _filed(folder: Path, board: Board) -> Path:
+    """A rig that says it was computed from three views of a board."""
+    corners = np.zeros((3, board.columns * board.rows, 2))
+    views = RigViews(
+        columns=board.columns,
+        rows=board.rows,
+        square_m=board.square_m,
+        names=("1", "2", "3"),
+        left_px=corners,
+        right_px=corners,
+        board=board_name(board),
+    )
+    write_rig(folder / "rig.yaml", unlike_rig(), rectify_rig(unlike_rig()), views)
+    return folder / "rig.yaml"
+
+
+def _another_board(named: Named) -> Known:
+    assert named.board == BOARD
+    raise SettingsError("these boards have 10x7 inner corners, --board says 9x6", "give --board 10x7")
+
+
+def test_another_board_in_the_new_pictures_is_named_as_that(tmp_path: Path) -> None:
+    """Nobody gave --board, so the error does not speak of it but of the file."""
+    options = _options(tmp_path, "--from", str(_filed(tmp_path, BOARD)))
+    with pytest.raises(DataError, match=r"another board than .*rig\.yaml holds"):
+        session_of(options, asked_of(options), _another_board)
+
+
+@pytest.mark.parametrize(
+    "name", ["9x6", "charuco:8x6:27.5mm:20mm:5x5", "aprilgrid:4x3:30mm:9mm", "charuco:5x7:30.125mm:21mm:4x4"]
+)
+def test_the_earlier_calibration_knows_its_board_with_its_marks(tmp_path: Path, name: str) -> None:
+    """--from needs no --board: the file names it, marks included, and its side as it was measured."""
+    board = named_board(name, 28.0)
+    read = read_rig_views(_filed(tmp_path, board))
+    assert read is not None
+    again = board_of(read)
+    assert (again.columns, again.rows, again.square_m) == (board.columns, board.rows, board.square_m)
+    np.testing.assert_allclose(again.points_m(), board.points_m(), rtol=1e-7)
+    assert type(again.marks) is type(board.marks)
+    known = _session(_options(tmp_path, "--from", str(tmp_path / "rig.yaml"), "--board", name)).board
+    assert known == again
+    with pytest.raises(DataError, match="the earlier calibration is 'charuco:9x9"):
+        board_of(replace(read, board="charuco:9x9:28mm:20mm:5x5"))
+    with pytest.raises(DataError, match="the earlier calibration is 'nothing'"):
+        board_of(replace(read, board="nothing"))
+
+
+def test_pictures_of_another_size_are_refused_before_they_are_searched(tmp_path: Path) -> None:
+    """Headers tell the size: no picture is decoded, and the way out holds; --pose-only scales lenses, but not to any shape."""
+    path = str(_filed(tmp_path, BOARD))
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        for number in range(3):
+            (tmp_path / side / f"{number}.png").write_bytes(encoded(".png", np.zeros((48, 64), np.uint8)))
+    with pytest.raises(DataError, match=r"the new left pictures are 64x48 px, .*640x480 px.*alone, without --from"):
+        run(_options(tmp_path, "--from", path))
+    with pytest.raises(DataError, match="right image is 64x48 px, neither a scaling nor a crop"):
+        run(_options(tmp_path, "--from", path, "--pose-only"))
 
 
 def test_the_command_adds_to_a_rig_and_solves_the_pose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -160,6 +230,7 @@ def test_the_command_adds_to_a_rig_and_solves_the_pose(tmp_path: Path, capsys: p
     run(_options(second, "--from", str(first / "new.yaml")))
     views = read_rig_views(second / "new.yaml")
     assert views is not None
+    assert views.board == "9x6"
     assert len(set(views.names)) == len(views.names) == len(pairs_of(views)) > 5
     run(_options(first, "--from", str(second / "new.yaml"), "--pose-only", "--board", "9x6", "--square", "25mm"))
     assert read_rig_views(first / "new.yaml") is None

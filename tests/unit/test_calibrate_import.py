@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.errors import DataError
 from phone_host.cli import main
-from phone_host.output.rig_files.imported import import_rig
+from phone_host.output.rig_files.imported import import_rig, read_own_rig
 from phone_host.output.rig_yaml import read_rig
 from tests.unit.test_report_keys import _described, _keys
 from tests.unit.test_rig_files import KALIBR
@@ -76,7 +77,7 @@ def test_a_rig_is_exported_into_folders_beside_it(
         (["--import", "C", "--size", "640x480,1x1,2x2"], 2, "--size is"),
         (["--import", "C", "--size", "320x240"], 4, "is for images of 640x480 px, and --size says otherwise"),
         (["--import", "C", "--unit", "1km"], 2, "--unit is"),
-        (["--import", "C", "--unit", "1mm"], 4, "puts the cameras 0.00012 m apart"),
+        (["--import", "C", "--unit", "1mm"], 4, "puts the cameras 0.12 mm apart"),
         (["--import", "C", "C", "C"], 2, "--import has 3 files"),
         (["--import", "missing.yaml"], 4, "missing.yaml cannot be read"),
     ],
@@ -110,3 +111,49 @@ def test_nothing_foreign_is_replaced(chain: Path, tmp_path: Path, capsys: pytest
             == code
         )
     assert (letter.read_text(), theirs.read_text(), chain.read_text()) == ("dear", _UPRIGHT, _UPRIGHT)
+
+
+def test_the_calibration_of_another_program_is_not_taken_for_rig_yaml(
+    chain: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """--calibration with a file or folder of Kalibr, ROS, EuRoC, COLMAP: the error names the command that imports it. JSON is nobody's."""
+    kinds = ("ros", "kalibr", "euroc", "colmap", "opencv-xml")
+    out = tmp_path / "rig.yaml"
+    _told(
+        capsys, "calibrate", "--import", chain, *(word for kind in kinds for word in ("--export", kind)), "--out", out
+    )
+    for kind, file, given in (
+        ("ros", "ros/left.yaml", "ros"),
+        ("ros", "ros", "ros"),
+        ("kalibr", "kalibr/camchain.yaml", "kalibr/camchain.yaml"),
+        ("euroc", "euroc/cam1/sensor.yaml", "euroc"),
+        ("colmap", "colmap/images.txt", "colmap"),
+        ("opencv", "opencv-xml/stereo.xml", "opencv-xml/stereo.xml"),
+    ):
+        with pytest.raises(DataError) as caught:
+            read_own_rig(tmp_path / file)
+        assert f"is the calibration of another program ({kind})" in caught.value.problem
+        assert caught.value.remedy == f"make one: phone-host calibrate --import {tmp_path / given} --out rig.yaml"
+    (tmp_path / "ros" / "left.yaml").rename(tmp_path / "it is.yaml")
+    with pytest.raises(DataError) as caught:
+        read_own_rig(tmp_path / "it is.yaml")
+    assert caught.value.remedy.endswith(f"--import '{tmp_path / 'it is.yaml'}' OTHER --out rig.yaml")
+    (tmp_path / "rig.json").write_text('{"R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "T": [1, 2, 3]}')
+    with pytest.raises(DataError, match="is not a calibration file"):
+        read_own_rig(tmp_path / "rig.json")
+    assert read_own_rig(out).left.width_px == 640
+    assert main(["measure", "a.png", "b.png", "--calibration", str(chain), "--points", "1,1"]) == 4
+
+
+def test_an_import_says_what_looks_wrong(chain: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A wrong unit makes cameras that hardly any rig has; a rejected rig stays rejected; a calib.txt is for rectified images of one size."""
+    out = tmp_path / "rig.yaml"
+    assert main(["calibrate", "--import", str(chain), "--unit", "50m", "--out", str(out)]) == 0
+    assert "note     cameras 6000 mm apart are unusual: check the unit" in capsys.readouterr().out
+    assert main(["calibrate", "--import", str(chain), "--out", str(out), "--export", "kitti"]) == 0
+    told = capsys.readouterr().out
+    assert "unusual" not in told
+    assert "for rectified images of " in told
+    out.write_text(out.read_text() + "verdict: reject\n")
+    assert main(["calibrate", "--import", str(out), "--out", str(tmp_path / "again.yaml")]) == 0
+    assert "verdict  reject\nrun and stereo refuse this calibration" in capsys.readouterr().out

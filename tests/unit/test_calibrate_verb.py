@@ -150,3 +150,23 @@ def test_a_square_without_a_unit_that_no_board_has_is_refused(tmp_path: Path, sq
     given = ["none", "none", "--board", "9x6", "--square", square, "--out", str(tmp_path / "rig.yaml")]
     with pytest.raises(SettingsError, match=rf"write {float(square) * 1000:g}mm or {square}m"):
         run(parser.parse_args(given))
+
+
+@pytest.mark.parametrize(
+    ("paint", "said"),
+    [
+        (None, "these images show a chessboard of 9x6 inner corners: leave --board out, and give --square"),
+        (90, "no chessboard is seen in 8 images: check --board: it counts squares (of an AprilGrid tags)"),
+    ],
+)
+def test_marks_that_are_not_there_are_not_called_a_chessboard(
+    tmp_path: Path, paint: int | None, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """--board charuco:... of pictures that show a chessboard, or nothing: the error says what they show, and what the option counts."""
+    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    for path in folder.glob("*/*.png") if paint is not None else ():
+        path.write_bytes(encoded(".png", np.full((240, 320), paint, np.uint8)))
+    with pytest.raises(DataError) as caught:
+        _calibrate(folder, "--board", "charuco:8x6:25mm:18mm:5x5")
+    assert said in str(caught.value)
+    assert "too few of the board's marks are seen in either image" in capsys.readouterr().out

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.errors import DataError
+from common.errors import SettingsError
 from phone_host.model import Crop, DepthLimits, Disparity, StereoGeometry
 from phone_host.stereo.depth_limits import (
     DepthWanted,
@@ -115,5 +115,5 @@ def test_a_crop_is_cut_to_the_image_and_refused_outside() -> None:
     """What reaches beyond the image is left out; what lies outside altogether is a mistake."""
     inside = crop_inside(Crop(x_px=50, y_px=10, width_px=100, height_px=10), 64, 32)
     assert inside == Crop(x_px=50, y_px=10, width_px=14, height_px=10)
-    with pytest.raises(DataError, match=r"--crop 64,0,10,10 lies outside .* 64x32 px"):
+    with pytest.raises(SettingsError, match=r"--crop 64,0,10,10 lies outside .* 64x32 px"):
         crop_inside(Crop(x_px=64, y_px=0, width_px=10, height_px=10), 64, 32)

@@ -14,6 +14,7 @@ from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.docs import troubleshooting
 from tests.docs.commands import ROOT, Command, documented, pages
+from tests.docs.imports import PICTURE, reduced, rooms
 from tests.docs.message_texts import Code
 from tests.support.rigs import unlike_rig
 from tests.support.samples import LEDGER
@@ -88,3 +89,11 @@ def test_readme_is_one_screen() -> None:
 def _verbs(parser: argparse.ArgumentParser) -> set[str]:
     actions = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
     return {name for action in actions for name in action.choices}
+
+
+def test_the_picture_of_imports_is_of_this_code() -> None:
+    """Each room of phone_host and each import that no other implies; `python -m tests.docs.imports` draws it anew."""
+    drawn = set(re.findall(r"<title>([\w&#;]+)</title>", PICTURE.read_text(encoding="utf-8"))) - {"imports"}
+    graph = reduced(rooms())
+    assert drawn == graph.keys() | {f"{room}&#45;&gt;{other}" for room in graph for other in graph[room]}
+    assert "geometry" in drawn

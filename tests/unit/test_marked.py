@@ -172,6 +172,14 @@ def test_what_names_no_board_is_refused(text: str, said: str) -> None:
         named_board(text, None)
 
 
+def test_a_square_that_contradicts_the_boards_name_is_refused() -> None:
+    """A print is some per cent off; half as large again is another board, or a slip."""
+    with pytest.raises(SettingsError, match="--square is 40 mm, and --board says 25 mm: measure it again"):
+        named_board("charuco:10x8:25mm:18mm:5x5", 40.0)
+    with pytest.raises(SettingsError, match=r"--square is 2\.5 mm, and --board says 30 mm"):
+        named_board("aprilgrid:5x4:30mm:9mm", 2.5)
+
+
 def test_an_aprilgrid_has_gaps() -> None:
     """Its corners lie a tag and a gap apart in turn."""
     x = np.unique(_GRID.points_m()[:, 0])

@@ -66,7 +66,7 @@ def test_distances_hold_the_truth(folder: Path, capsys: pytest.CaptureFixture[st
         assert np.linalg.norm(point["point_mm"]) == pytest.approx(point["distance_mm"]["value"], abs=0.01)
     for part, (one, other) in zip(told["between"], pairwise(true), strict=True):
         assert part["length_mm"]["low"] < float(np.linalg.norm(one - other)) < part["length_mm"]["high"]
-    assert _keys(told) <= _described("What `--json` prints", "What `measure --json` prints")
+    assert _keys(told) <= _described("What `--json` prints", "What `measure` prints as JSON")
     assert told["uncertainty"]["includes"] == ["noise of both images", "the rig's zero (zero_sigma)"]
 
 
@@ -101,6 +101,31 @@ def test_what_cannot_be_measured_is_told_in_one_line(
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+def test_one_bad_point_leaves_the_others(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The second of three points is outside of what both cameras see: it is named, the others are told as they are without it, and the exit code is 4."""
+    assert _measure(folder, "--points", "100,120", "1,1", "150,180", "--json") == 4
+    told: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert "problem" in told["points"][1]
+    assert [part["length_mm"] for part in told["between"]] == [None, None]
+    assert _keys(told) <= _described("What `--json` prints", "What `measure` prints as JSON")
+    assert _measure(folder, "--points", "100,120", "150,180", "--json") == 0
+    alone: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert [told["points"][0], told["points"][2]] == alone["points"]
+    assert _measure(folder, "--points", "100,120", "1,1") == 4
+    lines = capsys.readouterr().out.splitlines()
+    assert "mm away" in lines[0]
+    assert lines[1].startswith("point 2  at 1,1 px: not measured: it ")
+    assert lines[2] == "1 to 2   not measured"
+    assert lines[3].startswith("remedy   choose a point")
+
+
+def test_a_far_from_certain_rig_is_named_as_the_reason(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """zero_sigma of 2 px makes the limits wide, and the line says so."""
+    _write(folder / "vague.yaml", replace(small_rig(), zero_sigma_px=2.0))
+    assert _measure(folder, "--points", "100,120", rig="vague.yaml") == 0
+    assert "; uncertain, because the rig's zero is uncertain" in capsys.readouterr().out
 
 
 def test_exchanged_images_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from phone_host.cli import main
+from phone_host.model import Processed
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK, plane_scene, unlike_rig
 from phone_host.scene.scene_model import Body, Box, Scene, Texture, rig_poses, rotation
 from phone_host.scene.scene_render import render
+from phone_host.stereo.core import StereoCore
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.boards import BOARD, render_pair
 from tests.support.html import Page
@@ -53,6 +55,28 @@ def report_of(out: Path) -> dict[str, Any]:
     """What it wrote."""
     report: dict[str, Any] = json.loads((out / "report.json").read_text())
     return report
+
+
+def test_what_was_measured_before_ctrl_c_is_written(
+    room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C during the second pair: exit 130, and report and page of the first one, which say so. During the first one nothing is written."""
+    core, calls = StereoCore.compute, iter((False, True, True))
+
+    def compute(self: StereoCore, *given: Any, **named: Any) -> Processed:
+        if next(calls):
+            raise KeyboardInterrupt
+        return core(self, *given, **named)
+
+    monkeypatch.setattr(StereoCore, "compute", compute)
+    given = [str(room / "left"), str(room / "right"), "--out"]
+    assert run(room, *given, str(tmp_path / "o")) == 130
+    report = report_of(tmp_path / "o")
+    assert (report["interrupted_of"], len(report["pairs"])) == (2, 1)
+    assert report["headline"].startswith("Interrupted after 1 of 2 pairs. At ")
+    assert "Interrupted after 1 of 2 pairs" in (tmp_path / "o" / "index.html").read_text()
+    assert run(room, *given, str(tmp_path / "none")) == 130
+    assert not (tmp_path / "none").exists()
 
 
 def test_walls_at_known_distances(room: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -195,5 +219,5 @@ def test_what_has_no_metres_or_region_is_refused(
     assert "neither a focal length nor a baseline" in capsys.readouterr().err
     assert main(["quality", *images, *out]) == 2
     assert "neither --calibration nor --rectified" in capsys.readouterr().err
-    assert run(room, *images, "--roi", "5000,0,10,10", *out) == 4
+    assert run(room, *images, "--roi", "5000,0,10,10", *out) == 2
     assert "--roi 5000,0,10,10 lies outside" in capsys.readouterr().err

@@ -91,11 +91,14 @@ def test_a_quality_of_failed_pairs_only_has_no_table() -> None:
 
 
 def test_a_page_of_very_many_pairs_holds_the_maps_of_the_first_thirty() -> None:
-    """Of 31 walls the page shows 30 pictures and says so."""
+    """Of 31 walls the page shows 30 pictures and says so, and so does the terminal."""
     wall = pair("wall.png", quality(1.0, 1.0))
     page = Page(quality_page(report(*[wall] * 31)))
     assert "maps are those of the first 30 pairs; report.json has the tiles of all" in page.words
     assert len(page.every("img")) == 30
+    assert "note: maps are those of the first 30 pairs; report.json has the tiles of all" in quality_lines(
+        report(*[wall] * 31), "out"
+    )
 
 
 def test_a_gain_that_cannot_be_tells_no_levels() -> None:

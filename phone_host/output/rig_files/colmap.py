@@ -28,7 +28,7 @@ _CENTRE_PX: Final = 0.5
 
 _QUATERNION_TOLERANCE: Final = 1e-3
 _POSE_WORDS: Final = 10
-_CAMERA_LINE: Final = re.compile(r"\s*\d+\s+[A-Z][A-Z_]+\s+\d+\s+\d+\s+\S.*")
+_CAMERA_LINE: Final = re.compile(r"\s*\d+\s+[A-Z][A-Z_]+\s+-?\d+\s+-?\d+\s+\S.*")
 _IMAGE_LINE: Final = re.compile(r"\s*\d+(?:\s+[-+.\deE]+){7}\s+\d+\s+\S.*")
 
 

@@ -1,10 +1,14 @@
 """Reads a calibration of any known kind. Which kind it is, its content tells; its name tells nothing."""
 
+import shlex
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from common.errors import DataError, SettingsError
 from common.files import read_whole
@@ -29,6 +33,9 @@ _MOST_BYTES: Final = 16 << 20
 
 _MOST_YAML_BYTES: Final = 1 << 20
 _NO_UNIT_M: Final = 1.0
+_USUAL_BASELINE_M: Final = (0.01, 2.0)
+"""From two endoscopes to two cameras on a car's roof."""
+
 _REMEDY: Final = "give files of rig.yaml, ROS, Kalibr, OpenCV, COLMAP, EuRoC, Middlebury, ETH3D or KITTI"
 
 
@@ -99,6 +106,60 @@ def files_of(given: tuple[Path, ...]) -> tuple[Path, ...]:
     raise DataError(f"{given[0]} holds no calibration with a usual name", _REMEDY)
 
 
+def read_own_rig(path: Path) -> Rig:
+    """Read a rig.yaml; for the calibration of another program, say how to make one of it.
+
+    Args:
+        path: the file.
+
+    Raises:
+        DataError: as `read_rig`, or it is another program's.
+    """
+    try:
+        return read_rig(path)
+    except DataError as error:
+        kind = _foreign_kind(path)
+        if kind is None:
+            raise
+        given = shlex.join(map(str, _to_import(path, kind)))
+        raise DataError(
+            f"{path} is the calibration of another program ({kind.value}), not a rig.yaml",
+            f"make one: phone-host calibrate --import {given} --out rig.yaml",
+        ) from error
+
+
+def _foreign_kind(path: Path) -> RigKind | None:
+    """Tell by its content whose calibration a file or folder is, or is a part of; None: nobody's, or this program's."""
+    try:
+        text = _text(files_of((path,))[0])
+        if is_cameras(text) or is_images(text):
+            return RigKind.COLMAP
+        node = _node(text, str(path))
+    except DataError:
+        return None
+    kinds = ((RigKind.ROS, is_ros), (RigKind.EUROC, is_euroc), (RigKind.KALIBR, is_kalibr), (RigKind.OPENCV, is_opencv))
+    is_other = node.has("format_version") or text.lstrip().startswith("{")  # JSON is none of them
+    return None if is_other else next((kind for kind, is_kind in kinds if is_kind(node)), None)
+
+
+def _to_import(path: Path, kind: RigKind) -> tuple[Path, ...]:
+    """Return what to import for a file that may be one of two: the folder that holds both, if they have the usual names."""
+    for folder in (path, path.parent, path.parent.parent):
+        with suppress(DataError):
+            found = files_of((folder,))
+            if kind_of(path) is Kind.FOLDER or (path in found and len(found) > 1):
+                return (folder,)
+    return (path,) if kind in {RigKind.KALIBR, RigKind.OPENCV} else (path, Path("OTHER"))
+
+
+def _unusual(rig: Rig) -> tuple[str, ...]:
+    """Return a note if hardly any rig is so wide or so narrow."""
+    baseline_m = float(np.linalg.norm(rig.t_right_left_m))
+    if _USUAL_BASELINE_M[0] <= baseline_m <= _USUAL_BASELINE_M[1]:
+        return ()
+    return (f"cameras {baseline_m * 1e3:.4g} mm apart are unusual: check the unit of the file's lengths (--unit)",)
+
+
 def import_rig(
     given: tuple[Path, ...],
     unit_m: float | None = None,
@@ -131,15 +192,17 @@ def import_rig(
         stated = stated.exchanged()
         aside = f"the second camera stands left of the first: {stated.left.name} is the left one"
         rig = rig_of(stated, _NO_UNIT_M if unit_m is None else unit_m, None if sizes_px is None else sizes_px[::-1])
-        return Imported(kind, paths, rig, (*stated.notes, aside))
-    return Imported(kind, paths, rig_of(stated, _NO_UNIT_M if unit_m is None else unit_m, sizes_px), stated.notes)
+        return Imported(kind, paths, rig, (*stated.notes, aside, *_unusual(rig)))
+    rig = rig_of(stated, _NO_UNIT_M if unit_m is None else unit_m, sizes_px)
+    return Imported(kind, paths, rig, (*stated.notes, *_unusual(rig)))
 
 
 def _rectified(path: Path, sizes_px: tuple[tuple[int, int], tuple[int, int]] | None) -> Imported:
     found = read_calib_txt(path)
     kind = RigKind.MIDDLEBURY if found.cameras.startswith("cam0") else RigKind.KITTI
     stated = stated_of_geometry(found.geometry, found.size_px, str(path), found.cameras)
-    return Imported(kind, (path,), rig_of(stated, _NO_UNIT_M, sizes_px), stated.notes)
+    rig = rig_of(stated, _NO_UNIT_M, sizes_px)
+    return Imported(kind, (path,), rig, (*stated.notes, *_unusual(rig)))
 
 
 def _text(path: Path) -> str:

@@ -117,9 +117,10 @@ def rig_of(stated: StatedRig, unit_m: float, sizes_px: tuple[tuple[int, int], tu
     """
     length_m = float(np.linalg.norm(stated.t_right_left)) * unit_m
     if not _BASELINE_M[0] <= length_m <= _BASELINE_M[1]:
+        apart = f"{length_m * 1e3:g} mm" if 0 < length_m < 1 else f"{length_m:g} m"
         raise DataError(
-            f"{stated.name} puts the cameras {length_m:g} m apart",
-            "check which two cameras they are, and give --unit if lengths are in mm or in squares, such as --unit 1mm",
+            f"{stated.name} puts the cameras {apart} apart",
+            "check which two cameras they are, and --unit: it says what 1 in the file is, such as 1mm; without it, 1 m",
         )
     left_px, right_px = sizes_px or (None, None)
     return Rig(

@@ -7,7 +7,7 @@ from typing import Final
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
 
-SUMMARY = "calibrate two cameras from pictures of a chessboard"
+SUMMARY = "calibrate two cameras from pictures of a board"
 
 EXAMPLES = """  phone-host calibrate left/ right/ --square 25mm --out rig.yaml    # the board's size is found in the pictures
   phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
+from common.errors import DataError
 from phone_host.calibration.board_names import named_board, no_square
 from phone_host.calibration.board_size import require_size, size_in_files, size_text
 from phone_host.calibration.marked import Charuco
@@ -13,6 +14,15 @@ from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.units import square_mm
 
 AUTO: Final = "auto"
+
+_COUNT_CORNERS: Final = (
+    "check --board: it counts inner corners, one less than the squares each way (10x7 squares are --board 9x6); or take 15 or"
+    " more pairs with the whole board sharp in both images"
+)
+_COUNT_MARKS: Final = (
+    "check --board: it counts squares (of an AprilGrid tags) and names the marks' family; or take 15 or more pairs with the"
+    " marks sharp in both images"
+)
 
 
 class Origin(Enum):
@@ -62,13 +72,11 @@ class Known:
 
     def as_line(self) -> str:
         """Return it for the summary."""
-        if self.board.marks is not None:
-            kind = "ChArUco board" if isinstance(self.board.marks, Charuco) else "AprilGrid"
-            size = size_text((self.board.columns, self.board.rows))
-            return f"board    {kind} of {size} corners, as --board says; squares of {self.board.square_m * 1e3:g} mm"
-        said = _SAID[self.origin]
+        marks = self.board.marks
+        kind = "" if marks is None else "ChArUco board of " if isinstance(marks, Charuco) else "AprilGrid of "
+        what = "inner corners" if marks is None else "corners"
         size = size_text((self.board.columns, self.board.rows))
-        return f"board    {size} inner corners, {said}; squares of {self.board.square_m * 1e3:g} mm"
+        return f"board    {kind}{size} {what}, {_SAID[self.origin]}; squares of {self.board.square_m * 1e3:g} mm"
 
 
 def named(board: str, square: str | None) -> Named:
@@ -111,3 +119,20 @@ def board_in(files: ViewFiles, named: Named, most_pixels: int) -> Known:
             return Known(named.board, Origin.OPTION)
         columns, rows = size_in_files(files, most_pixels)
     return Known(Board(columns, rows, named.square_mm / 1000), Origin.IMAGES)
+
+
+def unseen_remedy(files: ViewFiles, board: Board, most_pixels: int) -> str:
+    """Say what to do where a board was hardly found: for one with marks also what the images show instead.
+
+    Args:
+        files: the pairs of files.
+        board: the board that was looked for.
+        most_pixels: an image that claims more is passed over.
+    """
+    if board.marks is None:
+        return _COUNT_CORNERS
+    try:
+        size = size_text(size_in_files(files, most_pixels))
+    except DataError as error:
+        return f"{error.problem}: {_COUNT_MARKS}"
+    return f"these images show a chessboard of {size} inner corners: leave --board out, and give --square"

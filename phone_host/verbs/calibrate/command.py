@@ -1,4 +1,4 @@
-"""phone-host calibrate: calibrate two cameras from pictures of a chessboard."""
+"""phone-host calibrate: calibrate two cameras from pictures of a board."""
 
 import argparse
 import math
@@ -25,13 +25,14 @@ from phone_host.output.rig_yaml import REJECTED, is_rig, read_rig, write_rig
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files
-from phone_host.verbs.calibrate.board import Known, board_in
+from phone_host.verbs.calibrate.board import Known, board_in, unseen_remedy
 from phone_host.verbs.calibrate.cause import calibrated_as_last, cause_report, with_cause
 from phone_host.verbs.calibrate.earlier import (
     Session,
     asked_of,
     calibrated,
     notes,
+    require_first_sizes,
     saved_views,
     session_of,
     with_earlier_cameras,
@@ -53,14 +54,10 @@ from phone_host.verbs.units import baseline_mm
 
 _CHECK_FAILED = 4
 _NOT_FOUND = frozenset({Reason.NOT_FOUND_LEFT, Reason.NOT_FOUND_RIGHT, Reason.NOT_FOUND_BOTH})
-_COUNT_CORNERS = (
-    "check --board: it counts inner corners, one less than the squares each way (10x7 squares are --board 9x6); or take 15 or"
-    " more pairs with the whole board sharp in both images"
-)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Find the chessboard in all pairs, calibrate, judge and write; or import what another program calibrated."""
+    """Find the board in all pairs, calibrate, judge and write; or import what another program calibrated."""
     if options.imported:
         return import_calibration(options)
     require_pictures(options)
@@ -70,6 +67,7 @@ def run(options: argparse.Namespace) -> int:
     if kind_of(options.out) is not Kind.MISSING and not is_rig(options.out):
         raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
     files = pair_files(*two_lists(options.images))
+    require_first_sizes(files, asked, options, mounted)
     keep_other_report(options.out.parent, "calibrate")
     claim_names(options.out.parent, options.out, "report.json")
     beside = cameras_beside(files, mounted)
@@ -95,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     exported: list[str] = []
     if found.rectification is not None:
         report |= write_exports(options, rig, found.rectification)
-        exported = export_lines(report)
+        exported = export_lines(report, found.rectification)
     _write_report(options.out, report)
     said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
     _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported])
@@ -143,7 +141,10 @@ def _report_failure(
         DataError: always: why there is none.
     """
     unseen = sum(each.reason in _NOT_FOUND for each in views.rejected)
-    error = DataError(failure.problem, _COUNT_CORNERS) if 2 * unseen > len(files.pairs) else failure
+    error = failure
+    if 2 * unseen > len(files.pairs):
+        limit = most_pixels(None, options.max_megapixels)
+        error = DataError(failure.problem, unseen_remedy(files, known.board, limit))
     report = report_of_failure(files, views, error) | known.as_report() | _write_rig(options.out, None)
     _write_report(options.out, report)
     _tell(

@@ -7,17 +7,23 @@ from pathlib import Path
 
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
-from phone_host.calibration.board_names import no_square
+from phone_host.calibration.board_names import board_name, named_board
 from phone_host.calibration.board_pairs import BoardPair, Calibration
+from phone_host.calibration.board_views import Mounted
 from phone_host.calibration.calibrate import Sizes, calibrate
+from phone_host.calibration.cameras_beside import first_sizes
 from phone_host.calibration.earlier_views import board_of, new_ones, pairs_of, together, views_of
 from phone_host.calibration.pose_only import solve_pose
 from phone_host.calibration.target import Board
 from phone_host.model import CameraModel, Rig, Side
+from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.output.rig_views import RigViews
-from phone_host.output.rig_yaml import read_rig, read_rig_views
+from phone_host.output.rig_yaml import read_rig_views
+from phone_host.settings import most_pixels
 from phone_host.stereo.scaled_rig import is_scaling, scaled_rig
+from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.board import AUTO, Known, Named, Origin, named
+from phone_host.verbs.units import square_mm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,77 +45,103 @@ class Session:
     views: RigViews | None = None
 
 
-def asked_of(options: argparse.Namespace) -> Named | None:
-    """Read --board and --square; None: they are to be those of the earlier calibration.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What the options ask for, with what the earlier calibration says.
 
-    Raises:
-        SettingsError: one of them is missing or not valid.
+    Attributes:
+        named: the board.
+        rig: the earlier calibration; None: there is none.
+        views: what it was computed from; None: not known.
     """
-    if options.earlier is not None and options.board is None and options.square is None:
-        return None
-    return named(options.board or AUTO, options.square)
+
+    named: Named
+    rig: Rig | None = None
+    views: RigViews | None = None
 
 
-def session_of(
-    options: argparse.Namespace, asked: Named | None, find: Callable[[Named], Known]
-) -> tuple[Session, Known]:
-    """Find the board, and read the earlier calibration if there is one.
-
-    Args:
-        options: the command's.
-        asked: what they say of the board.
-        find: finds a board in the new pictures, or checks it there.
+def asked_of(options: argparse.Namespace) -> Asked:
+    """Read --board and --square, and the earlier calibration if there is one.
 
     Raises:
-        SettingsError: an option is missing or contradicts the earlier calibration or the pictures.
-        DataError: the earlier calibration cannot be added to, or the pictures show no board.
+        SettingsError: one of them is missing, not valid, or contradicts the earlier calibration.
+        DataError: the earlier calibration cannot be read or added to.
     """
     if options.earlier is None:
         if options.pose_only:
             raise SettingsError("--pose-only keeps the lenses of an earlier calibration", "name it: --from rig.yaml")
-        known = find(asked or named(AUTO, options.square))
-        return Session(board=known.board, side=Side(options.board_side or Side.LEFT.value), path=Path()), known
-    rig, views = read_rig(options.earlier), read_rig_views(options.earlier)
+        return Asked(named=named(options.board or AUTO, options.square))
+    rig, views = read_own_rig(options.earlier), read_rig_views(options.earlier)
     if views is None and not options.pose_only:
         raise DataError(
             f"{options.earlier} does not hold the corners it was computed from",
             "calibrate from all pictures together, or give --pose-only to keep its lenses",
         )
-    known = _known(options, asked, views, find)
+    asked = named(options.board or AUTO, options.square) if views is None else _named_again(options, board_of(views))
+    return Asked(named=asked, rig=rig, views=views)
+
+
+def _named_again(options: argparse.Namespace, before: Board) -> Named:
+    """Return the board, where what is not said is as it was."""
+    text = (options.board or AUTO).strip()
+    if options.pose_only and options.square is not None:
+        return named(text, options.square)
+    side_mm = _mm(before) if options.square is None else square_mm(options.square)
+    given = before if text.lower() == AUTO else named_board(text, side_mm)
+    if options.pose_only and board_name(given) != board_name(before):
+        return named(text, None)  # another board has a square of its own
+    for option, now, earlier in (
+        ("--board", board_name(replace(given, square_m=before.square_m)), board_name(before)),
+        ("--square", f"{side_mm:g} mm", f"{_mm(before):g} mm"),
+    ):
+        if now != earlier:
+            raise SettingsError(
+                f"{option} says {now}, and the pictures of {options.earlier} show {earlier}",
+                f"leave {option} out and show the same board, or calibrate without --from",
+            )
+    return Named(before, _mm(before))
+
+
+def _mm(board: Board) -> float:
+    return board.square_m * 1e3
+
+
+def session_of(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Known]) -> tuple[Session, Known]:
+    """Find the board, and join what is known of the earlier calibration.
+
+    Args:
+        options: the command's.
+        asked: what they say.
+        find: finds a board in the new pictures, or checks it there.
+
+    Raises:
+        SettingsError: an option contradicts the pictures.
+        DataError: the pictures show no board, or another one than the earlier ones.
+    """
+    known = find(asked.named) if asked.views is None else _known(options, asked, find)
+    if asked.rig is None:
+        return Session(board=known.board, side=Side(options.board_side or Side.LEFT.value), path=Path()), known
     session = Session(
         board=known.board,
-        side=Side(options.board_side or rig.board_side.value),
+        side=Side(options.board_side or asked.rig.board_side.value),
         path=options.earlier,
-        rig=rig,
-        views=None if options.pose_only else views,
+        rig=asked.rig,
+        views=None if options.pose_only else asked.views,
     )
     return session, known
 
 
-def _known(
-    options: argparse.Namespace, asked: Named | None, views: RigViews | None, find: Callable[[Named], Known]
-) -> Known:
-    if asked is None and views is None:
-        raise no_square()
-    if asked is None:
-        assert views is not None
-        return Known(board_of(views), Origin.EARLIER)
-    known = find(asked)
-    if views is None or options.pose_only:
-        return known
-    before = board_of(views)
-    if _turned(known.board) == before and known.origin is Origin.IMAGES:
-        return Known(before, known.origin)
-    if replace(known.board, marks=None) != before:
-        raise SettingsError(
-            f"--board and --square differ from those of {options.earlier}", "leave them out, and show the same board"
-        )
-    return known
-
-
-def _turned(board: Board) -> Board:
-    """The same board, held the other way."""
-    return replace(board, columns=board.rows, rows=board.columns)
+def _known(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Known]) -> Known:
+    """Find the board; one that is not named is that of the earlier calibration."""
+    if options.board is not None or options.square is not None:
+        return find(asked.named)
+    try:
+        return replace(find(asked.named), origin=Origin.EARLIER)
+    except SettingsError as error:
+        raise DataError(
+            f"the new pictures show another board than {options.earlier} holds",
+            "show the same board, or calibrate without --from",
+        ) from error
 
 
 def calibrated(session: Session, pairs: list[BoardPair], sizes_px: Sizes) -> Calibration:
@@ -124,7 +156,7 @@ def calibrated(session: Session, pairs: list[BoardPair], sizes_px: Sizes) -> Cal
         earlier = scaled_rig(session.rig, *sizes_px)
         found = solve_pose(pairs, session.board, replace(earlier, board_side=session.side))
     else:
-        _require_sizes(session, sizes_px)
+        _require_sizes(session.rig, session.path, sizes_px)
         earlier_pairs = pairs_of(session.views)
         fresh = new_ones(earlier_pairs, pairs)
         if pairs and not fresh:
@@ -173,13 +205,29 @@ def notes(session: Session, pairs: list[BoardPair], sizes_px: Sizes) -> list[str
     return rows
 
 
-def _require_sizes(session: Session, sizes_px: Sizes) -> None:
-    assert session.rig is not None
-    for side, model, size_px in (("left", session.rig.left, sizes_px[0]), ("right", session.rig.right, sizes_px[1])):
+def require_first_sizes(files: ViewFiles, asked: Asked, options: argparse.Namespace, mounted: Mounted) -> None:
+    """Check the size of the first pictures before all of them are searched for a board.
+
+    Raises:
+        DataError: the earlier calibration is for images of another size.
+    """
+    if asked.rig is None:
+        return
+    sizes_px = first_sizes(files, most_pixels(None, options.max_megapixels), mounted)
+    if sizes_px is None:
+        return
+    if options.pose_only:
+        scaled_rig(asked.rig, *sizes_px)
+    else:
+        _require_sizes(asked.rig, options.earlier, sizes_px)
+
+
+def _require_sizes(rig: Rig, path: Path, sizes_px: Sizes) -> None:
+    for side, model, size_px in (("left", rig.left, sizes_px[0]), ("right", rig.right, sizes_px[1])):
         if size_px != _size(model):
             raise DataError(
-                f"the new {side} pictures are {size_text(size_px)} px, those of {session.path} {size_text(_size(model))} px",
-                "take them at that size, or give --pose-only, which scales the lenses",
+                f"the new {side} pictures are {size_text(size_px)} px, those of {path} {size_text(_size(model))} px",
+                "take them at that size, or calibrate from them alone, without --from",
             )
 
 

@@ -14,7 +14,7 @@ from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import BoardViews, turn_text
 from phone_host.calibration.fit_quality import LensTrial
-from phone_host.calibration.verdict import Assessment
+from phone_host.calibration.verdict import SHARE_GOOD, Assessment
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import Rectification, Rig
 from phone_host.output.rig_yaml import REJECTED
@@ -22,6 +22,7 @@ from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.stereo.working import chosen_scale
+from phone_host.verbs.calibrate.importing import REFUSED
 
 _WHOLE_METRES = 10.0
 """From here on a limit in tenths of a metre says nothing."""
@@ -217,7 +218,7 @@ def summary(
     rows.append(f"RMS      left {rms['left']:.3f}, right {rms['right']:.3f}, stereo {rms['stereo']:.3f} px")
     if vertical["p95"] is not None:
         rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
-    rows.append(f"baseline {report['baseline_mm']:.2f} +- {_sigma_mm(calibration.baseline_sigma_m)} mm")
+    rows.append(_baseline_row(report["baseline_mm"], calibration.baseline_sigma_m))
     rows.append("         compare it with a ruler: it shows a wrong --square")
     rows += _lens_rows(calibration)
     if calibration.depths:
@@ -241,6 +242,12 @@ def summary(
     return [*rows, *_written(report, calibration, out)]
 
 
+def _baseline_row(baseline_mm: float, sigma_m: float) -> str:
+    share = sigma_m * 1e3 / baseline_mm
+    vague = f": uncertain by {share:.0%}, and so is every depth" if share > SHARE_GOOD else ""
+    return f"baseline {baseline_mm:.2f} +- {_sigma_mm(sigma_m)} mm{vague}"
+
+
 def _lens_rows(calibration: Calibration) -> list[str]:
     """Return one line on the lenses, if one of them is not the usual one."""
     if all(bend in {Bend.RADIAL, Bend.USUAL} for bend in calibration.bends):
@@ -257,5 +264,5 @@ def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> lis
         return unwritten(report, out)
     rows = [f"written to {out} and {out.with_name('report.json')}{_earlier(report)}"]
     if report["verdict"] == REJECTED:
-        rows.append("run and stereo refuse this calibration unless --use-rejected-rig is given")
+        rows.append(REFUSED)
     return rows

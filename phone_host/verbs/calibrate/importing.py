@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.errors import SettingsError, UnavailableError
+from common.imagesize.head import size_text
 from common.places import Kind, kind_of, make_folder, resolved
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
@@ -16,7 +17,7 @@ from phone_host.model import Rectification, Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import Imported, RigKind, export_texts, import_rig
-from phone_host.output.rig_yaml import is_rig, write_rig
+from phone_host.output.rig_yaml import REJECTED, is_rig, write_rig
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
@@ -26,6 +27,9 @@ Sizes = tuple[tuple[int, int], tuple[int, int]]
 
 _SIZE: Final = re.compile(r"([1-9]\d{0,5})x([1-9]\d{0,5})", re.ASCII)
 _REPORT: Final = "report.json"
+_OF_RECTIFIED: Final = frozenset({RigKind.MIDDLEBURY.value, RigKind.KITTI.value})
+
+REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
 
 
 def require_pictures(options: argparse.Namespace) -> None:
@@ -77,7 +81,13 @@ def import_calibration(options: argparse.Namespace) -> int:
     if options.json:
         print(json_text(report))
     else:
-        say([*_lines(found, report), *export_lines(report), *([] if same else [f"written to {options.out}"])])
+        say(
+            [
+                *_lines(found, report),
+                *export_lines(report, rectification),
+                *([] if same else [f"written to {options.out}"]),
+            ]
+        )
     return 0
 
 
@@ -131,6 +141,8 @@ def _lines(found: Imported, report: dict[str, Any]) -> list[str]:
         f"focal    left {focal['left'][0]:.1f}, right {focal['right'][0]:.1f} px",
         f"baseline {report['baseline_mm']:.2f} mm",
         "         compare it with a ruler: it shows a wrong unit",
+        *([f"verdict  {report['verdict']}"] if report["verdict"] else []),
+        *([REFUSED] if report["verdict"] == REJECTED else []),
     ]
 
 
@@ -175,6 +187,13 @@ def write_exports(
     return {"exported": written} if written else {}
 
 
-def export_lines(report: dict[str, Any]) -> list[str]:
-    """Return a line for each exported kind."""
-    return [f"exported {kind}: {', '.join(files)}" for kind, files in report.get("exported", {}).items()]
+def export_lines(report: dict[str, Any], rectification: Rectification) -> list[str]:
+    """Return a line for each exported kind, and which images a calib.txt is for."""
+    exported: dict[str, list[str]] = report.get("exported", {})
+    lines = [f"exported {kind}: {', '.join(files)}" for kind, files in exported.items()]
+    if not _OF_RECTIFIED.isdisjoint(exported):
+        size = size_text((rectification.width_px, rectification.height_px))
+        lines.append(
+            f"         calib.txt is for rectified images of {size} px, not for images as the cameras take them"
+        )
+    return lines

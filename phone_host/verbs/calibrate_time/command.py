@@ -33,7 +33,8 @@ from phone_host.camera.factory import open_camera
 from phone_host.model import Image, Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.rig_yaml import read_rig, write_time_offset
+from phone_host.output.rig_files.imported import read_own_rig
+from phone_host.output.rig_yaml import write_time_offset
 from phone_host.recording.footage import Footage, film, keep, read
 from phone_host.run.progress_bar import share_bar
 from phone_host.settings import key_folder
@@ -50,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
         return _write_pattern(options)
     _check(options)
     logs.set_up(log_level("warning"))
-    rig = None if options.calibration is None else read_rig(options.calibration)
+    rig = None if options.calibration is None else read_own_rig(options.calibration)
     if options.out is not None:
         require_folder(options.out)
         keep_other_report(options.out, "calibrate-time")

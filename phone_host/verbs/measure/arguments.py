@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="X,Y",
         help="points of the left image, px, as it is taken and upright; the centre of the first pixel is 0,0. Of several, the distance"
-        " from each to the next is told, too",
+        " from each to the next is told, too. A point that cannot be measured is named, the others are told; the exit code is then 4",
     )
     parser.add_argument(
         "--use-rejected-rig",

@@ -2,6 +2,8 @@
 
 import argparse
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,16 +12,26 @@ import numpy as np
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_text
-from phone_host.run.point_job import Measured, PointJob, measure_points, point_text
+from phone_host.run.point_job import (
+    ELSEWHERE,
+    FoundPoint,
+    Measured,
+    MissedPoint,
+    Outcome,
+    PointJob,
+    measure_points,
+    point_text,
+)
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
-from phone_host.stereo.measured_point import Within, path_between
+from phone_host.stereo.measured_point import Within, distance_between
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.stereo_numbers import point_px
 from phone_host.verbs.stereo_options import build_core
 
+_CHECK_FAILED: Final = 4
 _NOISE: Final = "noise of both images"
 _ZERO: Final = "the rig's zero (zero_sigma)"
 _LEFT_OUT: Final = ("the baseline's own uncertainty", "how exactly the points were picked")
@@ -44,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         print(json_text(_report(options, points, found)))
     else:
         say(_lines(points, found))
-    return 0
+    return _CHECK_FAILED if any(isinstance(each, MissedPoint) for each in found.points) else 0
 
 
 def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:
@@ -68,26 +80,44 @@ def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], .
         "left": options.left,
         "right": options.right,
         "calibration": options.calibration,
-        "points": [
-            {
-                "at_px": list(at_px),
-                "distance_mm": _values(point.distance),
-                "point_mm": [round(float(value) * 1e3, 3) for value in point.point_m],
-                "sigma_mm": [
-                    round(float(value) * 1e3, 3) for value in np.sqrt(np.diag(point.covariance_m2) + point.zero_m**2)
-                ],
-                "rays_miss_px": round(point.miss_px, 3),
-                "noise_factor": round(point.noise_factor, 3),
-            }
-            for at_px, point in zip(points_px, found.points, strict=True)
-        ],
+        "points": [_point(at_px, outcome) for at_px, outcome in zip(points_px, found.points, strict=True)],
         "between": [
-            {"from_point": number, "to_point": number + 1, "length_mm": _values(length)}
-            for number, length in enumerate(path_between(found.points), start=1)
+            {
+                "from_point": number,
+                "to_point": number + 1,
+                "length_mm": None if length is None else _values(length),
+            }
+            for number, length in enumerate(_path(found.points), start=1)
         ],
         "uncertainty": {"level": 0.95, "includes": included, "leaves_out": left_out},
         "doubts": [{"sentence": concern.sentence, "remedy": concern.remedy} for concern in found.doubts],
     }
+
+
+def _point(at_px: tuple[float, float], outcome: Outcome) -> dict[str, Any]:
+    if isinstance(outcome, MissedPoint):
+        return {"at_px": list(at_px), "problem": outcome.problem}
+    point = outcome.point
+    sigma_m = np.sqrt(np.diag(point.covariance_m2) + point.zero_m**2)
+    return {
+        "at_px": list(at_px),
+        "distance_mm": _values(point.distance),
+        "point_mm": [round(float(value) * 1e3, 3) for value in point.point_m],
+        "sigma_mm": [round(float(value) * 1e3, 3) for value in sigma_m],
+        "rays_miss_px": round(point.miss_px, 3),
+        "noise_factor": round(point.noise_factor, 3),
+        "wide_because": None if outcome.wide is None else outcome.wide.value,
+    }
+
+
+def _path(outcomes: Sequence[Outcome]) -> list[Within | None]:
+    """Return the distance from each point to the next; None where one of the two is missing."""
+    return [
+        distance_between(one.point, other.point)
+        if isinstance(one, FoundPoint) and isinstance(other, FoundPoint)
+        else None
+        for one, other in pairwise(outcomes)
+    ]
 
 
 def _values(length: Within) -> dict[str, float | None]:
@@ -97,20 +127,27 @@ def _values(length: Within) -> dict[str, float | None]:
 
 def _lines(points_px: tuple[tuple[float, float], ...], found: Measured) -> list[str]:
     included, left_out = _included(found)
-    lines = []
-    for number, (at_px, point) in enumerate(zip(points_px, found.points, strict=True), start=1):
-        x, y, z = point.point_m * 1e3
-        lines.append(
-            f"point {number}  at {point_text(at_px)} px: {_text(point.distance)} away; x {x:.1f}, y {y:.1f}, z {z:.1f} mm"
-        )
+    lines = [_line(*each) for each in enumerate(zip(points_px, found.points, strict=True), start=1)]
     lines += [
-        f"{number} to {number + 1}   {_text(length)}"
-        for number, length in enumerate(path_between(found.points), start=1)
+        f"{number} to {number + 1}   {'not measured' if length is None else _text(length)}"
+        for number, length in enumerate(_path(found.points), start=1)
     ]
+    if any(isinstance(each, MissedPoint) for each in found.points):
+        lines.append(f"remedy   {ELSEWHERE}")
     lines += [f"doubt    {concern.sentence} {concern.remedy}" for concern in found.doubts]
     lines.append(f"95 % of the cases lie between these limits; they include {' and '.join(included)}")
     lines.append(f"not included: {', '.join(left_out)}")
     return lines
+
+
+def _line(number: int, asked: tuple[tuple[float, float], Outcome]) -> str:
+    at_px, outcome = asked
+    head = f"point {number}  at {point_text(at_px)} px"
+    if isinstance(outcome, MissedPoint):
+        return f"{head}: not measured: it {outcome.problem}"
+    x, y, z = outcome.point.point_m * 1e3
+    wide = "" if outcome.wide is None else f"; uncertain, because {outcome.wide.value}"
+    return f"{head}: {_text(outcome.point.distance)} away; x {x:.1f}, y {y:.1f}, z {z:.1f} mm{wide}"
 
 
 def _text(length: Within) -> str:
