@@ -106,6 +106,9 @@ border:1px solid var(--line);border-radius:10px;overflow:hidden}
 .pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(260px,1fr));gap:1rem;align-items:start}
 .pictures figure{margin:0}.pictures img{display:block;width:100%;height:auto;border-radius:8px;border:1px solid var(--line)}
 .pictures figcaption{font-size:.85rem;color:var(--ink2);margin-top:.35rem}
+.views2{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,420px),1fr));gap:1rem;align-items:start;margin-top:.75rem}
+.views2 figure{margin:0;min-width:0}.views2 figcaption{font-size:.85rem;color:var(--ink2);margin-top:.3rem;overflow-wrap:anywhere}.views2 b{color:var(--ink)}
+.both{display:grid;grid-template-columns:1fr 1fr;gap:3px;align-items:start}
 section{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:1.1rem 1.25rem}
 .pair{display:grid;grid-template-columns:1fr 1fr;gap:1.25rem}.pair>*{min-width:0}
 .wide+.wide,.narrow+.wide{margin-top:1rem}.narrow{display:none}
