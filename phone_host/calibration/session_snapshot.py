@@ -1,7 +1,7 @@
 """Copies what a calibration's page shows out of its parts: each view with its corners and what is left of them, and the rig. Pure."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -28,7 +28,8 @@ class Taken:
     Attributes:
         order: names of the pairs in the order in which they were taken.
         views: what was found in the images.
-        pairs: corners of all pairs that the calibration was given, those of an earlier one included.
+        pairs: corners of all pairs that the calibration was given, those of an earlier one included; perhaps a drift of the
+            cameras was taken out of them.
         board: the board.
     """
 
@@ -36,6 +37,16 @@ class Taken:
     views: BoardViews
     pairs: list[BoardPair]
     board: Board
+
+    def as_seen(self, pair: BoardPair) -> BoardPair:
+        """Return a pair as it was seen, under the name that it has now; one of an earlier calibration as it is."""
+        own = next((each for each in self.views.pairs if each.left_px is pair.left_px), pair)
+        return replace(own, name=pair.name)
+
+    @property
+    def is_straightened(self) -> bool:
+        """Whether a drift was taken out."""
+        return any(self.as_seen(pair).right_px is not pair.right_px for pair in self.pairs)
 
 
 def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejected, ...]) -> tuple[SessionView, ...]:
@@ -57,7 +68,7 @@ def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejec
     for pair in taken.pairs:
         own = next((each.name for each in taken.views.pairs if each.left_px is pair.left_px), "")  # pairs may be renamed
         place, why = places.get(pair.name), reasons.pop(pair.name, None)
-        view = _view(pair, pictures.get(own), found, place, why, taken.board)
+        view = _view((pair, taken.as_seen(pair)), pictures.get(own), found, place, why, taken.board)
         made.append((order.get(own, -1), view))
     for name, why in reasons.items():
         picture = pictures.get(name)
@@ -107,32 +118,34 @@ def _seen(picture: ViewPictures) -> tuple[SeenBoard, SeenBoard]:
 
 
 def _view(
-    pair: BoardPair,
+    both: tuple[BoardPair, BoardPair],
     picture: ViewPictures | None,
     found: Calibration | None,
     place: int | None,
     why: Rejected | None,
     board: Board,
 ) -> SessionView:
-    """Return a view whose board was found in both images."""
+    """Return a view whose board was found in both images, from its corners as they were used and as they were seen."""
+    pair, seen = both
     left, right = (b"", b"") if picture is None else (picture.left, picture.right)
     if found is None or place is None:
         return SessionView(
             name=pair.name,
-            left=SeenBoard(picture=left, corners_px=pair.left_px),
-            right=SeenBoard(picture=right, corners_px=pair.right_px),
+            left=SeenBoard(picture=left, corners_px=seen.left_px),
+            right=SeenBoard(picture=right, corners_px=seen.right_px),
             reason=_UNUSED if why is None else why.reason.value,
             detail="" if why is None else why.detail,
         )
-    vertical = np.empty(0)
+    vertical = as_seen = np.empty(0)
     if found.rectification is not None:
-        vertical = vertical_errors_px(pair, found.rig, found.rectification)
+        vertical, as_seen = (vertical_errors_px(each, found.rig, found.rectification) for each in both)
     return SessionView(
         name=pair.name,
-        left=SeenBoard(picture=left, corners_px=pair.left_px, residuals_px=found.left_errors_px[place]),
-        right=SeenBoard(picture=right, corners_px=pair.right_px, residuals_px=found.right_errors_px[place]),
+        left=SeenBoard(picture=left, corners_px=seen.left_px, residuals_px=found.left_errors_px[place]),
+        right=SeenBoard(picture=right, corners_px=seen.right_px, residuals_px=found.right_errors_px[place]),
         outline_m=SE3.of(found.poses[place]).apply(_outline_m(board)),
         vertical_px=vertical,
+        as_seen_px=as_seen,
     )
 
 

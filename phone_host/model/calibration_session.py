@@ -53,6 +53,7 @@ class SessionView:
         detail: the reason in words, with numbers.
         outline_m: (4, 3) the board's outer corners in turn, in the left camera's axes, m; (0, 3): the view is not used.
         vertical_px: (M,) left minus right across the rows after rectification, px; empty: not known.
+        as_seen_px: (M,) the same before a drift of the cameras was taken out of the corners.
     """
 
     name: str
@@ -62,6 +63,7 @@ class SessionView:
     detail: str = ""
     outline_m: Floats = field(default_factory=lambda: _none(0, 3))
     vertical_px: Floats = field(default_factory=lambda: _none(0))
+    as_seen_px: Floats = field(default_factory=lambda: _none(0))
 
     @property
     def is_used(self) -> bool:
@@ -71,7 +73,7 @@ class SessionView:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ViewTurns:
-    """How the right camera stood in each view, against the mean of all.
+    """How the right camera stood in each view, against the rig.
 
     Attributes:
         names: of V views, in the order in which they were taken.
@@ -180,6 +182,7 @@ class CalibrationSession:
         found: the rig; None: there is none.
         turns: how the cameras stood in each view; None: not known.
         rectified: one pair after rectification; None: not at hand.
+        is_straightened: whether a drift of the cameras was taken out of the corners before the rig was computed.
         rig_file: name of the rig's file beside the page; empty: it was not written.
     """
 
@@ -194,4 +197,5 @@ class CalibrationSession:
     found: SessionRig | None = None
     turns: ViewTurns | None = None
     rectified: RectifiedView | None = None
+    is_straightened: bool = False
     rig_file: str = ""

@@ -1,6 +1,7 @@
 """The figures of a calibration as tables: how good it is, and each camera's parameters with their uncertainty. Pure."""
 
 import math
+from html import escape
 from typing import Final
 
 import cv2
@@ -20,83 +21,100 @@ _COEFFICIENTS: Final = {
     Lens.RATIONAL: ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
     Lens.FISHEYE: ("k1", "k2", "k3", "k4"),
 }
+_JUDGED_M: Final = 1.0
+"""The depth whose error has limits."""
+
+_WHOLE_MM: Final = 10.0
 _HALF: Final = 12
 """Parameters of a camera in the rig's covariance."""
 
 
-def figure_rows(found: SessionRig) -> list[tuple[str, ...]]:
-    """Return a row for each figure: name, value, good up to, usable up to, what it means.
+def figures_card(found: SessionRig) -> str:
+    """Make the card with the figures, their limits and what they mean.
 
     Args:
         found: the rig.
     """
-    rig, limits = found.rig, found.limits
-    rows = list[tuple[str, ...]]()
-    p95_px = float(np.percentile(found.vertical_px, 95))
-    if math.isfinite(p95_px):
-        mean, most = float(found.vertical_px.mean()), float(found.vertical_px.max())
-        rows.append(
-            (
-                "vertical error, 95 %",
-                f"{p95_px:.3f} px (mean {mean:.3f}, most {most:.3f})",
-                f"{limits.good_px:.2f} px",
-                f"{limits.usable_px:.2f} px",
-                "how far matching points lie from the same row: a matcher looks along rows only",
-            )
-        )
-    rows.append(
-        (
-            "RMS",
-            f"left {rig.rms_left_px:.3f}, right {rig.rms_right_px:.3f}, together {rig.rms_stereo_px:.3f} px",
-            _DASH,
-            _DASH,
-            "how far corners lie from where the rig expects them",
-        )
+    parts = (_rows(found), _rms(found), _baseline(found), _depths(found), _squares(found), _far(found))
+    rows = [row for part in parts for row in part]
+    meanings = "".join(
+        f"<dt>{escape(part[0][0])}</dt><dd>{escape(words)}</dd>" for part, words in zip(parts, _MEANINGS, strict=True) if part
     )
-    baseline_m = float(np.linalg.norm(rig.t_right_left_m))
-    good, usable = (f"{share:.0%}" for share in (limits.good_share, limits.usable_share))
-    rows.append(
-        (
-            "baseline",
-            f"{baseline_m * 1e3:.2f} ± {found.baseline_sigma_m * 1e3:.2g} mm ({found.baseline_sigma_m / baseline_m:.2%})",
-            good,
-            usable,
-            "distance of the two cameras; its uncertainty is that of all depths",
-        )
-    )
-    rows += [
+    details = f'<details><summary>What the figures mean</summary><dl class="words files">{meanings}</dl></details>'
+    return section("How good it is", "", table(("", "figure", "good up to", "usable up to"), rows) + details)
+
+
+_Row = tuple[str, ...]
+"""What it is, its value, good up to, usable up to; shorter where there are no limits."""
+
+_MEANINGS: Final = (
+    "how far matching points lie from the same row after rectification; a matcher looks along rows only",
+    "how far corners lie from where each camera alone, and the whole rig, expects them; root mean square",
+    "distance of the two cameras; its uncertainty is that of every depth",
+    "one standard deviation that the calibration alone leaves; noise of matching comes on top",
+    "squares on boards that the rig was not fitted to: mean and standard deviation",
+    "depth beyond it is a guess, because the disparity of infinity is not known better",
+)
+
+
+def _rows(found: SessionRig) -> list[_Row]:
+    errors, limits = found.vertical_px, found.limits
+    if not np.isfinite(errors).all():
+        return []
+    p95 = f"{np.percentile(errors, 95):.3f} px"
+    return [
+        ("vertical error, 95 %", p95, f"{limits.good_px:.2f} px", f"{limits.usable_px:.2f} px"),
+        ("mean, greatest", f"{errors.mean():.3f}, {errors.max():.3f} px", _DASH, _DASH),
+    ]
+
+
+def _rms(found: SessionRig) -> list[_Row]:
+    rig = found.rig
+    alone = f"{rig.rms_left_px:.3f}, {rig.rms_right_px:.3f} px"
+    return [("RMS left, right", alone, _DASH, _DASH), ("RMS together", f"{rig.rms_stereo_px:.3f} px", _DASH, _DASH)]
+
+
+def _baseline(found: SessionRig) -> list[_Row]:
+    baseline_m, sigma_m = float(np.linalg.norm(found.rig.t_right_left_m)), found.baseline_sigma_m
+    words = f"{baseline_m * 1e3:.2f} ± {sigma_m * 1e3:.2g} mm ({sigma_m / baseline_m:.2%})"
+    return [("baseline", words, *_shares(found))]
+
+
+def _depths(found: SessionRig) -> list[_Row]:
+    return [
         (
             f"depth error at {depth_m:g} m",
-            f"± {sigma_m * 1e3:.2g} mm ({sigma_m / depth_m:.2%})",
-            good if depth_m == 1 else _DASH,
-            usable if depth_m == 1 else _DASH,
-            "one standard deviation, by the calibration alone; noise of matching comes on top",
+            f"± {_millimetres(sigma_m)} mm ({sigma_m / depth_m:.2%})",
+            *(_shares(found) if depth_m == _JUDGED_M else (_DASH, _DASH)),
         )
         for depth_m, sigma_m in found.depths
         if math.isfinite(sigma_m)
     ]
-    if math.isfinite(found.square_mean_m):
-        off = found.square_mean_m / found.square_m - 1
-        rows.append(
-            (
-                "squares held out",
-                f"{found.square_mean_m * 1e3:.2f} ± {found.square_sigma_m * 1e3:.2f} mm ({off:+.2%})",
-                good,
-                usable,
-                f"squares on boards that the rig was not fitted to; {found.square_m * 1e3:.2f} mm is true",
-            )
-        )
-    if math.isfinite(found.far_m):
-        rows.append(
-            (
-                "far limit",
-                f"{found.far_m:.1f} m (zero ± {rig.zero_sigma_px:.2f} px)",
-                _DASH,
-                _DASH,
-                "depth beyond it is a guess",
-            )
-        )
-    return rows
+
+
+def _squares(found: SessionRig) -> list[_Row]:
+    if not math.isfinite(found.square_mean_m):
+        return []
+    off = round(found.square_mean_m / found.square_m - 1, 4) + 0.0
+    mean, sigma, true = (each * 1e3 for each in (found.square_mean_m, found.square_sigma_m, found.square_m))
+    words = f"{mean:.2f} ± {sigma:.2f} mm; true {true:.2f} mm ({off:+.2%})"
+    return [("squares held out", words, *_shares(found))]
+
+
+def _far(found: SessionRig) -> list[_Row]:
+    if not math.isfinite(found.far_m):
+        return []
+    words = f"{found.far_m:.3g} m (infinity ± {found.rig.zero_sigma_px:.2f} px)"
+    return [("far limit", words, _DASH, _DASH)]
+
+
+def _shares(found: SessionRig) -> tuple[str, str]:
+    return f"{found.limits.good_share:.0%}", f"{found.limits.usable_share:.0%}"
+
+
+def _millimetres(length_m: float) -> str:
+    millimetres = length_m * 1e3
+    return f"{millimetres:.0f}" if millimetres >= _WHOLE_MM else f"{millimetres:.2g}"
 
 
 def camera_tables(found: SessionRig) -> str:
@@ -145,8 +163,11 @@ def _parameters(model: CameraModel, sigmas: Floats) -> list[tuple[str, str]]:
 
 
 def _with_sigma(value: float, sigma: float, unit: str, digits: int) -> str:
-    known = f" ± {sigma:.2g}" if math.isfinite(sigma) and sigma > 0 else ""
-    return f"{value:.{digits}f}{known} {unit}".strip()
+    """Write a value with its uncertainty, two digits of that; with so many digits if it is not known."""
+    if not (math.isfinite(sigma) and sigma > 0):
+        return f"{value:.{digits}f} {unit}".strip()
+    digits = max(0, 1 - math.floor(math.log10(sigma)))
+    return f"{value:.{digits}f} ± {sigma:.{digits}f} {unit}".strip()
 
 
 def _three(values: Floats, sigmas: Floats, unit: str, digits: int) -> str:

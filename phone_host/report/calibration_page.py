@@ -1,14 +1,14 @@
 """The page of `calibrate`: what the rig is good for, and what the views show; one self-contained HTML document. Pure."""
 
 import math
-from typing import Final
+from typing import Final, assert_never
 
 import numpy as np
 
 from common.imagesize.head import size_text
 from common.words import counted
 from phone_host.model.calibration_session import CalibrationSession, SessionRig, Verdict
-from phone_host.report.calibration_figures import camera_tables, figure_rows
+from phone_host.report.calibration_figures import camera_tables, figures_card
 from phone_host.report.calibration_space import rig_card
 from phone_host.report.calibration_views import (
     course_card,
@@ -18,7 +18,7 @@ from phone_host.report.calibration_views import (
     rejected_card,
     views_card,
 )
-from phone_host.report.page_frame import document, section, table
+from phone_host.report.page_frame import document
 from phone_host.report.page_links import FileLink, files_section
 from phone_host.report.report_page import Figure, Headline, figures_row, heading
 
@@ -44,7 +44,7 @@ def calibration_page(session: CalibrationSession) -> str:
     parts = [
         heading(_TITLE, _subtitle(session), _COLOURS[session.verdict], verdict_words(session)),
         "" if found is None else figures_row(_figures(session, found)),
-        _table(session),
+        "" if found is None else figures_card(found),
         coverage_card(session),
         rectified_card(session),
         views_card(session),
@@ -60,19 +60,22 @@ def calibration_page(session: CalibrationSession) -> str:
 
 def verdict_words(session: CalibrationSession) -> str:
     """Say what the rig is good for and, unless it is good, what to do."""
+    because = f", {session.cause}" if session.cause else ""
     match session.verdict:
         case Verdict.GOOD:
-            told = f" {_sentence(session.cause_words)}" if session.cause else ""
+            told = f" But mind: {_sentence(session.cause_words)}" if session.cause else ""
             return f"Good: scan with it.{told}"
         case Verdict.USABLE:
-            return f"Usable: {_sentence(session.remedy)}"
+            return f"Usable{because}: {_sentence(session.remedy)}"
         case Verdict.REJECT:
             what = f"{session.problem}: {session.remedy}" if session.problem else session.remedy
-            return f"Rejected: {_sentence(what)}"
+            return f"Rejected{because}: {_sentence(what)}"
+        case _:
+            assert_never(session.verdict)
 
 
 def _sentence(words: str) -> str:
-    return words if words.endswith((".", "!")) else f"{words}."
+    return f"{words.replace('+-', '±')}."
 
 
 def _subtitle(session: CalibrationSession) -> str:
@@ -101,8 +104,8 @@ def _figures(session: CalibrationSession, found: SessionRig) -> tuple[Figure, ..
         Figure(
             label="baseline",
             value=f"{baseline_mm:.2f}",
-            unit=f"± {found.baseline_sigma_m * 1e3:.2g} mm",
-            note="compare it with a ruler",
+            unit="mm",
+            note=f"± {found.baseline_sigma_m * 1e3:.2g} mm; compare it with a ruler",
         )
     )
     sigma_m = depths.get(_DEPTH_M, math.nan)
@@ -119,18 +122,6 @@ def _figures(session: CalibrationSession, found: SessionRig) -> tuple[Figure, ..
         note = f"held out; true {found.square_m * 1e3:.2f} mm"
         figures.append(Figure(label="squares", value=f"{found.square_mean_m * 1e3:.2f}", unit="mm", note=note))
     return tuple(figures)
-
-
-def _table(session: CalibrationSession) -> str:
-    rows = list[tuple[str, ...]]()
-    if session.cause:
-        rows.append(("what is wrong", session.cause, "\u2013", "\u2013", _sentence(session.cause_words)))
-    if session.found is not None:
-        rows += figure_rows(session.found)
-    if not rows:
-        return ""
-    columns = ("figure", "value", "good up to", "usable up to", "what it means")
-    return section("How good it is", "", table(columns, rows))
 
 
 def _files(session: CalibrationSession) -> tuple[FileLink, ...]:

@@ -42,7 +42,7 @@ def rig_card(session: CalibrationSession, found: SessionRig) -> str:
     drawn = "".join(
         f"<div><h3>{escape(title)}</h3>"
         f"{two_widths(partial(_drawn, shapes, seen_from(*direction), f'cameras and boards, {title}'), HALF_PX)}</div>"
-        for title, direction in (("from behind, to the left", _OBLIQUE), ("from above", _ABOVE))
+        for title, direction in (("from behind, left and above", _OBLIQUE), ("from above", _ABOVE))
     )
     names = legend([("left camera", _LEFT), ("right camera", _RIGHT), ("boards", _BOARD)])
     words = "Where the boards stood, as far as their outer corners. Pyramids show what a camera sees; the bars show the scale."
@@ -73,4 +73,4 @@ def _camera(model: CameraModel, to_left: Floats, centre_m: Floats, reach_m: floa
     slopes = np.clip((corners - 0.5 - middle) / focal, -_MOST_SLOPE, _MOST_SLOPE)
     points = np.column_stack([slopes, np.ones(4)]) * reach_m @ to_left.T + centre_m
     edges = tuple(np.vstack([centre_m, point]) for point in points)
-    return Shape(lines=(*edges, np.vstack([points, points[:1]])), colour=colour, label=name, title=f"{name} camera")
+    return Shape(lines=(*edges, np.vstack([points, points[:1]])), colour=colour, title=f"{name} camera")

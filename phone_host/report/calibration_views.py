@@ -21,7 +21,7 @@ from phone_host.svg.plot_tilts import Tilt, tilt_disc
 
 Floats = NDArray[np.float64]
 
-_MOST_PICTURES: Final = 40  # views; each takes 25 KB of the page
+_MOST_PICTURES: Final = 30  # views; each takes 25 KB of the page
 _MOST_SHOWN: Final = 6
 """So many pictures of the worst views are shown at once; the others open on demand."""
 
@@ -52,7 +52,7 @@ def coverage_card(session: CalibrationSession) -> str:
     if placed:
         content += f'<div class="pair">{_distances(placed)}</div>'
     words = (
-        "Each dot is a corner that was seen; the darker a tile, the more views reach it; tiles with a stroke have none. Lenses"
+        "Each dot is a corner that was seen; the darker a tile, the more views reach it; crossed-out tiles have none. Lenses"
         " bend most at the edges, and what no board has shown there is extrapolated."
     )
     return section("What the views cover", words, content)
@@ -61,7 +61,7 @@ def coverage_card(session: CalibrationSession) -> str:
 def _coverage(name: str, corners: list[Floats], size: Size) -> str:
     counts = tile_views(corners, size)
     drawn = two_widths(partial(_map, corners, size, counts, f"corners seen in the {name} image"), HALF_PX)
-    return f"<div><h3>{name} camera</h3>{drawn}<p class=sub>{escape(_empty_words(counts))}</p></div>"
+    return f'<div><h3>{name} camera</h3>{drawn}<p class="sub">{escape(_empty_words(counts))}</p></div>'
 
 
 def _map(corners: list[Floats], size: Size, counts: NDArray[np.int64], label: str, width_px: int) -> str:
@@ -93,7 +93,7 @@ def _distances(views: list[SessionView]) -> str:
     far = two_widths(partial(over_distance, marks, [], "tilt, °", "tilt of the boards over their distance"), HALF_PX)
     way = two_widths(partial(tilt_disc, tilts, "which way the boards were tilted"), HALF_PX)
     words = "Each dot is a board, seen from the left camera. The middle faces the camera; 20° to 45° in all directions teach most."
-    return f"<div><h3>Distance and tilt</h3>{far}</div><div><h3>Which way boards faced</h3>{way}<p class=sub>{words}</p></div>"
+    return f'<div><h3>Distance and tilt</h3>{far}</div><div><h3>Which way boards faced</h3>{way}<p class="sub">{words}</p></div>'
 
 
 def rectified_card(session: CalibrationSession) -> str:
@@ -121,8 +121,9 @@ def _rectified(shown: RectifiedView) -> str:
             f'<image href="{uri}" x="{at[0]:.1f}" y="{at[1]:.1f}" width="{width}" height="{height}" preserveAspectRatio="none"/>'
         )
     axis = 0 if shown.is_vertical else 1
-    order = np.argsort(shown.left_px[:, axis])
-    chosen = order[np.linspace(0, len(order) - 1, min(_LINES, len(order))).round().astype(int)]
+    rows = shown.left_px[:, axis]
+    wanted = np.linspace(rows.min(), rows.max(), _LINES)
+    chosen = np.unique(np.abs(rows - wanted[:, np.newaxis]).argmin(axis=1))
     radius = 0.006 * max(whole_w, whole_h)
     for number, index in enumerate(chosen):
         left, right = shown.left_px[index] + 0.5, shown.right_px[index] + 0.5 + step
@@ -189,7 +190,7 @@ def _view(view: SessionView, session: CalibrationSession, scale: Enlarged) -> st
         said = f"left {_one_rms(view.left):.3f}, right {_one_rms(view.right):.3f}, vertical {_vertical(view)} px RMS"
     else:
         said = _why(view)
-    return f'<figure><div class="both">{pictures}</div><figcaption><b>{escape(view.name)}</b> {escape(said)}</figcaption></figure>'
+    return f'<figure><div class="both">{pictures}</div><figcaption><b>{escape(view.name)}</b>: {escape(said)}</figcaption></figure>'
 
 
 def _photo(board: SeenBoard, size: Size, scale: Enlarged, label: str) -> str:
@@ -243,33 +244,32 @@ def _field(boards: list[SeenBoard], size: Size) -> tuple[Floats, Floats]:
 
 def course_card(session: CalibrationSession) -> str:
     """Make the card with vertical error and relative rotation over the order of the views."""
-    used = [view for view in session.views if view.is_used and len(view.vertical_px)]
+    used = [view for view in session.views if view.is_used and len(view.as_seen_px)]
     turns = session.turns
     content = ""
     if len(used) > 1:
-        means = np.array([view.vertical_px.mean() for view in used])
-        limits = np.array([_95_PERCENT * view.vertical_px.std() / math.sqrt(len(view.vertical_px)) for view in used])
+        means = np.array([view.as_seen_px.mean() for view in used])
+        limits = np.array([_95_PERCENT * view.as_seen_px.std() / math.sqrt(len(view.as_seen_px)) for view in used])
         course = Course("vertical error", 5, means, limits)
         names = [view.name for view in used]
         draw = partial(over_views, names, [course], "px", "mean vertical error of each view")
         content += f"<h3>Mean vertical error, left minus right</h3>{two_widths(draw)}"
     if turns is not None:
-        millidegrees = np.degrees(turns.turns_rad) * 1e3
-        sigmas = np.degrees(turns.sigmas_rad) * 1e3
+        degrees, sigmas = np.degrees(turns.turns_rad), np.degrees(turns.sigmas_rad)
         courses = [
-            Course(label, colour, millidegrees[:, axis], _95_PERCENT * sigmas[:, axis])
+            Course(label, colour, degrees[:, axis], _95_PERCENT * sigmas[:, axis])
             for axis, (label, colour) in enumerate(_TURNS)
         ]
-        draw = partial(over_views, turns.names, courses, "0.001°", "turn of the right camera in each view")
-        content += f"<h3>Turn of the right camera against the mean of all views</h3>{legend(list(_TURNS))}{two_widths(draw)}"
+        draw = partial(over_views, turns.names, courses, "degrees", "turn of the right camera in each view")
+        content += f"<h3>Turn of the right camera against the rig</h3>{legend(list(_TURNS))}{two_widths(draw)}"
     if not content:
         return ""
     words = (
         "Views in the order in which they were taken. A rig that is stiff scatters about 0; a trend or a step means that the"
         " cameras turned against each other. Bars hold 95 % by the noise of the corners."
     )
-    if session.cause and turns is not None:
-        words += f" Found here: {session.cause_words}."
+    if session.is_straightened:
+        words += " The trend shown here was taken out before the rig was computed: it stands as in the last view."
     return section("Over the order of the views", words, content)
 
 

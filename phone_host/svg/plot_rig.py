@@ -13,7 +13,7 @@ from phone_host.svg.plot_parts import svg
 
 Floats = NDArray[np.float64]
 
-_MARGIN_PX: Final = 26
+_MARGIN_PX: Final = 30
 _MOST_HIGH: Final = 0.75
 """Height over width at most."""
 
@@ -25,14 +25,12 @@ class Shape:
     Attributes:
         lines: each (N, 3), m; a line that ends where it began is filled.
         colour: index into the palette.
-        label: written at its first point; may be empty.
         title: shown when the pointer rests on it.
         opacity: of the filling.
     """
 
     lines: tuple[Floats, ...]
     colour: int
-    label: str = ""
     title: str = ""
     opacity: float = 0.2
 
@@ -73,10 +71,6 @@ def in_space(shapes: Sequence[Shape], view: Floats, label: str, width_px: int) -
         drawn = "".join(_path((line[:, :2] - low[:2]) * scale + start) for line in flat[index])
         look = f"fill:var(--c{shape.colour});fill-opacity:{shape.opacity};stroke:var(--c{shape.colour});stroke-width:1.4;stroke-linejoin:round"
         parts.append(f'<path d="{drawn}" style="{look}"><title>{escape(shape.title)}</title></path>')
-    for index in farthest_first:
-        if shapes[index].label:
-            x, y = (flat[index][0][0, :2] - low[:2]) * scale + start
-            parts.append(f'<text class="strong" x="{x:.1f}" y="{y - 6:.1f}" text-anchor="middle">{escape(shapes[index].label)}</text>')
     parts.append(_bar(scale, width_px, height_px))
     return svg(width_px, height_px, label, parts)
 

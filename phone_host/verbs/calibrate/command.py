@@ -180,7 +180,7 @@ def _advised(judgement: Assessment, found: Calibration, wrong: Misplaced | None,
         return judgement
     if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
         return Assessment(Verdict.REJECT, (hint,))  # all else follows from it
-    return Assessment(judgement.verdict, (hint,))
+    return Assessment(judgement.verdict, () if judgement.verdict is Verdict.GOOD else (hint,))
 
 
 def _write_rig(out: Path, calibration: Calibration | None, views: RigViews | None = None) -> dict[str, str]:

@@ -242,6 +242,8 @@ def summary(
         far = f"{far_m:.0f}" if far_m >= _WHOLE_METRES else f"{far_m:.1f}"
         rows.append(f"zero     disparity +- {report['zero_sigma_px']:.2f} px; depth beyond {far} m is a guess")
     rows.append(f"verdict  {report['verdict']}")
+    if not report["remedy"] and report["cause"] is not None:
+        rows.append(f"note     {report['cause']['sentence']}")
     rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
     return [*rows, *_written(report, calibration, out)]
 

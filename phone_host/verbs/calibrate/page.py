@@ -6,10 +6,9 @@ from typing import Any, Final
 
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import Mounted
-from phone_host.calibration.causes.mistakes import Finding
-from phone_host.calibration.causes.view_turns import view_turns
 from phone_host.calibration.rectified_view import rectified_view
 from phone_host.calibration.session_snapshot import Taken, session_rig, session_views
+from phone_host.calibration.view_turns import view_turns
 from phone_host.model import Rig
 from phone_host.model.calibration_session import CalibrationSession, Verdict
 from phone_host.output.atomic import write_text
@@ -39,7 +38,7 @@ def session_of_rig(
     """Return what the page shows of a rig, but for what is read from files again."""
     cause = report["cause"]
     used = {each.name for each in found.used}
-    kept = [pair for pair in taken.pairs if pair.name in used]
+    kept = [taken.as_seen(pair) for pair in taken.pairs if pair.name in used]
     return CalibrationSession(
         verdict=Verdict(report["verdict"]),
         remedy=report["remedy"],
@@ -49,7 +48,8 @@ def session_of_rig(
         sizes_px=taken.views.sizes_px,
         views=session_views(taken, found, rejected),
         found=session_rig(found, rig, depth_limit_m(found)),
-        turns=view_turns(kept, taken.board, taken.views.sizes_px),
+        turns=view_turns(kept, found.poses, taken.board.points_m(), found.rig),
+        is_straightened=taken.is_straightened,
     )
 
 
