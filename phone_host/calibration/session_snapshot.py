@@ -17,7 +17,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import Rig
 from phone_host.model.calibration_session import LensTried, SeenBoard, SessionRig, SessionView
 
-_UNUSED: Final = "no rig"
+_UNUSED: Final = "no rig came of the views"
 """Why a view is not used whose board was found, if no rig came of any."""
 
 
@@ -62,13 +62,14 @@ def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejec
     """
     reasons = {each.name: each for each in rejected}
     pictures = {each.name: each for each in taken.views.pictures}
-    places = {} if found is None else {each.name: index for index, each in enumerate(found.used)}
     made = list[tuple[int, SessionView]]()
     order = {name: index for index, name in enumerate(taken.order)}
     for pair in taken.pairs:
-        own = next((each.name for each in taken.views.pairs if each.left_px is pair.left_px), "")  # pairs may be renamed
-        place, why = places.get(pair.name), reasons.pop(pair.name, None)
-        view = _view((pair, taken.as_seen(pair)), pictures.get(own), found, place, why, taken.board)
+        own = next(
+            (each.name for each in taken.views.pairs if each.left_px is pair.left_px), ""
+        )  # pairs may be renamed
+        why = reasons.pop(pair.name, None)
+        view = _view((pair, taken.as_seen(pair)), pictures.get(own), found, why, taken.board)
         made.append((order.get(own, -1), view))
     for name, why in reasons.items():
         picture = pictures.get(name)
@@ -121,12 +122,12 @@ def _view(
     both: tuple[BoardPair, BoardPair],
     picture: ViewPictures | None,
     found: Calibration | None,
-    place: int | None,
     why: Rejected | None,
     board: Board,
 ) -> SessionView:
     """Return a view whose board was found in both images, from its corners as they were used and as they were seen."""
     pair, seen = both
+    place = None if found is None else next((i for i, each in enumerate(found.used) if each.name == pair.name), None)
     left, right = (b"", b"") if picture is None else (picture.left, picture.right)
     if found is None or place is None:
         return SessionView(

@@ -54,7 +54,8 @@ def _fitted(pair: BoardPair, pose: SE3, points_m: Vector, rig: Rig) -> tuple[Vec
     Raises:
         numpy.linalg.LinAlgError: the corners do not determine it.
     """
-    turn = np.eye(3)
+    turn: Vector = np.eye(3)
+    inverse: Vector = np.eye(_NUMBERS)
     for _ in range(_STEPS):
         errors, jacobian = _linearised(pair, pose, turn, points_m, rig)
         inverse = np.linalg.inv(jacobian.T @ jacobian)
@@ -64,7 +65,7 @@ def _fitted(pair: BoardPair, pose: SE3, points_m: Vector, rig: Rig) -> tuple[Vec
     errors, _ = _linearised(pair, pose, turn, points_m, rig)
     skew = (turn - turn.T) / 2  # of a small turn: the cross product with its vector
     vector = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
-    return vector, inverse, float(errors @ errors), len(errors) - _NUMBERS
+    return vector, np.asarray(inverse, np.float64), float(errors @ errors), len(errors) - _NUMBERS
 
 
 def _linearised(pair: BoardPair, pose: SE3, turn: Vector, points_m: Vector, rig: Rig) -> tuple[Vector, Vector]:

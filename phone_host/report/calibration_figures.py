@@ -38,7 +38,9 @@ def figures_card(found: SessionRig) -> str:
     parts = (_rows(found), _rms(found), _baseline(found), _depths(found), _squares(found), _far(found))
     rows = [row for part in parts for row in part]
     meanings = "".join(
-        f"<dt>{escape(part[0][0])}</dt><dd>{escape(words)}</dd>" for part, words in zip(parts, _MEANINGS, strict=True) if part
+        f"<dt>{escape(part[0][0])}</dt><dd>{escape(words)}</dd>"
+        for part, words in zip(parts, _MEANINGS, strict=True)
+        if part
     )
     details = f'<details><summary>What the figures mean</summary><dl class="words files">{meanings}</dl></details>'
     return section("How good it is", "", table(("", "figure", "good up to", "usable up to"), rows) + details)
@@ -125,9 +127,7 @@ def camera_tables(found: SessionRig) -> str:
     """
     rig = found.rig
     sigmas = np.sqrt(np.diag(rig.covariance).clip(min=0))
-    left, right = (
-        _parameters(model, sigmas[at : at + _HALF]) for model, at in ((rig.left, 0), (rig.right, _HALF))
-    )
+    left, right = (_parameters(model, sigmas[at : at + _HALF]) for model, at in ((rig.left, 0), (rig.right, _HALF)))
     names = [name for name, _ in max(left, right, key=len)]
     values = [dict(side) for side in (left, right)]
     rows = [(name, *(side.get(name, _DASH) for side in values)) for name in names]

@@ -34,10 +34,9 @@ def rig_card(session: CalibrationSession, found: SessionRig) -> str:
     shapes = _boards(session)
     rig = found.rig
     away_m = float(np.median([np.linalg.norm(shape.lines[0][:-1].mean(axis=0)) for shape in shapes])) if shapes else 1.0
-    to_left = rig.R_right_left.T
     shapes += [
-        _camera(rig.left, np.eye(3), np.zeros(3), _REACH * away_m, _LEFT, "left"),
-        _camera(rig.right, to_left, -to_left @ rig.t_right_left_m, _REACH * away_m, _RIGHT, "right"),
+        _camera(_pyramid(rig.left, _REACH * away_m), _LEFT, "left"),
+        _camera((_pyramid(rig.right, _REACH * away_m) - rig.t_right_left_m) @ rig.R_right_left, _RIGHT, "right"),
     ]
     drawn = "".join(
         f"<div><h3>{escape(title)}</h3>"
@@ -66,11 +65,14 @@ def _boards(session: CalibrationSession) -> list[Shape]:
     ]
 
 
-def _camera(model: CameraModel, to_left: Floats, centre_m: Floats, reach_m: float, colour: int, name: str) -> Shape:
-    """Return a camera's pyramid: from its centre to the corners of what it sees, without the lens's bend."""
+def _pyramid(model: CameraModel, reach_m: float) -> Floats:
+    """Return a camera's centre and the corners of what it sees, (5, 3) in its own axes, m; without the lens's bend."""
     corners = np.array([[0, 0], [model.width_px, 0], [model.width_px, model.height_px], [0, model.height_px]], float)
     focal, middle = np.diag(model.matrix)[:2], model.matrix[:2, 2]
     slopes = np.clip((corners - 0.5 - middle) / focal, -_MOST_SLOPE, _MOST_SLOPE)
-    points = np.column_stack([slopes, np.ones(4)]) * reach_m @ to_left.T + centre_m
-    edges = tuple(np.vstack([centre_m, point]) for point in points)
-    return Shape(lines=(*edges, np.vstack([points, points[:1]])), colour=colour, title=f"{name} camera")
+    return np.vstack([np.zeros(3), np.column_stack([slopes, np.ones(4)]) * reach_m])
+
+
+def _camera(pyramid: Floats, colour: int, name: str) -> Shape:
+    edges = tuple(np.vstack([pyramid[0], point]) for point in pyramid[1:])
+    return Shape(lines=(*edges, np.vstack([pyramid[1:], pyramid[1:2]])), colour=colour, title=f"{name} camera")

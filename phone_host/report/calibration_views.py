@@ -12,7 +12,7 @@ from common.words import counted
 from phone_host.model.calibration_session import CalibrationSession, RectifiedView, SeenBoard, SessionView, Size
 from phone_host.report.page_frame import HALF_PX, section, table, two_widths
 from phone_host.report.report_page import Picture, picture_uri
-from phone_host.svg.plot_arrows import Enlarged, arrow_field, enlarged, photo_arrows
+from phone_host.svg.plot_arrows import Enlarged, SeenErrors, arrow_field, enlarged, photo_arrows
 from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_coverage import coverage_map, tile_views
 from phone_host.svg.plot_depth import Mark, over_distance
@@ -129,7 +129,9 @@ def _rectified(shown: RectifiedView) -> str:
         left, right = shown.left_px[index] + 0.5, shown.right_px[index] + 0.5 + step
         line = f"M{left[0]:.1f} 0V{whole_h:.1f}" if shown.is_vertical else f"M0 {left[1]:.1f}H{whole_w:.1f}"
         look = f"stroke:var(--c{number});stroke-width:1.6;fill:none;vector-effect:non-scaling-stroke"
-        rings = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" style="{look}"/>' for x, y in (left, right))
+        rings = "".join(
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" style="{look}"/>' for x, y in (left, right)
+        )
         parts.append(f'<path d="{line}" style="{look}"/>{rings}')
     return svg(round(whole_w), whole_h, "left and right image after rectification, with lines", parts)
 
@@ -153,9 +155,7 @@ def views_card(session: CalibrationSession) -> str:
         more = "".join(_view(view, session, scale) for view in shown[_MOST_SHOWN:])
         rest = counted(len(shown) - _MOST_SHOWN, "more view", "more views")
         content += f'<details><summary>{rest}</summary><div class="views2">{more}</div></details>'
-    rows = [
-        (view.name, f"{_one_rms(view.left):.3f}", f"{_one_rms(view.right):.3f}", _vertical(view)) for view in used
-    ]
+    rows = [(view.name, f"{_one_rms(view.left):.3f}", f"{_one_rms(view.right):.3f}", _vertical(view)) for view in used]
     numbers = table(("pair", "left, px", "right, px", "vertical, px"), rows)
     content += f"<details><summary>Figures of all views, RMS</summary>{numbers}</details>"
     return section("What is left in each view", words, content)
@@ -195,7 +195,12 @@ def _view(view: SessionView, session: CalibrationSession, scale: Enlarged) -> st
 
 def _photo(board: SeenBoard, size: Size, scale: Enlarged, label: str) -> str:
     uri = picture_uri(Picture(label, board.picture)) if board.picture else ""
-    return photo_arrows(uri, size, board.corners_px, board.residuals_px, scale, label, _PICTURE_PX)
+    return photo_arrows(
+        SeenErrors(size_px=size, places=board.corners_px, errors_px=board.residuals_px, picture=uri),
+        scale,
+        label,
+        _PICTURE_PX,
+    )
 
 
 def _why(view: SessionView) -> str:
@@ -216,7 +221,8 @@ def field_card(session: CalibrationSession) -> str:
         return ""
     scale, drawn = enlarged(every, _FIELD_SHARE), ""
     for name, (places, errors), size in zip(("left", "right"), fields, session.sizes_px, strict=True):
-        draw = partial(arrow_field, places, errors, size, scale, f"mean residuals of the {name} image")
+        seen = SeenErrors(size_px=size, places=places, errors_px=errors)
+        draw = partial(arrow_field, seen, scale, f"mean residuals of the {name} image")
         title = f"{name} camera, enlarged {scale.times(size[0])} times"
         drawn += f"<div><h3>{title}</h3>{two_widths(draw, HALF_PX)}</div>"
     words = (

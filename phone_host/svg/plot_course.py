@@ -62,7 +62,7 @@ def over_views(names: Sequence[str], courses: Sequence[Course], unit: str, label
     parts.append(f'<text x="{width_px - RIGHT_PX}" y="{_HEIGHT_PX - 3}" text-anchor="end">view</text>')
     for number, one in enumerate(courses):
         aside = (number - (len(courses) - 1) / 2) * _APART_PX
-        for index in np.flatnonzero(np.isfinite(one.values)):
+        for index in np.flatnonzero(np.isfinite(one.values)).tolist():
             x, value, limit = across.px(float(index)) + aside, float(one.values[index]), float(one.limits[index])
             if limit > 0:
                 parts.append(

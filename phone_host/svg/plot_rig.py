@@ -65,7 +65,9 @@ def in_space(shapes: Sequence[Shape], view: Floats, label: str, width_px: int) -
     height_px = float((high - low)[1]) * scale + 2.5 * _MARGIN_PX
     start = np.array([(width_px - (high - low)[0] * scale) / 2, _MARGIN_PX])
     parts = []
-    farthest_first = sorted(range(len(shapes)), key=lambda index: -float(np.mean([line[:, 2].mean() for line in flat[index]])))
+    farthest_first = sorted(
+        range(len(shapes)), key=lambda index: -float(np.mean([line[:, 2].mean() for line in flat[index]]))
+    )
     for index in farthest_first:
         shape = shapes[index]
         drawn = "".join(_path((line[:, :2] - low[:2]) * scale + start) for line in flat[index])

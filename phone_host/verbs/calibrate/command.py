@@ -49,10 +49,10 @@ from phone_host.verbs.calibrate.figures import (
 )
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
 from phone_host.verbs.calibrate.importing import export_lines, import_calibration, require_pictures, write_exports
-from phone_host.verbs.calibrate.page import PAGE, session_of_failure, session_of_rig, with_rectified, write_page
+from phone_host.verbs.calibrate.page import session_of_failure, session_of_rig, with_rectified, write_page
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
+from phone_host.verbs.output_folders import PAGE, claim_names, keep_other_report, require_file, unwritable
 from phone_host.verbs.units import baseline_mm
 
 _CHECK_FAILED = 4

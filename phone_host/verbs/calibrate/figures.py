@@ -185,12 +185,7 @@ def pairing_notes(files: ViewFiles) -> list[str]:
 
 def unwritten(report: dict[str, Any], out: Path) -> list[str]:
     """Say that there is no new rig, and where the earlier one is."""
-    return [f"{out} was not written{_earlier(report)}", look_at(report, out)]
-
-
-def look_at(report: dict[str, Any], out: Path) -> str:
-    """Say where the page is."""
-    return f"look at {out.with_name(report['page'])}"
+    return [f"{out} was not written{_earlier(report)}", f"look at {report['page']}"]
 
 
 def _earlier(report: dict[str, Any]) -> str:
@@ -262,7 +257,7 @@ def _lens_rows(calibration: Calibration) -> list[str]:
 def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> list[str]:
     if calibration.rectification is None:
         return unwritten(report, out)
-    rows = [f"written to {out} and {out.with_name('report.json')}{_earlier(report)}", look_at(report, out)]
+    rows = [f"written to {out} and {out.with_name('report.json')}{_earlier(report)}", f"look at {report['page']}"]
     if report["verdict"] == REJECTED:
         rows.append("run and stereo refuse this calibration unless --use-rejected-rig is given")
     return rows

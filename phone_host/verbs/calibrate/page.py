@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import Mounted
@@ -15,9 +15,7 @@ from phone_host.output.atomic import write_text
 from phone_host.report.calibration_page import calibration_page
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.figures import depth_limit_m
-from phone_host.verbs.output_folders import unwritable
-
-PAGE: Final = "index.html"
+from phone_host.verbs.output_folders import PAGE, unwritable
 
 
 def session_of_failure(taken: Taken, report: dict[str, Any]) -> CalibrationSession:
@@ -77,17 +75,18 @@ def write_page(out: Path, session: CalibrationSession) -> dict[str, str]:
         session: what the page shows.
 
     Returns:
-        For the report: the page's name.
+        For the report: where it is.
 
     Raises:
         UnavailableError: it cannot be written.
     """
     is_written = session.found is not None and session.found.rectification is not None
+    page = out.with_name(PAGE)
     try:
-        write_text(out.with_name(PAGE), calibration_page(replace(session, rig_file=out.name if is_written else "")))
+        write_text(page, calibration_page(replace(session, rig_file=out.name if is_written else "")))
     except OSError as error:
         raise unwritable(out, error) from error
-    return {"page": PAGE}
+    return {"page": str(page)}
 
 
 def _board_words(report: dict[str, Any]) -> str:
