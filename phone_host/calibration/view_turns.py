@@ -58,14 +58,14 @@ def _fitted(pair: BoardPair, pose: SE3, points_m: Vector, rig: Rig) -> tuple[Vec
     inverse: Vector = np.eye(_NUMBERS)
     for _ in range(_STEPS):
         errors, jacobian = _linearised(pair, pose, turn, points_m, rig)
-        inverse = np.linalg.inv(jacobian.T @ jacobian)
+        inverse = np.asarray(np.linalg.inv(jacobian.T @ jacobian), np.float64)
         step = inverse @ jacobian.T @ errors
         pose = SE3(rotations_of(step[:3]) @ pose.R, pose.t_m + step[3:6])
-        turn = rotations_of(step[6:]) @ turn
+        turn = np.asarray(rotations_of(step[6:]) @ turn, np.float64)
     errors, _ = _linearised(pair, pose, turn, points_m, rig)
     skew = (turn - turn.T) / 2  # of a small turn: the cross product with its vector
     vector = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
-    return vector, np.asarray(inverse, np.float64), float(errors @ errors), len(errors) - _NUMBERS
+    return vector, inverse, float(errors @ errors), len(errors) - _NUMBERS
 
 
 def _linearised(pair: BoardPair, pose: SE3, turn: Vector, points_m: Vector, rig: Rig) -> tuple[Vector, Vector]:
