@@ -12,7 +12,7 @@ from common.orientation import UPRIGHT, Orientation
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.small_picture import shrunk_to, small_jpeg, small_size
 from phone_host.calibration.target import Corners
-from phone_host.model import CameraModel, Rig
+from phone_host.model import CameraModel, Rectification, Rig
 from phone_host.model.calibration_session import RectifiedView
 from phone_host.stereo.images import decode_file, open_image
 from phone_host.stereo.rectify import Rectifier, rectify_points
@@ -20,6 +20,31 @@ from phone_host.stereo.scaled_rig import scaled_rig
 
 _MOST_PX: Final = 640
 """Longer side of the images that are rectified, px: enough for a page, and rectifying 12 megapixels takes a second."""
+
+
+def fullest(pairs: list[BoardPair], rig: Rig, rectification: Rectification) -> BoardPair:
+    """Return the pair whose board fills most of both rectified images and is whole in them.
+
+    Args:
+        pairs: some, at least one.
+        rig: the cameras.
+        rectification: of the rig.
+    """
+
+    def filled(pair: BoardPair) -> tuple[float, float]:
+        shares, areas = [], []
+        for corners, model, turn in (
+            (pair.left_px, rig.left, rectification.R_left),
+            (pair.right_px, rig.right, rectification.R_right),
+        ):
+            seen = corners[np.isfinite(corners).all(axis=1)]
+            at = rectify_points(seen, model, turn, rectification.geometry)
+            inside = np.all((at > 0) & (at < (rectification.width_px - 1, rectification.height_px - 1)), axis=1)
+            shares.append(float(inside.sum()) / len(corners))
+            areas.append(float(np.prod(np.ptp(at, axis=0))))
+        return round(min(shares), 2), min(areas)
+
+    return max(pairs, key=filled)
 
 
 def rectified_view(

@@ -1,4 +1,4 @@
-"""Copies what a calibration's page shows out of its parts: each view with its corners and what is left of them, and the rig. Pure."""
+"""Copies what a calibration's page shows out of its parts: each view with its corners and what is left of them, and the rig."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.calibration.rectified_view import rectified_view
+from phone_host.calibration.rectified_view import fullest, rectified_view
 from phone_host.calibration.session_snapshot import session_views
 from phone_host.calibration.small_picture import small_jpeg, small_size
 from phone_host.calibration.view_turns import view_turns
@@ -132,6 +132,17 @@ def test_a_rectified_pair_is_small_and_its_corners_lie_on_its_lines(tmp_path: Pa
     assert max(image.shape[:2]) <= 640
     files[1].unlink()
     assert rectified_view(files, pairs()[2], rig) is None
+
+
+def test_the_pair_that_is_shown_has_a_whole_and_large_board() -> None:
+    """Of a board that is whole, the same half as large, and one larger whose corners lie outside, the first."""
+    found = calibration()
+    assert found.rectification is not None
+    whole = pairs()[0]
+    both = (whole.left_px, whole.right_px)
+    small = replace(whole, name="small", left_px=both[0].mean(axis=0) + (both[0] - both[0].mean(axis=0)) / 2)
+    cut = replace(whole, name="cut", left_px=both[0] - (600, 0), right_px=both[1] * 1.5)
+    assert fullest([small, whole, cut], found.rig, found.rectification) is whole
 
 
 def test_small_pictures_keep_their_shape_and_are_never_enlarged() -> None:

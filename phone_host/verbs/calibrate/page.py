@@ -6,7 +6,7 @@ from typing import Any
 
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import Mounted
-from phone_host.calibration.rectified_view import rectified_view
+from phone_host.calibration.rectified_view import fullest, rectified_view
 from phone_host.calibration.session_snapshot import Taken, session_rig, session_views
 from phone_host.calibration.view_turns import view_turns
 from phone_host.model import Rig
@@ -54,17 +54,17 @@ def session_of_rig(
 def with_rectified(
     session: CalibrationSession, taken: Taken, files: ViewFiles, mounted: Mounted, most_pixels: int
 ) -> CalibrationSession:
-    """Add one pair after rectification: the last one, because a rig that turned is as it stood last."""
+    """Add one pair after rectification: the last one of a rig that turned, because it is as it stood then; else the one whose board is largest."""
     if session.found is None or session.found.rectification is None:
         return session
+    rig, rectification = session.found.rig, session.found.rectification
     used = {view.name for view in session.views if view.is_used}
     paths = {name: (left, right) for name, left, right in files.pairs}
     shown = [pair for pair in taken.views.pairs if pair.name in used and pair.name in paths]
     if not shown:
         return session
-    return replace(
-        session, rectified=rectified_view(paths[shown[-1].name], shown[-1], session.found.rig, mounted, most_pixels)
-    )
+    one = shown[-1] if session.is_straightened else fullest(shown, rig, rectification)
+    return replace(session, rectified=rectified_view(paths[one.name], one, rig, mounted, most_pixels))
 
 
 def write_page(out: Path, session: CalibrationSession) -> dict[str, str]:
