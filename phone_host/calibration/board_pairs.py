@@ -1,7 +1,9 @@
 """The values of a calibration: pairs of board views, why a pair is not used, and the result. No behaviour."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+
+import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.bend import Bend
@@ -93,6 +95,9 @@ class Calibration:
         depths: depth and the standard uncertainty that the calibration leaves there, m, for some depths.
         advice: which view would teach most; None: it cannot be told.
         trials: how the formulas of the left and of the right lens did that were tried.
+        poses: (V, 6) of the boards of the pairs used, in the left camera's axes.
+        left_errors_px: (V, N, 2) of the pairs used, measured minus projected; NaN where a corner was not seen.
+        right_errors_px: (V, N, 2), the same, right.
     """
 
     rig: Rig
@@ -109,3 +114,6 @@ class Calibration:
     depths: tuple[tuple[float, float], ...] = ()
     advice: NextView | None = None
     trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())
+    poses: Vector = field(default_factory=lambda: np.empty((0, 6)))
+    left_errors_px: Vector = field(default_factory=lambda: np.empty((0, 0, 2)))
+    right_errors_px: Vector = field(default_factory=lambda: np.empty((0, 0, 2)))

@@ -14,6 +14,7 @@ from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.causes.looks import Look, SeenLook, look_at
 from phone_host.calibration.out_of_step import FileCorners
+from phone_host.calibration.small_picture import PREVIEW_PX, small_jpeg
 from phone_host.calibration.target import Board, Corners, agree, find_corners
 from phone_host.calibration.threads import side_by_side
 from phone_host.model import Side
@@ -23,6 +24,15 @@ from phone_host.stereo.view_files import ViewFiles
 Size = tuple[int, int]
 Mounted = tuple[Orientation, Orientation]
 """How the left and the right camera are mounted."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewPictures:
+    """What both images of a pair look like: its name, and small JPEG files."""
+
+    name: str
+    left: bytes
+    right: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +46,7 @@ class BoardViews:
         turned: by which turn and mirroring the left and the right images became upright, as their EXIF headers say.
         looks: how sharp the board is in each image, and how much light has washed out.
         in_order: the corners in all pictures of both sides, where they were paired by order and the counts differ.
+        pictures: of the pairs whose images could be read.
     """
 
     pairs: tuple[BoardPair, ...]
@@ -44,6 +55,7 @@ class BoardViews:
     turned: Mounted = (UPRIGHT, UPRIGHT)
     in_order: tuple[tuple[FileCorners, ...], tuple[FileCorners, ...]] = ((), ())
     looks: tuple[SeenLook, ...] = ()
+    pictures: tuple[ViewPictures, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -55,6 +67,7 @@ class _Seen:
     turned: Orientation
     corners: Corners
     look: Look
+    picture: bytes
 
 
 def look_for_boards(
@@ -118,6 +131,7 @@ def look_for_boards(
         (usual[0].turned, usual[1].turned),
         every,
         tuple(SeenLook(each.file, side, each.look) for _, *both in seen for side, each in zip(Side, both, strict=True)),
+        tuple(ViewPictures(name, left.picture, right.picture) for name, left, right in seen),
     )
 
 
@@ -144,7 +158,7 @@ def _every_file(
 
 
 def _look(path: Path, board: Board, most_pixels: int, mounted: Orientation) -> _Seen:
-    """Read one image and find the board in it. The pixels are dropped: 50 megapixels take 150 MB."""
+    """Read one image and find the board in it. Of the pixels only a small picture is kept: 50 megapixels take 150 MB."""
     file = open_image(path, most_pixels, mounted)
     grey = to_grey(decode_file(file))
     corners = find_corners(grey, board)
@@ -154,6 +168,7 @@ def _look(path: Path, board: Board, most_pixels: int, mounted: Orientation) -> _
         turned=file.head.orientation,
         corners=corners,
         look=look_at(grey, corners, board),
+        picture=small_jpeg(grey, PREVIEW_PX),
     )
 
 

@@ -378,6 +378,9 @@ def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibrat
         depths=depths,
         advice=advice,
         trials=fitted.trials,
+        poses=state.poses,
+        left_errors_px=result.left_errors_px,
+        right_errors_px=result.right_errors_px,
     )
 
 

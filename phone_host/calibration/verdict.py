@@ -9,13 +9,25 @@ one by the largest factor gives the remedy: mending another would leave the verd
 import math
 from collections import Counter
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 from phone_host.calibration.next_view import DEPTH_M, Kind
 from phone_host.model import Rig
+from phone_host.model.calibration_session import Limits, Verdict
+
+__all__ = [
+    "GOOD_PX",
+    "REFERENCE_PX",
+    "USABLE_PX",
+    "Assessment",
+    "Verdict",
+    "judge",
+    "limits_of",
+    "size_factor",
+    "vertical_p95_px",
+]
 
 GOOD_PX, USABLE_PX = 0.25, 0.5
 """Limits of the 95th percentile of the vertical error, for images of up to `REFERENCE_PX`."""
@@ -33,14 +45,6 @@ SHARE_GOOD, _SHARE_USABLE = 0.01, 0.05
 _FEW_PAIRS = 6
 _WANTED_PAIRS = 15
 _MANY_REJECTED = 1 / 3
-
-
-class Verdict(Enum):
-    """What the calibration is good for."""
-
-    GOOD = "good"
-    USABLE = "usable"
-    REJECT = "reject"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +84,17 @@ def size_factor(rig: Rig) -> float:
     """Return by which factor limits in px are wider for this rig's images; at least 1. Rectified images are as coarse as the coarser camera's."""
     longest = min(max(model.width_px, model.height_px) for model in (rig.left, rig.right))
     return max(1.0, longest / REFERENCE_PX)
+
+
+def limits_of(rig: Rig) -> Limits:
+    """Return up to where the figures of a rig are good and usable."""
+    factor = size_factor(rig)
+    return Limits(
+        good_px=GOOD_PX * factor,
+        usable_px=USABLE_PX * factor,
+        good_share=SHARE_GOOD,
+        usable_share=_SHARE_USABLE,
+    )
 
 
 def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessment:
@@ -122,18 +137,18 @@ def _remedy(calibration: Calibration, rejected: tuple[Rejected, ...], worst: _Me
 
 
 def _rows(calibration: Calibration) -> _Measure:
-    p95_px, factor = vertical_p95_px(calibration), size_factor(calibration.rig)
-    if p95_px > USABLE_PX * factor:
+    p95_px, limits = vertical_p95_px(calibration), limits_of(calibration.rig)
+    if p95_px > limits.usable_px:
         remedy = (
             f"rows of the two views differ by {p95_px:.2f} px (95 %): fix focus and zoom, hold board and cameras still in each"
             " pair, glue the print to a flat plate, check --board, and take new pairs"
         )
     else:
         remedy = (
-            f"rows of the two views differ by {p95_px:.2f} px (95 %), {GOOD_PX * factor:.2f} px is good: hold the board still,"
+            f"rows of the two views differ by {p95_px:.2f} px (95 %), {limits.good_px:.2f} px is good: hold the board still,"
             " flat, sharp and larger in the image"
         )
-    return _Measure(p95_px / (GOOD_PX * factor), p95_px / (USABLE_PX * factor), remedy)
+    return _Measure(p95_px / limits.good_px, p95_px / limits.usable_px, remedy)
 
 
 def _baseline(calibration: Calibration) -> _Measure:

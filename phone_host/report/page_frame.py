@@ -106,7 +106,11 @@ border:1px solid var(--line);border-radius:10px;overflow:hidden}
 .pictures{display:grid;grid-template-columns:repeat(auto-fit,minmax(260px,1fr));gap:1rem;align-items:start}
 .pictures figure{margin:0}.pictures img{display:block;width:100%;height:auto;border-radius:8px;border:1px solid var(--line)}
 .pictures figcaption{font-size:.85rem;color:var(--ink2);margin-top:.35rem}
+.views2{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,420px),1fr));gap:1rem;align-items:start;margin-top:.75rem}
+.views2 figure{margin:0;min-width:0}.views2 figcaption{font-size:.85rem;color:var(--ink2);margin-top:.3rem;overflow-wrap:anywhere}.views2 b{color:var(--ink)}
+.both{display:grid;grid-template-columns:1fr 1fr;gap:3px;align-items:start}
 section{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:1.1rem 1.25rem}
+.pair .sub{font-size:.85rem}
 .pair{display:grid;grid-template-columns:1fr 1fr;gap:1.25rem}.pair>*{min-width:0}
 .wide+.wide,.narrow+.wide{margin-top:1rem}.narrow{display:none}
 .scroll{overflow-x:auto;background:linear-gradient(to right,var(--card) 40%,transparent) left/2.5rem 100% no-repeat local,
@@ -124,6 +128,6 @@ border:1px solid var(--line);border-radius:6px;font:.85rem/1.5 ui-monospace,mono
 .command+p,.for{margin:0;font-size:.9rem;color:var(--ink2)}
 section ul.small{font-size:.85rem;color:var(--ink2);margin-top:.6rem}section ul{margin:.25rem 0 0;padding-left:1.2rem}
 @media (max-width:700px){main{padding:1.25rem .9rem 2rem}.pair{grid-template-columns:1fr}.wide{display:none}
-.narrow{display:block}.narrow+.wide+.narrow{margin-top:1rem}section{padding:1rem}.figures{grid-template-columns:1fr 1fr}
+.narrow{display:block}th,td{padding-right:.8rem}.narrow+.wide+.narrow{margin-top:1rem}section{padding:1rem}.figures{grid-template-columns:1fr 1fr}
 .figures dd{font-size:1.25rem}.words.files{grid-template-columns:1fr}.files dd{margin-bottom:.4rem}h1{font-size:1.4rem}}
 """

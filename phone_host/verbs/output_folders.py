@@ -4,6 +4,7 @@ import os
 import re
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +16,8 @@ from phone_host.output.json_text import json_value
 from phone_host.output.listed import ListedFolder, claim
 
 REPORT: Final = "report.json"
-_REPLACED: Final = (REPORT, "index.html")
+PAGE: Final = "index.html"
+_REPLACED: Final = (REPORT, PAGE)
 """What every command calls alike; the other results of two commands have different names or are computed from the same input."""
 
 _MOST_REPORT_BYTES: Final = 16 << 20
@@ -114,6 +116,25 @@ def keep_other_report(folder: Path, command: str) -> None:
         raise unwritable(folder, error) from error
     names = " and ".join(moves.values())
     say(f"phone-host: kept what {owner} had written in {folder} as {names}", sys.stderr)
+
+
+def drop_page(folder: Path, command: str) -> None:
+    """Remove the page that a command wrote earlier, where it now writes a report without one.
+
+    Args:
+        folder: folder for the results.
+        command: the verb whose results go there.
+
+    Raises:
+        UnavailableError: the folder cannot be written to.
+    """
+    if _owner_of(folder / REPORT) != command or kind_of(folder / PAGE) is Kind.MISSING:
+        return
+    try:
+        with suppress(UnavailableError):  # the user's own
+            ListedFolder(folder, re.escape(PAGE)).close()
+    except OSError as error:
+        raise unwritable(folder, error) from error
 
 
 def _owner_of(report: Path) -> str:

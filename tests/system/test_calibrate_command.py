@@ -18,6 +18,7 @@ from phone_host.stereo.images import read_image
 from phone_host.stereo.rectify import Rectifier
 from phone_host.stereo.reproject import project
 from tests.support.boards import poses, render_pair
+from tests.support.html import Page
 from tests.support.rigs import unlike_rig
 
 
@@ -100,6 +101,14 @@ def test_unlike_cameras_are_calibrated_and_every_pair_is_accounted_for(boards: P
     assert (
         report["vertical_error_px"]["mean"] <= report["vertical_error_px"]["p95"] <= report["vertical_error_px"]["max"]
     )
+    assert report["page"] == str(out.parent / "index.html")
+    page = Page(Path(report["page"]).read_text())
+    assert page.open == []
+    assert "board not found left" in page.words
+    assert page.every("script") == []
+    assert not [each for each in page.every("link") + page.every("image") if "http" in str(each.get("href"))]
+    assert len(page.every("image")) == 2 * 10 + 2  # of all pairs that could be read, and the rectified one
+    assert Path(report["page"]).stat().st_size < 1_000_000
     rig = read_rig(out)
     assert (rig.left.width_px, rig.right.width_px) == (640, 1280)
     assert rig.board_side.value == "right"
@@ -117,6 +126,7 @@ def test_the_table_names_every_pair(few: Path, tmp_path: Path) -> None:
         "baseline",
         "verdict",
         str(tmp_path / "rig.yaml"),
+        f"look at {tmp_path / 'index.html'}",
     ):
         assert word in done.stdout
 

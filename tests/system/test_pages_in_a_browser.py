@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from phone_host.model import Epipolar
+from phone_host.report.calibration_page import calibration_page
 from phone_host.report.page_links import NextCommand
 from phone_host.report.stereo_page import stereo_page
+from tests.support import calibration_sessions
 from tests.support.browser import Browser, browser, needs_chromium
 from tests.support.stereo_pages import page_data, processed
 
@@ -96,6 +98,21 @@ def test_the_page_fits_the_window(shown: tuple[Browser, str], width_px: int) -> 
     assert page.ask("document.documentElement.scrollWidth") <= width_px
     assert page.ask("document.querySelector('button.copy').hidden") is False
     assert page.ask("getComputedStyle(document.body).backgroundColor") == "rgb(16, 19, 24)"
+
+
+@pytest.mark.parametrize(("width_px", "dark"), [(360, True), (1400, False)])
+def test_the_page_of_a_calibration_fits_the_window(
+    shown: tuple[Browser, str], tmp_path: Path, width_px: int, *, dark: bool
+) -> None:
+    """On a phone and on a desktop no part is wider than the window, every picture is shown, and its policy refuses nothing."""
+    page, _ = shown
+    path = tmp_path / "index.html"
+    path.write_text(calibration_page(calibration_sessions.session()))
+    page.complaints.clear()
+    page.open(path.as_uri(), width_px, dark=dark)
+    assert page.ask("document.documentElement.scrollWidth") <= width_px
+    assert page.ask("[...document.querySelectorAll('svg.plot image')].length") > 10
+    assert page.complaints == []
 
 
 def box(page: Browser, selector: str) -> list[float]:

@@ -11,11 +11,17 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
+from phone_host.calibration.causes.mistakes import Finding, Mistake
+from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import Image
 from phone_host.output.rig_yaml import read_rig
+from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.arguments import add_arguments
+from phone_host.verbs.calibrate.cause import cause_report, with_cause
 from phone_host.verbs.calibrate.command import run
+from phone_host.verbs.calibrate.figures import report_of, summary
 from tests.support.boards import poses, render_pair
+from tests.support.calibration_sessions import calibration, taken
 from tests.support.oriented import oriented
 from tests.support.pictures import encoded
 from tests.support.rigs import small_rig
@@ -170,3 +176,26 @@ def test_marks_that_are_not_there_are_not_called_a_chessboard(
         _calibrate(folder, "--board", "charuco:8x6:25mm:18mm:5x5")
     assert said in str(caught.value)
     assert "too few of the board's marks are seen in either image" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("verdict", "remedies"),
+    [
+        (Verdict.GOOD, ()),
+        (Verdict.USABLE, ("the board is blurred: hold it still",)),
+        (Verdict.REJECT, ("the board is blurred: hold it still",)),
+    ],
+)
+def test_a_good_rig_has_no_remedy_though_a_mistake_was_found(verdict: Verdict, remedies: tuple[str, ...]) -> None:
+    """The mistake is told all the same, as a note; a rig that is not good has its remedy in place of the other."""
+    finding = Finding(mistake=Mistake.BLUR, sentence="the board is blurred", remedy="hold it still")
+    before = Assessment(verdict, () if verdict is Verdict.GOOD else ("take more",))
+    judgement = with_cause(before, finding)
+    assert judgement == Assessment(verdict, remedies)
+    found, views = calibration(), taken().views
+    files = ViewFiles(pairs=(), by_number=True, by_name=False, left_alone=(), right_alone=())
+    report = report_of(files, views, (), found, judgement) | cause_report(finding, "") | {"page": "index.html"}
+    told = summary(report, views, found, (), Path("rig.yaml"))
+    assert ("note     the board is blurred" in told) == (verdict is Verdict.GOOD)
+    assert any(line.startswith("remedy") for line in told) == bool(remedies)
+    assert (report["remedy"] == "") == (verdict is Verdict.GOOD)

@@ -200,3 +200,15 @@ def test_a_rig_is_calibrated_from_parts_of_boards() -> None:
     truth = np.linalg.norm(unlike_rig().t_right_left_m)
     assert np.linalg.norm(found.rig.t_right_left_m) == pytest.approx(truth, rel=0.01)
     assert name_mistake(BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes), found) is None
+
+
+@pytest.mark.parametrize(
+    ("board", "sheet"),
+    [(_CHARUCO, _charuco_sheet()), (_GRID, _grid_sheet(1, upward=False)), (_GRID, _grid_sheet(2, upward=True))],
+)
+def test_marks_are_no_glare(board: Board, sheet: tuple[Image, NDArray[np.float64]]) -> None:
+    """A mark inside a white square leaves the square's edges their contrast: a clear image of a marked board is neither washed out nor blurred."""
+    image, _ = _seen(*sheet)
+    look = look_at(image, find_corners(image, board), board)
+    assert look.washed < 0.03
+    assert 1 < look.edge_px < 3.5

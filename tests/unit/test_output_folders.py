@@ -9,9 +9,10 @@ import pytest
 
 from phone_host.cli import main
 from phone_host.model import CameraModel, Rig
+from phone_host.output.listed import claim
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.output_folders import keep_other_report
+from phone_host.verbs.output_folders import drop_page, keep_other_report
 from tests.support.planes import noise
 
 CALIB = (
@@ -95,6 +96,23 @@ def test_reports_of_older_versions_are_recognised_by_their_keys(
     (tmp_path / "report.json").write_text(json.dumps(dict.fromkeys(keys, 1)))
     keep_other_report(tmp_path, verb)
     assert names(tmp_path) == {"report.json"}
+
+
+@pytest.mark.parametrize(
+    ("listed", "verb", "stays"), [(True, "calibrate", False), (False, "calibrate", True), (True, "stereo", True)]
+)
+def test_a_page_of_before_goes_where_its_report_is_replaced(
+    tmp_path: Path, verb: str, *, listed: bool, stays: bool
+) -> None:
+    """Ours goes; the user's own and another verb's stay, and so does an empty folder."""
+    drop_page(tmp_path, "calibrate")
+    assert names(tmp_path) == set()
+    (tmp_path / "report.json").write_text(json.dumps({"command": verb}))
+    if listed:
+        claim(tmp_path, "index.html")
+    (tmp_path / "index.html").write_text("a page")
+    drop_page(tmp_path, "calibrate")
+    assert (tmp_path / "index.html").exists() == stays
 
 
 def test_a_strangers_report_names_no_file(tmp_path: Path) -> None:

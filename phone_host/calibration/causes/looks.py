@@ -5,18 +5,24 @@ one has no contrast. Both spoil corners before they keep the board from being fo
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, assert_never
 
 import cv2
 import numpy as np
 
 from phone_host.calibration.causes.lone import Vector
-from phone_host.calibration.marked import is_mirrored
+from phone_host.calibration.marked import AprilGrid, Charuco, is_mirrored
 from phone_host.calibration.target import Board, Corners
 from phone_host.model import Image, Side
 
 _REACH: Final = 0.35
 """How far an edge is followed to both sides, in sides of a square."""
+
+_TAG_BORDER: Final = 1 / 8
+"""The narrowest black border of an AprilTag, in sides of the tag."""
+
+_WITHIN: Final = 0.9
+"""Share of a mark's margin up to which an edge is followed: a mark inside a white square is no light."""
 
 _SAMPLES: Final = 41
 _FAINT: Final = 0.4
@@ -72,7 +78,7 @@ def look_at(grey: Image, corners: Corners, board: Board) -> Look:
         seen = np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1)
         if not seen.any():
             continue
-        width, contrast = _edges(grey, starts[seen], ends[seen])
+        width, contrast = _edges(grey, starts[seen], ends[seen], _reach(board))
         usual = float(np.median(contrast))
         clear = contrast > max(_FAINT * usual, _LEAST_CONTRAST)
         widths.append(float(np.median(width[clear])) if clear.any() else float("nan"))
@@ -85,16 +91,29 @@ def look_at(grey: Image, corners: Corners, board: Board) -> Look:
     return Look(float(np.nanmax(widths)), float((together < _FAINT * usual).mean()), bright)
 
 
-def _edges(grey: Image, starts: Vector, ends: Vector) -> tuple[Vector, Vector]:
+def _reach(board: Board) -> float:
+    """Return how far an edge of a board is followed to both sides, in sides of a square: not into its marks."""
+    match board.marks:
+        case None:
+            return _REACH
+        case Charuco(mark_share=share):
+            return min(_REACH, _WITHIN * (1 - share) / 2)
+        case AprilGrid():
+            return _WITHIN * _TAG_BORDER
+        case _:
+            assert_never(board.marks)
+
+
+def _edges(grey: Image, starts: Vector, ends: Vector, reach: float) -> tuple[Vector, Vector]:
     """Return width, px, and contrast of the edges between corners that lie beside each other, (M,) each."""
     along = ends - starts
     across = np.column_stack([-along[:, 1], along[:, 0]])
-    offsets = np.linspace(-_REACH, _REACH, _SAMPLES)
+    offsets = np.linspace(-reach, reach, _SAMPLES)
     at = (starts + ends)[:, np.newaxis] / 2 + offsets[:, np.newaxis] * across[:, np.newaxis]
     where = at.astype(np.float32)
     profile = np.asarray(cv2.remap(grey, where, np.empty(0), cv2.INTER_LINEAR), np.float64)
     ends_of = max(1, _SAMPLES // 8)
     contrast = np.abs(profile[:, :ends_of].mean(axis=1) - profile[:, -ends_of:].mean(axis=1))
-    step_px = np.linalg.norm(along, axis=1) * 2 * _REACH / (_SAMPLES - 1)
+    step_px = np.linalg.norm(along, axis=1) * 2 * reach / (_SAMPLES - 1)
     steepest = np.abs(profile[:, 2:] - profile[:, :-2]).max(axis=1) / (2 * step_px)
     return contrast / np.maximum(steepest, 1e-9), contrast

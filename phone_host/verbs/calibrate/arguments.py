@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="rig.yaml",
-        help="file for the calibration; report.json is written beside it",
+        help="file for the calibration; report.json and the page index.html are written beside it",
     )
 
 

@@ -45,8 +45,13 @@ def calibrated_as_last(
 
 
 def with_cause(judgement: Assessment, finding: Finding) -> Assessment:
-    """Give the mistake's remedy, which helps most, in place of all others; a session that has it may get no better verdict than it allows."""
+    """Give the mistake's remedy, which helps most, in place of all others; a session that has it may get no better verdict than it allows.
+
+    A rig that is good all the same needs no remedy: the mistake is only told.
+    """
     verdict = max(judgement.verdict, finding.most, key=_BEST_FIRST.index)
+    if verdict is Verdict.GOOD:
+        return judgement
     return Assessment(verdict, (f"{finding.sentence}: {finding.remedy}",))
 
 

@@ -17,6 +17,8 @@ from phone_host.calibration.cameras_beside import cameras_beside, require_sizes,
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.causes.name import BoardSession, name_mistake
 from phone_host.calibration.out_of_step import out_of_step
+from phone_host.calibration.session_snapshot import Taken
+from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Assessment, Verdict, judge
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -31,6 +33,7 @@ from phone_host.verbs.calibrate.earlier import (
     Session,
     asked_of,
     calibrated,
+    every_pair,
     notes,
     require_first_sizes,
     saved_views,
@@ -47,9 +50,10 @@ from phone_host.verbs.calibrate.figures import (
 )
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
 from phone_host.verbs.calibrate.importing import export_lines, import_calibration, require_pictures, write_exports
+from phone_host.verbs.calibrate.page import session_of_failure, session_of_rig, with_rectified, write_page
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
+from phone_host.verbs.output_folders import PAGE, claim_names, keep_other_report, require_file, unwritable
 from phone_host.verbs.units import baseline_mm
 
 _CHECK_FAILED = 4
@@ -69,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     files = pair_files(*two_lists(options.images))
     require_first_sizes(files, asked, options, mounted)
     keep_other_report(options.out.parent, "calibrate")
-    claim_names(options.out.parent, options.out, "report.json")
+    claim_names(options.out.parent, options.out, "report.json", PAGE)
     beside = cameras_beside(files, mounted)
     session, known = session_of(
         options, asked, lambda named: board_in(files, named, most_pixels(None, options.max_megapixels))
@@ -94,6 +98,10 @@ def run(options: argparse.Namespace) -> int:
     if found.rectification is not None:
         report |= write_exports(options, rig, found.rectification)
         exported = export_lines(report, found.rectification)
+    taken = _taken(files, views, every_pair(session, pairs), session.board)
+    page = session_of_rig(taken, found, rig, rejected, report)
+    limit = most_pixels(None, options.max_megapixels)
+    report |= write_page(options.out, with_rectified(page, taken, files, mounted, limit))
     _write_report(options.out, report)
     said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
     _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported])
@@ -146,6 +154,7 @@ def _report_failure(
         limit = most_pixels(None, options.max_megapixels)
         error = DataError(failure.problem, unseen_remedy(files, known.board, limit))
     report = report_of_failure(files, views, error) | known.as_report() | _write_rig(options.out, None)
+    report |= write_page(options.out, session_of_failure(_taken(files, views, list(views.pairs), known.board), report))
     _write_report(options.out, report)
     _tell(
         options,
@@ -153,6 +162,10 @@ def _report_failure(
         [*pairing_notes(files), known.as_line(), *rejections(views.rejected), *unwritten(report, options.out)],
     )
     raise error
+
+
+def _taken(files: ViewFiles, views: BoardViews, pairs: list[BoardPair], board: Board) -> Taken:
+    return Taken(order=[name for name, _, _ in files.pairs], views=views, pairs=pairs, board=board)
 
 
 def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[str]) -> None:
@@ -168,7 +181,7 @@ def _advised(judgement: Assessment, found: Calibration, wrong: Misplaced | None,
         return judgement
     if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
         return Assessment(Verdict.REJECT, (hint,))  # all else follows from it
-    return Assessment(judgement.verdict, (hint,))
+    return Assessment(judgement.verdict, () if judgement.verdict is Verdict.GOOD else (hint,))
 
 
 def _write_rig(out: Path, calibration: Calibration | None, views: RigViews | None = None) -> dict[str, str]:

@@ -169,12 +169,14 @@ def saved_views(session: Session, found: Calibration, pairs: list[BoardPair]) ->
     """Return what rig.yaml keeps of the views; None after --pose-only, whose lenses come from others."""
     if session.rig is not None and session.views is None:
         return None
-    every = pairs if session.views is None else _every(session.views, pairs)
-    return views_of(found, every, session.board)
+    return views_of(found, every_pair(session, pairs), session.board)
 
 
-def _every(views: RigViews, pairs: list[BoardPair]) -> list[BoardPair]:
-    earlier = pairs_of(views)
+def every_pair(session: Session, pairs: list[BoardPair]) -> list[BoardPair]:
+    """Return the pairs that the rig was computed from: those of the earlier calibration that are wanted, and the new ones."""
+    if session.views is None:
+        return pairs
+    earlier = pairs_of(session.views)
     return together(earlier, new_ones(earlier, pairs))
 
 
@@ -194,7 +196,7 @@ def notes(session: Session, pairs: list[BoardPair], sizes_px: Sizes) -> list[str
     if session.rig is None:
         return []
     if session.views is not None:
-        fresh = len(_every(session.views, pairs)) - len(session.views.names)
+        fresh = len(every_pair(session, pairs)) - len(session.views.names)
         known = f"; {len(pairs) - fresh} were in it already" if fresh < len(pairs) else ""
         return [f"from     {len(session.views.names)} pairs of {session.path} and {fresh} new ones{known}"]
     rows = [f"from     {session.path}: its lenses are kept, the relative pose is new"]

@@ -186,7 +186,7 @@ def pairing_notes(files: ViewFiles) -> list[str]:
 
 def unwritten(report: dict[str, Any], out: Path) -> list[str]:
     """Say that there is no new rig, and where the earlier one is."""
-    return [f"{out} was not written{_earlier(report)}"]
+    return [f"{out} was not written{_earlier(report)}", f"look at {report['page']}"]
 
 
 def _earlier(report: dict[str, Any]) -> str:
@@ -238,6 +238,8 @@ def summary(
         far = f"{far_m:.0f}" if far_m >= _WHOLE_METRES else f"{far_m:.1f}"
         rows.append(f"zero     disparity +- {report['zero_sigma_px']:.2f} px; depth beyond {far} m is a guess")
     rows.append(f"verdict  {report['verdict']}")
+    if not report["remedy"] and report["cause"] is not None:
+        rows.append(f"note     {report['cause']['sentence']}")
     rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
     return [*rows, *_written(report, calibration, out)]
 
@@ -262,7 +264,7 @@ def _lens_rows(calibration: Calibration) -> list[str]:
 def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> list[str]:
     if calibration.rectification is None:
         return unwritten(report, out)
-    rows = [f"written to {out} and {out.with_name('report.json')}{_earlier(report)}"]
+    rows = [f"written to {out} and {out.with_name('report.json')}{_earlier(report)}", f"look at {report['page']}"]
     if report["verdict"] == REJECTED:
         rows.append(REFUSED)
     return rows

@@ -20,7 +20,7 @@ from phone_host.output.rig_files.imported import Imported, RigKind, export_texts
 from phone_host.output.rig_yaml import REJECTED, is_rig, write_rig
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
-from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
+from phone_host.verbs.output_folders import claim_names, drop_page, keep_other_report, require_file, unwritable
 from phone_host.verbs.units import length_mm
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
@@ -69,6 +69,7 @@ def import_calibration(options: argparse.Namespace) -> int:
     if not same:
         _require_own(options.out)
         keep_other_report(options.out.parent, "calibrate")
+        drop_page(options.out.parent, "calibrate")
         claim_names(options.out.parent, options.out, options.out.name, _REPORT)
     report |= write_exports(options, found.rig, rectification, found.files)
     if not same:

@@ -1,0 +1,157 @@
+"""Copies what a calibration's page shows out of its parts: each view with its corners and what is left of them, and the rig."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Rejected
+from phone_host.calibration.board_views import BoardViews, ViewPictures
+from phone_host.calibration.bundle import Vector
+from phone_host.calibration.fit_quality import LensTrial
+from phone_host.calibration.misfits import vertical_errors_px
+from phone_host.calibration.target import Board
+from phone_host.calibration.verdict import limits_of
+from phone_host.geometry.se3 import SE3
+from phone_host.model import Rig
+from phone_host.model.calibration_session import LensTried, SeenBoard, SessionRig, SessionView
+
+_UNUSED: Final = "no rig came of the views"
+"""Why a view is not used whose board was found, if no rig came of any."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Taken:
+    """What a session took.
+
+    Attributes:
+        order: names of the pairs in the order in which they were taken.
+        views: what was found in the images.
+        pairs: corners of all pairs that the calibration was given, those of an earlier one included; perhaps a drift of the
+            cameras was taken out of them.
+        board: the board.
+    """
+
+    order: Sequence[str]
+    views: BoardViews
+    pairs: list[BoardPair]
+    board: Board
+
+    def as_seen(self, pair: BoardPair) -> BoardPair:
+        """Return a pair as it was seen, under the name that it has now; one of an earlier calibration as it is."""
+        own = next((each for each in self.views.pairs if each.left_px is pair.left_px), pair)
+        return replace(own, name=pair.name)
+
+    @property
+    def is_straightened(self) -> bool:
+        """Whether a drift was taken out."""
+        return any(self.as_seen(pair).right_px is not pair.right_px for pair in self.pairs)
+
+
+def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejected, ...]) -> tuple[SessionView, ...]:
+    """Return all views of a session, used or not.
+
+    Args:
+        taken: what the session took.
+        found: what came of it; None: no rig.
+        rejected: the pairs that are not used, with the reasons.
+
+    Returns:
+        Those of an earlier calibration first, the others in their order, those without a partner last.
+    """
+    reasons = {each.name: each for each in rejected}
+    pictures = {each.name: each for each in taken.views.pictures}
+    made = list[tuple[int, SessionView]]()
+    order = {name: index for index, name in enumerate(taken.order)}
+    for pair in taken.pairs:
+        own = next(
+            (each.name for each in taken.views.pairs if each.left_px is pair.left_px), ""
+        )  # pairs may be renamed
+        why = reasons.pop(pair.name, None)
+        view = _view((pair, taken.as_seen(pair)), pictures.get(own), found, why, taken.board)
+        made.append((order.get(own, -1), view))
+    for name, why in reasons.items():
+        picture = pictures.get(name)
+        left, right = (SeenBoard(), SeenBoard()) if picture is None else _seen(picture)
+        view = SessionView(name=name, left=left, right=right, reason=why.reason.value, detail=why.detail)
+        made.append((order.get(name, len(order)), view))
+    return tuple(view for _, view in sorted(made, key=lambda each: each[0]))
+
+
+def session_rig(found: Calibration, rig: Rig, far_m: float) -> SessionRig:
+    """Return the rig with its figures.
+
+    Args:
+        found: what came of the views.
+        rig: as it is written.
+        far_m: depth beyond which it is a guess, m.
+    """
+    left, right = (_tried(trials, bend.terms) for trials, bend in zip(found.trials, found.bends, strict=True))
+    return SessionRig(
+        rig=rig,
+        rectification=found.rectification,
+        vertical_px=found.vertical_px,
+        baseline_sigma_m=found.baseline_sigma_m,
+        square_m=found.squares.true_m,
+        square_mean_m=found.squares.mean_m,
+        square_sigma_m=found.squares.sigma_m,
+        depths=found.depths,
+        far_m=far_m,
+        limits=limits_of(rig),
+        tried=(left, right),
+    )
+
+
+def _tried(trials: tuple[LensTrial, ...], terms: int) -> tuple[LensTried, ...]:
+    return tuple(
+        LensTried(
+            words=f"{each.bend.lens.value}, {each.bend.terms} coefficients",
+            held_out_px=each.rms_px,
+            is_chosen=each.bend.terms == terms,
+        )
+        for each in trials
+    )
+
+
+def _seen(picture: ViewPictures) -> tuple[SeenBoard, SeenBoard]:
+    return SeenBoard(picture=picture.left), SeenBoard(picture=picture.right)
+
+
+def _view(
+    both: tuple[BoardPair, BoardPair],
+    picture: ViewPictures | None,
+    found: Calibration | None,
+    why: Rejected | None,
+    board: Board,
+) -> SessionView:
+    """Return a view whose board was found in both images, from its corners as they were used and as they were seen."""
+    pair, seen = both
+    place = None if found is None else next((i for i, each in enumerate(found.used) if each.name == pair.name), None)
+    left, right = (b"", b"") if picture is None else (picture.left, picture.right)
+    if found is None or place is None:
+        return SessionView(
+            name=pair.name,
+            left=SeenBoard(picture=left, corners_px=seen.left_px),
+            right=SeenBoard(picture=right, corners_px=seen.right_px),
+            reason=_UNUSED if why is None else why.reason.value,
+            detail="" if why is None else why.detail,
+        )
+    vertical = as_seen = np.empty(0)
+    if found.rectification is not None:
+        vertical, as_seen = (vertical_errors_px(each, found.rig, found.rectification) for each in both)
+    return SessionView(
+        name=pair.name,
+        left=SeenBoard(picture=left, corners_px=seen.left_px, residuals_px=found.left_errors_px[place]),
+        right=SeenBoard(picture=right, corners_px=seen.right_px, residuals_px=found.right_errors_px[place]),
+        outline_m=SE3.of(found.poses[place]).apply(_outline_m(board)),
+        vertical_px=vertical,
+        as_seen_px=as_seen,
+    )
+
+
+def _outline_m(board: Board) -> Vector:
+    """Return the outer corners in turn, (4, 3), in the board's axes."""
+    points = board.points_m()
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([[low[0], low[1], 0], [high[0], low[1], 0], [high[0], high[1], 0], [low[0], high[1], 0]])
