@@ -210,5 +210,6 @@ def test_a_single_view_of_two_corners_has_neither_a_mean_nor_an_order() -> None:
     }
     page = _page(replace(whole, views=(replace(one, left=sides["left"], right=sides["right"]),), turns=None))
     assert "What is left in each view" in page.words
-    for absent in ("more view", "What is left over the image", "Over the order", "Not used"):
+    assert len(page.every("details")) == 2  # what the figures mean, and the figures of all views
+    for absent in ("What is left over the image", "Over the order", "Not used"):
         assert absent not in page.words
