@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Rejected
 from phone_host.calibration.board_views import BoardViews, ViewPictures
 from phone_host.calibration.bundle import Vector
@@ -38,10 +39,13 @@ class Taken:
     pairs: list[BoardPair]
     board: Board
 
+    def own(self, pair: BoardPair) -> BoardPair | None:
+        """Return a pair as it was found in this session's images, where it may have another name; None: it is of an earlier calibration."""
+        return next((each for each in self.views.pairs if each.left_px is pair.left_px), None)
+
     def as_seen(self, pair: BoardPair) -> BoardPair:
         """Return a pair as it was seen, under the name that it has now; one of an earlier calibration as it is."""
-        own = next((each for each in self.views.pairs if each.left_px is pair.left_px), pair)
-        return replace(own, name=pair.name)
+        return replace(self.own(pair) or pair, name=pair.name)
 
     @property
     def is_straightened(self) -> bool:
@@ -64,17 +68,18 @@ def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejec
     pictures = {each.name: each for each in taken.views.pictures}
     made = list[tuple[int, SessionView]]()
     order = {name: index for index, name in enumerate(taken.order)}
+    used = set() if found is None else {each.name for each in found.used}
     for pair in taken.pairs:
-        own = next(
-            (each.name for each in taken.views.pairs if each.left_px is pair.left_px), ""
-        )  # pairs may be renamed
-        why = reasons.pop(pair.name, None)
-        view = _view((pair, taken.as_seen(pair)), pictures.get(own), found, why, taken.board)
-        made.append((order.get(own, -1), view))
-    for name, why in reasons.items():
+        own = taken.own(pair)
+        name = "" if own is None else own.name
+        # A pair of an earlier calibration may have the name of a rejected one.
+        why = None if pair.name in used else reasons.pop(pair.name, None)
+        view = _view((pair, taken.as_seen(pair)), pictures.get(name), found, why, taken.board)
+        made.append((order.get(name, -1), view))
+    for name, reason in reasons.items():
         picture = pictures.get(name)
         left, right = (SeenBoard(), SeenBoard()) if picture is None else _seen(picture)
-        view = SessionView(name=name, left=left, right=right, reason=why.reason.value, detail=why.detail)
+        view = SessionView(name=name, left=left, right=right, reason=reason.reason.value, detail=reason.detail)
         made.append((order.get(name, len(order)), view))
     return tuple(view for _, view in sorted(made, key=lambda each: each[0]))
 
@@ -87,7 +92,7 @@ def session_rig(found: Calibration, rig: Rig, far_m: float) -> SessionRig:
         rig: as it is written.
         far_m: depth beyond which it is a guess, m.
     """
-    left, right = (_tried(trials, bend.terms) for trials, bend in zip(found.trials, found.bends, strict=True))
+    left, right = (_tried(trials, bend) for trials, bend in zip(found.trials, found.bends, strict=True))
     return SessionRig(
         rig=rig,
         rectification=found.rectification,
@@ -103,12 +108,12 @@ def session_rig(found: Calibration, rig: Rig, far_m: float) -> SessionRig:
     )
 
 
-def _tried(trials: tuple[LensTrial, ...], terms: int) -> tuple[LensTried, ...]:
+def _tried(trials: tuple[LensTrial, ...], chosen: Bend) -> tuple[LensTried, ...]:
     return tuple(
         LensTried(
             words=f"{each.bend.lens.value}, {each.bend.terms} coefficients",
             held_out_px=each.rms_px,
-            is_chosen=each.bend.terms == terms,
+            is_chosen=each.bend is chosen,
         )
         for each in trials
     )

@@ -198,3 +198,18 @@ def test_a_page_with_many_views_stays_small() -> None:
     assert len([each for each in page.every("svg") if str(each.get("aria-label", "")).endswith(", left")]) == 30
     assert "24 more views" in page.words
     assert "v99" in page.words
+
+
+def test_a_single_view_of_two_corners_has_neither_a_mean_nor_an_order() -> None:
+    """Its pictures are shown without a list of more views; no tile has enough corners, and one view has no order."""
+    whole = session()
+    one = next(view for view in whole.views if view.is_used)
+    sides = {
+        name: replace(side, corners_px=side.corners_px[:2], residuals_px=side.residuals_px[:2])
+        for name, side in (("left", one.left), ("right", one.right))
+    }
+    page = _page(replace(whole, views=(replace(one, left=sides["left"], right=sides["right"]),), turns=None))
+    assert "What is left in each view" in page.words
+    assert len(page.every("details")) == 2  # what the figures mean, and the figures of all views
+    for absent in ("What is left over the image", "Over the order", "Not used"):
+        assert absent not in page.words

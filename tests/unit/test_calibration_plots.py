@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from phone_host.calibration.board_pairs import Reason, Rejected
 from phone_host.calibration.rectified_view import fullest, rectified_view
 from phone_host.calibration.session_snapshot import session_views
 from phone_host.calibration.small_picture import small_jpeg, small_size
@@ -113,6 +114,10 @@ def test_views_of_an_earlier_calibration_come_first_and_have_no_picture() -> Non
     assert [view.name for view in views] == ["0", "1", "2", "3", "4 (2)", "5 (2)", "6 (2)", "7 (2)"]
     assert [bool(view.left.picture) for view in views] == [False] * 4 + [True] * 4
     assert not any(view.is_used for view in views)
+    found = calibration()
+    namesake = Rejected("3", Reason.NOT_FOUND_LEFT, "it is new")
+    views = session_views(taken([replace(pair, left_px=pair.left_px.copy()) for pair in pairs()]), found, (namesake,))
+    assert [(view.is_used, view.detail) for view in views if view.name == "3"] == [(True, ""), (False, "it is new")]
 
 
 def test_a_rectified_pair_is_small_and_its_corners_lie_on_its_lines(tmp_path: Path) -> None:

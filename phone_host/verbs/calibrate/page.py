@@ -60,7 +60,7 @@ def with_rectified(
     rig, rectification = session.found.rig, session.found.rectification
     used = {view.name for view in session.views if view.is_used}
     paths = {name: (left, right) for name, left, right in files.pairs}
-    shown = [pair for pair in taken.views.pairs if pair.name in used and pair.name in paths]
+    shown = [own for pair in taken.pairs if pair.name in used and (own := taken.own(pair)) is not None]
     if not shown:
         return session
     one = shown[-1] if session.is_straightened else fullest(shown, rig, rectification)
