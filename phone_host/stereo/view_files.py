@@ -9,10 +9,16 @@ from typing import Final
 from common.errors import DataError, SettingsError
 from common.name_order import DIGITS, name_order
 from common.places import Kind, kind_of, resolved
+from common.words import counted
 
 SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"})
 _UNREAD: Final = frozenset({".heic", ".heif", ".avif"})
 """Photographs of phones that are not read."""
+
+_FILMS: Final = frozenset({".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".3gp"})
+_FROM_FILMS: Final = (
+    "take pictures of the same moments out of both films first, such as: ffmpeg -i left.mp4 -vf fps=1 left/%03d.png"
+)
 
 _REMEDY: Final = "give an image, a folder of images or a quoted glob such as 'left*.png'"
 _MOST_KINDS: Final = 4  # enough to recognise a folder by; the line stays short
@@ -171,7 +177,8 @@ def _inside(folder: str, side: str) -> list[Path]:
         raise DataError(f"{side} {folder!r} names no image", _REMEDY)
     kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
     shown = ", ".join(kinds[:_MOST_KINDS])
-    raise DataError(f"{side} {folder!r} names no image, only {len(inside)} other files ({shown})", _REMEDY)
+    remedy = _REMEDY if _FILMS.isdisjoint(kinds) else _FROM_FILMS
+    raise DataError(f"{side} {folder!r} names no image, only {counted(len(inside), 'other file')} ({shown})", remedy)
 
 
 def _matching(pattern: str, side: str) -> list[Path]:

@@ -167,7 +167,8 @@ def require_file(out: Path, option: str = "--out") -> None:
     except OSError as error:
         raise unwritable(out, error, option) from None
     if kind not in {Kind.MISSING, Kind.FILE}:
-        raise UnavailableError(f"{out} is {kind.value}, not a file", f"name another {option}")
+        remedy = f"name a file in it with {option}" if kind is Kind.FOLDER else f"name another {option}"
+        raise UnavailableError(f"{out} is {kind.value}, not a file", remedy)
 
 
 def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:

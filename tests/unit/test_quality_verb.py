@@ -194,6 +194,7 @@ def test_a_board_gives_the_true_distance(room: Path, tmp_path: Path, capsys: pyt
         (["--distance", "1m,2m,3m"], "--distance has 3 values, and there are 2 pairs"),
         (["--distance", "1"], "--distance 1 has no unit"),
         (["--roi", "1,2,3"], "--roi is '1,2,3'"),
+        (["--board", "charuco:8x6:25mm:18mm:5x5", "--square", "25mm"], "quality knows chessboards only"),
     ],
 )
 def test_contradictory_options_are_exit_2(

@@ -127,6 +127,11 @@ def test_files_that_are_no_images_are_left_out_and_named_when_nothing_else_is_th
     other = _touch(tmp_path / "o", "Thumbs.db", "notes.txt")
     with pytest.raises(DataError, match=r"names no image, only 2 other files \(\.db, \.txt\)"):
         pair_files(str(left), str(other))
+    film = _touch(tmp_path / "f", "left.MP4")
+    with pytest.raises(
+        DataError, match=r"only 1 other file \(\.mp4\): take pictures of the same moments out of both films"
+    ):
+        pair_files(str(film), str(film))
 
 
 def test_a_name_that_leads_nowhere_does_not_exist(tmp_path: Path) -> None:

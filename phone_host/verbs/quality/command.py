@@ -69,7 +69,7 @@ def _board(options: argparse.Namespace) -> Board | None:
     """Read --board and --square.
 
     Raises:
-        SettingsError: only one of them is given, one is invalid, or --distance is given, too.
+        SettingsError: only one of them is given, one is invalid or of a board with marks, or --distance is given, too.
     """
     if options.board is None and options.square is None:
         return None
@@ -78,6 +78,11 @@ def _board(options: argparse.Namespace) -> Board | None:
     if options.distance is not None:
         raise SettingsError(
             "--distance and --board contradict each other: both give the true distance", "give only one of the two"
+        )
+    if ":" in options.board:
+        raise SettingsError(
+            f"--board {options.board!r} has marks, and quality knows chessboards only",
+            "show a chessboard and give its inner corners, such as 9x6, or give --distance",
         )
     return parse_board(options.board, square_mm(options.square))
 

@@ -104,7 +104,7 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
         board, size, mark = "", f"{columns}x{rows}", 0.0
     else:
         side = _MAT_MM if options.kind == "mat" and not options.square else _side_mm(options, paper, columns, rows)
-        mark = length_mm(options.mark, "--mark", "18mm") if options.mark else float(math.floor(_MARK_SHARE * side))
+        mark = length_mm(options.mark, "--mark", "18mm") if options.mark else _usual_mark_mm(side)
         if not 0.3 * side <= mark <= _LARGEST_MARK * side:
             raise SettingsError(
                 f"--mark {mark:g}mm does not fit a square of {side:g} mm", "give 0.3 to 0.9 of its side"
@@ -120,6 +120,11 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
     marks = "" if options.kind == "chessboard" else f"-{mark:g}mm-{options.family}"
     stem = f"{options.kind}-{size}-{side:g}mm{marks}-{paper.name.lower()}"
     return _Made(_files(stem, sheet), side, _paper_lines(board, side))
+
+
+def _usual_mark_mm(side: float) -> float:
+    """Return whole millimetres, where a square has room for them."""
+    return float(math.floor(_MARK_SHARE * side)) or round(_MARK_SHARE * side, 1)
 
 
 def _files(stem: str, sheet: Sheet) -> dict[str, bytes]:
