@@ -32,8 +32,8 @@ _BLURRED_PX, _MOST_BLURRED_PX = 4.0, 6.0
 _BLURRED_FACTOR: Final = 1.6
 """A camera that is soft by nature is compared with its own sharpest view."""
 
-_WASHED: Final = 0.1
-"""More of the edges may not have lost their contrast: half of what makes a session a glaring one."""
+_WASHED: Final = 0.05
+"""More of the edges may not have lost their contrast: from 0.08 on `causes` calls a session glaring."""
 
 _LEAST_SEEN, _LEAST_CORNERS = 0.3, 12
 """Share and number of a board's corners, for boards of which a part is enough."""
@@ -92,7 +92,7 @@ def found(sighting: Sighting) -> Gate:
         case _:
             pass
     both = np.isfinite(sighting.left_px).all(axis=1) & np.isfinite(sighting.right_px).all(axis=1)
-    is_enough = both.sum() >= _LEAST_CORNERS and both.mean() >= _LEAST_SEEN or bool(both.all())
+    is_enough = (both.sum() >= _LEAST_CORNERS and both.mean() >= _LEAST_SEEN) or bool(both.all())
     return Gate.READY if is_enough else Gate.PART
 
 

@@ -62,6 +62,13 @@ _HOPELESS_VIEWS: Final = 6
 _LEAST_GAIN: Final = 0.08
 """A view that lowers the depth error by a smaller share no longer helps: with twelve views every further one does so by about 4 %."""
 
+_ABSENT: Final = {
+    Gate.NOT_FOUND: Words.SHOW_BOTH,
+    Gate.NOT_FOUND_LEFT: Words.SHOW_LEFT,
+    Gate.NOT_FOUND_RIGHT: Words.SHOW_RIGHT,
+    Gate.PART: Words.PART,
+}
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
@@ -93,7 +100,7 @@ class Guide:
     """
 
     def __init__(self, board: Board, most_views: int, now_ns: int) -> None:
-        self._board, self._most = board, most_views
+        self.board, self._most = board, most_views
         self.views: list[View] = []
         self.ended = Ended.RUNNING
         self._began_ns = self._seen_ns = now_ns
@@ -205,19 +212,17 @@ class Guide:
 
     def snapshot(self, now_ns: int) -> GuideSnapshot:
         """Return everything that presenters show."""
-        progress, outlines = self._progress, ((), ())
-        if self._placed is not None and self._gate not in NOT_SEEN:
-            outlines = (self._placed.left.outline, self._placed.right.outline)
+        progress = self._progress
         return GuideSnapshot(
             ended=self.ended,
             words=self._words,
             gate=self._gate,
-            board=f"{self._board.columns}x{self._board.rows}",
+            board=f"{self.board.columns}x{self.board.rows}",
             views=len(self.views),
             most_views=self._most,
             seconds=(now_ns - self._began_ns) / 1e9,
             coverage=self._coverage,
-            outlines=outlines,
+            outlines=self._outlines,
             asked=self._asked,
             wanted=tuple(want for want in ORDER if want in self._open),
             depth_error_m=math.nan if progress is None else progress.depth_error_m,
@@ -245,14 +250,15 @@ class Guide:
 
     def _place(self, sighting: Sighting) -> Placed:
         rig = self._rig
-        left, right = (
-            placement(corners, self._board, usual_camera(size_px) if rig is None else model)
-            for corners, size_px, model in (
-                (sighting.left_px, sighting.sizes_px[0], None if rig is None else rig.left),
-                (sighting.right_px, sighting.sizes_px[1], None if rig is None else rig.right),
-            )
-        )
-        return Placed(left, right)
+        left, right = map(usual_camera, sighting.sizes_px) if rig is None else (rig.left, rig.right)
+        return Placed(placement(sighting.left_px, self.board, left), placement(sighting.right_px, self.board, right))
+
+    @property
+    def _outlines(self) -> tuple[Outline, Outline]:
+        """The board in the newest pair."""
+        if self._placed is None or self._gate in NOT_SEEN:
+            return (), ()
+        return self._placed.left.outline, self._placed.right.outline
 
     @property
     def _rig(self) -> Rig | None:
@@ -308,32 +314,18 @@ class Guide:
             return done("" if self._progress is None else self._progress.verdict.value, len(self.views))
         if self._is_heard(now_ns):
             return taken(len(self.views))
-        match self._gate:
-            case Gate.NOT_FOUND | Gate.NOT_FOUND_LEFT | Gate.NOT_FOUND_RIGHT | Gate.PART:
-                return self._words_for_absent(now_ns)
-            case Gate.MOVING | Gate.APART | Gate.READY | Gate.TAKEN:
-                return Words.STILL.value
-            case Gate.BLURRED:
-                return Words.BLURRED.value
-            case Gate.GLARE:
-                return Words.GLARE.value
-            case Gate.NOTHING_NEW:
-                assert self._placed is not None
-                return missing(self._asked, self._placed) or Words.ELSEWHERE.value
+        if self._gate in NOT_SEEN:
+            return self._words_for_absent(now_ns)
+        if self._gate is Gate.NOTHING_NEW and self._placed is not None:
+            return missing(self._asked, self._placed) or Words.ELSEWHERE.value
+        return {Gate.BLURRED: Words.BLURRED, Gate.GLARE: Words.GLARE}.get(self._gate, Words.STILL).value
 
     def _words_for_absent(self, now_ns: int) -> str:
         if not self._has_seen:
-            return (Words.HELP if now_ns - self._began_ns > _NEVER_NS else Words.SHOW_BOTH).value
+            never = now_ns - self._began_ns > _NEVER_NS
+            return Words.HELP.value if never else Words.SHOW_BOTH.value
         if now_ns - self._seen_ns < _LOST_NS:
             return self._words
         if self._placed is not None and is_at_an_edge(self._placed):
             return Words.BACK.value
-        match self._gate:
-            case Gate.NOT_FOUND_LEFT:
-                return Words.SHOW_LEFT.value
-            case Gate.NOT_FOUND_RIGHT:
-                return Words.SHOW_RIGHT.value
-            case Gate.PART:
-                return Words.PART.value
-            case _:
-                return Words.SHOW_BOTH.value
+        return _ABSENT[self._gate].value

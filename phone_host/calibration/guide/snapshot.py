@@ -8,7 +8,7 @@ from typing import Any
 from common.versions import REPORT_FORMAT
 from phone_host.calibration.guide.coverage import Coverage, Depth, Tilt
 from phone_host.calibration.guide.gates import Gate
-from phone_host.calibration.guide.wants import Want
+from phone_host.calibration.guide.wants import ORDER, Want
 from phone_host.model import Side
 
 
@@ -102,3 +102,25 @@ class GuideSnapshot:
 
 def _mm(metres: float) -> float | None:
     return round(metres * 1e3, 3) if math.isfinite(metres) else None
+
+
+def before_board(words: str, most_views: int, seconds: float) -> GuideSnapshot:
+    """Return the snapshot of a live calibration whose board is not known yet."""
+    return GuideSnapshot(
+        ended=Ended.RUNNING,
+        words=words,
+        gate=Gate.NOT_FOUND,
+        board="",
+        views=0,
+        most_views=most_views,
+        seconds=seconds,
+        coverage=(),
+        outlines=((), ()),
+        asked=Want.ANY,
+        wanted=ORDER,
+        depth_error_m=math.nan,
+        next_error_m=math.nan,
+        verdict="",
+        remedy="",
+        refused=(),
+    )
