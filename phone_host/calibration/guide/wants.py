@@ -16,8 +16,9 @@ _TILT_DEG, _ASKED_TILT_DEG = 18.0, 30.0
 """A board counts as tilted from the first on; the second is what is imagined. Below 15 a focal length is hardly told from a
 distance."""
 
-_EDGE: Final = 0.1
-"""A corner of the board that is this near to an edge, in image sizes beside the board's own outer square, has reached it."""
+_EDGE: Final = 0.14
+"""A corner of the board that is this near to an edge, in image sizes beside the board's own outer square, has reached it. A person who is
+told to stop there stops half a second later, and must not have left the picture by then."""
 
 _NEAR_FILLS, _FAR_FILLS = 0.5, 0.25
 _LEAST_FILLS, _MOST_FILLS = 0.15, 0.65
@@ -109,7 +110,9 @@ def missing(want: Want, placed: Placed) -> str:
         placed: where the board is.
     """
     if want is Want.NEAR:
-        return _CLOSER if placed.fills < _NEAR_FILLS else ""
+        return (
+            "" if placed.fills >= _NEAR_FILLS or _is_full(placed) else ", ".join(filter(None, (_CLOSER, back(placed))))
+        )
     if want is Want.FAR:
         return _FARTHER if placed.fills > _FAR_FILLS else ""
     size = _CLOSER if placed.fills < _LEAST_FILLS else _FARTHER if placed.fills > _MOST_FILLS else ""
@@ -117,9 +120,15 @@ def missing(want: Want, placed: Placed) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def is_at_an_edge(placed: Placed) -> bool:
-    """Return whether the board is about to leave one of the pictures."""
-    return any(_reached(placed, x, y) for x, y in _EDGES)
+def back(placed: Placed) -> str:
+    """Return how a board that is about to leave one of the pictures comes back, in a few words; empty: it is far from all edges."""
+    if _is_full(placed):
+        return _FARTHER
+    x = next((way for way in (-1, 1) if _reached(placed, way, 0)), 0)
+    y = next((way for way in (-1, 1) if _reached(placed, 0, way)), 0)
+    corner = next((want for want, ways in _CORNERS.items() if ways == (x, y)), None)
+    where = corner.value if corner is not None else _EDGES.get((x, y))
+    return "" if where is None else f"back from the {where}"
 
 
 def _way(want: Want, placed: Placed) -> str:
@@ -134,10 +143,15 @@ def _way(want: Want, placed: Placed) -> str:
     return ""
 
 
+def _is_full(placed: Placed) -> bool:
+    """Return whether the board has reached opposite edges, be it of different pictures: both cameras see no more of it."""
+    return any(_reached(placed, x, y) and _reached(placed, -x, -y) for x, y in ((1, 0), (0, 1)))
+
+
 def _reached(placed: Placed, x: int, y: int) -> bool:
     """Return whether the board has reached an edge of one of the pictures."""
     axis = 0 if x else 1
-    sides = (placed.left, placed.right)
-    if x < 0 or y < 0:
-        return any(each.low[axis] <= _EDGE + each.square[axis] for each in sides)
-    return any(each.high[axis] >= 1 - _EDGE - each.square[axis] for each in sides)
+    return any(
+        (each.low[axis] if x + y < 0 else 1 - each.high[axis]) - each.square[axis] <= _EDGE
+        for each in (placed.left, placed.right)
+    )
