@@ -1,5 +1,6 @@
 """A person who follows the live guide's words, by the corners that both cameras would see: no images, no clock. Fast enough for unit tests."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,11 +10,11 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.causes.looks import Look
 from phone_host.calibration.guide.gates import Gate, Sighting
-from phone_host.calibration.guide.guide import Guide
+from phone_host.calibration.guide.guide import Guide, View
+from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended
 from phone_host.calibration.target import Board
-from phone_host.model import Rig, Side
-from phone_host.verbs.calibrate.live import grown
+from phone_host.model import Rig
 from tests.support.rigs import project_points
 
 Vector = NDArray[np.float64]
@@ -98,8 +99,11 @@ def seen(rig: Rig, board: Board, at: Vector, random: np.random.Generator, noise_
     return found[0], found[1]
 
 
+Grow = Callable[[tuple[View, ...]], Progress]
+
+
 def follow(
-    rig: Rig, board: Board, random: np.random.Generator, *, most_s: float = 300.0, most_views: int = 25
+    rig: Rig, board: Board, random: np.random.Generator, grow: Grow, *, most_s: float = 300.0, most_views: int = 25
 ) -> Guide:
     """Let a person follow the words until the guide ends, or time is up.
 
@@ -107,6 +111,7 @@ def follow(
         rig: the true cameras.
         board: the board.
         random: of the hand and of the corners' noise.
+        grow: calibrates from the views so far.
         most_s: give up after this time.
         most_views: as the guide takes it.
     """
@@ -124,7 +129,7 @@ def follow(
         if guide.see(sighting, now_ns) is Gate.READY and guide.examine(sighting, (look, look), now_ns) is Gate.TAKEN:
             solve_at = now_ns + _SOLVE_NS
         if solve_at and now_ns >= solve_at and len(guide.views) >= 3:
-            guide.grow(grown(tuple(guide.views), board, sizes, Side.LEFT, float("nan")), now_ns)
+            guide.grow(grow(tuple(guide.views)), now_ns)
             solve_at = 0
         if guide.words(now_ns) != words:
             words, heard_at = guide.words(now_ns), now_ns

@@ -31,7 +31,7 @@ from phone_host.calibration.guide.gates import (
 from phone_host.calibration.guide.placement import placement, usual_camera
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
-from phone_host.calibration.guide.wants import ORDER, Placed, Want, back, is_there, missing
+from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Words, done, taken
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
@@ -48,6 +48,9 @@ _LOST_NS: Final = 1_000_000_000
 
 _LEFT_NS: Final = 4_000_000_000
 """A board that left over an edge may have gone anywhere after this time."""
+
+_REACTION_NS: Final = 500_000_000
+"""So long after the words a hand stops. In this time a board that is moved to an edge leaves the picture."""
 
 _STEADY_NS: Final = 400_000_000
 """Words must hold for so long before they replace others."""
@@ -136,9 +139,11 @@ class Guide:
         gate = found(sighting)
         speed = speed_widths_s(self._last, sighting)
         if gate is Gate.READY:
-            self._last, self._has_seen, self._seen_ns = sighting, True, now_ns
-            self._placed = self._place(sighting)
-            gate = self._judged(sighting, self._placed, speed)
+            placed = self._place(sighting)
+            gate = self._judged(sighting, placed, speed)
+            if gate is Gate.NOTHING_NEW and self._is_coming(sighting, placed):
+                gate = Gate.MOVING
+            self._last, self._placed, self._has_seen, self._seen_ns = sighting, placed, True, now_ns
         else:
             self._last = self._still_since_ns = None
         self._give_up(now_ns)
@@ -251,6 +256,13 @@ class Guide:
         if self._still_since_ns is None or sighting.at_ns - self._still_since_ns < STILL_NS:
             return Gate.MOVING
         return Gate.READY if is_paired_well(sighting, speed) else Gate.APART
+
+    def _is_coming(self, sighting: Sighting, placed: Placed) -> bool:
+        """Return whether the wanted view will be there by the time a person has heard to hold still."""
+        if self._last is None or self._placed is None or self._still_since_ns is not None or self.is_full:
+            return False
+        steps = _REACTION_NS / max(1, sighting.at_ns - self._last.at_ns)
+        return bool(self.views) and is_there(self._asked, ahead(self._placed, placed, steps))
 
     def _is_wanted(self, placed: Placed) -> bool:
         wants = {Want.ANY} if not self.views else self._open | {self._asked}
