@@ -54,8 +54,9 @@ class Show:
     ) -> Gate:
         """Hold a board before both cameras for a while; return what became of the last look."""
         gate = Gate.NOT_FOUND
-        for _ in range(round(seconds * 10)):
-            self.now_ns += LOOK_NS
+        step_ns = LOOK_NS if seconds < 3 else 4 * LOOK_NS
+        for _ in range(math.ceil(seconds * SECOND_NS / step_ns)):
+            self.now_ns += step_ns
             scale = np.array(SIZES[1]) / SIZES[0]
             seen = Sighting(
                 at_ns=self.now_ns,
