@@ -65,7 +65,7 @@ def printed(board: Board, grip: int) -> tuple[Level, ...]:
     n = _FINEST
     rows, columns = board.rows + 1, board.columns + 1
     checks = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0
-    squares = np.where(checks, _BLACK, GREY_OF_PAPER).repeat(n, 0).repeat(n, 1)
+    squares = np.where(checks, GREY_OF_PAPER, _BLACK).repeat(n, 0).repeat(n, 1)
     paper = np.pad(squares, n, constant_values=GREY_OF_PAPER)
     card = np.pad(paper, n // 2, constant_values=_CARD)
     rest = (2 * AROUND - 3) * n // 2
