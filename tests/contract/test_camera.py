@@ -95,7 +95,7 @@ def served(folder: Path) -> Set:
 def held(folder: Path) -> Set:
     """Open another package's camera before which somebody holds a board."""
     folder.mkdir()
-    write_plan(folder / PLAN, Novice(np.random.default_rng(1), 0.0).plan)
+    write_plan(folder / PLAN, Novice(np.random.default_rng(1), np.zeros(3), 0.0).plan)
     options = (("side", "left"), ("seed", "1"), ("fps", "30"))
     request = CameraRequest(uri="novice:", path=str(folder), options=options, clock=CLOCK, now_ns=now.monotonic_ns())
     return Set(NoviceCamera(request), now.monotonic_ns())

@@ -63,7 +63,7 @@ def test_a_shorter_plan_is_the_same() -> None:
 )
 def test_the_novice_does_what_it_hears(words: str, component: int, sign: int) -> None:
     """Told for ten seconds, somebody who mistakes no direction has moved the board that way, not before a reaction time."""
-    novice = Novice(np.random.default_rng(3), 0.0)
+    novice = Novice(np.random.default_rng(3), np.array([0.05, 0, 0]), 0.0)
     novice.person = replace(novice.person, mistakes=0.0, bored_s=1e9)
     novice.plan = Plan((Stroke(-10, 1, np.array([0.05, 0, 0.5, 0, 0, 0])),))
     novice._bored_s = np.inf

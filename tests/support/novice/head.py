@@ -24,6 +24,10 @@ _STEEPEST: Final = np.radians(50)
 _HORIZONTAL: Final = {"left": -1, "right": 1}
 _VERTICAL: Final = {"top": -1, "bottom": 1}
 _SILENT: Final = ("taken", "done")
+_HOLD: Final = "hold"
+_LEARNS, _STEPS_BACK = 0.2, 0.06
+"""How much of the way what they take for the middle moves to where the cameras saw the board; how much farther away it is taken to be
+each time they did not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +57,8 @@ class Person:
     middle_m: Floats
 
     @staticmethod
-    def of(random: np.random.Generator) -> "Person":
-        """Draw a person."""
+    def of(random: np.random.Generator, between_m: Floats) -> "Person":
+        """Draw a person who faces two cameras; `between_m` is the point between them, (3,)."""
         return Person(
             tempo=random.uniform(0.7, 1.6),
             reaction_s=(0.4, random.uniform(0.8, 1.2)),
@@ -64,7 +68,7 @@ class Person:
             fidgets=random.uniform(0.05, 0.25),
             bored_s=random.uniform(15, 40),
             careless=random.uniform(0.02, 0.1),
-            middle_m=np.array([random.uniform(0.0, 0.1), random.uniform(-0.03, 0.03), random.uniform(0.35, 0.55)]),
+            middle_m=between_m + np.array([*random.normal(0, 0.025, 2), random.uniform(0.35, 0.6)]),
         )
 
 
@@ -73,16 +77,18 @@ class Novice:
 
     Args:
         random: what they are drawn from, and what they decide by.
+        between_m: (3,) the point between the two cameras, which they see before them.
         now_s: CLOCK_MONOTONIC, s.
     """
 
-    def __init__(self, random: np.random.Generator, now_s: float) -> None:
-        self._random, self.person = random, Person.of(random)
+    def __init__(self, random: np.random.Generator, between_m: Floats, now_s: float) -> None:
+        self._random, self.person = random, Person.of(random, between_m)
         aside = random.uniform(-0.2, 0.2, 2) * [1.0, 0.7]
         turned = [*np.radians(random.normal(0, 15, 2)), np.radians(random.normal(0, 8))]
         start = np.array([*(self.person.middle_m[:2] + aside), random.uniform(0.2, 1.0), *turned])
         self.plan = Plan((Stroke(now_s - 10, 1.0, start),))
         self._words, self._times, self._way = "", 0, 1
+        self._middle_m = self.person.middle_m.copy()
         self._acts_s, self._bored_s = np.inf, now_s + random.exponential(self.person.bored_s)
 
     def hear(self, words: str, now_s: float) -> None:
@@ -90,6 +96,10 @@ class Novice:
         if words.startswith(_SILENT):
             self._acts_s = np.inf
             return
+        if words.startswith(_HOLD):  # they see it now: so far the views reach
+            self._middle_m += _LEARNS * (self.plan.at(now_s)[:3] - self._middle_m)
+        elif "middle" in words or "whole" in words:  # a step back cannot be wrong
+            self._middle_m[2] *= 1 + _STEPS_BACK
         self._words, self._times = words, 0
         self._way = -1 if self._random.random() < self.person.mistakes else 1
         self._acts_s = now_s + self._random.uniform(*self.person.reaction_s)
@@ -102,7 +112,7 @@ class Novice:
             self._acts_s = now_s + self._random.uniform(*self.person.patience_s)
             if self._times > 1 and self._random.random() < 0.5:  # a coin
                 self._way = 1  # it was not that way, it seems
-        elif now_s >= self._bored_s and not self._words.startswith("hold"):
+        elif now_s >= self._bored_s and not self._words.startswith(_HOLD):
             goal = self._stirred(self.plan.goal, 0.08, 12)
         else:
             return False
@@ -120,7 +130,7 @@ class Novice:
         length = float(np.linalg.norm(by[:3])) + 0.15 * float(np.linalg.norm(by[3:]))
         lasts_s = self.person.tempo * self._random.uniform(0.8, 1.3) * (0.45 + 2.0 * length)
         grip = int(self._random.integers(1, GRIPS)) if self._random.random() < self.person.careless else 0
-        if self._words.startswith("hold"):
+        if self._words.startswith(_HOLD):
             grip = self.plan.grip(np.inf)
         stroke = Stroke(start_s, lasts_s, by, grip)
         self.plan = replace(
@@ -183,17 +193,17 @@ class Novice:
     def _shown(self, goal: Floats, part: str, now_s: float) -> Floats:
         """Bring the board to where the middle is thought to be, facing the cameras more than before."""
         del part, now_s
-        middle = self.person.middle_m + self._random.normal(0, 0.03, 3) + [0, 0, 0.08 * self._times]
+        middle = self._middle_m + self._random.normal(0, 0.03, 3) + [0, 0, 0.08 * self._times]
         share = min(1.0, max(0.4, self._about(0.8)))
         return self._shaken(np.r_[goal[:3] + share * (middle - goal[:3]), goal[3:5] * 0.5, goal[5] * 0.8])
 
     def _shown_to(self, goal: Floats, part: str, now_s: float) -> Floats:
         """Move towards the camera that is named, rather back than not, and take the fingers off."""
         del now_s
-        x = 0.0 if "left" in part else 2 * self.person.middle_m[0]
-        share = self._about(0.4)
-        there = np.r_[x, self.person.middle_m[1], goal[2] * 1.08]
-        return self._shaken(np.r_[goal[:3] + share * (there - goal[:3]), goal[3:5] * 0.8, goal[5]])
+        step_m = np.array([-0.08 if "left" in part else 0.08, 0, 0.08 * goal[2]])
+        moved = goal[:3] + step_m * self._about(0.7)
+        moved[1] += 0.4 * (self._middle_m[1] - moved[1])
+        return self._shaken(np.r_[moved, goal[3:5] * 0.8, goal[5]])
 
     def _tilted(self, goal: Floats, part: str, now_s: float) -> Floats:
         """Turn the edge that is named away, by what is taken for thirty degrees; more of it when it is said for long."""
@@ -218,7 +228,7 @@ class Novice:
         )
         is_corner = "corner" in part and self._times == 0
         step = self._about(0.2 if is_corner else 0.08) * goal[2]
-        start = self.person.middle_m[:2] if is_corner else goal[:2]
+        start = self._middle_m[:2] if is_corner else goal[:2]
         place = np.where(towards != 0, start + towards * step * [1, 0.75], goal[:2])
         return self._shaken(np.r_[place, goal[2], goal[3:5] * 0.6, goal[5]], 0.01)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phone_host.calibration.target import Board
 from phone_host.geometry.se3 import rotations_of
@@ -72,6 +73,11 @@ def novice_scene(seed: int) -> NoviceScene:
     centre = np.array([random.uniform(0.06, 0.14), *random.uniform(-0.01, 0.01, 2)])
     rig = Rig(left=left.model, right=right.model, R_right_left=rotation, t_right_left_m=-rotation @ centre)
     return NoviceScene(seed=seed, rig=rig, left=left, right=right, unrest=Unrest.of(random))
+
+
+def between_m(rig: Rig) -> NDArray[np.float64]:
+    """Return the point between the two cameras, (3,) m, in the axes of the left one."""
+    return np.asarray(-rig.R_right_left.T @ rig.t_right_left_m / 2)
 
 
 def _eye(random: np.random.Generator, size_px: tuple[int, int]) -> Eye:

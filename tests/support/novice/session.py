@@ -19,7 +19,7 @@ from phone_host.stereo.rectify import rectify_rig
 from tests.support.novice.camera import PLAN, registered
 from tests.support.novice.hands import write_plan
 from tests.support.novice.head import Novice
-from tests.support.novice.scene import BOARD, novice_scene
+from tests.support.novice.scene import BOARD, between_m, novice_scene
 from tests.support.programs import Program, board, host, until
 
 _STEP_S: Final = 0.02
@@ -89,7 +89,8 @@ def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session
         patience_s: longest time, s; then the session is ended as failed.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    novice = Novice(np.random.default_rng([16, seed]), time.monotonic())
+    truth = novice_scene(seed).rig
+    novice = Novice(np.random.default_rng([16, seed]), between_m(truth), time.monotonic())
     write_plan(folder / PLAN, novice.plan)
     more = registered(folder / "site")
     camera, link = f"novice:{folder}?seed={seed}&fps={fps}", f"ipc://{folder}/link"
@@ -115,7 +116,7 @@ def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session
         refused=_json(folder / "guide.json").get("refused", {}),
         said=tuple((round(at_s - began_s, 2), words) for at_s, words in said),
         skipped=_skipped(folder),
-        errors=_errors(folder / "rig.yaml", novice_scene(seed).rig),
+        errors=_errors(folder / "rig.yaml", truth),
         exit_code=code,
         log=log[-2000:],
     )
