@@ -10,12 +10,13 @@ from enum import Enum
 from typing import Final, assert_never
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phone_host.calibration.bundle import BundleResult, BundleView, FreeParameters, Vector, rig_of
 from phone_host.calibration.bundle_problem import GLOBALS, BundleState, RigProblem, project_view
 from phone_host.calibration.rig_sigma import depth_sigma_m
-from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.model import CameraModel, Rectification
+from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
+from phone_host.model import CameraModel, Rectification, Rig
 
 DEPTH_M: Final = 1.0
 """Where the depth error counts that is to become smaller."""
@@ -30,6 +31,9 @@ _ASIDE: Final = 0.28
 
 _LEAST_SEEN: Final = 0.5
 """An imagined view of which a camera would see less than this share of the corners would not be found."""
+
+_LEAST_SIGMA_PX: Final = 0.02
+"""Corners of rendered boards err by about as much: no view teaches without limit."""
 
 
 class Kind(Enum):
@@ -71,29 +75,109 @@ def next_view(
     Returns:
         The view; None if it cannot be told.
     """
-    now = _sigma_m(result.covariance, result.state, rectification)
+    sigmas = [float(np.sqrt(np.nanmean(errors**2))) for errors in (result.left_errors_px, result.right_errors_px)]
+    lesson = Lesson(
+        state=result.state,
+        covariance=result.covariance,
+        flags=free.flags(),
+        sigmas_px=(sigmas[0], sigmas[1]),
+        points_m=points_m,
+        rectification=rectification,
+    )
+    now = lesson.sigma_m()
     if not np.isfinite(now):
         return None
-    flags = free.flags()
-    information = np.linalg.pinv(result.covariance[np.ix_(flags, flags)], hermitian=True)
-    sigmas = [float(np.sqrt(np.nanmean(errors**2))) for errors in (result.left_errors_px, result.right_errors_px)]
-    found = []
-    for kind in Kind:
-        poses = _poses(kind, result.state, points_m)
-        views = [_imagined(result.state, pose, points_m) for pose in poses]
+    found = [NextView(kind, now, lesson.after_m(_poses(kind, result.state, points_m))) for kind in Kind]
+    seen = [each for each in found if np.isfinite(each.after_m)]
+    return min(seen, key=lambda each: each.after_m) if seen else None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Lesson:
+    """What a calibration knows, and what more views would teach it.
+
+    Attributes:
+        state: the rig; of its poses only those of Kind.MORE are asked for.
+        covariance: (30, 30) of its parameters.
+        flags: (30,) which of them are estimated.
+        sigmas_px: standard deviation of one coordinate of a corner, left and right.
+        points_m: (N, 3) corners in the board's axes.
+        rectification: of the rig.
+    """
+
+    state: BundleState
+    covariance: Vector
+    flags: NDArray[np.bool_]
+    sigmas_px: tuple[float, float]
+    points_m: Vector
+    rectification: Rectification
+
+    def sigma_m(self) -> float:
+        """Return the standard uncertainty of depth at 1 m now, m; NaN: not known."""
+        return _sigma_m(self.covariance, self.state, self.rectification)
+
+    def after_m(self, poses: Vector) -> float:
+        """Return the same after views of the board in some poses (V, 6), m; NaN: a camera would see too little of it."""
+        views = [_imagined(self.state, pose, self.points_m) for pose in poses]
         known = [(view, pose) for view, pose in zip(views, poses, strict=True) if view is not None]
         if not known:
-            continue
-        state = replace(result.state, poses=np.array([pose for _, pose in known]))
+            return float("nan")
+        state = replace(self.state, poses=np.array([pose for _, pose in known]))
         nothing = np.zeros(GLOBALS), np.zeros(GLOBALS)
-        problem = RigProblem(
-            [view for view, _ in known], points_m, nothing, (max(sigmas[0], 0.02), max(sigmas[1], 0.02))
-        )
-        more = problem.linearised(state).reduced(0.0, flags)[0] * len(poses) / len(known)
+        noise = max(self.sigmas_px[0], _LEAST_SIGMA_PX), max(self.sigmas_px[1], _LEAST_SIGMA_PX)
+        problem = RigProblem([view for view, _ in known], self.points_m, nothing, noise)
+        free = np.ix_(self.flags, self.flags)
+        more = problem.linearised(state).reduced(0.0, self.flags)[0] * len(poses) / len(known)
         covariance = np.zeros((GLOBALS, GLOBALS))
-        covariance[np.ix_(flags, flags)] = np.linalg.pinv(information + more, hermitian=True)
-        found.append(NextView(kind, now, _sigma_m(covariance, state, rectification)))
-    return min(found, key=lambda each: each.after_m) if found else None
+        information = np.linalg.pinv(self.covariance[free], hermitian=True)
+        covariance[free] = np.linalg.pinv(information + more, hermitian=True)
+        return _sigma_m(covariance, state, self.rectification)
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """Where a board is imagined to stand.
+
+    Attributes:
+        aside: of its middle from that of the images, in image sizes, right and down.
+        tilt_deg: across: positive if its left edge is away; down: positive if its top edge is.
+        fills: share of the image's width.
+    """
+
+    aside: tuple[float, float] = (0.0, 0.0)
+    tilt_deg: tuple[float, float] = (-6.0, -6.0)
+    fills: float = _FILLS
+
+
+def after_one_m(rig: Rig, rectification: Rectification, points_m: Vector, spot: Spot) -> float:
+    """Return the standard uncertainty of depth at 1 m that one more view would leave, m; NaN: it cannot be told.
+
+    Args:
+        rig: with its covariance and RMS.
+        rectification: of the rig.
+        points_m: (N, 3) corners in the board's axes.
+        spot: where the board would stand.
+    """
+    if not np.isfinite(rig.covariance).all():
+        return float("nan")
+    state = BundleState(
+        left=rig.left,
+        right=rig.right,
+        rotation=vectors_of(rig.R_right_left),
+        translation_m=rig.t_right_left_m,
+        poses=np.empty((0, 6)),
+    )
+    lesson = Lesson(
+        state=state,
+        covariance=rig.covariance,
+        flags=np.diag(rig.covariance) > 0,
+        sigmas_px=(rig.rms_stereo_px / np.sqrt(2), rig.rms_stereo_px / np.sqrt(2)),
+        points_m=points_m,
+        rectification=rectification,
+    )
+    across, down = np.radians(spot.tilt_deg)
+    pose = _pose(state, points_m, aside=spot.aside, turn=np.array([-down, across, 0.0]), fills=spot.fills)
+    return lesson.after_m(pose[np.newaxis])
 
 
 def _sigma_m(covariance: Vector, state: BundleState, rectification: Rectification) -> float:

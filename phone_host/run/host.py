@@ -204,6 +204,10 @@ class Host:
         self._files.close(report, page, self._cameras.text())
         return self._files.complete
 
+    def cameras_text(self) -> str:
+        """Return the content of cameras.json: which cameras these are; empty if no board has said hello."""
+        return self._cameras.text()
+
     @property
     def missing_files(self) -> str:
         """The files that `write_report` could not write, and why, in words; empty: none."""

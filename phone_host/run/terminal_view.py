@@ -37,8 +37,8 @@ _RECENT: Final = 300
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
-    """A part of the view.
+class Part:
+    """A part of a view.
 
     Attributes:
         rank: parts of a lower rank get room first.
@@ -117,16 +117,16 @@ class LiveTable:
             self._progress.update(self._task, completed=lasted_s if self._seconds else run.processed)
         with self._drawing:
             console = self._live.console
-            self._live.update(_fitted(self._parts(run, console.width), console), refresh=True)
+            self._live.update(fitted(self._parts(run, console.width), console), refresh=True)
 
-    def _parts(self, run: RunSnapshot, width: int) -> Sequence[_Part]:
+    def _parts(self, run: RunSnapshot, width: int) -> Sequence[Part]:
         """Return the view from top to bottom; on a low terminal warnings, bar and table are what stays."""
-        bar = [_Part(1, self._progress)] if self._task is not None else []
+        bar = [Part(1, self._progress)] if self._task is not None else []
         return (
-            *(_Part(0, line) for line in _warnings(run)),
-            *(_Part(3, line) for line in _cameras(run)),
+            *(Part(0, line) for line in _warnings(run)),
+            *(Part(3, line) for line in _cameras(run)),
             *(
-                _Part(5, Text(line))
+                Part(5, Text(line))
                 for line in (
                     *depth_lines(run.images),
                     *corrected_lines(run.depth),
@@ -134,10 +134,10 @@ class LiveTable:
                     *temporal_lines(run.depth.temporal),
                 )
             ),
-            _Part(2, _table(run, self._rate, width)),
-            _Part(6, _stages(run)),
-            _Part(7, Text(judge(figures(run)).sentence, style="dim")),
-            _Part(4, _state(run)),
+            Part(2, _table(run, self._rate, width)),
+            Part(6, _stages(run)),
+            Part(7, Text(judge(figures(run)).sentence, style="dim")),
+            Part(4, _state(run)),
             *bar,
         )
 
@@ -147,7 +147,7 @@ class LiveTable:
             self._live.console.print(Text(line, overflow="fold"))
 
 
-def _fitted(parts: Sequence[_Part], console: Console) -> Segments:
+def fitted(parts: Sequence[Part], console: Console) -> Segments:
     """Draw parts below each other in the rows of a terminal; the last parts to get room are cut or left out.
 
     One row stays free: a view as high as the terminal would scroll when it ends, and its top could not be removed.

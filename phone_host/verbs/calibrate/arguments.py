@@ -4,12 +4,15 @@ import argparse
 from pathlib import Path
 from typing import Final
 
+from common.program.quantities import milliseconds, reading, seconds
+from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
 
-SUMMARY = "calibrate two cameras from pictures of a chessboard"
+SUMMARY = "calibrate two cameras, live or from pictures of a chessboard"
 
-EXAMPLES = """  phone-host calibrate left/ right/ --square 25mm --out rig.yaml    # the board's size is found in the pictures
+EXAMPLES = """  phone-host calibrate --live --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --square 25mm --out rig.yaml    # says what to show
+  phone-host calibrate left/ right/ --square 25mm --out rig.yaml    # the board's size is found in the pictures
   phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
   phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
   phone-host calibrate left/ right/ --board 9x6 --square 25mm --rotate-right 180 --out rig.yaml    # right camera on its head
@@ -30,8 +33,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="LEFT RIGHT",
         help="pictures of the left and of the right camera: two folders or two globs; each left picture is paired with the"
-        " right one that has the same number in its name. Pictures are turned upright by their EXIF orientation",
+        " right one that has the same number in its name. Pictures are turned upright by their EXIF orientation. With --live:"
+        " two folders for the pictures it takes (default: views/left and views/right beside --out)",
     )
+    _add_live_arguments(parser)
     parser.add_argument(
         "--board",
         metavar="9x6",
@@ -77,6 +82,53 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="rig.yaml",
         help="file for the calibration; report.json is written beside it",
     )
+
+
+def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="take the pictures now, from both cameras: says what to show, takes each view by itself, ends when it is enough",
+    )
+    parser.add_argument(
+        "--link",
+        action="append",
+        metavar="URI",
+        help="for --live: address of the board (default: look for one, as `run` does)",
+    )
+    parser.add_argument("--camera", metavar="URI", help=f"for --live: camera of this machine: {EXAMPLE}")
+    parser.add_argument(
+        "--views",
+        type=int,
+        default=25,
+        metavar="N",
+        help="for --live: take at most so many views, 3 to 99 (default 25)",
+    )
+    parser.add_argument(
+        "--sound",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="for --live: speak, if the system has a speech program, else ring the terminal's bell (default: yes)",
+    )
+    parser.add_argument(
+        "--snapshots",
+        type=Path,
+        metavar="DIR",
+        help="for --live: folder for guide.json and guide.svg, what is shown just now",
+    )
+    parser.add_argument(
+        "--wait",
+        type=reading(seconds, "--wait"),
+        metavar="S",
+        help="for --live: seconds to wait for a board, then exit with code 3 (default: wait for ever)",
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=reading(milliseconds, "--tolerance"),
+        metavar="MS",
+        help="for --live: greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
+    )
+    parser.add_argument("--keys", metavar="DIR", help="for --live: folder of keys (default ~/.config/tandemscan)")
 
 
 def _add_file_arguments(parser: argparse.ArgumentParser) -> None:

@@ -4,12 +4,13 @@ import math
 from typing import Any, Final
 
 from common.errors import DataError
-from phone_host.calibration.board_pairs import BoardPair, Calibration
+from phone_host.calibration.arrangement import is_contradicted
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Rejected
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.mistakes import Course, Finding
 from phone_host.calibration.causes.name import BoardSession
 from phone_host.calibration.causes.unturned import unturned
-from phone_host.calibration.verdict import Assessment, Verdict
+from phone_host.calibration.verdict import Assessment, Verdict, judge
 from phone_host.model import Side
 
 _BEST_FIRST: Final = (Verdict.GOOD, Verdict.USABLE, Verdict.REJECT)
@@ -42,6 +43,26 @@ def calibrated_as_last(
     if isinstance(found, Calibration) and len(without.used) < len(found.used):
         return found, finding, pairs
     return without, finding, straight
+
+
+def assessed(found: Calibration, rejected: tuple[Rejected, ...], finding: Finding | None, hint: str) -> Assessment:
+    """Judge a calibration and say what to do: the mistake's remedy if there is one, else that of the verdict.
+
+    Args:
+        found: the calibration.
+        rejected: all pairs that are not used.
+        finding: what is wrong with the session; None: nothing.
+        hint: what to do about a turned or mirrored side; empty: it is none.
+    """
+    judgement = judge(found, rejected)
+    if finding is None:
+        return judgement
+    wrong = finding.misplaced
+    if wrong is None:
+        return judgement if found.obstacle is not None else with_cause(judgement, finding)
+    if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
+        return Assessment(Verdict.REJECT, (hint,))  # all else follows from it
+    return Assessment(judgement.verdict, (hint,))
 
 
 def with_cause(judgement: Assessment, finding: Finding) -> Assessment:

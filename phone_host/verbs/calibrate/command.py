@@ -10,14 +10,13 @@ from typing import Any
 from common.errors import DataError, UnavailableError
 from common.places import Kind, kind_of, make_folder
 from common.program.terminal import say
-from phone_host.calibration.arrangement import Misplaced, is_contradicted
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
 from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.causes.name import BoardSession, name_mistake
 from phone_host.calibration.out_of_step import out_of_step
-from phone_host.calibration.verdict import Assessment, Verdict, judge
+from phone_host.calibration.verdict import Verdict
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_views import RigViews
@@ -26,7 +25,7 @@ from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.calibrate.board import Known, board_in
-from phone_host.verbs.calibrate.cause import calibrated_as_last, cause_report, with_cause
+from phone_host.verbs.calibrate.cause import assessed, calibrated_as_last, cause_report
 from phone_host.verbs.calibrate.earlier import (
     Session,
     asked_of,
@@ -46,6 +45,7 @@ from phone_host.verbs.calibrate.figures import (
 )
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
 from phone_host.verbs.calibrate.importing import export_lines, import_calibration, require_pictures, write_exports
+from phone_host.verbs.calibrate.live import take_views
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, unwritable
@@ -69,7 +69,8 @@ def run(options: argparse.Namespace) -> int:
     require_file(options.out)
     if kind_of(options.out) is not Kind.MISSING and not is_rig(options.out):
         raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
-    files = pair_files(*two_lists(options.images))
+    live = take_views(options, asked) if options.live else None
+    files = pair_files(*(live.folders if live is not None else two_lists(options.images)))
     keep_other_report(options.out.parent, "calibrate")
     claim_names(options.out.parent, options.out, "report.json")
     beside = cameras_beside(files, mounted)
@@ -78,27 +79,29 @@ def run(options: argparse.Namespace) -> int:
     )
     views, found, finding, pairs = _calibrated(files, session, options, mounted)
     wrong = None if finding is None else finding.misplaced
-    hint = "" if wrong is None else arrangement_hint(views, mounted, wrong)
+    hint = "" if wrong is None else arrangement_hint(views, mounted, wrong, is_live=options.live)
     if isinstance(found, DataError):
         remedy = hint or ("" if finding is None else f"{finding.sentence}: {finding.remedy}") or found.remedy
         return _report_failure(files, views, known, DataError(found.problem, remedy), options)
     if beside is not None:
         require_sizes(*beside, views.sizes_px)
     rejected = (*views.rejected, *found.rejected)
-    judgement = _advised(judge(found, rejected), found, wrong, hint)
-    if wrong is None and finding is not None and found.obstacle is None:
-        judgement = with_cause(judgement, finding)
+    judgement = assessed(found, rejected, finding, hint)
     rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
     rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict.value)
     report = report_of(files, views, rejected, found, judgement) | known.as_report() | cause_report(finding, hint)
     report |= _write_rig(options.out, replace(found, rig=rig), saved_views(session, found, pairs))
+    report |= {} if live is None else live.as_report()
     exported: list[str] = []
     if found.rectification is not None:
         report |= write_exports(options, rig, found.rectification)
         exported = export_lines(report)
     _write_report(options.out, report)
     said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
-    _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported])
+    again = [] if live is None else live.as_lines(options)
+    _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported, *again])
+    if live is not None and live.stopped_with is not None:
+        return live.stopped_with
     return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
 
 
@@ -159,15 +162,6 @@ def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[s
         print(json_text(report))
     else:
         say(lines)
-
-
-def _advised(judgement: Assessment, found: Calibration, wrong: Misplaced | None, hint: str) -> Assessment:
-    """Put the side that is turned or mirrored first. A rig of mirrored or unlike views is none, whatever its figures."""
-    if wrong is None:
-        return judgement
-    if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
-        return Assessment(Verdict.REJECT, (hint,))  # all else follows from it
-    return Assessment(judgement.verdict, (hint,))
 
 
 def _write_rig(out: Path, calibration: Calibration | None, views: RigViews | None = None) -> dict[str, str]:

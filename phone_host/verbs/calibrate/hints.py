@@ -8,20 +8,25 @@ from phone_host.calibration.out_of_step import OutOfStep
 from phone_host.model import Side
 
 
-def arrangement_hint(views: BoardViews, mounted: Mounted, wrong: Misplaced) -> str:
+def arrangement_hint(views: BoardViews, mounted: Mounted, wrong: Misplaced, *, is_live: bool = False) -> str:
     """Say which side's images are turned or mirrored, and the options that mend it.
 
     Args:
         views: the board in the images; its corners are those of images already turned by `mounted`.
         mounted: the turns that were given.
         wrong: what is to be done besides.
+        is_live: whether the images come from cameras now, whose addresses mend it.
     """
     side, other = wrong.side.value, (Side.LEFT if wrong.side is Side.RIGHT else Side.RIGHT).value
     what = f"the {side} images are {_state(_plainest(wrong.turn))} against the {other} ones"
     if views.turned[0] != views.turned[1]:
         what = f"left and right EXIF headers differ, and {what}"
     given = mounted[0] if wrong.side is Side.LEFT else mounted[1]
-    remedy = _options(side, given, _plainest(composed(given, wrong.turn)))
+    remedy = (
+        _address(side, _plainest(wrong.turn))
+        if is_live
+        else _options(side, given, _plainest(composed(given, wrong.turn)))
+    )
     if wrong.is_mirrored:
         remedy = f"switch mirroring off in that camera, or {remedy}"
     if wrong.is_either:
@@ -51,6 +56,13 @@ def _state(turn: Orientation) -> str:
     parts += ["mirrored"] if turn.flip is Flip.H else []
     parts += ["mirrored top to bottom"] if turn.flip is Flip.V else []
     return " and ".join(parts)
+
+
+def _address(side: str, needed: Orientation) -> str:
+    """Return what to add to a camera's address."""
+    turn = [f"rotate={needed.rotate_deg}"] if needed.rotate_deg else []
+    flip = [f"flip={needed.flip.value}"] if needed.flip is not Flip.NONE else []
+    return f"add {'&'.join([*turn, *flip])} to the address of the {side} camera"
 
 
 def _options(side: str, given: Orientation, needed: Orientation) -> str:

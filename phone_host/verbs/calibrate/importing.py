@@ -29,15 +29,19 @@ _REPORT: Final = "report.json"
 
 
 def require_pictures(options: argparse.Namespace) -> None:
-    """Check that a calibration from pictures has some, and nothing that belongs to --import.
+    """Check that a calibration from pictures has some or takes them, and nothing that belongs to --import or to --live alone.
 
     Raises:
         SettingsError: they are missing, or an option has no meaning.
     """
-    if not options.images:
+    if not options.images and not options.live:
         raise SettingsError(
-            "neither pictures nor --import is given", "give LEFT RIGHT --board 9x6 --square 25mm, or --import FILE"
+            "neither pictures nor --live nor --import is given",
+            "give LEFT RIGHT --square 25mm, --live --camera URI --square 25mm, or --import FILE",
         )
+    for name in () if options.live else ("link", "camera", "snapshots"):
+        if getattr(options, name) is not None:
+            raise SettingsError(f"--{name} without --live", "add --live to take the pictures now, or leave it out")
     for name in ("unit", "size"):
         if getattr(options, name) is not None:
             raise SettingsError(f"--{name} without --import", "leave it out")
@@ -50,6 +54,7 @@ def import_calibration(options: argparse.Namespace) -> int:
         "square": options.square,
         "from": options.earlier,
         "pose-only": options.pose_only or None,
+        "live": options.live or None,
     }
     idle = [name for name, value in given.items() if value is not None]
     if options.images or idle:

@@ -1,0 +1,171 @@
+"""The gates that a view must pass before it is taken, in order, and how fast a board moves between two looks. Pure."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+
+from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.target import Corners
+from phone_host.calibration.verdict import REFERENCE_PX
+
+Size = tuple[int, int]
+"""Width and height, px."""
+
+STILL_NS: Final = 250_000_000
+"""So long a board must be still: at the turning point of a movement it is for a moment."""
+
+_STILL_WIDTHS_S: Final = 0.03
+"""A still board moves at most so many image widths per second: 19 px/s at 640 px, half a pixel in an exposure of 25 ms.
+A hand that rests on something moves by a third of that."""
+
+_STALE_NS: Final = 500_000_000
+"""Two looks farther apart than this tell no speed."""
+
+_APART_PX: Final = 0.2
+"""The board may move so far between the two exposures of a pair: less than what corners of a good rig err by."""
+
+_BLURRED_PX, _MOST_BLURRED_PX = 4.0, 6.0
+"""Edges of sharp boards are 1 to 3 px wide (four real rigs). From 6 px on `causes` calls a session blurred."""
+
+_BLURRED_FACTOR: Final = 1.6
+"""A camera that is soft by nature is compared with its own sharpest view."""
+
+_WASHED: Final = 0.05
+"""More of the edges may not have lost their contrast: from 0.08 on `causes` calls a session glaring."""
+
+_LEAST_SEEN, _LEAST_CORNERS = 0.3, 12
+"""Share and number of a board's corners, for boards of which a part is enough."""
+
+_ALIKE: Final = 0.05
+"""Two views are alike if their corners lie closer than this on average, in image widths."""
+
+
+class Gate(Enum):
+    """What became of a view: why it was refused, or that it was taken."""
+
+    NOT_FOUND = "board not found"
+    NOT_FOUND_LEFT = "board not found left"
+    NOT_FOUND_RIGHT = "board not found right"
+    PART = "too few corners"
+    NOTHING_NEW = "nothing new"
+    MOVING = "moving"
+    APART = "not the same moment"
+    BLURRED = "blurred"
+    GLARE = "glare"
+    READY = "ready"
+    TAKEN = "taken"
+
+
+NOT_SEEN: Final = frozenset({Gate.NOT_FOUND, Gate.NOT_FOUND_LEFT, Gate.NOT_FOUND_RIGHT, Gate.PART})
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sighting:
+    """A board in both images of a pair.
+
+    Attributes:
+        at_ns: exposure of the pair.
+        skew_ns: time between its two exposures.
+        left_px: (N, 2) corners; (0, 2): not found; NaN: not seen.
+        right_px: the same, right.
+        sizes_px: of the left and of the right image.
+    """
+
+    at_ns: int
+    skew_ns: int
+    left_px: Corners
+    right_px: Corners
+    sizes_px: tuple[Size, Size]
+
+
+def found(sighting: Sighting) -> Gate:
+    """Return whether both cameras see enough of the board: READY, or why not."""
+    match len(sighting.left_px) > 0, len(sighting.right_px) > 0:
+        case False, False:
+            return Gate.NOT_FOUND
+        case False, True:
+            return Gate.NOT_FOUND_LEFT
+        case True, False:
+            return Gate.NOT_FOUND_RIGHT
+        case _:
+            pass
+    both = np.isfinite(sighting.left_px).all(axis=1) & np.isfinite(sighting.right_px).all(axis=1)
+    is_enough = (both.sum() >= _LEAST_CORNERS and both.mean() >= _LEAST_SEEN) or bool(both.all())
+    return Gate.READY if is_enough else Gate.PART
+
+
+def speed_widths_s(before: Sighting | None, now: Sighting) -> float:
+    """Return how fast the board moves in the faster of the two images, image widths per second; infinite: it cannot be told.
+
+    An affine motion is fitted to the corners, so that their noise does not count as motion.
+
+    Args:
+        before: an earlier look that found the board; None: there is none.
+        now: this look.
+    """
+    if before is None or not 0 < now.at_ns - before.at_ns <= _STALE_NS:
+        return float("inf")
+    seconds = (now.at_ns - before.at_ns) / 1e9
+    speeds = []
+    for old, new, size_px in (
+        (before.left_px, now.left_px, now.sizes_px[0]),
+        (before.right_px, now.right_px, now.sizes_px[1]),
+    ):
+        if old.shape != new.shape:
+            return float("inf")
+        seen = np.isfinite(old).all(axis=1) & np.isfinite(new).all(axis=1)
+        if seen.sum() < _LEAST_CORNERS // 2:
+            return float("inf")
+        plan = np.column_stack([old[seen], np.ones(int(seen.sum()))])
+        motion = np.linalg.lstsq(plan, new[seen] - old[seen], rcond=None)[0]
+        speeds.append(float(np.linalg.norm(plan @ motion, axis=1).max()) / size_px[0] / seconds)
+    return max(speeds)
+
+
+def is_still(speed: float) -> bool:
+    """Return whether a board of this speed, image widths per second, stands still."""
+    return speed <= _STILL_WIDTHS_S
+
+
+def is_paired_well(sighting: Sighting, speed: float) -> bool:
+    """Return whether the board moves little enough between the two exposures."""
+    return all(
+        speed * width_px * abs(sighting.skew_ns) / 1e9 <= _APART_PX * _factor((width_px, height_px))
+        for width_px, height_px in sighting.sizes_px
+    )
+
+
+def sharp(looks: tuple[Look, Look], sizes_px: tuple[Size, Size], sharpest_px: tuple[float, float]) -> Gate:
+    """Return whether a view is sharp and evenly lit: READY, or why not.
+
+    Args:
+        looks: of the left and of the right image.
+        sizes_px: of both images.
+        sharpest_px: the narrowest edges of each camera so far, px; NaN: none yet.
+    """
+    for look, size_px, best_px in zip(looks, sizes_px, sharpest_px, strict=True):
+        usual = _BLURRED_FACTOR * best_px if np.isfinite(best_px) else 0.0
+        limit_px = min(max(_BLURRED_PX * _factor(size_px), usual), _MOST_BLURRED_PX * _factor(size_px))
+        if look.washed > _WASHED:
+            return Gate.GLARE
+        if look.edge_px > limit_px:
+            return Gate.BLURRED
+    return Gate.READY
+
+
+def is_alike(one: Sighting, other: Sighting) -> bool:
+    """Return whether two views show the board in nearly the same place and attitude."""
+    return all(
+        a.shape == b.shape and float(np.nanmean(np.linalg.norm(a - b, axis=1))) < _ALIKE * size_px[0]
+        for a, b, size_px in zip(
+            (one.left_px, one.right_px), (other.left_px, other.right_px), one.sizes_px, strict=True
+        )
+        if (np.isfinite(a) & np.isfinite(b)).any()
+    )
+
+
+def _factor(size_px: Size) -> float:
+    """Return by how much limits in px grow with an image: as those of the verdict do."""
+    return max(1.0, max(size_px) / REFERENCE_PX)

@@ -1,0 +1,331 @@
+"""Decides which views are taken, which one is wanted next, what is said, and when it is enough. Pure.
+
+A view passes the gates in this order: found in both images, whole, wanted and unlike those taken, still, paired well in time,
+sharp. Whether it is wanted comes before whether it is still, because nobody is told to hold a board still that shows nothing new.
+
+Every kind of view is wanted once. Which one is asked for first, the calibration so far tells: the one that would lower the depth
+error most. One that is not reached within some time is given up: not every rig can show a board in every corner of both
+images. If the verdict is then not good, or another view would still help, the kinds are wanted once more.
+"""
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import Final
+
+from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.guide.coverage import Coverage
+from phone_host.calibration.guide.gates import (
+    NOT_SEEN,
+    STILL_NS,
+    Gate,
+    Sighting,
+    found,
+    is_alike,
+    is_paired_well,
+    is_still,
+    sharp,
+    speed_widths_s,
+)
+from phone_host.calibration.guide.placement import placement, usual_camera
+from phone_host.calibration.guide.progress import Progress
+from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
+from phone_host.calibration.guide.wants import ORDER, Placed, Want, is_at_an_edge, is_there, missing
+from phone_host.calibration.guide.words import Words, done, taken
+from phone_host.calibration.target import Board
+from phone_host.calibration.verdict import Verdict
+from phone_host.model import Rig
+
+_PATIENCE_NS: Final = 15_000_000_000
+"""A wanted view that is not reached in this time is given up."""
+
+_NEVER_NS: Final = 20_000_000_000
+"""A board that was never seen for so long needs more than a few words."""
+
+_LOST_NS: Final = 1_000_000_000
+"""A board that is not found for a shorter time is not spoken of: it may be between two looks."""
+
+_STEADY_NS: Final = 400_000_000
+"""Words must hold for so long before they replace others."""
+
+_HEARD_NS: Final = 1_200_000_000
+"""So long it takes to say that a view was taken."""
+
+_RETHINK_NS: Final = 1_500_000_000
+"""The wanted view may still change so long after it was asked for, when the calibration of the views before comes."""
+
+_LEAST_VIEWS: Final = 10
+"""From so many views on, lenses up to the rational one are tried (`lens_choice`)."""
+
+_HOPELESS_VIEWS: Final = 6
+_LEAST_GAIN: Final = 0.08
+"""A view that lowers the depth error by a smaller share no longer helps: with twelve views every further one does so by about 4 %."""
+
+_ABSENT: Final = {
+    Gate.NOT_FOUND: Words.SHOW_BOTH,
+    Gate.NOT_FOUND_LEFT: Words.SHOW_LEFT,
+    Gate.NOT_FOUND_RIGHT: Words.SHOW_RIGHT,
+    Gate.PART: Words.PART,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A view that was taken.
+
+    Attributes:
+        name: how reports name it.
+        sighting: the board's corners in it.
+        looks: how it looks, left and right.
+    """
+
+    name: str
+    sighting: Sighting
+    looks: tuple[Look, Look]
+
+    @property
+    def pair(self) -> BoardPair:
+        """Its corners, as the calibration takes them."""
+        return BoardPair(self.name, self.sighting.left_px, self.sighting.right_px)
+
+
+class Guide:
+    """Guides one live calibration.
+
+    Args:
+        board: the board.
+        most_views: end after this many.
+        now_ns: now.
+    """
+
+    def __init__(self, board: Board, most_views: int, now_ns: int) -> None:
+        self.board, self._most = board, most_views
+        self.views: list[View] = []
+        self.ended = Ended.RUNNING
+        self._began_ns = self._seen_ns = now_ns
+        self._has_seen = False
+        self._gate = Gate.NOT_FOUND
+        self._last: Sighting | None = None
+        self._placed: Placed | None = None
+        self._still_since_ns: int | None = None
+        self._sharpest_px = (math.nan, math.nan)
+        self._coverage: tuple[Coverage, ...] = ()
+        self._refused = Counter[Gate]()
+        self._asked, self._asked_ns = Want.ANY, now_ns
+        self._open = set(ORDER)
+        self._given_up = set[Want]()
+        self._is_again = False
+        self._progress: Progress | None = None
+        self._words, self._next_words, self._next_since_ns = "", "", now_ns
+        self._taken_ns: int | None = None
+
+    def see(self, sighting: Sighting, now_ns: int) -> Gate:
+        """Judge a look at a pair.
+
+        Args:
+            sighting: the board in it, found quickly.
+            now_ns: now.
+
+        Returns:
+            READY: `examine` is to be called with its exact corners; else why the view is refused.
+        """
+        gate = found(sighting)
+        speed = speed_widths_s(self._last, sighting)
+        if gate is Gate.READY:
+            self._last, self._has_seen, self._seen_ns = sighting, True, now_ns
+            self._placed = self._place(sighting)
+            gate = self._judged(sighting, self._placed, speed)
+        else:
+            self._last = self._still_since_ns = None
+        self._give_up(now_ns)
+        return self._note(gate)
+
+    def examine(self, sighting: Sighting, looks: tuple[Look, Look], now_ns: int) -> Gate:
+        """Judge a view that was READY by its exact corners, and take it unless it is blurred.
+
+        Args:
+            sighting: the board in it.
+            looks: how sharp and evenly lit the board is in both images.
+            now_ns: now.
+
+        Returns:
+            TAKEN, or why not.
+        """
+        gate = found(sighting)
+        if gate is Gate.READY:
+            gate = sharp(looks, sighting.sizes_px, self._sharpest_px)
+            best = [
+                look.edge_px if math.isnan(known) else min(known, look.edge_px)
+                for known, look in zip(self._sharpest_px, looks, strict=True)
+            ]
+            self._sharpest_px = best[0], best[1]
+        if gate is not Gate.READY:
+            return self._note(gate)
+        placed = self._place(sighting)
+        self.views.append(View(f"{len(self.views) + 1:02}", sighting, looks))
+        coverage = self._coverage or tuple(Coverage(size_px) for size_px in sighting.sizes_px)
+        self._coverage = tuple(
+            each.with_view(corners, where)
+            for each, corners, where in zip(
+                coverage, (sighting.left_px, sighting.right_px), (placed.left, placed.right), strict=True
+            )
+        )
+        self._open -= {want for want in self._open if is_there(want, placed)}
+        self._taken_ns, self._still_since_ns = now_ns, None
+        self._ask(now_ns)
+        return self._note(Gate.TAKEN)
+
+    def grow(self, progress: Progress, now_ns: int) -> None:
+        """Take the calibration of the views so far; end if it is enough.
+
+        Args:
+            progress: what it gives.
+            now_ns: now.
+        """
+        self._progress = progress
+        if self._asked not in self._open or now_ns - self._asked_ns < _RETHINK_NS:
+            self._ask(now_ns)
+        if progress.views < len(self.views) or self.ended is not Ended.RUNNING:
+            return
+        if progress.is_hopeless and progress.views >= _HOPELESS_VIEWS:
+            self.ended = Ended.HOPELESS
+        elif self._is_good(progress):
+            self.ended = Ended.GOOD
+        elif len(self.views) >= self._most:
+            self.ended = Ended.ENOUGH
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no more views are to be taken."""
+        return self.ended is not Ended.RUNNING or len(self.views) >= self._most
+
+    def words(self, now_ns: int) -> str:
+        """Return what is to be said now. It changes only when the reason for it has lasted."""
+        wanted = self._wanted_words(now_ns)
+        if wanted != self._next_words:
+            self._next_words, self._next_since_ns = wanted, now_ns
+        at_once = self.ended is not Ended.RUNNING or self._is_heard(now_ns) or not self._words
+        if wanted and (at_once or now_ns - self._next_since_ns >= _STEADY_NS):
+            self._words = wanted
+        return self._words
+
+    def snapshot(self, now_ns: int) -> GuideSnapshot:
+        """Return everything that presenters show."""
+        progress = self._progress
+        return GuideSnapshot(
+            ended=self.ended,
+            words=self._words,
+            gate=self._gate,
+            board=f"{self.board.columns}x{self.board.rows}",
+            views=len(self.views),
+            most_views=self._most,
+            seconds=(now_ns - self._began_ns) / 1e9,
+            coverage=self._coverage,
+            outlines=self._outlines,
+            asked=self._asked,
+            wanted=tuple(want for want in ORDER if want in self._open),
+            depth_error_m=math.nan if progress is None else progress.depth_error_m,
+            next_error_m=math.nan if progress is None else progress.after_m(self._asked),
+            verdict="" if progress is None else progress.verdict.value,
+            remedy="" if progress is None else progress.remedy,
+            refused=tuple((gate, self._refused[gate]) for gate in Gate if self._refused[gate]),
+        )
+
+    def _judged(self, sighting: Sighting, placed: Placed, speed: float) -> Gate:
+        """Judge a view in which the board was found."""
+        if not is_still(speed):
+            self._still_since_ns = None
+        elif self._still_since_ns is None:
+            self._still_since_ns = sighting.at_ns
+        if self.is_full or not self._is_wanted(placed) or any(is_alike(sighting, each.sighting) for each in self.views):
+            return Gate.NOTHING_NEW
+        if self._still_since_ns is None or sighting.at_ns - self._still_since_ns < STILL_NS:
+            return Gate.MOVING
+        return Gate.READY if is_paired_well(sighting, speed) else Gate.APART
+
+    def _is_wanted(self, placed: Placed) -> bool:
+        wants = {Want.ANY} if not self.views else self._open | {self._asked}
+        return any(is_there(want, placed) for want in wants)
+
+    def _place(self, sighting: Sighting) -> Placed:
+        rig = self._rig
+        left, right = map(usual_camera, sighting.sizes_px) if rig is None else (rig.left, rig.right)
+        return Placed(placement(sighting.left_px, self.board, left), placement(sighting.right_px, self.board, right))
+
+    @property
+    def _outlines(self) -> tuple[Outline, Outline]:
+        """The board in the newest pair."""
+        if self._placed is None or self._gate in NOT_SEEN:
+            return (), ()
+        return self._placed.left.outline, self._placed.right.outline
+
+    @property
+    def _rig(self) -> Rig | None:
+        """The calibration so far, once it is no guess."""
+        progress = self._progress
+        if progress is None or progress.calibration is None or progress.verdict is Verdict.REJECT:
+            return None
+        return progress.calibration.rig
+
+    def _ask(self, now_ns: int) -> None:
+        """Choose the view that is wanted next: the one that would lower the depth error most."""
+        if not self.views:
+            return
+        if not self._open:
+            self._is_again = True
+            self._open = set(ORDER) - self._given_up or set(ORDER)
+        self._asked = min(self._open, key=self._rank)
+        self._asked_ns = now_ns
+
+    def _rank(self, want: Want) -> tuple[float, int]:
+        after_m = math.nan if self._progress is None else self._progress.after_m(want)
+        known = self._progress is not None and any(math.isfinite(each.after_m) for each in self._progress.taught)
+        return (after_m if math.isfinite(after_m) else math.inf) if known else 0.0, ORDER.index(want)
+
+    def _give_up(self, now_ns: int) -> None:
+        """Ask for another view if this one is not reached."""
+        if now_ns - self._seen_ns > _PATIENCE_NS / 3:  # nobody is there, so nobody tries
+            self._asked_ns = now_ns
+        if self.views and now_ns - self._asked_ns > _PATIENCE_NS:
+            self._given_up.add(self._asked)
+            self._open.discard(self._asked)
+            self._ask(now_ns)
+
+    def _is_good(self, progress: Progress) -> bool:
+        """Return whether the verdict is good and more views no longer help."""
+        if progress.verdict is not Verdict.GOOD or not self._is_again:
+            return False
+        gain = 1 - progress.after_m(self._asked) / progress.depth_error_m
+        return len(self.views) >= min(_LEAST_VIEWS, self._most) and not gain >= _LEAST_GAIN  # also if it is not known
+
+    def _note(self, gate: Gate) -> Gate:
+        self._gate = gate
+        if gate not in {Gate.READY, Gate.TAKEN}:
+            self._refused[gate] += 1
+        return gate
+
+    def _is_heard(self, now_ns: int) -> bool:
+        """Return whether it is being said that a view was taken."""
+        return self._taken_ns is not None and now_ns - self._taken_ns < _HEARD_NS
+
+    def _wanted_words(self, now_ns: int) -> str:
+        if self.ended is not Ended.RUNNING:
+            return done("" if self._progress is None else self._progress.verdict.value, len(self.views))
+        if self._is_heard(now_ns):
+            return taken(len(self.views))
+        if self._gate in NOT_SEEN:
+            return self._words_for_absent(now_ns)
+        if self._gate is Gate.NOTHING_NEW and self._placed is not None:
+            return missing(self._asked, self._placed) or Words.ELSEWHERE.value
+        return {Gate.BLURRED: Words.BLURRED, Gate.GLARE: Words.GLARE}.get(self._gate, Words.STILL).value
+
+    def _words_for_absent(self, now_ns: int) -> str:
+        if not self._has_seen:
+            never = now_ns - self._began_ns > _NEVER_NS
+            return Words.HELP.value if never else Words.SHOW_BOTH.value
+        if now_ns - self._seen_ns < _LOST_NS:
+            return self._words
+        if self._placed is not None and is_at_an_edge(self._placed):
+            return Words.BACK.value
+        return _ABSENT[self._gate].value

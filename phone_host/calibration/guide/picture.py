@@ -1,0 +1,86 @@
+"""A live calibration as one standalone SVG picture. Pure.
+
+Of each camera: the picture as it takes it, not mirrored, with the cells in which corners were seen and the board now; bars of
+the views at each distance; the board's far edge at each tilt. Below, the words, the figures and what is still wanted.
+"""
+
+from html import escape
+from typing import Final
+
+from phone_host.calibration.guide.coverage import COLUMNS, ROWS, Coverage, Depth, Tilt
+from phone_host.calibration.guide.snapshot import GuideSnapshot, Outline
+from phone_host.calibration.guide.text_picture import figure_lines
+
+_WIDTH_PX, _PANEL_PX, _GAP_PX, _MARGIN_PX = 720, 332, 24, 16
+_HEAD_PX: Final = 64
+_BAR_PX: Final = 16
+_FULL: Final = 36
+"""Corners of a cell for the strongest colour: about three views."""
+
+_STYLE: Final = (
+    "text{font:13px system-ui,sans-serif;fill:#333}.words{font-size:24px;font-weight:600;fill:#111}.cell{stroke:#ddd}"
+    ".cell,.bar{fill:#0072b2}.now{fill:none;stroke:#d55e00;stroke-width:2.5}.empty{fill:none;stroke:#ccc}"
+)
+
+
+def guide_svg(snapshot: GuideSnapshot) -> str:
+    """Draw a live calibration.
+
+    Args:
+        snapshot: the state to draw.
+    """
+    parts = [f'<text class="words" x="{_MARGIN_PX}" y="36">{escape(snapshot.words)}</text>']
+    bottom = float(_HEAD_PX)
+    for index, (name, coverage, outline) in enumerate(
+        zip(("left", "right"), snapshot.coverage, snapshot.outlines, strict=False)
+    ):
+        drawn, end = _panel(name, coverage, outline, _MARGIN_PX + index * (_PANEL_PX + _GAP_PX))
+        parts += drawn
+        bottom = max(bottom, end)
+    remedy = (f"to mend: {snapshot.remedy}",) if snapshot.remedy else ()
+    wanted = ", ".join(want.value for want in snapshot.wanted)
+    for line in (*figure_lines(snapshot), *remedy, f"wanted: {wanted}"):
+        bottom += 20
+        parts.append(f'<text x="{_MARGIN_PX}" y="{bottom:.0f}">{escape(line)}</text>')
+    height = bottom + _MARGIN_PX
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH_PX} {height:.0f}" width="{_WIDTH_PX}" height="{height:.0f}">'
+    ground = f'<rect width="{_WIDTH_PX}" height="{height:.0f}" fill="#fff"/>'
+    return f"{head}<style>{_STYLE}</style>{ground}{''.join(parts)}</svg>\n"
+
+
+def _panel(name: str, coverage: Coverage, outline: Outline, left: float) -> tuple[list[str], float]:
+    """Draw what is known of one camera; return it and where it ends."""
+    width_px, height_px = coverage.size_px
+    high = _PANEL_PX * height_px / width_px
+    parts = [f'<text x="{left}" y="{_HEAD_PX - 6}">{name} picture, {width_px}x{height_px}</text>']
+    for row, counts in enumerate(coverage.cells):
+        for column, count in enumerate(counts):
+            x, y = left + column * _PANEL_PX / COLUMNS, _HEAD_PX + row * high / ROWS
+            parts.append(
+                f'<rect class="cell" x="{x:.1f}" y="{y:.1f}" width="{_PANEL_PX / COLUMNS:.1f}" height="{high / ROWS:.1f}"'
+                f' fill-opacity="{0.85 * min(1.0, count / _FULL):.2f}"/>'
+            )
+    if outline:
+        points = " ".join(f"{left + x * _PANEL_PX:.1f},{_HEAD_PX + y * high:.1f}" for x, y in outline)
+        parts.append(f'<polygon class="now" points="{points}"/>')
+    top = _HEAD_PX + high + 8
+    for depth, count in zip(Depth, coverage.depths, strict=True):
+        parts.append(_bar(depth.name.lower(), count, left, top))
+        top += _BAR_PX + 4
+    for tilt, count in zip(Tilt, coverage.tilts, strict=True):
+        parts.append(_bar(tilt.value, count, left, top))
+        top += _BAR_PX + 4
+    return parts, top
+
+
+def _bar(name: str, count: int, left: float, top: float) -> str:
+    """Draw a name, a bar and its count; an outline where there is nothing yet."""
+    at = left + 84
+    shape = (
+        f'<rect class="bar" x="{at}" y="{top:.1f}" width="{min(count, 12) * 18}" height="{_BAR_PX - 4}"/>'
+        if count
+        else f'<rect class="empty" x="{at}" y="{top:.1f}" width="18" height="{_BAR_PX - 4}"/>'
+    )
+    text_at = top + _BAR_PX - 6
+    number = f'<text x="{at + max(1, min(count, 12)) * 18 + 6}" y="{text_at:.1f}">{count}</text>'
+    return f'<text x="{left}" y="{text_at:.1f}">{escape(name)}</text>{shape}{number}'

@@ -1,0 +1,143 @@
+"""The views that a calibration needs, when one of them is there, and what a person is told until it is. Pure.
+
+Left, right, top and bottom are those of the pictures as the cameras take them, not mirrored. A place counts where it is
+reached in the picture in which the board is nearer to that edge: the two pictures overlap, so only one of them can show the
+board at its outer edge.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from phone_host.calibration.guide.placement import Placement
+from phone_host.calibration.next_view import Spot
+
+_TILT_DEG, _ASKED_TILT_DEG = 18.0, 30.0
+"""A board counts as tilted from the first on; the second is what is imagined. Below 15 a focal length is hardly told from a
+distance."""
+
+_EDGE: Final = 0.1
+"""A corner of the board that is this near to an edge, in image sizes beside the board's own outer square, has reached it."""
+
+_NEAR_FILLS, _FAR_FILLS = 0.5, 0.25
+_LEAST_FILLS, _MOST_FILLS = 0.15, 0.65
+"""For all other views: a smaller board has coarse corners, a larger one fits into no corner."""
+
+_ASIDE: Final = 0.26
+
+
+class Want(Enum):
+    """A view that is wanted; its value is what a person is told."""
+
+    ANY = "show the board"
+    LEFT_AWAY = "tilt the board: left edge away"
+    TOP_LEFT = "top left corner"
+    TOP_AWAY = "tilt the board: top edge away"
+    BOTTOM_RIGHT = "bottom right corner"
+    NEAR = "closer"
+    RIGHT_AWAY = "tilt the board: right edge away"
+    TOP_RIGHT = "top right corner"
+    BOTTOM_AWAY = "tilt the board: bottom edge away"
+    BOTTOM_LEFT = "bottom left corner"
+    FAR = "farther away"
+
+
+ORDER: Final = tuple(want for want in Want if want is not Want.ANY)
+"""The order in which views are wanted while the calibration does not tell which one helps most."""
+
+_TILTS: Final = {
+    Want.LEFT_AWAY: (1, 0),
+    Want.RIGHT_AWAY: (-1, 0),
+    Want.TOP_AWAY: (0, 1),
+    Want.BOTTOM_AWAY: (0, -1),
+}
+_CORNERS: Final = {
+    Want.TOP_LEFT: (-1, -1),
+    Want.TOP_RIGHT: (1, -1),
+    Want.BOTTOM_LEFT: (-1, 1),
+    Want.BOTTOM_RIGHT: (1, 1),
+}
+_EDGES: Final = {(-1, 0): "left edge", (1, 0): "right edge", (0, -1): "top edge", (0, 1): "bottom edge"}
+_CLOSER, _FARTHER = Want.NEAR.value, Want.FAR.value
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A board in both images.
+
+    Attributes:
+        left: in the left one.
+        right: in the right one.
+    """
+
+    left: Placement
+    right: Placement
+
+    @property
+    def fills(self) -> float:
+        """Share of the width that the board would fill frontally, mean of both images."""
+        return (self.left.fills + self.right.fills) / 2
+
+
+def spot_of(want: Want) -> Spot:
+    """Return where the board would stand in a wanted view."""
+    if want in _TILTS:
+        across, down = _TILTS[want]
+        return Spot(tilt_deg=(across * _ASKED_TILT_DEG, down * _ASKED_TILT_DEG))
+    if want in _CORNERS:
+        x, y = _CORNERS[want]
+        return Spot(aside=(x * _ASIDE, y * _ASIDE))
+    match want:
+        case Want.NEAR:
+            return Spot(fills=_NEAR_FILLS)
+        case Want.FAR:
+            return Spot(fills=_FAR_FILLS)
+        case _:
+            return Spot()
+
+
+def is_there(want: Want, placed: Placed) -> bool:
+    """Return whether a view is the one that is wanted."""
+    return not missing(want, placed)
+
+
+def missing(want: Want, placed: Placed) -> str:
+    """Return what a person is to do until a wanted view is there, in a few words; empty: it is.
+
+    Args:
+        want: the view.
+        placed: where the board is.
+    """
+    if want is Want.NEAR:
+        return _CLOSER if placed.fills < _NEAR_FILLS else ""
+    if want is Want.FAR:
+        return _FARTHER if placed.fills > _FAR_FILLS else ""
+    size = _CLOSER if placed.fills < _LEAST_FILLS else _FARTHER if placed.fills > _MOST_FILLS else ""
+    parts = [_way(want, placed), size]
+    return ", ".join(part for part in parts if part)
+
+
+def is_at_an_edge(placed: Placed) -> bool:
+    """Return whether the board is about to leave one of the pictures."""
+    return any(_reached(placed, x, y) for x, y in _EDGES)
+
+
+def _way(want: Want, placed: Placed) -> str:
+    if want in _TILTS:
+        across, down = placed.left.tilt_deg
+        way = _TILTS[want]
+        return "" if across * way[0] + down * way[1] >= _TILT_DEG else want.value
+    if want in _CORNERS:
+        x, y = _CORNERS[want]
+        left_out = [way for way in ((x, 0), (0, y)) if not _reached(placed, *way)]
+        return "" if not left_out else _EDGES[left_out[0]] if len(left_out) == 1 else want.value
+    return ""
+
+
+def _reached(placed: Placed, x: int, y: int) -> bool:
+    """Return whether the board has reached an edge of one of the pictures."""
+    axis = 0 if x else 1
+    sides = (placed.left, placed.right)
+    if x < 0 or y < 0:
+        return any(each.low[axis] <= _EDGE + each.square[axis] for each in sides)
+    return any(each.high[axis] >= 1 - _EDGE - each.square[axis] for each in sides)

@@ -1,0 +1,230 @@
+"""The root of a live calibration: a run of the host whose pairs a guide looks at, in threads beside it.
+
+    host (receiver, camera, pairing, decoding) -> sink: find the board, gates ─┬ calibrate so far (newest views only)
+                                                                               └ pictures of the views that are taken
+
+The sink looks at one pair at a time, always at the newest: while it is busy, pairs pass. One lock guards the guide.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import Final
+
+from common import now
+from common.camera.base import Camera
+from common.errors import DataError
+from common.link.base import Link
+from phone_host.calibration.board_views import Size
+from phone_host.calibration.causes.looks import look_at
+from phone_host.calibration.guide.gates import Gate, Sighting
+from phone_host.calibration.guide.guide import Guide, View
+from phone_host.calibration.guide.progress import Progress
+from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
+from phone_host.calibration.guide.words import Words
+from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
+from phone_host.calibration.target import Board, Corners
+from phone_host.live.newest import Newest
+from phone_host.live.view_folders import Pictures, ViewFolders
+from phone_host.measure.unused import unused
+from phone_host.model import Image, Result
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason, HostSettings
+from phone_host.run.sinks import FunctionSink, SinkQueue
+from phone_host.stereo.images import to_grey
+from phone_host.stream.demand_clock import has_own_time
+
+_NO_PAIRS_NS: Final = 5_000_000_000
+"""So long after a board was met its first pair may take: a clock is known after a second."""
+
+_LEAST_VIEWS: Final = 3
+"""Fewer give no calibration."""
+
+_HELP_NS: Final = 20_000_000_000
+
+Grow = Callable[[tuple[View, ...], Board, tuple[Size, Size]], Progress]
+"""Calibrates from the views so far."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveSettings:
+    """What a live calibration is to do.
+
+    Attributes:
+        host: the run beneath.
+        board: None: its size is found.
+        square_m: side of its squares, m.
+        most_views: end after so many.
+        left: folder for the left pictures.
+        right: folder for the right ones.
+    """
+
+    host: HostSettings
+    board: Board | None
+    square_m: float
+    most_views: int
+    left: Path
+    right: Path
+
+
+class LiveCalibration:
+    """One live calibration.
+
+    Args:
+        settings: what to do.
+        camera: the host camera, open.
+        links: open links to the board.
+        grow: calibrates from the views so far; called in a thread of its own.
+
+    Raises:
+        DataError: the host camera has no clock.
+        UnavailableError: the folders hold other pictures.
+        OSError: they cannot be written to.
+    """
+
+    def __init__(self, settings: LiveSettings, camera: Camera, links: Sequence[Link], grow: Grow) -> None:
+        if not has_own_time(camera.description.pacing):
+            raise DataError("a camera with pace=demand has no clock", "give it fps= or pace=clock")
+        self._settings, self._grow = settings, grow
+        self._folders = ViewFolders(settings.left, settings.right)
+        self._lock = Lock()
+        self._began_ns = now.monotonic_ns()
+        self._guide: Guide | None = None
+        self._finder: BoardFinder | None = None
+        self._size_finder = SizeFinder(settings.square_m)
+        self._check: SizeCheck | None = None
+        if settings.board is not None:
+            self._know(settings.board)
+        self._solver = Newest[tuple[View, ...]]("calibrating", self._solve)
+        self._pictures = SinkQueue[Pictures]("views", self._folders.write, depth=settings.most_views)
+        self._looker = FunctionSink("guide", self._look, depth=1)
+        self._met_ns: int | None = None
+        self.host = Host(settings.host, camera, links, None, (self._looker,))
+
+    def run(self, stop: Callable[[], bool], watch: Callable[[], None]) -> Ended:
+        """Take views until it is enough, `stop` returns True or a stream ends.
+
+        Args:
+            stop: called several times a second.
+            watch: called as often, for presenters.
+
+        Returns:
+            Why it ended.
+
+        Raises:
+            UnavailableError: no board came in time, or it does not talk to this host.
+            DataError: a stream or the board cannot be used.
+            SettingsError: the person shows another board than was named.
+        """
+
+        def stop_or_done() -> bool:
+            self._raise_failures()
+            return stop() or self._ended is not Ended.RUNNING
+
+        try:
+            reason = self.host.run(stop_or_done, watch)
+        finally:
+            self._solver.finish(patience_s=0.0)
+            self._pictures.finish()
+            self._folders.close(self.host.cameras_text())
+        self._raise_failures()
+        with self._lock:
+            if self._guide is not None and self._guide.ended is Ended.RUNNING:
+                self._guide.ended = Ended.STREAM_ENDED if reason is EndReason.STREAM_ENDED else Ended.STOPPED
+        return self._ended if self._guide is not None else Ended.STOPPED
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """The views taken so far."""
+        with self._lock:
+            return () if self._guide is None else tuple(self._guide.views)
+
+    @property
+    def trouble(self) -> str:
+        """Why no pair has come though the board is there; empty: nothing is wrong yet."""
+        now_ns = now.monotonic_ns()
+        if not self.host.has_met_board or self.host.first_done_ns:
+            return ""
+        self._met_ns = self._met_ns or now_ns
+        if now_ns - self._met_ns < _NO_PAIRS_NS:
+            return ""
+        run = self.host.snapshot()
+        if run.estimate is None:
+            return "no pairs yet: the board's clock is not known, because no echo of it has come back; check the link"
+        lost = ", ".join(item.told for item in unused(run)) or "no frames come"
+        return f"no pairs yet: {lost}; check both cameras, or give --tolerance"
+
+    def snapshot(self) -> GuideSnapshot:
+        """Return everything that presenters show, with the words that are to be said now."""
+        now_ns = now.monotonic_ns()
+        with self._lock:
+            if self._guide is not None:
+                self._guide.words(now_ns)
+                return self._guide.snapshot(now_ns)
+        words = (
+            Words.HELP if self.host.first_done_ns and now_ns - self.host.first_done_ns > _HELP_NS else Words.SHOW_BOTH
+        )
+        return before_board(words.value, self._settings.most_views, (now_ns - self._began_ns) / 1e9)
+
+    @property
+    def _ended(self) -> Ended:
+        return Ended.RUNNING if self._guide is None else self._guide.ended
+
+    def _raise_failures(self) -> None:
+        for failure in (self._solver.failure, self._pictures.failure):
+            if failure is not None:
+                raise failure
+
+    def _know(self, board: Board) -> None:
+        self._finder = BoardFinder(board)
+        self._check = SizeCheck(board) if self._settings.board is not None else None
+        with self._lock:
+            self._guide = Guide(board, self._settings.most_views, now.monotonic_ns())
+
+    def _look(self, result: Result) -> None:
+        """Look at a pair: called in the sink's thread."""
+        pair = result.processed.pair
+        left, right = to_grey(pair.left), to_grey(pair.right)
+        if self._guide is None or self._finder is None:
+            board = self._size_finder.find(left, right)
+            if board is not None:
+                self._know(board)
+            return
+        guide, finder = self._guide, self._finder
+
+        def sighting(corners: tuple[Corners, Corners]) -> Sighting:
+            return Sighting(
+                at_ns=result.ledger.host.exposed_ns,
+                skew_ns=result.pair.time_skew_ns,
+                left_px=corners[0],
+                right_px=corners[1],
+                sizes_px=((left.shape[1], left.shape[0]), (right.shape[1], right.shape[0])),
+            )
+
+        seen = sighting(finder.find(left, right))
+        with self._lock:
+            gate = guide.see(seen, now.monotonic_ns())
+        if gate is Gate.NOT_FOUND and self._check is not None and not guide.views:
+            self._check.missed(left, right)
+        if gate is Gate.READY:
+            self._examine(guide, sighting(finder.find_exactly(left, right)), (left, right), (pair.left, pair.right))
+
+    def _examine(self, guide: Guide, exact: Sighting, greys: tuple[Image, Image], images: tuple[Image, Image]) -> None:
+        looks = [
+            look_at(grey, corners, guide.board)
+            for grey, corners in zip(greys, (exact.left_px, exact.right_px), strict=True)
+        ]
+        with self._lock:
+            gate = guide.examine(exact, (looks[0], looks[1]), now.monotonic_ns())
+            views = tuple(guide.views)
+        if gate is Gate.TAKEN:
+            self._pictures.offer(Pictures(views[-1].name, *images))
+            if len(views) >= _LEAST_VIEWS:
+                self._solver.offer(views)
+
+    def _solve(self, views: tuple[View, ...]) -> None:
+        assert self._guide is not None
+        progress = self._grow(views, self._guide.board, views[0].sighting.sizes_px)
+        with self._lock:
+            self._guide.grow(progress, now.monotonic_ns())

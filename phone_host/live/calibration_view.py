@@ -1,0 +1,176 @@
+"""Shows a live calibration: on a terminal as a picture that is redrawn, elsewhere as lines that are written once."""
+
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from threading import RLock
+from types import TracebackType
+from typing import Final, Protocol, Self
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from common import now
+from common.places import make_folder
+from common.program import logs
+from common.program.terminal import say
+from phone_host.calibration.guide.guide import View
+from phone_host.calibration.guide.picture import guide_svg
+from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.guide.text_picture import figure_lines, picture_lines, verdict_lines
+from phone_host.output.atomic import write_bytes
+from phone_host.output.json_text import json_text
+from phone_host.run.terminal_view import Part, fitted
+
+_EVERY_NS: Final = 250_000_000
+"""Pictures are redrawn, and snapshots written, at most so often."""
+
+_SIDES: Final = "left and right are those of the pictures: face the cameras, and their left is at your right hand"
+
+
+class Shows(Protocol):
+    """Shows snapshots."""
+
+    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
+        """Show the present state; called several times a second."""
+
+
+class Lines:
+    """Writes each new instruction, view, verdict and note as one line to stderr, at once."""
+
+    def __init__(self) -> None:
+        self._words = self._note = ""
+        self._views = 0
+        self._verdict: tuple[str, ...] = ()
+
+    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
+        """See Shows."""
+        for view in views[self._views :]:
+            edges = [f"edges {look.edge_px:.1f} px" for look in view.looks]
+            shares = [f"{100 * coverage.share:.0f} % covered" for coverage in snapshot.coverage]
+            left, right = (f"{edge}, {share}" for edge, share in zip(edges, shares, strict=True))
+            _write(f"taken: {view.name.lstrip('0')}  left {left}  right {right}")
+        self._views = len(views)
+        if (verdict := verdict_lines(snapshot)) != self._verdict:
+            self._verdict = verdict
+            _write("so far: " + "; ".join(verdict))
+        if snapshot.words != self._words:
+            self._words = snapshot.words
+            _write(f"say: {self._words}")
+        if note != self._note:
+            self._note = note
+            if note:
+                _write(f"note: {note}")
+
+
+class Picture:
+    """Redraws the picture on a terminal; a context manager.
+
+    Args:
+        console: where to draw; stderr by default, so that stdout is free for results.
+        rings: whether the terminal's bell tells that a view was taken.
+    """
+
+    def __init__(self, console: Console | None = None, *, rings: bool = False) -> None:
+        self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
+        self._drawing = RLock()
+        self._ending = ExitStack()
+        self._rings = rings
+        self._views = 0
+        self._shown_ns = 0
+
+    def __enter__(self) -> Self:
+        with ExitStack() as begun:
+            begun.enter_context(logs.written_by(self._say))
+            self._live.start()
+            begun.callback(self._live.stop)
+            self._ending = begun.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with self._drawing:
+            self._ending.close()
+
+    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
+        """See Shows."""
+        now_ns = now.monotonic_ns()
+        if now_ns - self._shown_ns < _EVERY_NS and len(views) == self._views:
+            return
+        self._shown_ns = now_ns
+        parts = [Part(0, Text(snapshot.words, style="bold reverse"))]
+        parts += [Part(1, Text(note, style="yellow"))] if note else []
+        parts += [Part(2, Text(line)) for line in figure_lines(snapshot)]
+        parts += [Part(4, Text(snapshot.remedy, style="dim"))] if snapshot.remedy else []
+        parts += [Part(3, Text(line, no_wrap=True)) for line in picture_lines(snapshot)]
+        with self._drawing:
+            if self._rings and len(views) > self._views:
+                self._live.console.bell()
+            self._live.update(fitted(parts, self._live.console), refresh=True)
+        self._views = len(views)
+
+    def _say(self, line: str) -> None:
+        """Write a line of the log above the picture."""
+        with self._drawing:
+            self._live.console.print(Text(line, overflow="fold"))
+
+
+class SnapshotFiles:
+    """Writes guide.json and guide.svg whenever something has changed, for whoever renders them.
+
+    Args:
+        folder: created if missing.
+
+    Raises:
+        OSError: it cannot be written to.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        make_folder(folder)
+        self._folder = folder
+        self._written = ""
+        self._due_ns = 0
+
+    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
+        """See Shows."""
+        del views
+        now_ns = now.monotonic_ns()
+        if now_ns < self._due_ns and snapshot.ended.value == "running":
+            return
+        self._due_ns = now_ns + _EVERY_NS
+        text = json_text(snapshot.as_json() | {"note": note}, indent=2) + "\n"
+        if text == self._written:
+            return
+        self._written = text
+        write_bytes(self._folder / "guide.svg", guide_svg(snapshot).encode())
+        write_bytes(self._folder / "guide.json", text.encode())
+
+
+class Spoken:
+    """Hands new words to a voice.
+
+    Args:
+        voice: takes words, and returns at once.
+    """
+
+    def __init__(self, voice: Callable[[str], None]) -> None:
+        self._voice, self._words = voice, ""
+
+    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
+        """See Shows."""
+        del views, note
+        if snapshot.words != self._words:
+            self._words = snapshot.words
+            self._voice(self._words)
+
+
+def tell_sides() -> None:
+    """Say once which left and right are meant."""
+    say(f"phone-host: {_SIDES}", sys.stderr, flush=True)
+
+
+def _write(line: str) -> None:
+    say([line], sys.stderr, flush=True)

@@ -1,0 +1,94 @@
+"""The pictures of a live calibration: left/NN.png and right/NN.png, upright, lossless, as `calibrate` reads them."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import cv2
+
+from common.errors import UnavailableError
+from phone_host.model import Image
+from phone_host.output.atomic import write_bytes, write_text
+from phone_host.output.listed import ListedFolder
+from phone_host.stereo.view_files import SUFFIXES
+
+CAMERAS: Final = "cameras.json"
+_NAMES: Final = r"[0-9]{2,3}\.png|cameras\.json"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pictures:
+    """The two images of a view.
+
+    Attributes:
+        name: of the view.
+        left: (H, W) grey or (H, W, 3) BGR, uint8, upright.
+        right: the same.
+    """
+
+    name: str
+    left: Image
+    right: Image
+
+
+class ViewFolders:
+    """Writes the views of one live calibration. What an earlier one left there is removed; other pictures are refused.
+
+    Args:
+        left: folder for the left images.
+        right: folder for the right ones.
+
+    Raises:
+        UnavailableError: a folder holds pictures that an earlier live calibration did not write.
+        OSError: as the operating system reports it.
+    """
+
+    def __init__(self, left: Path, right: Path) -> None:
+        self.left, self.right = left, right
+        for folder in (left, right):
+            _require_no_others(folder)
+        self._left = ListedFolder(left, _NAMES)
+        try:
+            self._right = ListedFolder(right, _NAMES)
+        except BaseException:
+            self._left.close()
+            raise
+
+    def write(self, pictures: Pictures) -> None:
+        """Write a view.
+
+        Raises:
+            OSError: as the operating system reports it.
+        """
+        for listed, folder, image in (
+            (self._left, self.left, pictures.left),
+            (self._right, self.right, pictures.right),
+        ):
+            name = f"{pictures.name}.png"
+            listed.add(name)
+            write_bytes(folder / name, cv2.imencode(".png", image)[1].tobytes())
+
+    def close(self, cameras: str) -> None:
+        """Close both folders.
+
+        Args:
+            cameras: content of cameras.json, from which rig.yaml gets to know its cameras; empty: none.
+        """
+        if cameras:
+            self._left.add(CAMERAS)
+            write_text(self.left / CAMERAS, cameras)
+        self._left.close()
+        self._right.close()
+
+
+def _require_no_others(folder: Path) -> None:
+    try:
+        names = [path.name for path in folder.iterdir()]
+    except FileNotFoundError:
+        return
+    others = [name for name in names if Path(name).suffix.lower() in SUFFIXES and not re.fullmatch(_NAMES, name)]
+    if others:
+        raise UnavailableError(
+            f"{folder} holds other pictures ({others[0]})", "name two new folders for the views as LEFT and RIGHT"
+        )

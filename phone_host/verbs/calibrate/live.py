@@ -1,0 +1,277 @@
+"""phone-host calibrate --live: takes the views with both cameras, guides the person, then leaves the pictures to `calibrate`."""
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from common import now
+from common.errors import DataError, SettingsError
+from common.link.factory import open_links, parse_link, tell_insecure
+from common.orientation import UPRIGHT
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.settings import log_level
+from common.program.signals import StopSignals
+from common.stamp import HOST_CLOCK
+from common.words import counted
+from phone_host.boards.discovery import find_board_and_say
+from phone_host.calibration.board_pairs import Calibration
+from phone_host.calibration.board_views import BoardViews, Size
+from phone_host.calibration.calibrate import calibrate
+from phone_host.calibration.causes.looks import SeenLook
+from phone_host.calibration.causes.mistakes import Mistake
+from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.earlier_views import board_of
+from phone_host.calibration.guide.guide import View
+from phone_host.calibration.guide.progress import Progress, lessons
+from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.target import Board
+from phone_host.calibration.verdict import Verdict
+from phone_host.camera.examples import EXAMPLE
+from phone_host.camera.factory import open_camera
+from phone_host.live.calibration import LiveCalibration, LiveSettings
+from phone_host.live.calibration_view import Lines, Picture, Shows, SnapshotFiles, Spoken, tell_sides
+from phone_host.live.voice import Voice, speech_program
+from phone_host.model import Side, TimeOffset
+from phone_host.output.rig_yaml import read_rig, read_rig_views
+from phone_host.run.host_settings import HostSettings
+from phone_host.settings import key_folder, most_pixels
+from phone_host.verbs.calibrate.board import Named
+from phone_host.verbs.calibrate.cause import assessed
+from phone_host.verbs.calibrate.hints import arrangement_hint
+from phone_host.verbs.orientation_arguments import orientations
+from phone_host.verbs.output_folders import require_folder, unwritable
+from phone_host.verbs.units import baseline_mm
+
+_LEAST_VIEWS, _MOST_VIEWS = 3, 99
+_WAITED_NS: Final = 1_000_000_000
+"""A board that is there is met within a fifth of this; then there is nothing to say."""
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """How a live calibration went.
+
+    Attributes:
+        last: its last snapshot.
+        left: folder of the left pictures.
+        right: folder of the right ones.
+        stopped_with: exit code if a signal ended it; None: it ended by itself.
+    """
+
+    last: GuideSnapshot
+    left: Path
+    right: Path
+    stopped_with: int | None
+
+    @property
+    def folders(self) -> tuple[str, str]:
+        """Both folders, as LEFT and RIGHT."""
+        return str(self.left), str(self.right)
+
+    def as_report(self) -> dict[str, Any]:
+        """Return it for report.json."""
+        return {
+            "live": {
+                "ended": self.last.ended.value,
+                "views": self.last.views,
+                "seconds": round(self.last.seconds, 1),
+                "refused": {gate.value: count for gate, count in self.last.refused},
+            }
+        }
+
+    def as_lines(self, options: argparse.Namespace) -> list[str]:
+        """Return it for the summary: where the pictures are, and how they are calibrated again."""
+        again = [f"--board {options.board}"] if options.board else []
+        again += [f"--square {options.square}"] if options.square else []
+        command = " ".join(["phone-host calibrate", *self.folders, *again, f"--out {options.out}"])
+        views = counted(self.last.views, "view")
+        return [f"live     {views} in {self.last.seconds:.0f} s; to calibrate from them again:", f"         {command}"]
+
+
+def take_views(options: argparse.Namespace, asked: Named | None) -> Live:
+    """Take views until it is enough.
+
+    Args:
+        options: the command's.
+        asked: what they say of the board; None: it is that of the earlier calibration.
+
+    Raises:
+        SettingsError: an option is missing or not valid, or the person shows another board.
+        UnavailableError: the board, the camera or a folder cannot be had.
+        DataError: too few views were taken to calibrate from.
+    """
+    _check(options)
+    logs.set_up(log_level("warning"))
+    settings = _settings(options, asked)
+    for folder in (settings.left, settings.right, options.snapshots):
+        if folder is not None:
+            require_folder(folder)
+    camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels)
+    keys = key_folder(options.keys or "")
+    named = tuple(options.link or (find_board_and_say(keys.path, options.wait),))
+    uris = [parse_link(uri, listens_by_default=False) for uri in named]
+    for uri in uris:
+        tell_insecure(uri)
+    signals = StopSignals()
+    baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
+
+    def grow(views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size]) -> Progress:
+        return grown(views, board, sizes_px, settings.host.board_side, baseline_m)
+
+    try:
+        live = LiveCalibration(settings, camera, open_links(uris, keys), grow)
+        _run(live, options, signals, named)
+    except OSError as error:
+        raise unwritable(settings.left, error, "LEFT or --snapshots") from error
+    last = live.snapshot()
+    if last.views < _LEAST_VIEWS and signals.interrupted:
+        raise KeyboardInterrupt
+    if last.views < _LEAST_VIEWS:
+        raise _too_few(last)
+    stopped_with = None if not signals.stop else INTERRUPTED if signals.interrupted else 0
+    return Live(last, settings.left, settings.right, stopped_with)
+
+
+def grown(
+    views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size], side: Side, baseline_m: float
+) -> Progress:
+    """Calibrate from the views so far and judge, as the command does at the end.
+
+    Args:
+        views: the views.
+        board: the board.
+        sizes_px: of the left and of the right images.
+        side: which camera is the board's.
+        baseline_m: as the user measured it, m; NaN: not told.
+    """
+    pairs = [view.pair for view in views]
+    looks = tuple(
+        SeenLook(view.name, side, look) for view in views for side, look in zip(Side, view.looks, strict=True)
+    )
+    found: Calibration | DataError
+    try:
+        found = calibrate(pairs, board, sizes_px, side)
+    except DataError as error:
+        found = error
+    session = BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
+    finding = name_mistake(session, found)
+    wrong = None if finding is None else finding.misplaced
+    shown = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=sizes_px, looks=looks)
+    hint = "" if wrong is None else arrangement_hint(shown, (UPRIGHT, UPRIGHT), wrong, is_live=True)
+    hopeless = wrong is not None or (finding is not None and finding.mistake in {Mistake.SWAPPED, Mistake.MIRRORED})
+    if isinstance(found, DataError):
+        remedy = hint or (f"{finding.sentence}: {finding.remedy}" if finding is not None else str(found))
+        return Progress(views=len(views), calibration=None, verdict=Verdict.REJECT, remedy=remedy, is_hopeless=hopeless)
+    judgement = assessed(found, found.rejected, finding, hint)
+    return Progress(
+        views=len(views),
+        calibration=found,
+        verdict=judgement.verdict,
+        remedy="; ".join(judgement.remedies),
+        is_hopeless=hopeless,
+        taught=lessons(found, board),
+    )
+
+
+def _check(options: argparse.Namespace) -> None:
+    if not options.camera:
+        raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    if not _LEAST_VIEWS <= options.views <= _MOST_VIEWS:
+        raise SettingsError(f"--views is {options.views}", f"give {_LEAST_VIEWS} to {_MOST_VIEWS}")
+    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
+        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")
+    if len(options.images) not in {0, 2}:
+        raise SettingsError(
+            f"--live with {counted(len(options.images), 'folder')}",
+            "name two folders for the pictures it takes, or none",
+        )
+    if orientations(options) != (UPRIGHT, UPRIGHT):
+        raise SettingsError(
+            "--live does not take --rotate-left, --rotate-right, --flip-left or --flip-right",
+            "add rotate= or flip= to the camera's address",
+        )
+
+
+def _settings(options: argparse.Namespace, asked: Named | None) -> LiveSettings:
+    rig = None if options.earlier is None else read_rig(options.earlier)
+    board = None if asked is None else asked.board
+    square_m = 0.0 if asked is None else asked.square_mm / 1000
+    if asked is None:
+        views = read_rig_views(options.earlier)
+        if views is None:
+            raise DataError(
+                f"{options.earlier} does not hold the corners it was computed from",
+                "give --square, and --pose-only to keep its lenses",
+            )
+        board = board_of(views)
+        square_m = board.square_m
+    side = Side(options.board_side) if options.board_side else Side.LEFT if rig is None else rig.board_side
+    beside = options.out.parent / "views"
+    left, right = map(Path, options.images) if options.images else (beside / "left", beside / "right")
+    return LiveSettings(
+        host=HostSettings(
+            board_side=side,
+            tolerance_ns=round(options.tolerance * 1e6) if options.tolerance else None,
+            wait_ns=None if options.wait is None else round(options.wait * 1e9),
+            time_offset=TimeOffset() if rig is None else rig.time_offset,
+            most_pixels=most_pixels(None, options.max_megapixels),
+        ),
+        board=board,
+        square_m=square_m,
+        most_views=options.views,
+        left=left,
+        right=right,
+    )
+
+
+def _run(live: LiveCalibration, options: argparse.Namespace, signals: StopSignals, named: Sequence[str]) -> None:
+    """Run it before all presenters that are wanted."""
+    command = speech_program() if options.sound else ()
+    is_terminal = sys.stderr.isatty()
+    with ExitStack() as ending:
+        shows: list[Shows] = []
+        if command:
+            voice = Voice(command)
+            ending.callback(voice.finish)
+            shows.append(Spoken(voice.say))
+        if options.snapshots is not None:
+            shows.append(SnapshotFiles(options.snapshots))
+        if is_terminal:
+            tell_sides()
+            shows.append(ending.enter_context(Picture(rings=options.sound and not command)))
+        else:
+            shows.append(Lines())
+
+        def show() -> None:
+            snapshot, views, note = live.snapshot(), live.views, _note(live, named)
+            for each in shows:
+                each.show(snapshot, views, note)
+
+        live.run(lambda: signals.stop, show)
+        show()
+
+
+def _note(live: LiveCalibration, named: Sequence[str]) -> str:
+    """Return what keeps views from coming; empty: nothing."""
+    host = live.host
+    if host.refused is not None:
+        return f"waiting: {host.refused.problem}: {host.refused.remedy}"
+    if not host.has_met_board:
+        waits = now.monotonic_ns() - host.started_ns > _WAITED_NS
+        return f"waiting for a board at {' and '.join(named)}" if waits else ""
+    return live.trouble
+
+
+def _too_few(last: GuideSnapshot) -> DataError:
+    refused = max(last.refused, key=lambda each: each[1], default=None)
+    reason = "" if refused is None else f"; most looks were refused: {refused[0].value}"
+    return DataError(
+        f"only {counted(last.views, 'view')} taken{reason}",
+        f"show the board as it is told; {_LEAST_VIEWS} are the least",
+    )
