@@ -149,6 +149,7 @@ class Novice:
             ("hold still", self._held),
             ("too blurred", self._held),
             ("does not see", self._shown_to),
+            ("back from", self._back),
             ("away", self._tilted),
             ("corner", self._aside),
             ("edge", self._aside),
@@ -231,6 +232,14 @@ class Novice:
         start = self._middle_m[:2] if is_corner else goal[:2]
         place = np.where(towards != 0, start + towards * step * [1, 0.75], goal[:2])
         return self._shaken(np.r_[place, goal[2], goal[3:5] * 0.6, goal[5]], 0.01)
+
+    def _back(self, goal: Floats, part: str, now_s: float) -> Floats:
+        """Move away from an edge or a corner, by a part of the way to the middle."""
+        del now_s
+        share = min(1.0, self._about(0.4 + 0.2 * self._times))
+        is_across = any(name in part for name in _HORIZONTAL), any(name in part for name in _VERTICAL)
+        back = goal[:2] + share * (self._middle_m[:2] - goal[:2])
+        return self._shaken(np.r_[np.where(is_across, back, goal[:2]), goal[2:]], 0.01, 3)
 
     def _nearer(self, goal: Floats, part: str, now_s: float) -> Floats:
         del now_s

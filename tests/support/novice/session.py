@@ -94,7 +94,18 @@ def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session
     write_plan(folder / PLAN, novice.plan)
     more = registered(folder / "site")
     camera, link = f"novice:{folder}?seed={seed}&fps={fps}", f"ipc://{folder}/link"
-    live = ["calibrate", "--live", "--link", link, "--camera", f"{camera}&side=right", "--no-sound", "--json"]
+    live = [
+        "calibrate",
+        "--live",
+        "--link",
+        link,
+        "--camera",
+        f"{camera}&side=right",
+        "--no-sound",
+        "--json",
+        "--snapshots",
+        str(folder),
+    ]
     live += ["--square", f"{BOARD.square_m * 1e3:g}mm", "--out", str(folder / "rig.yaml")]
     with board(["run", "--camera", f"{camera}&side=left", "--link", link], folder, more=more) as agent:
         until(lambda: "serving" in agent.stderr or agent.process.poll() is not None, "board-agent serves")
