@@ -38,8 +38,9 @@ _WASHED: Final = 0.05
 _LEAST_SEEN, _LEAST_CORNERS = 0.3, 12
 """Share and number of a board's corners, for boards of which a part is enough."""
 
-_ALIKE: Final = 0.05
-"""Two views are alike if their corners lie closer than this on average, in image widths."""
+_ALIKE, _SAME_SHAPE = 0.05, 0.006
+"""Two views are alike if their corners lie closer than the first on average, and, once brought together, closer than the second, in
+image widths. A board that fills 0.4 of the width and turns by 25 degrees in its place changes its shape by 0.009."""
 
 
 class Gate(Enum):
@@ -158,12 +159,21 @@ def sharp(looks: tuple[Look, Look], sizes_px: tuple[Size, Size], sharpest_px: tu
 def is_alike(one: Sighting, other: Sighting) -> bool:
     """Return whether two views show the board in nearly the same place and attitude."""
     return all(
-        a.shape == b.shape and float(np.nanmean(np.linalg.norm(a - b, axis=1))) < _ALIKE * size_px[0]
+        _is_near(a, b, size_px[0])
         for a, b, size_px in zip(
             (one.left_px, one.right_px), (other.left_px, other.right_px), one.sizes_px, strict=True
         )
-        if (np.isfinite(a) & np.isfinite(b)).any()
     )
+
+
+def _is_near(one: Corners, other: Corners, width_px: int) -> bool:
+    seen = np.isfinite(one).all(axis=1) & np.isfinite(other).all(axis=1)
+    if not seen.any():
+        return False
+    moves = one[seen] - other[seen]
+    apart = float(np.linalg.norm(moves, axis=1).mean())
+    reshaped = float(np.linalg.norm(moves - moves.mean(axis=0), axis=1).mean())
+    return apart < _ALIKE * width_px and reshaped < _SAME_SHAPE * width_px
 
 
 def _factor(size_px: Size) -> float:

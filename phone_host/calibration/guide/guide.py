@@ -31,13 +31,13 @@ from phone_host.calibration.guide.gates import (
 from phone_host.calibration.guide.placement import placement, usual_camera
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
-from phone_host.calibration.guide.wants import ORDER, Placed, Want, is_at_an_edge, is_there, missing
+from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Words, done, taken
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
 from phone_host.model import Rig
 
-_PATIENCE_NS: Final = 15_000_000_000
+_PATIENCE_NS: Final = 12_000_000_000
 """A wanted view that is not reached in this time is given up."""
 
 _NEVER_NS: Final = 20_000_000_000
@@ -45,6 +45,12 @@ _NEVER_NS: Final = 20_000_000_000
 
 _LOST_NS: Final = 1_000_000_000
 """A board that is not found for a shorter time is not spoken of: it may be between two looks."""
+
+_LEFT_NS: Final = 4_000_000_000
+"""A board that left over an edge may have gone anywhere after this time."""
+
+_REACTION_NS: Final = 500_000_000
+"""So long after the words a hand stops. In this time a board that is moved to an edge leaves the picture."""
 
 _STEADY_NS: Final = 400_000_000
 """Words must hold for so long before they replace others."""
@@ -133,9 +139,11 @@ class Guide:
         gate = found(sighting)
         speed = speed_widths_s(self._last, sighting)
         if gate is Gate.READY:
-            self._last, self._has_seen, self._seen_ns = sighting, True, now_ns
-            self._placed = self._place(sighting)
-            gate = self._judged(sighting, self._placed, speed)
+            placed = self._place(sighting)
+            gate = self._judged(sighting, placed, speed)
+            if gate is Gate.NOTHING_NEW and self._is_coming(sighting, placed):
+                gate = Gate.MOVING
+            self._last, self._placed, self._has_seen, self._seen_ns = sighting, placed, True, now_ns
         else:
             self._last = self._still_since_ns = None
         self._give_up(now_ns)
@@ -205,7 +213,12 @@ class Guide:
         wanted = self._wanted_words(now_ns)
         if wanted != self._next_words:
             self._next_words, self._next_since_ns = wanted, now_ns
-        at_once = self.ended is not Ended.RUNNING or self._is_heard(now_ns) or not self._words
+        at_once = (
+            self.ended is not Ended.RUNNING
+            or self._is_heard(now_ns)
+            or not self._words
+            or wanted == Words.STILL.value  # a moment later the board may have gone on
+        )
         if wanted and (at_once or now_ns - self._next_since_ns >= _STEADY_NS):
             self._words = wanted
         return self._words
@@ -243,6 +256,13 @@ class Guide:
         if self._still_since_ns is None or sighting.at_ns - self._still_since_ns < STILL_NS:
             return Gate.MOVING
         return Gate.READY if is_paired_well(sighting, speed) else Gate.APART
+
+    def _is_coming(self, sighting: Sighting, placed: Placed) -> bool:
+        """Return whether the wanted view will be there by the time a person has heard to hold still."""
+        if self._last is None or self._placed is None or self._still_since_ns is not None or self.is_full:
+            return False
+        steps = _REACTION_NS / max(1, sighting.at_ns - self._last.at_ns)
+        return bool(self.views) and is_there(self._asked, ahead(self._placed, placed, steps))
 
     def _is_wanted(self, placed: Placed) -> bool:
         wants = {Want.ANY} if not self.views else self._open | {self._asked}
@@ -326,6 +346,6 @@ class Guide:
             return Words.HELP.value if never else Words.SHOW_BOTH.value
         if now_ns - self._seen_ns < _LOST_NS:
             return self._words
-        if self._placed is not None and is_at_an_edge(self._placed):
-            return Words.BACK.value
-        return _ABSENT[self._gate].value
+        lost = self._placed is not None and now_ns - self._seen_ns < _LEFT_NS
+        way = back(self._placed) if lost and self._placed is not None else ""
+        return way or _ABSENT[self._gate].value

@@ -75,7 +75,7 @@ def _panel(name: str, coverage: Coverage, outline: Outline, left: float) -> tupl
 
 def _bar(name: str, count: int, left: float, top: float) -> str:
     """Draw a name, a bar and its count; an outline where there is nothing yet."""
-    at = left + 84
+    at = left + 100
     shape = (
         f'<rect class="bar" x="{at}" y="{top:.1f}" width="{min(count, 12) * 18}" height="{_BAR_PX - 4}"/>'
         if count

@@ -7,6 +7,7 @@ Beside each other the two pictures as the cameras take them, not mirrored: the d
 import math
 from typing import Final
 
+from common.words import counted
 from phone_host.calibration.guide.coverage import COLUMNS, ROWS, Coverage, Tilt
 from phone_host.calibration.guide.snapshot import GuideSnapshot, Outline
 
@@ -32,7 +33,7 @@ def picture_lines(snapshot: GuideSnapshot) -> tuple[str, ...]:
 
 def figure_lines(snapshot: GuideSnapshot) -> tuple[str, ...]:
     """Return how far the calibration is: views, depth error, verdict."""
-    wanted = f", {len(snapshot.wanted)} kinds still wanted" if snapshot.wanted else ""
+    wanted = f", {counted(len(snapshot.wanted), 'kind')} still wanted" if snapshot.wanted else ""
     board = f"board {snapshot.board}, " if snapshot.board else ""
     return (f"{board}{snapshot.views} of at most {snapshot.most_views} views{wanted}", *verdict_lines(snapshot))
 

@@ -5,7 +5,7 @@ reached in the picture in which the board is nearer to that edge: the two pictur
 board at its outer edge.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -16,12 +16,16 @@ _TILT_DEG, _ASKED_TILT_DEG = 18.0, 30.0
 """A board counts as tilted from the first on; the second is what is imagined. Below 15 a focal length is hardly told from a
 distance."""
 
-_EDGE: Final = 0.1
-"""A corner of the board that is this near to an edge, in image sizes beside the board's own outer square, has reached it."""
+_EDGE: Final = 0.14
+"""A corner of the board that is this near to an edge, in image sizes beside the board's own outer square, has reached it. A person who is
+told to stop there stops half a second later, and must not have left the picture by then."""
 
 _NEAR_FILLS, _FAR_FILLS = 0.5, 0.25
-_LEAST_FILLS, _MOST_FILLS = 0.15, 0.65
-"""For all other views: a smaller board has coarse corners, a larger one fits into no corner."""
+_LEAST_FILLS, _MOST_FILLS, _CORNER_FILLS = 0.15, 0.65, 0.5
+"""For all other views: a smaller board has coarse corners, a larger one can hardly be tilted, or fits into no corner."""
+
+_OFF_MIDDLE: Final = 0.1
+"""A board in a corner has its middle so far from that of both pictures, in image sizes: a large one is near all edges at once."""
 
 _ASIDE: Final = 0.26
 
@@ -79,6 +83,22 @@ class Placed:
         return (self.left.fills + self.right.fills) / 2
 
 
+def ahead(before: Placed, now: Placed, steps: float) -> Placed:
+    """Return where a board will be that goes on as it went between two looks.
+
+    Args:
+        before: the look before.
+        now: the newest look.
+        steps: how far ahead, in times between those two looks.
+    """
+    return Placed(_shifted(before.left, now.left, steps), _shifted(before.right, now.right, steps))
+
+
+def _shifted(before: Placement, now: Placement, steps: float) -> Placement:
+    x, y = ((now.low[axis] + now.high[axis] - before.low[axis] - before.high[axis]) / 2 * steps for axis in (0, 1))
+    return replace(now, low=(now.low[0] + x, now.low[1] + y), high=(now.high[0] + x, now.high[1] + y))
+
+
 def spot_of(want: Want) -> Spot:
     """Return where the board would stand in a wanted view."""
     if want in _TILTS:
@@ -109,17 +129,26 @@ def missing(want: Want, placed: Placed) -> str:
         placed: where the board is.
     """
     if want is Want.NEAR:
-        return _CLOSER if placed.fills < _NEAR_FILLS else ""
+        return (
+            "" if placed.fills >= _NEAR_FILLS or _is_full(placed) else ", ".join(filter(None, (_CLOSER, back(placed))))
+        )
     if want is Want.FAR:
         return _FARTHER if placed.fills > _FAR_FILLS else ""
-    size = _CLOSER if placed.fills < _LEAST_FILLS else _FARTHER if placed.fills > _MOST_FILLS else ""
+    most = _CORNER_FILLS if want in _CORNERS else _MOST_FILLS
+    size = _CLOSER if placed.fills < _LEAST_FILLS else _FARTHER if placed.fills > most else ""
     parts = [_way(want, placed), size]
     return ", ".join(part for part in parts if part)
 
 
-def is_at_an_edge(placed: Placed) -> bool:
-    """Return whether the board is about to leave one of the pictures."""
-    return any(_reached(placed, x, y) for x, y in _EDGES)
+def back(placed: Placed) -> str:
+    """Return how a board that is about to leave one of the pictures comes back, in a few words; empty: it is far from all edges."""
+    if _is_full(placed):
+        return _FARTHER
+    x = next((way for way in (-1, 1) if _reached(placed, way, 0)), 0)
+    y = next((way for way in (-1, 1) if _reached(placed, 0, way)), 0)
+    corner = next((want for want, ways in _CORNERS.items() if ways == (x, y)), None)
+    where = corner.value if corner is not None else _EDGES.get((x, y))
+    return "" if where is None else f"back from the {where}"
 
 
 def _way(want: Want, placed: Placed) -> str:
@@ -129,15 +158,27 @@ def _way(want: Want, placed: Placed) -> str:
         return "" if across * way[0] + down * way[1] >= _TILT_DEG else want.value
     if want in _CORNERS:
         x, y = _CORNERS[want]
-        left_out = [way for way in ((x, 0), (0, y)) if not _reached(placed, *way)]
+        left_out = [way for way in ((x, 0), (0, y)) if not (_reached(placed, *way) and _off_middle(placed, *way))]
         return "" if not left_out else _EDGES[left_out[0]] if len(left_out) == 1 else want.value
     return ""
+
+
+def _is_full(placed: Placed) -> bool:
+    """Return whether the board has reached opposite edges, be it of different pictures: both cameras see no more of it."""
+    return any(_reached(placed, x, y) and _reached(placed, -x, -y) for x, y in ((1, 0), (0, 1)))
+
+
+def _off_middle(placed: Placed, x: int, y: int) -> bool:
+    """Return whether the board's middle is on one side of that of the pictures."""
+    axis = 0 if x else 1
+    middles = [(each.low[axis] + each.high[axis]) / 2 - 0.5 for each in (placed.left, placed.right)]
+    return (x + y) * sum(middles) / 2 >= _OFF_MIDDLE
 
 
 def _reached(placed: Placed, x: int, y: int) -> bool:
     """Return whether the board has reached an edge of one of the pictures."""
     axis = 0 if x else 1
-    sides = (placed.left, placed.right)
-    if x < 0 or y < 0:
-        return any(each.low[axis] <= _EDGE + each.square[axis] for each in sides)
-    return any(each.high[axis] >= 1 - _EDGE - each.square[axis] for each in sides)
+    return any(
+        (each.low[axis] if x + y < 0 else 1 - each.high[axis]) - each.square[axis] <= _EDGE
+        for each in (placed.left, placed.right)
+    )

@@ -12,7 +12,6 @@ class Words(Enum):
     SHOW_LEFT = "the left camera does not see the whole board"
     SHOW_RIGHT = "the right camera does not see the whole board"
     PART = "show more of the board"
-    BACK = "back to the middle"
     HELP = "no board found: more light, no glare, the whole board with its white margin"
     STILL = "hold still"
     BLURRED = "too blurred"
