@@ -79,11 +79,10 @@ class Show:
         return self.guide.words(self.now_ns)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_person_who_follows_the_words_is_done_with_few_views(seed: int) -> None:
+def test_a_person_who_follows_the_words_is_done_with_few_views() -> None:
     """Two minutes and 25 views at most; views are unlike each other, and no kind of view is forgotten."""
     guide = follow(
-        unlike_rig(), BOARD, np.random.default_rng(seed), lambda views: grown(views, Verdict.GOOD), most_s=150
+        unlike_rig(), BOARD, np.random.default_rng(1), lambda views: grown(views, Verdict.GOOD), most_s=150
     )
     assert guide.ended is Ended.GOOD
     assert 10 <= len(guide.views) <= 25
@@ -101,13 +100,41 @@ def test_it_ends_with_the_most_views_whatever_the_verdict() -> None:
         assert show.show(view) is Gate.TAKEN
     guide = show.guide
     assert show.show(tilted(0, -25)) is Gate.NOTHING_NEW
-    guide.grow(grown(tuple(guide.views[:3]), Verdict.USABLE), show.now_ns)
-    assert guide.ended is Ended.RUNNING
-    guide.grow(grown(tuple(guide.views), Verdict.USABLE), show.now_ns)
-    assert guide.ended is Ended.ENOUGH
-    assert show.words == "done: verdict usable"
-    guide.grow(grown(tuple(guide.views), Verdict.GOOD), show.now_ns)
-    assert guide.ended is Ended.ENOUGH
+    ended = []
+    for views, verdict in ((3, Verdict.USABLE), (4, Verdict.USABLE), (4, Verdict.GOOD)):
+        guide.grow(grown(tuple(guide.views[:views]), verdict), show.now_ns)
+        ended.append((guide.ended, show.words))
+    assert [each for each, _ in ended] == [Ended.RUNNING, Ended.ENOUGH, Ended.ENOUGH]
+    assert ended[1][1] == "done: verdict usable"
+
+
+@pytest.mark.parametrize(
+    ("views", "after_m", "late_s", "ended"),
+    [
+        (9, 0.0039, 0.0, Ended.RUNNING),
+        (10, 0.0039, 0.0, Ended.GOOD),
+        (10, 0.003, 0.0, Ended.RUNNING),
+        (10, math.nan, 0.0, Ended.GOOD),
+        (8, 0.003, 95.0, Ended.GOOD),
+        (7, 0.003, 95.0, Ended.RUNNING),
+    ],
+)
+def test_it_ends_when_the_verdict_is_good_and_no_wanted_view_helps(
+    views: int, after_m: float, late_s: float, ended: Ended
+) -> None:
+    """Depth at 1 m is known to 4 mm. A view that leaves 3.9 mm is not waited for, one that leaves 3 mm is; after a minute and a half neither is."""
+    show = Show()
+    shown = [tilted(a, b) for a, b in ((0, 0), (25, 0), (-25, 0), (0, 25), (0, -25))]
+    shown += [corners(x, y) for x in (0.34, 0.66) for y in (0.36, 0.64)]
+    for view in (*shown, corners(square=0.03))[:views]:
+        show.show(view)
+    assert len(show.guide.views) == views
+    calibration = replace(_calibration(), depths=((0.3, 0.0), (0.5, 0.0), (1.0, 0.004), (2.0, 0.0)))
+    progress = grown(tuple(show.guide.views), Verdict.GOOD, *(Taught(want, after_m) for want in ORDER))
+    begun = show.guide.views[0].sighting.at_ns
+    now_ns = begun + 80 * SECOND_NS if not late_s else begun + round(late_s * SECOND_NS)
+    show.guide.grow(replace(progress, calibration=calibration), now_ns)
+    assert show.guide.ended is ended
 
 
 def test_it_ends_early_if_no_view_can_mend_it() -> None:

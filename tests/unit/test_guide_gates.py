@@ -17,6 +17,7 @@ from phone_host.calibration.guide.gates import (
     Sighting,
     found,
     is_alike,
+    is_far,
     is_paired_well,
     is_still,
     sharp,
@@ -142,21 +143,29 @@ def test_views_are_alike_if_the_board_is_at_nearly_the_same_place_in_both() -> N
     assert not is_alike(here, sighting(np.full((54, 2), math.nan)))
 
 
+def test_views_are_far_from_each_other_by_place_or_shape() -> None:
+    """A fifth of the width apart is far, a tenth is not; nearer by half is far; what has no corner in common is, too."""
+    here = sighting(corners())
+    assert is_far(here, sighting(corners(0.7)))
+    assert not is_far(here, sighting(corners(0.6)))
+    assert is_far(here, sighting(corners(square=0.075)))
+    assert is_far(here, sighting(np.full((54, 2), math.nan)))
+
+
 @given(across=st.floats(-45, 45), down=st.floats(-45, 45))
 def test_a_tilt_is_measured_with_its_way(across: float, down: float) -> None:
     """Of a board tilted about both axes, each tilt has the right sign, and an only one its size."""
-    alone = placement(tilted(across, 0.0), BOARD, usual_camera(SIZES[0])).tilt_deg
-    assert alone == (pytest.approx(across, abs=0.1), pytest.approx(0.0, abs=0.1))
-    alone = placement(tilted(0.0, down), BOARD, usual_camera(SIZES[0])).tilt_deg
-    assert alone == (pytest.approx(0.0, abs=0.1), pytest.approx(down, abs=0.1))
+    model = usual_camera(SIZES[0])
+    assert placement(tilted(across, 0.0), BOARD, model).tilt_deg == pytest.approx((across, 0.0), abs=0.1)
+    assert placement(tilted(0.0, down), BOARD, model).tilt_deg == pytest.approx((0.0, down), abs=0.1)
 
 
 def test_a_placement_says_where_and_how_large_a_board_is() -> None:
     """Squares of a twentieth of the width: eight of them fill 0.4 of it. A part that has no pose counts as flat."""
     where = placement(corners(0.4, 0.6), BOARD, usual_camera(SIZES[0]))
     assert where.fills == pytest.approx(0.4)
-    assert where.low == (pytest.approx(0.2), pytest.approx(0.6 - 2.5 * 0.05 * 4 / 3))
-    assert where.square == (pytest.approx(0.05), pytest.approx(0.05 * 4 / 3))
+    assert where.low == pytest.approx((0.2, 0.6 - 2.5 * 0.05 * 4 / 3))
+    assert where.square == pytest.approx((0.05, 0.05 * 4 / 3))
     assert len(where.outline) == 4
     row = corners()
     row[3:] = math.nan

@@ -18,7 +18,7 @@ class Depth(Enum):
     """How far the board is, by the share of the width that it fills, up to which."""
 
     FAR = 0.25
-    MIDDLE = 0.5
+    MIDDLE = 0.42
     NEAR = float("inf")
 
 

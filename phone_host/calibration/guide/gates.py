@@ -23,7 +23,7 @@ A hand that rests on something moves by a third of that."""
 _STALE_NS: Final = 500_000_000
 """Two looks farther apart than this tell no speed."""
 
-_APART_PX: Final = 0.2
+_APART_PX: Final = 0.15
 """The board may move so far between the two exposures of a pair: less than what corners of a good rig err by."""
 
 _BLURRED_PX, _MOST_BLURRED_PX = 4.0, 6.0
@@ -41,6 +41,9 @@ _LEAST_SEEN, _LEAST_CORNERS = 0.3, 12
 _ALIKE, _SAME_SHAPE = 0.05, 0.006
 """Two views are alike if their corners lie closer than the first on average, and, once brought together, closer than the second, in
 image widths. A board that fills 0.4 of the width and turns by 25 degrees in its place changes its shape by 0.009."""
+
+_FAR, _OTHER_SHAPE = 0.15, 0.02
+"""Two views teach different things if their corners lie farther apart than the first, or than the second once brought together."""
 
 
 class Gate(Enum):
@@ -158,22 +161,28 @@ def sharp(looks: tuple[Look, Look], sizes_px: tuple[Size, Size], sharpest_px: tu
 
 def is_alike(one: Sighting, other: Sighting) -> bool:
     """Return whether two views show the board in nearly the same place and attitude."""
-    return all(
-        _is_near(a, b, size_px[0])
-        for a, b, size_px in zip(
-            (one.left_px, one.right_px), (other.left_px, other.right_px), one.sizes_px, strict=True
-        )
-    )
+    for a, b, size_px in zip((one.left_px, one.right_px), (other.left_px, other.right_px), one.sizes_px, strict=True):
+        apart, reshaped = _differences(a, b, size_px[0])
+        if apart >= _ALIKE or reshaped >= _SAME_SHAPE:
+            return False
+    return True
 
 
-def _is_near(one: Corners, other: Corners, width_px: int) -> bool:
+def is_far(one: Sighting, other: Sighting) -> bool:
+    """Return whether two views differ so much in place, size or attitude that each teaches what the other does not."""
+    apart, reshaped = _differences(one.left_px, other.left_px, one.sizes_px[0][0])
+    return apart > _FAR or reshaped > _OTHER_SHAPE
+
+
+def _differences(one: Corners, other: Corners, width_px: int) -> tuple[float, float]:
+    """Return how far apart corners lie on average, and how far once brought together, image widths; infinite: none is common."""
     seen = np.isfinite(one).all(axis=1) & np.isfinite(other).all(axis=1)
     if not seen.any():
-        return False
+        return float("inf"), float("inf")
     moves = one[seen] - other[seen]
     apart = float(np.linalg.norm(moves, axis=1).mean())
     reshaped = float(np.linalg.norm(moves - moves.mean(axis=0), axis=1).mean())
-    return apart < _ALIKE * width_px and reshaped < _SAME_SHAPE * width_px
+    return apart / width_px, reshaped / width_px
 
 
 def _factor(size_px: Size) -> float:

@@ -5,7 +5,8 @@ sharp. Whether it is wanted comes before whether it is still, because nobody is 
 
 Every kind of view is wanted once. Which one is asked for first, the calibration so far tells: the one that would lower the depth
 error most. One that is not reached within some time is given up: not every rig can show a board in every corner of both
-images. If the verdict is then not good, or another view would still help, the kinds are wanted once more.
+images. Meanwhile any view is taken that is far from all others. It ends when the verdict is good and no view that is still wanted
+would help much. If all kinds are there before, they are wanted once more.
 """
 
 import math
@@ -23,6 +24,7 @@ from phone_host.calibration.guide.gates import (
     Sighting,
     found,
     is_alike,
+    is_far,
     is_paired_well,
     is_still,
     sharp,
@@ -37,7 +39,7 @@ from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
 from phone_host.model import Rig
 
-_PATIENCE_NS: Final = 12_000_000_000
+_PATIENCE_NS: Final = 8_000_000_000
 """A wanted view that is not reached in this time is given up."""
 
 _NEVER_NS: Final = 20_000_000_000
@@ -61,12 +63,19 @@ _HEARD_NS: Final = 1_200_000_000
 _RETHINK_NS: Final = 1_500_000_000
 """The wanted view may still change so long after it was asked for, when the calibration of the views before comes."""
 
+_VAIN_NS: Final = 4_000_000_000
+"""A view that was asked for in vain for so long gives way to any that is new: silence teaches less."""
+
 _LEAST_VIEWS: Final = 10
 """From so many views on, lenses up to the rational one are tried (`lens_choice`)."""
 
+_LONG_NS, _LONG_VIEWS = 90_000_000_000, 8
+"""After a minute and a half these are enough, if the verdict is good: a person is to be done in two."""
+
 _HOPELESS_VIEWS: Final = 6
-_LEAST_GAIN: Final = 0.08
-"""A view that lowers the depth error by a smaller share no longer helps: with twelve views every further one does so by about 4 %."""
+_LEAST_GAIN, _LEAST_SAVED_M = 0.08, 0.0005
+"""A view that lowers the depth error at 1 m by a smaller share, or by less, no longer helps: with twelve views every further one does
+so by about 4 %, and a matcher's own error is larger."""
 
 _ABSENT: Final = {
     Gate.NOT_FOUND: Words.SHOW_BOTH,
@@ -121,7 +130,6 @@ class Guide:
         self._asked, self._asked_ns = Want.ANY, now_ns
         self._open = set(ORDER)
         self._given_up = set[Want]()
-        self._is_again = False
         self._progress: Progress | None = None
         self._words, self._next_words, self._next_since_ns = "", "", now_ns
         self._taken_ns: int | None = None
@@ -140,7 +148,7 @@ class Guide:
         speed = speed_widths_s(self._last, sighting)
         if gate is Gate.READY:
             placed = self._place(sighting)
-            gate = self._judged(sighting, placed, speed)
+            gate = self._judged(sighting, placed, speed, now_ns)
             if gate is Gate.NOTHING_NEW and self._is_coming(sighting, placed):
                 gate = Gate.MOVING
             self._last, self._placed, self._has_seen, self._seen_ns = sighting, placed, True, now_ns
@@ -198,7 +206,7 @@ class Guide:
             return
         if progress.is_hopeless and progress.views >= _HOPELESS_VIEWS:
             self.ended = Ended.HOPELESS
-        elif self._is_good(progress):
+        elif self._is_good(progress, now_ns):
             self.ended = Ended.GOOD
         elif len(self.views) >= self._most:
             self.ended = Ended.ENOUGH
@@ -245,15 +253,17 @@ class Guide:
             refused=tuple((gate, self._refused[gate]) for gate in Gate if self._refused[gate]),
         )
 
-    def _judged(self, sighting: Sighting, placed: Placed, speed: float) -> Gate:
+    def _judged(self, sighting: Sighting, placed: Placed, speed: float, now_ns: int) -> Gate:
         """Judge a view in which the board was found."""
         if not is_still(speed):
             self._still_since_ns = None
         elif self._still_since_ns is None:
             self._still_since_ns = sighting.at_ns
-        if self.is_full or not self._is_wanted(placed) or any(is_alike(sighting, each.sighting) for each in self.views):
+        rests = self._still_since_ns is not None and sighting.at_ns - self._still_since_ns >= STILL_NS
+        wanted = self._is_wanted(placed) or (rests and self._is_new(sighting, now_ns))
+        if self.is_full or not wanted or any(is_alike(sighting, each.sighting) for each in self.views):
             return Gate.NOTHING_NEW
-        if self._still_since_ns is None or sighting.at_ns - self._still_since_ns < STILL_NS:
+        if not rests:
             return Gate.MOVING
         return Gate.READY if is_paired_well(sighting, speed) else Gate.APART
 
@@ -267,6 +277,10 @@ class Guide:
     def _is_wanted(self, placed: Placed) -> bool:
         wants = {Want.ANY} if not self.views else self._open | {self._asked}
         return any(is_there(want, placed) for want in wants)
+
+    def _is_new(self, sighting: Sighting, now_ns: int) -> bool:
+        """Return whether a view that nobody asked for is to be taken, because what was asked for is not reached."""
+        return now_ns - self._asked_ns > _VAIN_NS and all(is_far(sighting, each.sighting) for each in self.views)
 
     def _place(self, sighting: Sighting) -> Placed:
         rig = self._rig
@@ -293,7 +307,6 @@ class Guide:
         if not self.views:
             return
         if not self._open:
-            self._is_again = True
             self._open = set(ORDER) - self._given_up or set(ORDER)
         self._asked = min(self._open, key=self._rank)
         self._asked_ns = now_ns
@@ -305,19 +318,25 @@ class Guide:
 
     def _give_up(self, now_ns: int) -> None:
         """Ask for another view if this one is not reached."""
-        if now_ns - self._seen_ns > _PATIENCE_NS / 3:  # nobody is there, so nobody tries
+        if now_ns - self._seen_ns > _PATIENCE_NS / 2:  # nobody is there, so nobody tries
             self._asked_ns = now_ns
         if self.views and now_ns - self._asked_ns > _PATIENCE_NS:
             self._given_up.add(self._asked)
             self._open.discard(self._asked)
             self._ask(now_ns)
 
-    def _is_good(self, progress: Progress) -> bool:
-        """Return whether the verdict is good and more views no longer help."""
-        if progress.verdict is not Verdict.GOOD or not self._is_again:
+    def _is_good(self, progress: Progress, now_ns: int) -> bool:
+        """Return whether the verdict is good and more views no longer help, or it has taken long."""
+        if progress.verdict is not Verdict.GOOD:
             return False
-        gain = 1 - progress.after_m(self._asked) / progress.depth_error_m
-        return len(self.views) >= min(_LEAST_VIEWS, self._most) and not gain >= _LEAST_GAIN  # also if it is not known
+        if now_ns - self.views[0].sighting.at_ns > _LONG_NS and len(self.views) >= _LONG_VIEWS:
+            return True
+        best_m = min(
+            (progress.after_m(want) for want in self._open if math.isfinite(progress.after_m(want))), default=0
+        )
+        saved_m = progress.depth_error_m - best_m
+        helps = best_m > 0 and saved_m >= max(_LEAST_SAVED_M, _LEAST_GAIN * progress.depth_error_m)
+        return len(self.views) >= min(_LEAST_VIEWS, self._most) and not helps
 
     def _note(self, gate: Gate) -> Gate:
         self._gate = gate
@@ -346,6 +365,9 @@ class Guide:
             return Words.HELP.value if never else Words.SHOW_BOTH.value
         if now_ns - self._seen_ns < _LOST_NS:
             return self._words
-        lost = self._placed is not None and now_ns - self._seen_ns < _LEFT_NS
-        way = back(self._placed) if lost and self._placed is not None else ""
+        way = ""
+        if self._placed is not None and now_ns - self._seen_ns < _LEFT_NS:
+            left, right = self._placed.left, self._placed.right
+            lost = {Gate.NOT_FOUND_LEFT: Placed(left, left), Gate.NOT_FOUND_RIGHT: Placed(right, right)}
+            way = back(lost.get(self._gate, self._placed))
         return way or _ABSENT[self._gate].value

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from phone_host.calibration.guide.coverage import Depth
 from phone_host.calibration.guide.placement import Placement
 from phone_host.calibration.next_view import Spot
 
@@ -20,7 +21,7 @@ _EDGE: Final = 0.14
 """A corner of the board that is this near to an edge, in image sizes beside the board's own outer square, has reached it. A person who is
 told to stop there stops half a second later, and must not have left the picture by then."""
 
-_NEAR_FILLS, _FAR_FILLS = 0.5, 0.25
+_NEAR_FILLS, _FAR_FILLS = Depth.MIDDLE.value, Depth.FAR.value
 _LEAST_FILLS, _MOST_FILLS, _CORNER_FILLS = 0.15, 0.65, 0.5
 """For all other views: a smaller board has coarse corners, a larger one can hardly be tilted, or fits into no corner."""
 

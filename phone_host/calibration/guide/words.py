@@ -9,8 +9,8 @@ class Words(Enum):
     """What a person is told; beside these: what a wanted view lacks, and `taken`."""
 
     SHOW_BOTH = "show the whole board to both cameras"
-    SHOW_LEFT = "the left camera does not see the whole board"
-    SHOW_RIGHT = "the right camera does not see the whole board"
+    SHOW_LEFT = "the left camera sees too little of the board: to the left, or farther away"
+    SHOW_RIGHT = "the right camera sees too little of the board: to the right, or farther away"
     PART = "show more of the board"
     HELP = "no board found: more light, no glare, the whole board with its white margin"
     STILL = "hold still"

@@ -107,7 +107,7 @@ def take_views(options: argparse.Namespace, asked: Named | None) -> Live:
         DataError: too few views were taken to calibrate from.
     """
     _check(options)
-    logs.set_up(log_level("warning"))
+    logs.set_up(log_level("error"))  # doubts about pairs are the gates' business
     settings = _settings(options, asked)
     for folder in (settings.left, settings.right, options.snapshots):
         if folder is not None:
