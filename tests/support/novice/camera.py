@@ -21,7 +21,7 @@ from common.camera.base import CameraHealth, Grab, Mode, Offers, Skipped
 from common.camera.factory import CameraRequest
 from common.errors import SettingsError, UnavailableError
 from common.frame import Frame, PixelFormat
-from common.protocol.message import CameraDescription, Pacing
+from common.protocol.message import CameraDescription, Pacing, Steering
 from common.stamp import Stamp
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Image, Side
@@ -35,6 +35,9 @@ _KEPT: Final = 4
 """Frames that wait for a reader: as many as a driver has buffers."""
 
 _PATIENCE_S: Final = 0.005
+_REST_NS, _RESTART_SIGMA_NS = 400_000_000, 1.5e6
+"""A webcam that is restarted sends nothing for so long, and misses the moment by so much."""
+
 _REPORT_EVERY: Final = 75
 
 
@@ -80,8 +83,10 @@ class NoviceCamera:
             pixel_format=PixelFormat.MJPEG,
             period_ns=self._period_ns,
             pacing=Pacing.CLOCK,
+            steering=Steering.RESTART,
         )
         self.offers = Offers()
+        self._restarts, self._rests_until_ns = np.random.default_rng([17, seed, self._eye.model.width_px]), 0
         self._watched, self._closed = threading.Event(), threading.Event()
         self._watched.set()
         self._thread = threading.Thread(target=self._run, name="novice-camera", daemon=True)
@@ -117,7 +122,10 @@ class NoviceCamera:
         """Ignore the call."""
 
     def steer(self, later_ns: int, now_ns: int) -> None:
-        """Ignore the call."""
+        """Rest, and begin again later within the period, as exactly as webcams do."""
+        off_ns = self._restarts.normal(0, _RESTART_SIGMA_NS)
+        self._phase += (later_ns + off_ns) / self._period_ns
+        self._rests_until_ns = now_ns + _REST_NS
 
     def pause(self) -> None:
         """Paint no more."""
@@ -169,6 +177,9 @@ class NoviceCamera:
         while not self._closed.is_set():
             if not self._watched.is_set():
                 self._watched.wait()
+                index = self._index_at(now.monotonic_ns())
+            if (rest_ns := self._rests_until_ns - now.monotonic_ns()) > 0:
+                time.sleep(rest_ns / 1e9)
                 index = self._index_at(now.monotonic_ns())
             index += 1
             exposed_ns = self._time_of(index)

@@ -98,7 +98,7 @@ class Novice:
             return
         if words.startswith(_HOLD):  # they see it now: so far the views reach
             self._middle_m += _LEARNS * (self.plan.at(now_s)[:3] - self._middle_m)
-        elif "middle" in words or "whole" in words:  # a step back cannot be wrong
+        elif "farther" in words or "whole" in words:  # a step back cannot be wrong
             self._middle_m[2] *= 1 + _STEPS_BACK
         self._words, self._times = words, 0
         self._way = -1 if self._random.random() < self.person.mistakes else 1
@@ -148,20 +148,17 @@ class Novice:
         meanings: tuple[tuple[str, Callable[[Floats, str, float], Floats]], ...] = (
             ("hold still", self._held),
             ("too blurred", self._held),
-            ("does not see", self._shown_to),
+            ("sees too little", self._shown_to),
             ("back from", self._back),
+            ("farther", self._nearer),
             ("away", self._tilted),
             ("corner", self._aside),
             ("edge", self._aside),
             ("closer", self._nearer),
-            ("farther", self._nearer),
             ("a little", self._nudged),
-            ("middle", self._shown),
             ("show", self._shown),
             ("board", self._shown),
         )
-        if part.startswith("farther"):
-            return self._nearer
         return next((meaning for word, meaning in meanings if word in part), self._puzzled)
 
     def _about(self, size: float) -> float:
