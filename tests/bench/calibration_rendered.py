@@ -65,7 +65,7 @@ def random_rig(seed: int) -> Rig:
     kinds = random.choice([each.value for each in Lens], 2, p=[0.5, 0.25, 0.25])
     lenses = [Lens(str(kind)) for kind in kinds]
     models = [
-        _random_camera(random, SIZES[index], lens, is_wide=Lens.FISHEYE in lenses)
+        random_camera(random, SIZES[index], lens, is_wide=Lens.FISHEYE in lenses)
         for index, lens in zip(sizes, lenses, strict=True)
     ]
     rotation = rotations_of(np.radians(random.uniform(-3, 3, 3)))
@@ -73,7 +73,7 @@ def random_rig(seed: int) -> Rig:
     return Rig(left=models[0], right=models[1], R_right_left=rotation, t_right_left_m=-rotation @ centre)
 
 
-def _random_camera(random: np.random.Generator, size_px: tuple[int, int], lens: Lens, *, is_wide: bool) -> CameraModel:
+def random_camera(random: np.random.Generator, size_px: tuple[int, int], lens: Lens, *, is_wide: bool) -> CameraModel:
     """Beside a fisheye lens of 80 to 105 degrees stands a wide webcam: rigs whose cameras share little of their views are no rigs."""
     width, height = size_px
     focal = width * (random.uniform(0.55, 0.72) if is_wide else random.uniform(0.75, 1.1))

@@ -12,11 +12,15 @@ import pytest
 
 from common import now
 from common.camera.base import Camera, CameraState, Ended, Grab, Mode, Skipped, Spoiled
+from common.camera.factory import CameraRequest
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
 from common.protocol.message import Pacing, Steering
 from phone_host.camera.factory import open_camera
 from tests.support.mjpeg_server import MjpegServer
+from tests.support.novice.camera import PLAN, NoviceCamera
+from tests.support.novice.hands import write_plan
+from tests.support.novice.head import Novice
 from tests.support.pictures import encoded, jpeg, picture
 
 CLOCK = "board:test"
@@ -88,6 +92,15 @@ def served(folder: Path) -> Set:
     return Set(open_camera(server.uri, CLOCK, now.monotonic_ns()), now.monotonic_ns(), server)
 
 
+def held(folder: Path) -> Set:
+    """Open another package's camera before which somebody holds a board."""
+    folder.mkdir()
+    write_plan(folder / PLAN, Novice(np.random.default_rng(1), np.zeros(3), 0.0).plan)
+    options = (("side", "left"), ("seed", "1"), ("fps", "30"))
+    request = CameraRequest(uri="novice:", path=str(folder), options=options, clock=CLOCK, now_ns=now.monotonic_ns())
+    return Set(NoviceCamera(request), now.monotonic_ns())
+
+
 CAMERAS: dict[str, Callable[[Path], Set]] = {
     "replay clock loop": replay("fps=30&loop=1"),
     "replay clock": replay("fps=30"),
@@ -95,6 +108,7 @@ CAMERAS: dict[str, Callable[[Path], Set]] = {
     "replay demand": replay("fps=24&pace=demand"),
     "replay of a turned camera": replay("fps=30&loop=1&rotate=90&flip=h"),
     "mjpeg over http": served,
+    "painted by another package": held,
 }
 
 

@@ -39,6 +39,7 @@ from phone_host.live.voice import Voice, speech_program
 from phone_host.model import Side, TimeOffset
 from phone_host.run.host_settings import HostSettings
 from phone_host.settings import key_folder, most_pixels
+from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.cause import assessed
 from phone_host.verbs.calibrate.earlier import Asked
 from phone_host.verbs.calibrate.hints import arrangement_hint
@@ -208,6 +209,7 @@ def _settings(options: argparse.Namespace, asked: Asked) -> LiveSettings:
             wait_ns=None if options.wait is None else round(options.wait * 1e9),
             time_offset=TimeOffset() if rig is None else rig.time_offset,
             most_pixels=most_pixels(None, options.max_megapixels),
+            steered=frozenset(Whose),  # a view is worth as much as its two exposures are simultaneous
         ),
         board=asked.named.board,
         square_m=asked.named.square_mm / 1000,

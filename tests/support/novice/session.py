@@ -1,0 +1,204 @@
+"""One guided calibration from start to verdict: both programs, a real link, two test cameras, and a novice who hears the words."""
+
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.calibration.rig_sigma import baseline_sigma_m, depth_sigma_m
+from phone_host.geometry.lens import project, rays_through
+from phone_host.geometry.se3 import SE3, vectors_of
+from phone_host.geometry.triangulate import triangulate
+from phone_host.model import Rig
+from phone_host.output.rig_yaml import read_rig
+from phone_host.stereo.rectify import rectify_rig
+from tests.support.novice.camera import PLAN, registered
+from tests.support.novice.hands import write_plan
+from tests.support.novice.head import Novice
+from tests.support.novice.scene import BOARD, between_m, novice_scene
+from tests.support.programs import Program, board, host, until
+
+_STEP_S: Final = 0.02
+_SAY, _TAKEN = "say: ", "taken: "
+_AWAY_M: Final = 1.0
+_TURN: Final = slice(24, 27)
+"""Where a rig's covariance has the turn of the right camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """How far a rig is from the truth, and how far it says that it may be (one standard deviation).
+
+    Attributes:
+        baseline_m: error of the baseline, m.
+        baseline_sigma_m: stated.
+        turn_rad: angle of the right camera's error, rad.
+        turn_sigma_rad: stated.
+        depth_m: error of depth at 1 m, root mean square over what both cameras see, m.
+        depth_sigma_m: stated.
+    """
+
+    baseline_m: float
+    baseline_sigma_m: float
+    turn_rad: float
+    turn_sigma_rad: float
+    depth_m: float
+    depth_sigma_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Session:
+    """How one session went.
+
+    Attributes:
+        seed: of the session.
+        verdict: good, usable or reject; empty: there is none.
+        views: how many were taken.
+        seconds: from the first picture of the board's camera to the verdict, s.
+        refused: how many views were refused, by reason.
+        said: what was said, with the time, s.
+        skipped: frames that a camera could not paint in time, as a share.
+        errors: against the truth; None: there is no rig.
+        exit_code: of phone-host; None: it did not come to an end.
+        log: the end of what it wrote.
+    """
+
+    seed: int
+    verdict: str
+    views: int
+    seconds: float
+    refused: dict[str, int]
+    said: tuple[tuple[float, str], ...]
+    skipped: float
+    errors: Errors | None
+    exit_code: int | None
+    log: str
+
+
+def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session:
+    """Run one session in real time.
+
+    Args:
+        seed: of rig and person.
+        folder: an empty one.
+        fps: of both cameras.
+        patience_s: longest time, s; then the session is ended as failed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    truth = novice_scene(seed).rig
+    novice = Novice(np.random.default_rng([16, seed]), between_m(truth), time.monotonic())
+    write_plan(folder / PLAN, novice.plan)
+    more = registered(folder / "site")
+    camera, link = f"novice:{folder}?seed={seed}&fps={fps}", f"ipc://{folder}/link"
+    live = [
+        "calibrate",
+        "--live",
+        "--link",
+        link,
+        "--camera",
+        f"{camera}&side=right",
+        "--no-sound",
+        "--json",
+        "--snapshots",
+        str(folder),
+    ]
+    live += ["--square", f"{BOARD.square_m * 1e3:g}mm", "--out", str(folder / "rig.yaml")]
+    with board(["run", "--camera", f"{camera}&side=left", "--link", link], folder, more=more) as agent:
+        until(lambda: "serving" in agent.stderr or agent.process.poll() is not None, "board-agent serves")
+        with host(live, folder, more=more) as guide:
+            began_s = time.monotonic()
+            said = _talk(guide, novice, folder, began_s + patience_s)
+            took_s = time.monotonic() - began_s
+            code = guide.process.poll()
+            if code is None:
+                guide.stop()
+            log = guide.stderr
+        agent.stop()
+    report = _json(folder / "report.json") if code == 0 else {}
+    return Session(
+        seed=seed,
+        verdict=str(report.get("verdict", "")),
+        views=sum(line.startswith(_TAKEN) for line in log.splitlines()),
+        seconds=took_s,
+        refused=_json(folder / "guide.json").get("refused", {}),
+        said=tuple((round(at_s - began_s, 2), words) for at_s, words in said),
+        skipped=_skipped(folder),
+        errors=_errors(folder / "rig.yaml", truth),
+        exit_code=code,
+        log=log[-2000:],
+    )
+
+
+def _talk(guide: Program, novice: Novice, folder: Path, until_s: float) -> list[tuple[float, str]]:
+    """Let the novice hear what is said, until the program ends."""
+    said, read = list[tuple[float, str]](), 0
+    while guide.process.poll() is None and (now_s := time.monotonic()) < until_s:
+        log = guide.err.read_bytes()
+        whole = log.rfind(b"\n") + 1
+        for line in log[read:whole].decode(errors="replace").splitlines():
+            if line.startswith(_SAY):
+                said.append((now_s, line.removeprefix(_SAY)))
+                novice.hear(said[-1][1], now_s)
+        read = max(read, whole)
+        if novice.act(now_s):
+            write_plan(folder / PLAN, novice.plan)
+        time.sleep(_STEP_S)
+    return said
+
+
+def _json(path: Path) -> dict[str, Any]:
+    return dict(json.loads(path.read_text())) if path.exists() else {}
+
+
+def _skipped(folder: Path) -> float:
+    counts = [_json(folder / f"{side}.json") for side in ("left", "right")]
+    return max((each["skipped"] / (each["skipped"] + each["painted"]) for each in counts if each), default=float("nan"))
+
+
+def _errors(path: Path, truth: Rig) -> Errors | None:
+    if not path.exists():
+        return None
+    found = read_rig(path)
+    baselines = [float(np.linalg.norm(each.t_right_left_m)) for each in (found, truth)]
+    return Errors(
+        baseline_m=baselines[0] - baselines[1],
+        baseline_sigma_m=baseline_sigma_m(found),
+        turn_rad=float(np.linalg.norm(vectors_of(found.R_right_left @ truth.R_right_left.T))),
+        turn_sigma_rad=float(np.sqrt(np.trace(found.covariance[_TURN, _TURN]))),
+        depth_m=depth_error_m(found, truth, _AWAY_M),
+        depth_sigma_m=depth_sigma_m(found, rectify_rig(found), _AWAY_M),
+    )
+
+
+def depth_error_m(found: Rig, truth: Rig, depth_m: float) -> float:
+    """Return how wrong a rig measures what stands at a depth.
+
+    Args:
+        found: the rig that measures.
+        truth: the cameras as they are.
+        depth_m: of the points, m.
+
+    Returns:
+        Root mean square over all that both cameras see, m.
+    """
+    wide, high = truth.left.width_px - 1, truth.left.height_px - 1
+    grid = np.stack(np.meshgrid(np.linspace(0, wide, 17), np.linspace(0, high, 13)), axis=2).reshape(-1, 2)
+    rays = rays_through(grid, truth.left)
+    points_m = rays / rays[:, 2:] * depth_m
+    there = project(SE3(truth.R_right_left, truth.t_right_left_m).apply(points_m), truth.right)
+    limit = np.array([truth.right.width_px, truth.right.height_px]) - 1
+    both = ((there >= 0) & (there <= limit)).all(axis=1)
+    slopes = np.array([_slopes(grid[both], found.left), _slopes(there[both], found.right)])
+    covariances = np.broadcast_to(np.eye(2) * 1e-6, (*slopes.shape, 2))
+    poses = [SE3.identity(), SE3(found.R_right_left, found.t_right_left_m)]
+    measured_m = triangulate(slopes, covariances, poses).points_m[:, 2]
+    return float(np.sqrt(np.mean((measured_m - depth_m) ** 2)))
+
+
+def _slopes(pixels: NDArray[np.float64], model: Any) -> NDArray[np.float64]:
+    rays = rays_through(pixels, model)
+    return np.asarray(rays[:, :2] / rays[:, 2:])

@@ -1,0 +1,84 @@
+"""What the novice of the live guide's benchmark is worth: its pictures are right, its hands move smoothly, it does what it hears."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from phone_host.calibration.target import find_corners
+from phone_host.geometry.lens import project
+from tests.support.novice.hands import Plan, Stroke, motion
+from tests.support.novice.head import Novice
+from tests.support.novice.painter import Moment, Painter
+from tests.support.novice.scene import BOARD, novice_scene
+from tests.support.novice.session import depth_error_m
+
+MIDDLE_M = BOARD.points_m().mean(axis=0)
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.35])
+def test_painted_corners_lie_where_the_lens_puts_them(turned: float) -> None:
+    """Corners found in a picture with noise and blur lie where geometry puts them: 0.04 px rms, hardly more than the detector's own error."""
+    eye = novice_scene(1).left
+    pose = motion(np.array([0.02, 0.01, 0.42, -turned, turned, 0.02]), MIDDLE_M)
+    image = Painter(eye, BOARD, 1).paint((Moment(pose), Moment(pose)))
+    off = find_corners(image, BOARD) - project(pose.apply(BOARD.points_m()), eye.model)
+    assert float(np.sqrt((off**2).mean())) < 0.04
+    assert float(np.abs(off.mean(axis=0)).max()) < 0.01
+
+
+def test_a_moving_board_is_blurred() -> None:
+    """The picture of a board that moves by 12 px while the shutter is open has softer edges along the way than across it."""
+    eye = novice_scene(1).left
+    way_m = 12 * 0.42 / eye.model.matrix[0, 0]
+    painter = Painter(eye, BOARD, 1)
+    poses = [motion(np.array([x, 0.01, 0.42, 0, 0, 0]), MIDDLE_M) for x in np.linspace(0, way_m, 6)]
+    assert painter.moments_for(poses[0], poses[-1]) == len(poses)
+    image = painter.paint(tuple(Moment(pose) for pose in poses)).astype(float)[180:300, 240:400]
+    along, across = (float(np.abs(np.diff(image, axis=axis)).max()) for axis in (1, 0))
+    assert along < across / 2
+
+
+def test_a_shorter_plan_is_the_same() -> None:
+    """Strokes that are over count as one; the pose stays what it was, and the grip."""
+    strokes = [Stroke(float(k), 0.7, np.full(6, k + 1.0), k % 3) for k in range(6)]
+    plan = Plan(tuple(strokes))
+    shorter = plan.since(3.2)
+    assert len(shorter.strokes) == 4
+    for at_s in np.linspace(3.2, 8, 20):
+        assert np.allclose(shorter.at(at_s), plan.at(at_s))
+        assert shorter.grip(at_s) == plan.grip(at_s)
+
+
+@pytest.mark.parametrize(
+    ("words", "component", "sign"),
+    [
+        ("left edge", 0, -1),
+        ("bottom right corner", 1, 1),
+        ("closer", 2, -1),
+        ("farther away", 2, 1),
+        ("tilt the board: top edge away", 3, -1),
+        ("tilt the board: left edge away", 4, 1),
+    ],
+)
+def test_the_novice_does_what_it_hears(words: str, component: int, sign: int) -> None:
+    """Told for ten seconds, somebody who mistakes no direction has moved the board that way, not before a reaction time."""
+    novice = Novice(np.random.default_rng(3), np.array([0.05, 0, 0]), 0.0)
+    novice.person = replace(novice.person, mistakes=0.0, bored_s=1e9)
+    novice.plan = Plan((Stroke(-10, 1, np.array([0.05, 0, 0.5, 0, 0, 0])),))
+    novice._bored_s = np.inf
+    before = novice.plan.at(0.0)
+    novice.hear(words, 0.0)
+    assert not novice.act(0.39)
+    for at_s in np.arange(0.4, 10, 0.02):
+        novice.act(float(at_s))
+    assert sign * (novice.plan.at(10.0) - before)[component] > 0.05
+
+
+def test_a_perfect_rig_measures_exactly() -> None:
+    """The depth error of the truth is nothing; one of a baseline that is 1 % too long is 1 % of the depth."""
+    rig = novice_scene(2).rig
+    assert depth_error_m(rig, rig, 1.0) < 1e-6
+    assert depth_error_m(replace(rig, t_right_left_m=rig.t_right_left_m * 1.01), rig, 1.0) == pytest.approx(
+        0.01, rel=1e-3
+    )
