@@ -23,6 +23,7 @@ def _phone_host(*arguments: object) -> subprocess.CompletedProcess[str]:
             ["charuco-8x6-20mm-15mm-5x5-a3.pdf", "charuco-8x6-20mm-15mm-5x5-a3.svg"],
             20,
         ),
+        (["charuco", "--square", "1mm"], ["charuco-8x6-1mm-0.7mm-5x5-a4.pdf", "charuco-8x6-1mm-0.7mm-5x5-a4.svg"], 1),
         (["chessboard", "--screen", "1280x720"], ["chessboard-9x6-1280x720.png"], None),
     ],
 )

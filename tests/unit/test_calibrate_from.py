@@ -148,8 +148,8 @@ def test_what_contradicts_the_earlier_calibration_is_refused(tmp_path: Path) -> 
         with pytest.raises(SettingsError) as caught:
             _session(_options(tmp_path, *given))
         assert said in str(caught.value)
-    for alone in (("--pose-only",), ("--board", "9x6"), ("--board", "auto"), ("--square", "25mm")):
-        assert _session(_options(tmp_path, "--from", path, *alone)).board == BOARD
+    for again in ("--pose-only", "--board 9x6", "--board auto", "--square 25mm"):
+        assert _session(_options(tmp_path, "--from", path, *again.split())).board == BOARD
     small = ("--pose-only", "--board", "8x6", "--square", "30mm")
     assert _session(_options(tmp_path, "--from", path, *small)).board == Board(8, 6, 0.03)
     bare = str(_written(tmp_path, pairs, with_views=False))
