@@ -41,6 +41,7 @@ from phone_host.model import Side, TimeOffset
 from phone_host.output.rig_yaml import read_rig, read_rig_views
 from phone_host.run.host_settings import HostSettings
 from phone_host.settings import key_folder, most_pixels
+from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.board import Named
 from phone_host.verbs.calibrate.cause import assessed
 from phone_host.verbs.calibrate.hints import arrangement_hint
@@ -184,8 +185,6 @@ def _check(options: argparse.Namespace) -> None:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     if not _LEAST_VIEWS <= options.views <= _MOST_VIEWS:
         raise SettingsError(f"--views is {options.views}", f"give {_LEAST_VIEWS} to {_MOST_VIEWS}")
-    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
-        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")
     if len(options.images) not in {0, 2}:
         raise SettingsError(
             f"--live with {counted(len(options.images), 'folder')}",
@@ -221,6 +220,7 @@ def _settings(options: argparse.Namespace, asked: Named | None) -> LiveSettings:
             wait_ns=None if options.wait is None else round(options.wait * 1e9),
             time_offset=TimeOffset() if rig is None else rig.time_offset,
             most_pixels=most_pixels(None, options.max_megapixels),
+            steered=frozenset(Whose),  # a view is worth as much as its two exposures are simultaneous
         ),
         board=board,
         square_m=square_m,
