@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.corner_fit import FittedCorners, fit_corners
+from phone_host.calibration.corner_fit import fit_corners
 from phone_host.model import Image
 
 Corners = NDArray[np.float64]
@@ -24,10 +24,9 @@ _SEARCHED_PX: Final = 1600
 LEAST_SEEN: Final = 8
 """Fewer corners hardly determine where the board is: two marks may give four in a line."""
 
-_UNSURE: Final = 5.0
-"""Times the usual deviation. Rendered, corners half hidden by a hand have 11 and 34 times, all others less than twice."""
+_REACH_SHARE: Final = 0.5
+"""Of the clear space beside an edge, both sides together, before a mark begins."""
 
-_LEAST_SIGMA_PX: Final = 0.005
 _NEIGHBOURS: Final = 9
 _ASTRAY: Final = 0.02
 """Share of the distance to the next corners: a lens bends the small piece of board around a corner by far less. At least half a pixel."""
@@ -99,16 +98,10 @@ def find_marked(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
     along, down = _steps(plan_of(columns, rows, marks)[seen], whole, share)
     known = np.isfinite(along[:, 0])
     if known.any():
-        fitted = fit_corners(grey, whole[known], along[known], down[known])
-        found[np.flatnonzero(seen)[known]] = np.where(_is_sure(fitted)[:, np.newaxis], fitted.px, np.nan)
+        fitted = fit_corners(grey, whole[known], along[known], down[known], _REACH_SHARE)
+        found[np.flatnonzero(seen)[known]] = np.where(fitted.are_sure()[:, np.newaxis], fitted.px, np.nan)
     found[_astray(found, plan_of(columns, rows, marks))] = np.nan
     return found if np.isfinite(found[:, 0]).sum() >= LEAST_SEEN else np.empty((0, 2))
-
-
-def _is_sure(fitted: FittedCorners) -> NDArray[np.bool_]:
-    """Return which corners are about as well known as most: (N,). The edge of a hand is no crossing of two edges."""
-    sigmas = fitted.sigma_px
-    return np.isfinite(sigmas) & (sigmas < _UNSURE * max(float(np.nanmedian(sigmas)), _LEAST_SIGMA_PX))
 
 
 def _steps(plan: Corners, found: Corners, length: float) -> tuple[Corners, Corners]:

@@ -222,7 +222,7 @@ def _is_chessboard(fitted: FittedCorners, board: Board) -> bool:
     """Return whether edges cross at every corner, black to white and white to black by turns."""
     turns = (-1.0) ** np.add.outer(np.arange(board.rows), np.arange(board.columns)).ravel()
     is_light = fitted.contrast * turns > 0
-    return bool(np.isfinite(fitted.px).all() and (is_light.all() or not is_light.any()))
+    return bool(fitted.are_sure().all() and (is_light.all() or not is_light.any()))
 
 
 def shrunk(grey: Image, scale: float) -> tuple[Image, NDArray[np.float64]]:

@@ -65,10 +65,9 @@ class NormalEquations:
         coupling = self.coupling[:, free]
         matrix = self.shared[np.ix_(free, free)] + damping * np.diag(np.diag(self.shared)[free])
         right = self.shared_right[free]
-        for across, inverted, gradient in zip(coupling, inverse, self.blocks_right, strict=True):
-            eliminated = across @ inverted
-            matrix = matrix - eliminated @ across.T
-            right = right - eliminated @ gradient
+        eliminated = coupling @ inverse
+        matrix = matrix - (eliminated @ np.swapaxes(coupling, 1, 2)).sum(axis=0)
+        right = right - (eliminated @ self.blocks_right[..., np.newaxis]).sum(axis=0)[:, 0]
         return np.asarray(matrix, np.float64), np.asarray(right, np.float64), np.asarray(inverse, np.float64)
 
     def step(self, damping: float, free: Flags) -> tuple[Floats, Floats]:

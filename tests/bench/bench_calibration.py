@@ -128,7 +128,7 @@ def _row(
         verdict=judged(found, found.rejected).verdict.value,
         lenses=", ".join(f"{bend.lens.value} {bend.terms}" for bend in found.bends),
         recipe=recipe(rig.board, corners.theirs, corners.sizes_px),
-        recipe_on_ours=recipe(rig.board, fair, corners.sizes_px),
+        recipe_on_ours=recipe(rig.board, fair, corners.sizes_px, to_its_end=True),
     )
 
 

@@ -1,6 +1,7 @@
 """Sessions that tell little or nothing: too few views, views that are no boards, and deviations too small or too rare to name."""
 
 import math
+import re
 from dataclasses import replace
 
 import cv2
@@ -177,11 +178,13 @@ def test_six_pairs_are_the_least_for_a_deviation() -> None:
     assert deviation((*knocked[1:6], BoardPair("wild", wild, wild)), BOARD, _SIZES) is None
 
 
-def test_another_focus_in_each_view_is_no_change_of_focus() -> None:
-    """A focal length that scatters by 2 % from view to view has not changed at some view, nor from the first to the last."""
+def test_another_focus_in_each_view_is_told_as_that() -> None:
+    """A focal length that scatters by 2 % from view to view has not changed at some view, nor did the board move between the exposures."""
     zoom = dict(enumerate(1 + 0.02 * np.random.default_rng(1).normal(size=8)))
     found = deviation(tuple(_views(8, zoom=zoom)), BOARD, _SIZES)
-    assert found is None or found.mistake is not Mistake.FOCUS
+    assert found is not None
+    assert found.mistake is Mistake.FOCUS
+    assert re.search(r"the right camera's focal length changes by [12]\.\d% from view to view", found.sentence)
 
 
 def test_a_focus_that_breathes_accuses_nobody() -> None:

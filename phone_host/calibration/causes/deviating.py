@@ -37,6 +37,9 @@ _EXPLAINED_PX: Final = 0.12
 _SIGMAS: Final = 5.0
 _LEAST_TURN_PX: Final = 0.15
 _LEAST_FOCUS: Final = 0.001
+_LEAST_ZOOM: Final = 0.003
+"""Deviation of a focal length from view to view that an autofocus makes; lenses that breathe in a steady hand stay below."""
+
 _APART_FACTOR, _APART_FLOOR_PX = 5.0, 3.0
 _MOST_APART: Final = 0.3
 _COMMON: Final = 0.5
@@ -145,8 +148,8 @@ def _worth_refining(results: list[Weighed], loose: Loosened) -> list[Weighed]:
     stiff = next(each for each in results if each.rule is Rule.STIFF)
     better = [each for each in results if each.criterion < stiff.criterion - _ANY_BETTER]
     chosen = [each for each in better if each.rule in _COURSES and each.columns < loose.count][:_REFINED]
-    for rule in (Rule.LOOSE, Rule.SKEW, Rule.ROWS):
-        best = next((each for each in better if each.rule is rule), None)
+    for rule in (Rule.LOOSE, Rule.SKEW, Rule.ROWS, Rule.FOCUS_LEFT, Rule.FOCUS_RIGHT):
+        best = next((each for each in better if each.rule is rule and each.columns >= loose.count), None)
         if best is not None and best.squares_px2 < (1 - _EXPLAINED_SHARE) * stiff.squares_px2:
             chosen.append(best)
     return chosen
@@ -163,7 +166,11 @@ def _together(fitted: _Fitted) -> list[BoardPair] | None:
 def _named(fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
     # Two rigs that have nothing in common but their lenses leave at least what each view leaves alone.
     least = criterion(max(fitted.lone_px2, 1e-12), 6 * fitted.loose.count, fitted.loose)
-    courses = [each for each in fitted.results if each.rule in _COURSES and each.criterion < least]
+    courses = [
+        each
+        for each in fitted.results
+        if each.rule in _COURSES and each.columns < fitted.loose.count and each.criterion < least
+    ]
     for each in [*courses, *(other for other in fitted.results if other not in courses)]:
         if each.criterion >= fitted.stiff.criterion:
             continue
@@ -183,7 +190,8 @@ def _believed(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None
         case Rule.DRIFT | Rule.KNOCK:
             return _turned(each, fitted)
         case Rule.FOCUS_LEFT | Rule.FOCUS_RIGHT:
-            return _focus(each, fitted)
+            is_free = each.columns >= fitted.loose.count
+            return _focus(each, fitted) if not is_free or _explains_much(each, fitted, sizes_px) else None
         case _:
             return _scattered(each, fitted, sizes_px)
 
@@ -234,30 +242,40 @@ def _unstiff(turned: Turned, kept: list[BoardPair]) -> Finding:
 def _focus(each: Weighed, fitted: _Fitted) -> Finding | None:
     loose, kept = fitted.loose, fitted.kept
     free = fitted.free(each.rule, loose.count)
-    if each is free:
-        return None  # another focus in each view is no change, but scatter
     which = FOCUS_LEFT if each.rule is Rule.FOCUS_LEFT else FOCUS_RIGHT
+    side = Side.LEFT if each.rule is Rule.FOCUS_LEFT else Side.RIGHT
+    if each is free:
+        scattered = float(each.found[:, which].std())
+        return _focus_found(side, f"changes by {scattered:.1%} from view to view") if scattered >= _LEAST_ZOOM else None
     change = float((each.found[-1] - each.found[0])[which][0])
     if abs(significance(each, free, loose)[which][0]) < _SIGMAS or abs(change) < _LEAST_FOCUS:
         return None
-    side = Side.LEFT if each.rule is Rule.FOCUS_LEFT else Side.RIGHT
     when = f"from pair {kept[each.begins].name} on" if each.begins > 0 else "from the first pair to the last"
+    return _focus_found(side, f"changed by {change:+.1%} {when}")
+
+
+def _focus_found(side: Side, what: str) -> Finding:
     return Finding(
         mistake=Mistake.FOCUS,
-        sentence=f"the {side.value} camera's focal length changed by {change:+.1%} {when}",
+        sentence=f"the {side.value} camera's focal length {what}",
         remedy="switch autofocus and zoom off in that camera, and take all views again",
         most=Verdict.USABLE,
     )
 
 
-def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
-    loose = fitted.loose
+def _explains_much(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> bool:
+    """Return whether a rule with numbers for every pair explains more than it would of a good session."""
     factor = max(1.0, min(max(size) for size in sizes_px) / REFERENCE_PX)
     explained = 1 - each.squares_px2 / fitted.stiff.squares_px2
-    explained_px = _explained_px(each, fitted)
+    enough = explained >= _EXPLAINED_SHARE and _explained_px(each, fitted) >= _EXPLAINED_PX * factor
+    return enough and _is_common(each, fitted.loose)
+
+
+def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
+    loose = fitted.loose
     if each.rule is Rule.ROWS and each.squares_px2 > (1 - _EXPLAINED_SHARE) * fitted.lone_px2:
         return None  # each view alone is whole: its rows belong to one moment
-    if explained < _EXPLAINED_SHARE or explained_px < _EXPLAINED_PX * factor or not _is_common(each, loose):
+    if not _explains_much(each, fitted, sizes_px):
         return None
     if each.rule is Rule.LOOSE:
         angles = each.found[:, TURN] - each.found[:, TURN].mean(axis=0)
@@ -289,7 +307,7 @@ def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | Non
         )
     return Finding(
         mistake=Mistake.ROWS,
-        sentence=f"rows of an image show different moments, which explains {explained_px:.2f} px: the board or the cameras moved under a rolling shutter",
+        sentence=f"rows of an image show different moments, which explains {_explained_px(each, fitted):.2f} px: the board or the cameras moved under a rolling shutter",
         remedy="hold board and cameras still in each view",
     )
 
