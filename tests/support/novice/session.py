@@ -1,7 +1,10 @@
 """One guided calibration from start to verdict: both programs, a real link, two test cameras, and a novice who hears the words."""
 
 import json
+import signal
+import subprocess
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +26,8 @@ from tests.support.novice.scene import BOARD, between_m, novice_scene
 from tests.support.programs import Program, board, host, until
 
 _STEP_S: Final = 0.02
-_SAY, _TAKEN = "say: ", "taken: "
+_SAY, _TAKEN, _DONE = "say: ", "taken: ", "done"
+_PATIENCE_S: Final = 180.0
 _AWAY_M: Final = 1.0
 _TURN: Final = slice(24, 27)
 """Where a rig's covariance has the turn of the right camera."""
@@ -56,9 +60,9 @@ class Session:
 
     Attributes:
         seed: of the session.
-        verdict: good, usable or reject; empty: there is none.
+        verdict: good, usable or reject, as the report says; empty: it was never said that all is done.
         views: how many were taken.
-        seconds: from the first picture of the board's camera to the verdict, s.
+        seconds: from the start of phone-host until it says that it is done, s.
         refused: how many views were refused, by reason.
         said: what was said, with the time, s.
         skipped: frames that a camera could not paint in time, as a share.
@@ -113,15 +117,17 @@ def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session
             began_s = time.monotonic()
             said = _talk(guide, novice, folder, began_s + patience_s)
             took_s = time.monotonic() - began_s
-            code = guide.process.poll()
-            if code is None:
-                guide.stop()
-            log = guide.stderr
+            is_done = bool(said) and said[-1][1].startswith(_DONE)
+            if not is_done and guide.process.poll() is None:
+                guide.send(signal.SIGTERM)
+            with suppress(subprocess.TimeoutExpired):
+                guide.process.wait(_PATIENCE_S)  # it calibrates once more, from the saved pictures
+            code, log = guide.process.poll(), guide.stderr
         agent.stop()
     report = _json(folder / "report.json") if code == 0 else {}
     return Session(
         seed=seed,
-        verdict=str(report.get("verdict", "")),
+        verdict=str(report.get("verdict", "")) if is_done else "",
         views=sum(line.startswith(_TAKEN) for line in log.splitlines()),
         seconds=took_s,
         refused=_json(folder / "guide.json").get("refused", {}),
@@ -134,9 +140,13 @@ def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session
 
 
 def _talk(guide: Program, novice: Novice, folder: Path, until_s: float) -> list[tuple[float, str]]:
-    """Let the novice hear what is said, until the program ends."""
+    """Let the novice hear what is said, until it is said that all is done or the program ends."""
     said, read = list[tuple[float, str]](), 0
-    while guide.process.poll() is None and (now_s := time.monotonic()) < until_s:
+    while (
+        not (said and said[-1][1].startswith(_DONE))
+        and guide.process.poll() is None
+        and (now_s := time.monotonic()) < until_s
+    ):
         log = guide.err.read_bytes()
         whole = log.rfind(b"\n") + 1
         for line in log[read:whole].decode(errors="replace").splitlines():
