@@ -50,7 +50,7 @@ class ChangeKind(Enum):
     """What happened to a rig or to its correction."""
 
     KNOCKED = "knocked"
-    """It turned at once, between two pairs or nearly so."""
+    """It turned, or its focus changed, at once: between two pairs or nearly so."""
 
     RETURNED = "returned"
     """A camera or the board was away; whether it stands as before is measured afresh."""
@@ -67,14 +67,14 @@ class Change:
         kind: what happened.
         at_s: when it was noticed, s since the start of the run.
         departure: how the rig departed from its calibration then; for `returned` as it was before.
-        step_rad: for `knocked`: by how much it turned, rad.
+        step: for `knocked`: by how much it turned, and its focal length changed, at once.
         away_s: for `returned`: how long no pair came, s.
     """
 
     kind: ChangeKind
     at_s: float
     departure: Correction = UNCORRECTED
-    step_rad: float = 0.0
+    step: Correction = UNCORRECTED
     away_s: float = 0.0
 
 

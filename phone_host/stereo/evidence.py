@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from phone_host.model import Disparity, Evidence, Image, OffMiddle, Processed, Search
 from phone_host.stereo import filters
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.correction import corrected_rectification, corrected_rig
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
 from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
@@ -59,7 +60,10 @@ def maps_of(core: StereoCore, processed: Processed) -> PointMaps:
     height_px, width_px = processed.pair.left.shape[:2]
     rectifier = core.rectifier_for((width_px, height_px))
     if rectifier is not None:
-        return ThroughRig(rectifier.rig, rectifier.rectification)
+        turned = processed.correction
+        return ThroughRig(
+            corrected_rig(rectifier.rig, turned), corrected_rectification(rectifier.rectification, turned)
+        )
     return Unmoved(width_px, height_px)
 
 
@@ -119,7 +123,7 @@ def look_at(processed: Processed, maps: PointMaps | None) -> Look:
             and sharpness are measured.
     """
     pair, disparity, epipolar = lying_pair(processed.pair), processed.disparity, processed.pair.epipolar
-    left, right = _grey(pair.left), _grey(pair.right)
+    left, right = grey(pair.left), grey(pair.right)
     if maps is None or disparity is None:
         blind = Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
         return Look(blind, left, right, Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, np.float32)))
@@ -212,7 +216,8 @@ def _middle(disparity: Disparity) -> float:
     return float(np.median(known)) if known.size else math.nan
 
 
-def _grey(image: Image) -> Image:
+def grey(image: Image) -> Image:
+    """Return an image in grey, (H, W) uint8."""
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
 
 

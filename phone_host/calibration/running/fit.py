@@ -2,7 +2,8 @@
 
 - Robust: Tukey's weights; a wrong match or a thing that moved between the two exposures counts nothing.
 - Late images: what moves lies beside its row by its speed times the time between the exposures. That time is estimated as
-  well, so that it is not taken for a turn; and whatever moves counts for less, by what its stamp may be off.
+  well, so that it is not taken for a turn; and whatever moves counts for less, by what its stamp and its speed may be off,
+  which all features of one thing share.
 - Honest: a lens model is never perfect, and what it leaves differs from place to place but not from pair to pair. So all
   features of one cell of the image together know its rows no better than `MODEL_PX`, however many there are.
 """
@@ -33,6 +34,10 @@ _STAMP_S: Final = 0.004
 
 _TUKEY: Final = 4.7
 _ROUNDS: Final = 12
+_ROUNDS_OF_HUBER: Final = 3
+_COUNTS: Final = 0.3
+"""A feature counts if it is trusted by so much."""
+
 _SIGMA_OF_MEDIAN: Final = 1.48
 
 
@@ -76,19 +81,23 @@ def fit_rows(model: RowModel, sightings: Sequence[Sighting]) -> Fit:
     # A feature that moves down by v px/s is farther down in the image that was exposed later.
     target = off_px + speed * late_s
     design = np.column_stack([model.columns(slopes), -speed])
-    cell = _cells(model, slopes)
+    cell, alike_px2 = _cells(model, slopes), MODEL_PX**2 + (speed * _STAMP_S) ** 2
     values, weights = np.zeros(PARAMETERS + 1), np.ones(len(target))
+    trust = weights
     matrix = np.diag(_PRIOR**-2.0)
     for number in range(_ROUNDS):
         rest = np.abs(target - design @ values) if number else np.zeros(len(target))
         scale = max(_SIGMA_OF_MEDIAN * float(np.median(rest[weights > 0])), _LEAST_PX) if number else _LEAST_PX
         spread = np.hypot(scale, speed * _STAMP_S)
-        trust = np.clip(1 - (rest / (_TUKEY * spread)) ** 2, 0, None) ** 2 if number > 2 else 1 / np.maximum(rest / spread, 1.0)  # fmt: skip
+        # Huber's weights first: Tukey's would hold on to whatever they begin with.
+        trust = 1 / np.maximum(rest / spread, 1.0)
+        if number >= _ROUNDS_OF_HUBER:
+            trust = np.clip(1 - (rest / (_TUKEY * spread)) ** 2, 0, None) ** 2
         weights = trust / spread**2
-        weights = weights / (1 + MODEL_PX**2 * np.bincount(cell, weights)[cell])
+        weights = weights / (1 + alike_px2 * np.bincount(cell, weights)[cell])
         matrix = np.diag(_PRIOR**-2.0) + design.T @ (weights[:, np.newaxis] * design)
         values = np.linalg.solve(matrix, design.T @ (weights * target))
-    counts = trust > 0.3
+    counts = trust > _COUNTS
     return Fit(
         values=values,
         covariance=np.linalg.inv(matrix),

@@ -102,6 +102,9 @@ class RowModel:
         right_px = calibrated.rectified(now.own(seen.right_px, Side.RIGHT), Side.RIGHT)
         off_px = (right_px - seen.left_px)[:, self.axis]
         known = np.isfinite(right_px).all(axis=1)
+        moves = np.isfinite(seen.velocity_px_s).all(axis=1)
+        if moves.any():  # what could not be followed from the pair before moves fast, or was hidden
+            known &= moves
         slopes = (right_px[known] - np.array([geometry.cx_px, geometry.cy_px])) / geometry.focal_px
         return Sighting(slopes, off_px[known], seen.velocity_px_s[known, self.axis], late_s)
 

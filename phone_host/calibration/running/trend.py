@@ -1,5 +1,6 @@
 """The trend of a departure: a straight line through the estimates since the last change at once. Pure."""
 
+from typing import Final
 
 import numpy as np
 

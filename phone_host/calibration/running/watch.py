@@ -42,6 +42,9 @@ _FOLLOW_PX: Final = 0.1
 _FOLLOW_SIGMAS: Final = 2.0
 """A correction follows the estimate in steps of this size, if it is not mere noise."""
 
+_AT_FIRST: Final = 3
+"""Sightings before anything is said: one that is wrong must not be half of them."""
+
 _STEP_PX: Final = 0.25
 _STEP_CHI2: Final = 35.0
 """A sighting that departs from the estimate by so much is set aside: 5 sigmas in four dimensions."""
@@ -83,11 +86,18 @@ class DriftWatch:
         self._judged = 0
         self._trends = Trends()
         self._changes: list[Change] = []
+        self._news: list[Change] = []
 
     @property
     def correction(self) -> Correction:
         """The correction that the next pairs shall be rectified with."""
         return self._correction
+
+    def take_news(self) -> tuple[Change, ...]:
+        """Return the changes since the last call, in order."""
+        news = tuple(self._news)
+        self._news.clear()
+        return news
 
     def returned(self, at_s: float, away_s: float) -> None:
         """Start afresh: a camera or the board was away, and may have been touched.
@@ -123,7 +133,7 @@ class DriftWatch:
         else:
             self._step(model, at_s)
         fit = fit_rows(model, tuple(self._window))
-        if len(self._window) < 2 or not self._is_sound(fit):
+        if len(self._window) < (_AT_FIRST if self._known is None else 2) or not self._is_sound(fit):
             return
         self._known = fit
         self._estimate = _Estimate(fit, proven(fit, _SIGMAS))
@@ -209,15 +219,9 @@ class DriftWatch:
         self._aside.clear()
         self._trends.restart()
         now = fit_rows(model, tuple(self._window))
-        off = (now.values - self._known.values)[:3]
-        self._note(
-            Change(
-                kind=ChangeKind.KNOCKED,
-                at_s=at_s,
-                departure=correction_of(proven(now, _SIGMAS)),
-                step_rad=float(np.linalg.norm(off)),
-            )
-        )
+        off = (now.values - self._known.values)[:PARAMETERS]
+        departure = correction_of(proven(now, _SIGMAS))
+        self._note(Change(kind=ChangeKind.KNOCKED, at_s=at_s, departure=departure, step=correction_of(off)))
 
     def _follow(self, found: _Estimate, at_s: float) -> None:
         """Let the correction follow the estimate, within bounds, and note what changes."""
@@ -248,3 +252,4 @@ class DriftWatch:
         if len(self._changes) >= _MOST_CHANGES:
             del self._changes[_MOST_CHANGES // 2]
         self._changes.append(change)
+        self._news.append(change)
