@@ -100,10 +100,9 @@ def drift_lines(drift: Drift | None) -> list[str]:
         DriftState.BEYOND: "too far to be corrected",
     }[drift.state]
     trend = f"; {trended}" if (trended := _trend_words(drift)) else ""
-    return [
-        f"drift: since the calibration the right camera has turned: {turn_words(drift.departure) or 'not any more'}; {told}:"
-        f" vertical error {drift.rows_px:.2f} px, {drift.left_px:.2f} px left{trend}"
-    ]
+    turned = turn_words(drift.departure) or "not any more"
+    rows = f"vertical error {drift.rows_px:.2f} px, {drift.left_px:.2f} px left"
+    return [f"drift: since the calibration the right camera has turned: {turned}; {told}: {rows}{trend}"]
 
 
 def _trend_words(drift: Drift) -> str:
@@ -134,6 +133,4 @@ def _mended(drift: Drift) -> str:
     """Say what a correction does for depth, and what it can't."""
     if drift.state is not DriftState.CORRECTED:
         return f"rows are off by {drift.rows_px:.1f} px, and depth suffers"
-    return (
-        f"rows are corrected to {max(drift.left_px, 0.05):.1f} px, but disparities may all be off by {2 * drift.zero_sigma_px:.1f} px"
-    )
+    return f"rows are corrected to {max(drift.left_px, 0.05):.1f} px, but disparities may all be off by {2 * drift.zero_sigma_px:.1f} px"

@@ -58,7 +58,8 @@ def drift_table(drift: Drift | None) -> tuple[Table, ...]:
     if drift is None or not drift.changes:
         return ()
     rows = tuple(
-        (f"{change.at_s:.1f} s", _WORDS[change.kind], turn_words(change.departure) or "none") for change in drift.changes
+        (f"{change.at_s:.1f} s", _WORDS[change.kind], turn_words(change.departure) or "none")
+        for change in drift.changes
     )
     return (Table("The rig while it ran", ("when", "what", "right camera against its calibration"), rows),)
 

@@ -13,6 +13,7 @@ from common.program.logs import event
 from phone_host.calibration.running.see import Timed, sighting_of
 from phone_host.calibration.running.watch import DriftWatch
 from phone_host.model import UNCORRECTED, Change, ChangeKind, Correction, Drift, Image, Result, Side
+from phone_host.output.overlay_yaml import overlay_text
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import Look
 
@@ -76,6 +77,12 @@ class DriftKeeper:
         """What is known so far, as a copy."""
         with self._lock:
             return self._watch.drift
+
+    @property
+    def overlay(self) -> str:
+        """The content of overlay.yaml; empty if nothing is corrected."""
+        drift, rig = self.drift, self._core.rig
+        return "" if rig is None or drift.correction == UNCORRECTED else overlay_text(rig, drift)
 
     def note(self, result: Result, at_s: float) -> Moment:
         """Remember a result, and tell if a camera or the board was away before it. Called with every one.
@@ -146,7 +153,9 @@ def _say(change: Change, drift: Drift) -> None:
     values = {"at_s": f"{change.at_s:.1f}"} | _turn_values(change.departure)
     match change.kind:
         case ChangeKind.RETURNED:
-            _LOG.info(event("rig_returned", at_s=values["at_s"], away_s=f"{change.away_s:.1f}", drift="measured afresh"))
+            _LOG.info(
+                event("rig_returned", at_s=values["at_s"], away_s=f"{change.away_s:.1f}", drift="measured afresh")
+            )
         case ChangeKind.KNOCKED:
             step_deg = f"{math.degrees(change.step.angle_rad):.2f}"
             remedy = "tighten the bar, then calibrate again, or calibrate --pose-only"
@@ -165,4 +174,9 @@ def _say(change: Change, drift: Drift) -> None:
 
 def _turn_values(departure: Correction) -> dict[str, str]:
     pitch, yaw, roll = (f"{math.degrees(angle):+.3f}" for angle in departure.turn_rad)
-    return {"pitch_deg": pitch, "yaw_deg": yaw, "roll_deg": roll, "focal_percent": f"{100 * (departure.focal - 1):+.2f}"}
+    return {
+        "pitch_deg": pitch,
+        "yaw_deg": yaw,
+        "roll_deg": roll,
+        "focal_percent": f"{100 * (departure.focal - 1):+.2f}",
+    }

@@ -215,7 +215,8 @@ class Host:
         Returns:
             Whether all results of the run were written.
         """
-        self._files.close(report, page, self._cameras.text())
+        overlay = "" if self._keeper is None else self._keeper.overlay
+        self._files.close(report, page, self._cameras.text(), overlay)
         return self._files.complete
 
     @property

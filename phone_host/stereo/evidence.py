@@ -157,7 +157,11 @@ def look_at(processed: Processed, maps: PointMaps | None) -> Look:
         enough_from_m=fit.enough_from_m,
         skew_px=fit.skew_px,
         ambiguous_share=ambiguity(
-            reduced_grey(left, check), reduced_grey(right, check), disparity, (processed.search or Search()).disparities, check
+            reduced_grey(left, check),
+            reduced_grey(right, check),
+            disparity,
+            (processed.search or Search()).disparities,
+            check,
         ),
         from_rig=from_rig,
         is_cropped=is_cropped,

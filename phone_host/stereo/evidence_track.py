@@ -117,9 +117,7 @@ def _velocity(here: Image, earlier: Image, points_px: Points, scale: float) -> P
     start = _small(points_px, scale)
     window = (_WINDOW_PX, _WINDOW_PX)
     back, found, _ = cv2.calcOpticalFlowPyrLK(here, earlier, start, start.copy(), winSize=window, maxLevel=_FLOW_LEVELS)
-    home, again, _ = cv2.calcOpticalFlowPyrLK(
-        earlier, here, back, back.copy(), winSize=window, maxLevel=_FLOW_LEVELS
-    )
+    home, again, _ = cv2.calcOpticalFlowPyrLK(earlier, here, back, back.copy(), winSize=window, maxLevel=_FLOW_LEVELS)
     off = np.abs(home - start).reshape(-1, 2).max(axis=1)
     sure = (found.ravel() == 1) & (again.ravel() == 1) & (off <= _BACK_PX)
     return np.where(sure[:, np.newaxis], points_px - _whole(back, scale), np.nan)

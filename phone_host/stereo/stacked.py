@@ -69,7 +69,7 @@ def upright_points(points_px: NDArray[np.float64], epipolar: Epipolar, size_px: 
     if not epipolar.is_vertical:
         return points_px
     far = np.array([size_px[0] - 1.0, 0.0]) if epipolar is Epipolar.UP else np.array([0.0, size_px[1] - 1.0])
-    return upright_steps(points_px, epipolar) + far
+    return np.asarray(upright_steps(points_px, epipolar) + far, np.float64)
 
 
 def upright_steps(steps: NDArray[np.float64], epipolar: Epipolar) -> NDArray[np.float64]:

@@ -100,7 +100,7 @@ def fit_rows(model: RowModel, sightings: Sequence[Sighting]) -> Fit:
     counts = trust > _COUNTS
     return Fit(
         values=values,
-        covariance=np.linalg.inv(matrix),
+        covariance=np.asarray(np.linalg.inv(matrix), np.float64),
         features=int(counts.sum()),
         share=float(counts.mean()) if len(counts) else 0.0,
         cells=int((np.bincount(cell[counts], minlength=1) >= 2).sum()),

@@ -143,9 +143,7 @@ class DriftWatch:
     @property
     def drift(self) -> Drift:
         """What is known so far."""
-        found = Drift(
-            state=self._state, correction=self._correction, judged=self._judged, changes=tuple(self._changes)
-        )
+        found = Drift(state=self._state, correction=self._correction, judged=self._judged, changes=tuple(self._changes))
         if self._estimate is None or self._model is None:
             return found
         fit, values = self._estimate.fit, self._estimate.values
