@@ -100,9 +100,9 @@ def drift_lines(drift: Drift | None) -> list[str]:
         DriftState.BEYOND: "too far to be corrected",
     }[drift.state]
     trend = f"; {trended}" if (trended := _trend_words(drift)) else ""
-    turned = turn_words(drift.departure) or "not any more"
+    turned = turn_words(drift.departure) or "as calibrated"
     rows = f"vertical error {drift.rows_px:.2f} px, {drift.left_px:.2f} px left"
-    return [f"drift: since the calibration the right camera has turned: {turned}; {told}: {rows}{trend}"]
+    return [f"drift: the right camera against its calibration: {turned}; {told}: {rows}{trend}"]
 
 
 def _trend_words(drift: Drift) -> str:

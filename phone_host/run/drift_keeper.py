@@ -84,6 +84,12 @@ class DriftKeeper:
         drift, rig = self.drift, self._core.rig
         return "" if rig is None or drift.correction == UNCORRECTED else overlay_text(rig, drift)
 
+    @property
+    def is_unsure(self) -> bool:
+        """Whether another judged pair would tell if the rig was knocked."""
+        with self._lock:
+            return self._watch.is_unsure
+
     def note(self, result: Result, at_s: float) -> Moment:
         """Remember a result, and tell if a camera or the board was away before it. Called with every one.
 

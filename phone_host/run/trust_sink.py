@@ -92,6 +92,8 @@ class TrustSink(OneQueueSink):
         look = look_at(processed, maps)
         if self._keeper is not None and moment is not None:
             self._keeper.judge(moment, look, at_s)
+            if self._keeper.is_unsure:
+                self._due_ns = 0  # was the rig knocked? The next pair tells
         with self._lock:
             self._judge.add(look.evidence, at_s=at_s, pair=result.number)
             self._is_busy = False

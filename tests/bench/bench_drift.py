@@ -12,7 +12,7 @@ import multiprocessing
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -28,7 +28,7 @@ from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, 
 from phone_host.calibration.running.see import Timed, sighting_of
 from phone_host.calibration.running.watch import WINDOW, DriftWatch
 from phone_host.measure.drift_words import drift_concerns
-from phone_host.model import UNCORRECTED, Change, ChangeKind, Correction, Drift
+from phone_host.model import UNCORRECTED, Change, Correction, Drift
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.evidence import look_at, maps_of

@@ -52,25 +52,27 @@ def seconds_until_told() -> float:
             board(["run", "--camera", f"replay:{folder}/left{film}", "--link", link], folder),
             host([*run, "--out", f"{folder}/out"], folder) as running,
         ):
-            return _watched(running.err)
+            return _watched(running.err, folder / "out" / "delays.jsonl")
 
 
-def _watched(log: Path) -> float:
-    """Wait for a whole first half to be judged, then for the turn to be told."""
+def _watched(log: Path, lines: Path) -> float:
+    """Wait for the first pairs, then until a turn, then until it is told."""
     period_s, until_s = 2 * _HALF / _FPS, time.monotonic() + _PATIENCE_S
-    while time.monotonic() < until_s and "link" not in log.read_text(errors="replace"):
+    while time.monotonic() < until_s and not (lines.exists() and lines.stat().st_size):
         time.sleep(0.05)
-    begun = time.monotonic() + 5.0  # the program and its first estimate
+    begun = time.monotonic() + 4.0  # its first estimate
     turn_s = (int(begun / period_s) + (0.5 if begun % period_s < 0.5 * period_s else 1.5)) * period_s
     told = 0
-    while time.monotonic() < turn_s:
-        told = log.read_text(errors="replace").count("drift_corrected") + log.read_text(errors="replace").count(
-            "knocked"
-        )
+    while time.monotonic() < min(turn_s, until_s):
+        told = _news(log)
         time.sleep(0.01)
-    while time.monotonic() < min(turn_s + period_s / 2, until_s):
-        text = log.read_text(errors="replace")
-        if text.count("drift_corrected") + text.count("knocked") > told:
+    while time.monotonic() < turn_s + period_s / 2:
+        if _news(log) > told:
             return time.monotonic() - turn_s
         time.sleep(0.01)
     return float("inf")
+
+
+def _news(log: Path) -> int:
+    text = log.read_text(errors="replace")
+    return text.count("drift_corrected") + text.count("rig_knocked")

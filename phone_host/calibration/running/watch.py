@@ -93,6 +93,11 @@ class DriftWatch:
         """The correction that the next pairs shall be rectified with."""
         return self._correction
 
+    @property
+    def is_unsure(self) -> bool:
+        """Whether the last sighting departs from the estimate, and another one would tell whether the rig was knocked."""
+        return bool(self._aside)
+
     def take_news(self) -> tuple[Change, ...]:
         """Return the changes since the last call, in order."""
         news = tuple(self._news)
