@@ -129,10 +129,9 @@ class DriftKeeper:
             before = self._watch.correction
             self._watch.add(*found, at_s)
             wanted = self._watch.correction
+            self._tell()
         if wanted != before:
             self._core.correct(wanted)  # makes the maps: some 50 ms, outside the lock
-        with self._lock:
-            self._tell()
 
     def _timed(self, result: Result, exposed_ns: int) -> Timed:
         if self._is_timeless:

@@ -80,14 +80,15 @@ def fit_rows(model: RowModel, sightings: Sequence[Sighting]) -> Fit:
     late_s = np.concatenate([np.full(len(seen.off_px), seen.late_s) for seen in sightings])
     # A feature that moves down by v px/s is farther down in the image that was exposed later.
     target = off_px + speed * late_s
-    design = np.column_stack([model.columns(slopes), -speed])
+    design = np.column_stack([np.concatenate([seen.columns for seen in sightings]), -speed])
     cell, alike_px2 = _cells(model, slopes), MODEL_PX**2 + (speed * _STAMP_S) ** 2
     values, weights = np.zeros(PARAMETERS + 1), np.ones(len(target))
     trust = weights
     matrix = np.diag(_PRIOR**-2.0)
     for number in range(_ROUNDS):
         rest = np.abs(target - design @ values) if number else np.zeros(len(target))
-        scale = max(_SIGMA_OF_MEDIAN * float(np.median(rest[weights > 0])), _LEAST_PX) if number else _LEAST_PX
+        counted = rest[weights > 0] if number else rest[:0]
+        scale = max(_SIGMA_OF_MEDIAN * float(np.median(counted)), _LEAST_PX) if counted.size else _LEAST_PX
         spread = np.hypot(scale, speed * _STAMP_S)
         # Huber's weights first: Tukey's would hold on to whatever they begin with.
         trust = 1 / np.maximum(rest / spread, 1.0)

@@ -6,8 +6,9 @@ focal length grows by s, the point moves away from the camera's axis by s. So th
 
     f (-u_x (1 + y^2) + u_y x y + u_z x + s (y - y0))
 
-Pitch moves all rows alike, roll tilts them, a longer focal length spreads them, and yaw (vergence) twists them: only the
-corners tell it. That is why yaw is the last to be proven and the first to be doubted: it moves disparities by f u_y.
+where distortion makes the last term up to a tenth more at the edge. Pitch moves all rows alike, roll tilts them, a longer
+focal length spreads them, and yaw (vergence) twists them: only the corners tell it. That is why yaw is the last to be proven
+and the first to be doubted: it moves disparities by f u_y.
 
 The vertical error is told by these four alone. That the right camera moved, as well as turned, shows in proportion to
 disparity; a bar that bends by 0.3 degrees moves it by less than 0.1 px of rows, which is left to the scatter.
@@ -19,8 +20,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import UNCORRECTED, Correction, Rectification, Side
-from phone_host.stereo.evidence_points import PointMaps, Points
+from phone_host.model import UNCORRECTED, Correction, Rectification, Rig, Side
+from phone_host.stereo.evidence_points import PointMaps, Points, ThroughRig
 from phone_host.stereo.evidence_track import Followed
 
 Vector = NDArray[np.float64]
@@ -30,6 +31,9 @@ PARAMETERS: Final = 4
 
 YAW: Final = 1
 """Place of the turn about the vertical axis of cameras that stand side by side."""
+
+_WIDER: Final = 1e-3
+"""Step of the numeric derivative by the focal length: a webcam's refocusing is a few of these."""
 
 _OVER: Final = 9
 """The image's rows are judged at 9 x 9 places."""
@@ -41,12 +45,14 @@ class Sighting:
 
     Attributes:
         slopes: (N, 2) of the right image's points: x / z and y / z in the rectified axes.
+        columns: (N, 4): how far each moves across its line for each parameter, px per rad or per unit.
         off_px: (N,) right minus left across the epipolar lines, px.
         speed_px_s: (N,) how fast each moves across the lines in the left image, px/s; NaN = not measured.
         late_s: by how much later the left image was exposed than the right one, by their stamps, s.
     """
 
     slopes: Points
+    columns: Vector
     off_px: Vector
     speed_px_s: Vector
     late_s: float = 0.0
@@ -57,9 +63,11 @@ class RowModel:
     """What moves rows in one rectified size.
 
     Attributes:
-        rectification: of the rig as it was calibrated.
+        rig: as it was calibrated, at the size of its images.
+        rectification: of it.
     """
 
+    rig: Rig
     rectification: Rectification
 
     @property
@@ -73,14 +81,20 @@ class RowModel:
         Args:
             slopes: (N, 2) of points of the right image.
         """
-        geometry, rotation = self.rectification.geometry, self.rectification.R_right
         x, y = slopes.T
-        one, axis = np.ones(len(slopes)), rotation[:2, 2] / rotation[2, 2]  # where the right camera's own axis points
-        if self.axis == 1:
-            about, spread = np.column_stack([-one - y * y, x * y, x]), y - axis[1]
-        else:
-            about, spread = np.column_stack([-x * y, one + x * x, -y]), x - axis[0]
-        return np.asarray(geometry.focal_px * np.column_stack([about @ rotation, spread]), np.float64)
+        one = np.ones(len(slopes))
+        about = [-one - y * y, x * y, x] if self.axis == 1 else [-x * y, one + x * x, -y]
+        turns = self.rectification.geometry.focal_px * np.column_stack(about) @ self.rectification.R_right
+        return np.column_stack([turns, self._spread(slopes)])
+
+    def _spread(self, slopes: Points) -> Vector:
+        """Return how far points move across their lines if the focal length grows, px per unit: through the lens, whose bend multiplies it."""
+        geometry, maps = self.rectification.geometry, ThroughRig(self.rig, self.rectification)
+        places = slopes * geometry.focal_px + np.array([geometry.cx_px, geometry.cy_px])
+        middle = self.rig.right.matrix[:2, 2]
+        own = maps.own(places, Side.RIGHT)
+        wider = maps.rectified(middle + (own - middle) * (1 + _WIDER), Side.RIGHT)
+        return np.asarray(np.nan_to_num((wider - places)[:, self.axis]) / _WIDER, np.float64)
 
     def everywhere(self) -> Vector:
         """Return (81, 4): the columns at places all over the image."""
@@ -106,7 +120,7 @@ class RowModel:
         if moves.any():  # what could not be followed from the pair before moves fast, or was hidden
             known &= moves
         slopes = (right_px[known] - np.array([geometry.cx_px, geometry.cy_px])) / geometry.focal_px
-        return Sighting(slopes, off_px[known], seen.velocity_px_s[known, self.axis], late_s)
+        return Sighting(slopes, self.columns(slopes), off_px[known], seen.velocity_px_s[known, self.axis], late_s)
 
 
 def correction_of(values: Vector) -> Correction:

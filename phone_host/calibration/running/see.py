@@ -53,6 +53,6 @@ def sighting_of(core: StereoCore, processed: Processed, look: Look, timed: Timed
         upright_points(seen.right_px, epipolar, size_px),
         upright_steps(seen.velocity_px_s, epipolar),
     )
-    model = RowModel(rectifier.rectification)
+    model = RowModel(rectifier.rig, rectifier.rectification)
     calibrated = ThroughRig(rectifier.rig, rectifier.rectification)
     return model, model.sighting(upright, maps_of(core, processed), calibrated, timed.late_s)

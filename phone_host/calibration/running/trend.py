@@ -16,16 +16,21 @@ _MOST: Final = 256
 
 
 class Trends:
-    """The estimates since the last change at once."""
+    """The estimates since the last change at once.
 
-    def __init__(self) -> None:
+    Args:
+        every: of so many estimates one is kept: those that share sightings would agree better than they know.
+    """
+
+    def __init__(self, every: int = 1) -> None:
+        self._every, self._count = every, 0
         self._kept: list[tuple[float, Vector]] = []
         self._every_s = 0.0
 
     def restart(self) -> None:
         """Forget them."""
         self._kept.clear()
-        self._every_s = 0.0
+        self._count, self._every_s = 0, 0.0
 
     def add(self, at_s: float, values: Vector, rows_px: float) -> None:
         """Add an estimate.
@@ -35,7 +40,8 @@ class Trends:
             values: (4,) its parameters.
             rows_px: the vertical error it makes, px.
         """
-        if self._kept and at_s - self._kept[-1][0] < self._every_s:
+        self._count += 1
+        if self._count % self._every or (self._kept and at_s - self._kept[-1][0] < self._every_s):
             return
         self._kept.append((at_s, np.array([*values[:3], rows_px])))
         if len(self._kept) > _MOST:

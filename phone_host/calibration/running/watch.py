@@ -84,7 +84,7 @@ class DriftWatch:
         self._estimate: _Estimate | None = None
         self._is_beyond = False
         self._judged = 0
-        self._trends = Trends()
+        self._trends = Trends(WINDOW)
         self._changes: list[Change] = []
         self._news: list[Change] = []
 
