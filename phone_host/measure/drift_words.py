@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from phone_host.measure.trust import Concern, Doubt
-from phone_host.model import ChangeKind, Correction, Drift, DriftState
+from phone_host.model import ChangeKind, Departure, Drift, DriftState
 
 TOLD_TURN_RAD: Final = math.radians(0.25)
 """A rig that has turned by more is no stiff rig, though its rows are corrected: its vergence is known from the corners alone."""
@@ -26,7 +26,7 @@ _HOLD: Final = "switch autofocus off, hold the focus that you scan with, and cal
 _TIME: Final = "measure the cameras' time offset: phone-host calibrate-time"
 
 
-def turn_words(departure: Correction) -> str:
+def turn_words(departure: Departure) -> str:
     """Name the departure's parts that are not 0: "pitch +0.300 degrees, focal length +1.00 %"."""
     named = zip(("pitch", "yaw", "roll"), departure.turn_rad, strict=True)
     parts = [f"{name} {math.degrees(angle):+.2f} degrees" for name, angle in named if angle]
@@ -118,7 +118,7 @@ def _was_knocked(drift: Drift) -> bool:
     return any(change.kind is ChangeKind.KNOCKED for change in drift.changes)
 
 
-def _is_far(departure: Correction) -> bool:
+def _is_far(departure: Departure) -> bool:
     return departure.angle_rad >= TOLD_TURN_RAD
 
 

@@ -6,10 +6,10 @@ Conventions: camera axes x right, y down, z forward; pixel centres are integers 
 
 from phone_host.model.budget import BudgetAccount, BudgetChange, BudgetReason, BudgetStep
 from phone_host.model.drift import (
-    UNCORRECTED,
+    AS_CALIBRATED,
     Change,
     ChangeKind,
-    Correction,
+    Departure,
     Drift,
     DriftState,
     Trend,
@@ -63,8 +63,8 @@ from phone_host.model.run import (
 from phone_host.model.temporal import Searched, SearchedAs, TemporalAccount
 
 __all__ = [
+    "AS_CALIBRATED",
     "RIG_PARAMETERS",
-    "UNCORRECTED",
     "UNMEASURED_NS",
     "Arrangement",
     "BoardFrame",
@@ -78,9 +78,9 @@ __all__ = [
     "CloudImage",
     "Completed",
     "Confidence",
-    "Correction",
     "Crop",
     "CutCounts",
+    "Departure",
     "DepthAccount",
     "DepthLimits",
     "Disparity",

@@ -10,7 +10,7 @@ Turn = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Correction:
+class Departure:
     """How the right camera departs from the rig that was calibrated. The left one is taken to stand as it stood.
 
     Attributes:
@@ -28,7 +28,7 @@ class Correction:
         return math.hypot(*self.turn_rad)
 
 
-UNCORRECTED: Final = Correction()
+AS_CALIBRATED: Final = Departure()
 
 
 class DriftState(Enum):
@@ -73,8 +73,8 @@ class Change:
 
     kind: ChangeKind
     at_s: float
-    departure: Correction = UNCORRECTED
-    step: Correction = UNCORRECTED
+    departure: Departure = AS_CALIBRATED
+    step: Departure = AS_CALIBRATED
     away_s: float = 0.0
 
 
@@ -108,7 +108,7 @@ class Drift:
         rows_sigma_px: standard uncertainty of the rows over the image, root mean square, px.
         left_px: vertical error that remains with the correction in use, 95th percentile over the image, px.
         zero_sigma_px: standard uncertainty of the disparity of infinitely far points, by this alone, px.
-        correction: in use.
+        overlay: the departure that pairs are corrected for.
         features: that the estimate rests on.
         measurements: judged pairs that it rests on.
         judged: judged pairs in all.
@@ -120,14 +120,14 @@ class Drift:
     """
 
     state: DriftState = DriftState.UNKNOWN
-    departure: Correction = UNCORRECTED
+    departure: Departure = AS_CALIBRATED
     turn_sigma_rad: Turn = (math.nan, math.nan, math.nan)
     focal_sigma: float = math.nan
     rows_px: float = math.nan
     rows_sigma_px: float = math.nan
     left_px: float = math.nan
     zero_sigma_px: float = math.nan
-    correction: Correction = UNCORRECTED
+    overlay: Departure = AS_CALIBRATED
     features: int = 0
     measurements: int = 0
     judged: int = 0

@@ -17,7 +17,7 @@ import numpy as np
 from common.errors import DataError
 from common.files import read_whole
 from common.versions import OVERLAY_FORMAT
-from phone_host.model import Correction, Drift, Rig
+from phone_host.model import Departure, Drift, Rig
 from phone_host.output.rig_files.tree import Node
 from phone_host.output.rig_files.yaml_text import read_yaml
 
@@ -48,7 +48,7 @@ def overlay_text(rig: Rig, drift: Drift) -> str:
         rig: as it was calibrated.
         drift: with the correction that was in use at the end.
     """
-    used = drift.correction
+    used = drift.overlay
     values = {
         "format_version": str(OVERLAY_FORMAT),
         "rig": f'"{fingerprint(rig)}"',
@@ -64,7 +64,7 @@ def overlay_text(rig: Rig, drift: Drift) -> str:
     return "%YAML:1.0\n---\n" + "".join(f"{key}: {value}\n" for key, value in values.items())
 
 
-def read_overlay(path: Path, rig: Rig) -> Correction:
+def read_overlay(path: Path, rig: Rig) -> Departure:
     """Read an overlay and check it.
 
     Args:
@@ -93,7 +93,7 @@ def read_overlay(path: Path, rig: Rig) -> Correction:
     focal = node.child("right_focal")
     if abs(focal.number() - 1) > _MOST_FOCUS:
         raise focal.problem("is more than any focus changes", _REMEDY)
-    return Correction(turn_rad=(x, y, z), focal=focal.number())
+    return Departure(turn_rad=(x, y, z), focal=focal.number())
 
 
 def _list(values: tuple[float, ...]) -> str:

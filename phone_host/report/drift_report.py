@@ -3,13 +3,13 @@
 import math
 
 from phone_host.measure.drift_words import is_late, turn_words
-from phone_host.model import Change, ChangeKind, Correction, Drift, Turn
+from phone_host.model import Change, ChangeKind, Departure, Drift, Turn
 from phone_host.report.report_page import Table
 
 _WORDS = {
     ChangeKind.KNOCKED: "knocked",
     ChangeKind.RETURNED: "a camera or the board was away; measured afresh",
-    ChangeKind.CORRECTED: "correction",
+    ChangeKind.CORRECTED: "corrected for",
     ChangeKind.BEYOND: "too far to be corrected",
 }
 
@@ -28,7 +28,7 @@ def drift_values(drift: Drift | None) -> dict[str, object] | None:
         "departure": _departure(drift.departure),
         "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
         "focal_sigma_percent": _rounded(100 * drift.focal_sigma),
-        "correction": _departure(drift.correction),
+        "overlay": _departure(drift.overlay),
         "vertical_error_px": _rounded(drift.rows_px),
         "vertical_error_sigma_px": _rounded(drift.rows_sigma_px),
         "vertical_error_left_px": _rounded(drift.left_px),
@@ -77,10 +77,10 @@ def _change(change: Change) -> dict[str, object]:
     return values
 
 
-def _departure(correction: Correction) -> dict[str, object]:
+def _departure(departure: Departure) -> dict[str, object]:
     return {
-        "turn_deg": _degrees(correction.turn_rad),
-        "focal_percent": _rounded(100 * (correction.focal - 1)),
+        "turn_deg": _degrees(departure.turn_rad),
+        "focal_percent": _rounded(100 * (departure.focal - 1)),
     }
 
 

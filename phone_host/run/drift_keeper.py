@@ -12,7 +12,7 @@ from typing import Final, assert_never
 from common.program.logs import event
 from phone_host.calibration.running.see import Timed, sighting_of
 from phone_host.calibration.running.watch import DriftWatch
-from phone_host.model import UNCORRECTED, Change, ChangeKind, Correction, Drift, Image, Result, Side
+from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, Image, Result, Side
 from phone_host.output.overlay_yaml import overlay_text
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import Look
@@ -58,7 +58,7 @@ class DriftKeeper:
         board_side: Side,
         *,
         corrects: bool = True,
-        start: Correction = UNCORRECTED,
+        start: Departure = AS_CALIBRATED,
         is_timeless: bool = False,
         interpolates: bool = False,
     ) -> None:
@@ -69,7 +69,7 @@ class DriftKeeper:
         self._session = ""
         self._before: tuple[Image, int] | None = None
         self._last_ns = self._usual_ns = 0
-        if start != UNCORRECTED:
+        if start != AS_CALIBRATED:
             core.correct(start)
 
     @property
@@ -82,7 +82,7 @@ class DriftKeeper:
     def overlay(self) -> str:
         """The content of overlay.yaml; empty if nothing is corrected."""
         drift, rig = self.drift, self._core.rig
-        return "" if rig is None or drift.correction == UNCORRECTED else overlay_text(rig, drift)
+        return "" if rig is None or drift.overlay == AS_CALIBRATED else overlay_text(rig, drift)
 
     @property
     def is_unsure(self) -> bool:
@@ -126,9 +126,9 @@ class DriftKeeper:
         if found is None:
             return
         with self._lock:
-            before = self._watch.correction
+            before = self._watch.overlay
             self._watch.add(*found, at_s)
-            wanted = self._watch.correction
+            wanted = self._watch.overlay
             self._tell()
         if wanted != before:
             self._core.correct(wanted)  # makes the maps: some 50 ms, outside the lock
@@ -177,7 +177,7 @@ def _say(change: Change, drift: Drift) -> None:
             assert_never(change.kind)
 
 
-def _turn_values(departure: Correction) -> dict[str, str]:
+def _turn_values(departure: Departure) -> dict[str, str]:
     pitch, yaw, roll = (f"{math.degrees(angle):+.3f}" for angle in departure.turn_rad)
     return {
         "pitch_deg": pitch,

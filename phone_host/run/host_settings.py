@@ -6,7 +6,7 @@ from enum import Enum
 from pathlib import Path
 
 from common.imagesize.head import MOST_PIXELS
-from phone_host.model import UNCORRECTED, Correction, Side, TimeOffset
+from phone_host.model import AS_CALIBRATED, Departure, Side, TimeOffset
 from phone_host.output.axes import Axes
 from phone_host.stereo.budget_ladder import BudgetWanted
 from phone_host.sync.fifo import FifoSettings
@@ -64,4 +64,4 @@ class HostSettings:
     matcher_note: str = ""
     budget: BudgetWanted | None = None
     corrects: bool = True
-    overlay: Correction = UNCORRECTED
+    overlay: Departure = AS_CALIBRATED

@@ -15,11 +15,11 @@ import numpy as np
 
 from common.ledger import StageTimes
 from phone_host.model import (
-    UNCORRECTED,
+    AS_CALIBRATED,
     CloudImage,
     Completed,
-    Correction,
     CutCounts,
+    Departure,
     DepthLimits,
     Disparity,
     Epipolar,
@@ -86,18 +86,18 @@ class _InUse:
     """A correction, and the rectifiers that have it.
 
     Args:
-        correction: how the right camera departs from the rig that was calibrated.
+        departure: how the right camera departs from the rig that was calibrated.
         made: corrected rectifiers, by the calibrated ones.
     """
 
-    def __init__(self, correction: Correction, made: dict[Rectifier, Rectifier]) -> None:
-        self.correction, self._made = correction, made
+    def __init__(self, departure: Departure, made: dict[Rectifier, Rectifier]) -> None:
+        self.overlay, self._made = departure, made
 
     def of(self, rectifier: Rectifier) -> Rectifier:
         """Return the corrected rectifier of a calibrated one; make it if it is new."""
         found = self._made.get(rectifier)
         if found is None:
-            found = self._made[rectifier] = rectifier.corrected(self.correction)
+            found = self._made[rectifier] = rectifier.corrected(self.overlay)
         return found
 
 
@@ -134,7 +134,7 @@ class StereoCore:
         self.geometry = geometry if rectifier is None else rectifier.geometry
         self.wanted = wanted
         self._kept: dict[_Key, _Ready] = {}
-        self._in_use = _InUse(UNCORRECTED, {})
+        self._in_use = _InUse(AS_CALIBRATED, {})
         native()  # a wrong TANDEMSCAN_SIMD is told before the first pair comes
         if isinstance(matcher, MatchSettings):
             create_matcher(matcher)  # so is a name or a number that is wrong is told before the first pair comes
@@ -199,17 +199,17 @@ class StereoCore:
             confidence=confidence,
             match_report=matched.report,
             completed=filled,
-            correction=UNCORRECTED if rectifier is None else rectifier.correction,
+            overlay=AS_CALIBRATED if rectifier is None else rectifier.overlay,
         )
 
-    def correct(self, correction: Correction) -> None:
+    def correct(self, departure: Departure) -> None:
         """Rectify the next pairs with a corrected rig. Any thread may call it: the maps are made first, in this thread.
 
         Args:
-            correction: how the right camera departs from the rig that was calibrated.
+            departure: how the right camera departs from the rig that was calibrated.
         """
         known = {ready.rectifier for ready in list(self._kept.values()) if ready.rectifier is not None}
-        self._in_use = _InUse(correction, {rectifier: rectifier.corrected(correction) for rectifier in known})
+        self._in_use = _InUse(departure, {rectifier: rectifier.corrected(departure) for rectifier in known})
 
     def reductions(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> tuple[int, int]:
         """Return by how much images of these sizes may be decoded smaller, left and right; see `Rectifier.reductions`.

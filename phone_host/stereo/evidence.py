@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from phone_host.model import Disparity, Evidence, Image, OffMiddle, Processed, Search
 from phone_host.stereo import filters
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.correction import corrected_rectification, corrected_rig
+from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
 from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
@@ -60,7 +60,7 @@ def maps_of(core: StereoCore, processed: Processed) -> PointMaps:
     height_px, width_px = processed.pair.left.shape[:2]
     rectifier = core.rectifier_for((width_px, height_px))
     if rectifier is not None:
-        turned = processed.correction
+        turned = processed.overlay
         return ThroughRig(
             corrected_rig(rectifier.rig, turned), corrected_rectification(rectifier.rectification, turned)
         )

@@ -29,9 +29,9 @@ from common.errors import DataError
 from common.imagesize.head import size_text
 from phone_host.geometry.lens import project, rays_through
 from phone_host.model import (
-    UNCORRECTED,
+    AS_CALIBRATED,
     CameraModel,
-    Correction,
+    Departure,
     Epipolar,
     Image,
     Lens,
@@ -41,7 +41,7 @@ from phone_host.model import (
     Side,
     StereoGeometry,
 )
-from phone_host.stereo.correction import corrected_rectification, corrected_rig
+from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.images import size_px
 from phone_host.stereo.remap import Maps, remap
 from phone_host.stereo.two_threads import in_two_threads
@@ -174,7 +174,7 @@ class Rectifier:
         rig: the rig it was made for, as it stands now.
         rectification: rotations, projections and size.
         geometry: of the rectified pair.
-        correction: how the right camera departs from the rig that was calibrated.
+        overlay: how the right camera departs from the rig that was calibrated.
 
     Args:
         rig: two calibrated cameras.
@@ -187,22 +187,22 @@ class Rectifier:
         self.rig = rig
         self.rectification = rectify_rig(rig)
         self.geometry = self.rectification.geometry
-        self.correction = UNCORRECTED
+        self.overlay = AS_CALIBRATED
         self._left = _Remap(rig.left, self.rectification.R_left, self.rectification)
         self._right = _Remap(rig.right, self.rectification.R_right, self.rectification)
 
-    def corrected(self, correction: Correction) -> "Rectifier":
+    def corrected(self, departure: Departure) -> "Rectifier":
         """Return a rectifier for the same rig whose right camera has turned since; the left image's maps are shared.
 
         Args:
-            correction: how the right camera departs from the rig that was calibrated.
+            departure: how the right camera departs from the rig that was calibrated.
         """
-        if correction == self.correction:
+        if departure == self.overlay:
             return self
         made = copy(self)
-        made.rig = corrected_rig(self.rig, correction)
-        made.rectification = corrected_rectification(self.rectification, correction)
-        made.correction = correction
+        made.rig = corrected_rig(self.rig, departure)
+        made.rectification = corrected_rectification(self.rectification, departure)
+        made.overlay = departure
         made._right = _Remap(made.rig.right, made.rectification.R_right, made.rectification, self._right.shrink)  # noqa: SLF001  # its own
         return made
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from common.errors import DataError, SettingsError
 from phone_host.declared_settings import NEAR_M
-from phone_host.model import UNCORRECTED, Correction, Rig, Side, StereoGeometry
+from phone_host.model import AS_CALIBRATED, Departure, Rig, Side, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import KittiCameras, is_calib_txt, read_calib_txt
 from phone_host.output.overlay_yaml import read_overlay
@@ -103,7 +103,7 @@ def build_core(
     return StereoCore(_matcher(chosen, options.disparities, temporal=temporal), None, geometry, wanted), None
 
 
-def overlay_of(options: argparse.Namespace, core: StereoCore | None) -> Correction:
+def overlay_of(options: argparse.Namespace, core: StereoCore | None) -> Departure:
     """Read --overlay; no correction without it.
 
     Args:
@@ -115,7 +115,7 @@ def overlay_of(options: argparse.Namespace, core: StereoCore | None) -> Correcti
         DataError: it is not valid, or belongs to another rig.
     """
     if options.overlay is None:
-        return UNCORRECTED
+        return AS_CALIBRATED
     if core is None or core.rig is None:
         raise SettingsError("--overlay without a rig.yaml that it belongs to", "add --calibration rig.yaml")
     return read_overlay(options.overlay, core.rig)

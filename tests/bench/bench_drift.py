@@ -28,7 +28,7 @@ from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, 
 from phone_host.calibration.running.see import Timed, sighting_of
 from phone_host.calibration.running.watch import WINDOW, DriftWatch
 from phone_host.measure.drift_words import drift_concerns
-from phone_host.model import UNCORRECTED, Change, Correction, Drift
+from phone_host.model import AS_CALIBRATED, Change, Departure, Drift
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.evidence import look_at, maps_of
@@ -124,14 +124,14 @@ class Watched:
         self.cpu_ms.append((time.process_time() - began) * 1e3)
         self.model, self.seen = found[0], [*self.seen, found[1]][-WINDOW:]
         drift = self.watch.drift
-        if drift.correction != processed.correction:
-            self.core.correct(drift.correction)
+        if drift.overlay != processed.overlay:
+            self.core.correct(drift.overlay)
         return drift
 
-    def left_px(self, true: Correction) -> float:
+    def left_px(self, true: Departure) -> float:
         """Return the vertical error that the correction in use leaves, 95th percentile over the image, px."""
         assert self.model is not None
-        off = values_of(true) - values_of(self.watch.correction)
+        off = values_of(true) - values_of(self.watch.overlay)
         return float(np.percentile(np.abs(self.model.everywhere() @ off), 95))
 
     def raw_rows_px(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -189,7 +189,7 @@ def films() -> list[Play]:
     for axis, name in enumerate(("pitch", "yaw", "roll")):
         steps = in_steps(_TURN_S, axis, 0.3, count=6, seconds=6)
         found.append(Play(name=f"{name} +0.3 in 6 steps", scene=furnished_room(40 + axis), acts=steps, seconds=13))
-    focus = (replace(turned(_TURN_S, 0, 0.0), departure=Correction(focal=1.01)),)
+    focus = (replace(turned(_TURN_S, 0, 0.0), departure=Departure(focal=1.01)),)
     found.append(Play(name="focus +1 %", scene=furnished_room(50), acts=focus, seconds=6))
     walker = with_walker(furnished_room(51))
     turn = (turned(_TURN_S, 0, 0.3),)
@@ -213,7 +213,7 @@ def person_px(late_s: float) -> tuple[str, float, float]:
         play = Play(name="person", scene=scene, seconds=9, late_s=late_s)
         for t_s, left, right, before in judged_pairs(play, play_rig(), _PERIOD_S):
             drift = watched.look(t_s, left, right, before, 1 / play.fps)
-            used = max(used, watched.left_px(UNCORRECTED), drift.rows_px if drift.judged > WINDOW else 0.0)
+            used = max(used, watched.left_px(AS_CALIBRATED), drift.rows_px if drift.judged > WINDOW else 0.0)
             if drift.judged > WINDOW:
                 each.append(watched.raw_rows_px())
         rows.append(each)

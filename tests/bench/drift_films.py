@@ -8,9 +8,9 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.model import CameraModel, Correction, Rig
+from phone_host.model import CameraModel, Departure, Rig
 from phone_host.scene.scene import Body, Box, Look, Path, Plane, Renderer, Scene, Sphere, Texture, rig_poses, rotation
-from phone_host.stereo.correction import corrected_rig
+from phone_host.stereo.departure import corrected_rig
 from tests.bench.depth_scenes import Image
 
 JPEG_QUALITY: Final = 90
@@ -26,7 +26,7 @@ class Act:
     """
 
     from_s: float
-    departure: Correction
+    departure: Departure
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -56,10 +56,10 @@ class Play:
         )
     )
 
-    def departure_at(self, t_s: float) -> Correction:
+    def departure_at(self, t_s: float) -> Departure:
         """Return how the right camera departs at a moment."""
         begun = [act.departure for act in self.acts if act.from_s <= t_s + 1e-9]
-        return begun[-1] if begun else Correction()
+        return begun[-1] if begun else Departure()
 
 
 def play_rig() -> Rig:
@@ -143,7 +143,7 @@ def turned(from_s: float, axis: int, degrees: float) -> Act:
     """
     turn = [0.0, 0.0, 0.0]
     turn[axis] = math.radians(degrees)
-    return Act(from_s, Correction(turn_rad=(turn[0], turn[1], turn[2])))
+    return Act(from_s, Departure(turn_rad=(turn[0], turn[1], turn[2])))
 
 
 def in_steps(from_s: float, axis: int, degrees: float, *, count: int, seconds: float) -> tuple[Act, ...]:
@@ -169,7 +169,7 @@ def judged_pairs(play: Play, rig: Rig, period_s: float) -> Iterator[tuple[float,
         period_s: time between two judged pairs, s.
     """
     left = Renderer(play.scene, rig.left, rig_poses(rig)[0], play.looks[0])
-    rights: dict[Correction, Renderer] = {}
+    rights: dict[Departure, Renderer] = {}
     due_s = 0.0
     for number in range(1, round(play.seconds * play.fps)):
         t_s = number / play.fps

@@ -9,7 +9,7 @@ import cv2
 
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.scene import Renderer, rig_poses
-from phone_host.stereo.correction import corrected_rig
+from phone_host.stereo.departure import corrected_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.bench.drift_films import furnished_room, play_rig, turned
 from tests.support.programs import board, host

@@ -6,9 +6,9 @@ import numpy as np
 
 from phone_host.calibration.running.rows import RowModel, Sighting
 from phone_host.geometry.lens import project
-from phone_host.model import UNCORRECTED, CameraModel, Correction, Rig, Side
+from phone_host.model import AS_CALIBRATED, CameraModel, Departure, Rig, Side
 from phone_host.scene.scene import rotation
-from phone_host.stereo.correction import corrected_rectification, corrected_rig
+from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.evidence_track import Followed
 from phone_host.stereo.rectify import rectify_rig
@@ -43,8 +43,8 @@ class Sight:
     def features(
         self,
         seed: int,
-        departure: Correction,
-        corrected: Correction = UNCORRECTED,
+        departure: Departure,
+        corrected: Departure = AS_CALIBRATED,
         *,
         count: int = 120,
     ) -> Followed:
@@ -60,7 +60,7 @@ class Sight:
         right_px = now.rectified(right, Side.RIGHT)
         return Followed(left_px, right_px, np.zeros((count, 2)))
 
-    def through(self, corrected: Correction) -> ThroughRig:
+    def through(self, corrected: Departure) -> ThroughRig:
         """Return how points go through the rectification with a correction."""
         made = self.calibrated.rectification
         return ThroughRig(corrected_rig(self.rig, corrected), corrected_rectification(made, corrected))
@@ -68,7 +68,7 @@ class Sight:
     def sighting(
         self,
         seed: int,
-        departure: Correction,
+        departure: Departure,
         *,
         count: int = 120,
         noise_px: float = 0.1,

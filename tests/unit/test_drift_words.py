@@ -11,14 +11,14 @@ import pytest
 from common.errors import DataError
 from phone_host.measure.drift_words import drift_concerns, drift_lines
 from phone_host.measure.trust import Doubt
-from phone_host.model import UNCORRECTED, Change, ChangeKind, Correction, Drift, DriftState, Trend
+from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Trend
 from phone_host.output.overlay_yaml import fingerprint, overlay_text, read_overlay
 from phone_host.report.drift_report import drift_table, drift_values
 from tests.support.drift_sightings import two_webcams
 
-PITCHED = Correction(turn_rad=(math.radians(0.1), 0.0, 0.0))
-FAR = Correction(turn_rad=(math.radians(0.3), 0.0, math.radians(-0.1)))
-ZOOMED = Correction(focal=1.01)
+PITCHED = Departure(turn_rad=(math.radians(0.1), 0.0, 0.0))
+FAR = Departure(turn_rad=(math.radians(0.3), 0.0, math.radians(-0.1)))
+ZOOMED = Departure(focal=1.01)
 KNOCK = Change(kind=ChangeKind.KNOCKED, at_s=12.34, departure=PITCHED, step=PITCHED)
 KNOWN = Drift(
     state=DriftState.CORRECTED,
@@ -37,9 +37,9 @@ KNOWN = Drift(
 )
 
 
-def corrected(departure: Correction, *changes: Change) -> Drift:
+def corrected(departure: Departure, *changes: Change) -> Drift:
     """A rig that is corrected."""
-    return replace(KNOWN, departure=departure, correction=departure, changes=changes)
+    return replace(KNOWN, departure=departure, overlay=departure, changes=changes)
 
 
 def test_a_small_slow_departure_is_told_in_a_line_and_worries_nobody() -> None:
@@ -56,7 +56,7 @@ def test_a_small_slow_departure_is_told_in_a_line_and_worries_nobody() -> None:
         (corrected(PITCHED, KNOCK), Doubt.RIG_MOVED, "by 0.10 degrees against each other, at once 12 s after", "bar"),
         (corrected(FAR), Doubt.RIG_MOVED, "by 0.32 degrees against each other since the calibration", "--pose-only"),
         (
-            replace(corrected(FAR), state=DriftState.DEPARTED, correction=UNCORRECTED),
+            replace(corrected(FAR), state=DriftState.DEPARTED, overlay=AS_CALIBRATED),
             Doubt.RIG_MOVED,
             "rows are off by 1.0 px",
             "tighten",
@@ -83,7 +83,7 @@ def test_what_the_user_must_know_is_one_concern(drift: Drift, doubt: Doubt, word
 
 def test_what_is_over_or_not_proven_is_no_concern() -> None:
     """A knocked rig that was put right, lateness within the stamps' own doubt, and a rig that was never measured."""
-    right = replace(corrected(UNCORRECTED, KNOCK), rows_px=0.0, state=DriftState.STEADY)
+    right = replace(corrected(AS_CALIBRATED, KNOCK), rows_px=0.0, state=DriftState.STEADY)
     unproven = replace(KNOWN, late_ns=3e6, late_px=1.0)
     for drift in (right, unproven, Drift()):
         assert drift_concerns(drift) == ()
@@ -98,7 +98,7 @@ def test_the_line_says_what_is_known() -> None:
         in drift_lines(replace(KNOWN, state=DriftState.STEADY))[0]
     )
     assert "not corrected" in drift_lines(replace(corrected(FAR), state=DriftState.DEPARTED))[0]
-    assert "as calibrated; corrected" in drift_lines(corrected(UNCORRECTED))[0]
+    assert "as calibrated; corrected" in drift_lines(corrected(AS_CALIBRATED))[0]
     trend = Trend(turn_rad_s=(1e-4, 0, 0), sigma_rad_s=(1e-6, 1e-6, 1e-6), rows_px_s=0.1, seconds=60.0)
     [line] = drift_lines(replace(corrected(FAR), trend=trend))
     assert line.endswith("it still turns, pitch by +0.344 degrees a minute")
@@ -111,7 +111,9 @@ def test_report_and_page_hold_the_changes() -> None:
     values = drift_values(corrected(FAR, KNOCK, back))
     assert values is not None
     assert values["departure"] == {"turn_deg": [0.3, 0.0, -0.1], "focal_percent": 0.0}
-    first, second = values["changes"]  # type: ignore[misc]
+    changes = values["changes"]
+    assert isinstance(changes, list)
+    first, second = changes
     assert (first["what"], first["step"]["turn_deg"][0]) == ("knocked", 0.1)
     assert (second["what"], second["away_s"], "step" in second) == ("returned", 2.5, False)
     empty = drift_values(Drift())
@@ -125,8 +127,8 @@ def test_report_and_page_hold_the_changes() -> None:
 def test_an_overlay_is_read_back_and_belongs_to_one_rig(tmp_path: Path) -> None:
     """The correction survives bit for bit, OpenCV reads the file, and another rig refuses it."""
     rig, path = two_webcams(), tmp_path / "overlay.yaml"
-    used = Correction(turn_rad=(0.1 / 3, -1e-5, 2.5e-3), focal=1 / 0.99)
-    path.write_text(overlay_text(rig, replace(KNOWN, correction=used)))
+    used = Departure(turn_rad=(0.1 / 3, -1e-5, 2.5e-3), focal=1 / 0.99)
+    path.write_text(overlay_text(rig, replace(KNOWN, overlay=used)))
     assert read_overlay(path, rig) == used
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
     assert storage.getNode("right_focal").real() == used.focal
@@ -134,7 +136,7 @@ def test_an_overlay_is_read_back_and_belongs_to_one_rig(tmp_path: Path) -> None:
     assert fingerprint(other) != fingerprint(rig)
     with pytest.raises(DataError, match=re.escape("rig is that of another rig than --calibration")):
         read_overlay(path, other)
-    path.write_text(overlay_text(rig, replace(KNOWN, correction=used, focal_sigma=math.nan)))
+    path.write_text(overlay_text(rig, replace(KNOWN, overlay=used, focal_sigma=math.nan)))
     assert ".Nan" in path.read_text()
     assert read_overlay(path, rig) == used
 
@@ -152,7 +154,7 @@ def test_an_overlay_is_read_back_and_belongs_to_one_rig(tmp_path: Path) -> None:
 def test_a_spoiled_overlay_is_refused_by_name(tmp_path: Path, old: str, new: str, words: str) -> None:
     """Another format, and numbers that no run writes: file and key are named."""
     rig, path = two_webcams(), tmp_path / "overlay.yaml"
-    text = overlay_text(rig, replace(KNOWN, correction=PITCHED))
+    text = overlay_text(rig, replace(KNOWN, overlay=PITCHED))
     assert old in text
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(DataError, match=re.escape(words)):

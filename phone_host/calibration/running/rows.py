@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import UNCORRECTED, Correction, Rectification, Rig, Side
+from phone_host.model import AS_CALIBRATED, Departure, Rectification, Rig, Side
 from phone_host.stereo.evidence_points import PointMaps, Points, ThroughRig
 from phone_host.stereo.evidence_track import Followed
 
@@ -123,14 +123,14 @@ class RowModel:
         return Sighting(slopes, self.columns(slopes), off_px[known], seen.velocity_px_s[known, self.axis], late_s)
 
 
-def correction_of(values: Vector) -> Correction:
+def departure_of(values: Vector) -> Departure:
     """Return the correction of the four parameters."""
     if not values.any():
-        return UNCORRECTED
+        return AS_CALIBRATED
     x, y, z, spread = values.tolist()
-    return Correction(turn_rad=(x, y, z), focal=1.0 + spread)
+    return Departure(turn_rad=(x, y, z), focal=1.0 + spread)
 
 
-def values_of(correction: Correction) -> Vector:
+def values_of(departure: Departure) -> Vector:
     """Return the four parameters of a correction."""
-    return np.array([*correction.turn_rad, correction.focal - 1.0])
+    return np.array([*departure.turn_rad, departure.focal - 1.0])

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 from phone_host.calibration.running.fit import Fit, fit_rows, proven
-from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, Vector, correction_of, values_of
+from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, Vector, departure_of, values_of
 from phone_host.calibration.running.trend import Trends
-from phone_host.model import UNCORRECTED, Change, ChangeKind, Correction, Drift, DriftState
+from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState
 
 WINDOW: Final = 6
 """Sightings in the estimate: three seconds at two a second. What more would gain, the lens model's own error hides."""
@@ -70,12 +70,12 @@ class DriftWatch:
 
     Args:
         corrects: whether the user wants corrections.
-        start: the correction in use from the start, of an earlier run.
+        start: the overlay in use from the start, of an earlier run.
     """
 
-    def __init__(self, *, corrects: bool = True, start: Correction = UNCORRECTED) -> None:
+    def __init__(self, *, corrects: bool = True, start: Departure = AS_CALIBRATED) -> None:
         self._corrects = corrects
-        self._correction = start
+        self._overlay = start
         self._model: RowModel | None = None
         self._everywhere: Vector = np.zeros((0, PARAMETERS))
         self._window: deque[Sighting] = deque(maxlen=WINDOW)
@@ -89,9 +89,9 @@ class DriftWatch:
         self._news: list[Change] = []
 
     @property
-    def correction(self) -> Correction:
-        """The correction that the next pairs shall be rectified with."""
-        return self._correction
+    def overlay(self) -> Departure:
+        """The departure that the next pairs shall be corrected for."""
+        return self._overlay
 
     @property
     def is_unsure(self) -> bool:
@@ -148,7 +148,7 @@ class DriftWatch:
     @property
     def drift(self) -> Drift:
         """What is known so far."""
-        found = Drift(state=self._state, correction=self._correction, judged=self._judged, changes=tuple(self._changes))
+        found = Drift(state=self._state, overlay=self._overlay, judged=self._judged, changes=tuple(self._changes))
         if self._estimate is None or self._model is None:
             return found
         fit, values = self._estimate.fit, self._estimate.values
@@ -156,12 +156,12 @@ class DriftWatch:
         along = y if self._model.axis == 1 else x
         return replace(
             found,
-            departure=correction_of(values),
+            departure=departure_of(values),
             turn_sigma_rad=(x, y, z),
             focal_sigma=focal,
             rows_px=self._rows_px(values),
             rows_sigma_px=fit.rows_sigma_px(self._everywhere),
-            left_px=self._rows_px(values - values_of(self._correction)),
+            left_px=self._rows_px(values - values_of(self._overlay)),
             zero_sigma_px=self._model.rectification.geometry.focal_px * along,
             features=fit.features,
             measurements=len(self._window),
@@ -177,13 +177,13 @@ class DriftWatch:
             return DriftState.UNKNOWN
         if self._is_beyond:
             return DriftState.BEYOND
-        if self._correction != UNCORRECTED:
+        if self._overlay != AS_CALIBRATED:
             return DriftState.CORRECTED
         return DriftState.DEPARTED if self._rows_px(self._estimate.values) >= START_PX else DriftState.STEADY
 
     @property
-    def _departure(self) -> Correction:
-        return UNCORRECTED if self._estimate is None else correction_of(self._estimate.values)
+    def _departure(self) -> Departure:
+        return AS_CALIBRATED if self._estimate is None else departure_of(self._estimate.values)
 
     def _begin(self, model: RowModel) -> None:
         """Another size of images has another scale of its rows; what was known of the rig stays."""
@@ -223,31 +223,31 @@ class DriftWatch:
         self._trends.restart()
         now = fit_rows(model, tuple(self._window))
         off = (now.values - self._known.values)[:PARAMETERS]
-        departure = correction_of(proven(now, _SIGMAS))
-        self._note(Change(kind=ChangeKind.KNOCKED, at_s=at_s, departure=departure, step=correction_of(off)))
+        departure = departure_of(proven(now, _SIGMAS))
+        self._note(Change(kind=ChangeKind.KNOCKED, at_s=at_s, departure=departure, step=departure_of(off)))
 
     def _follow(self, found: _Estimate, at_s: float) -> None:
         """Let the correction follow the estimate, within bounds, and note what changes."""
-        values, departure = found.values, correction_of(found.values)
+        values, departure = found.values, departure_of(found.values)
         is_beyond = departure.angle_rad > MOST_TURN_RAD or abs(departure.focal - 1) > MOST_FOCUS
         if is_beyond and not self._is_beyond:
             self._note(Change(kind=ChangeKind.BEYOND, at_s=at_s, departure=departure))
         self._is_beyond = is_beyond
         if is_beyond or not self._corrects:
             return
-        if self._correction == UNCORRECTED:
-            wanted = departure if self._rows_px(values) >= START_PX else UNCORRECTED
+        if self._overlay == AS_CALIBRATED:
+            wanted = departure if self._rows_px(values) >= START_PX else AS_CALIBRATED
         elif self._rows_px(values) < _END_PX:
-            wanted = UNCORRECTED
+            wanted = AS_CALIBRATED
         else:
-            wanted = departure if self._is_off(found) else self._correction
-        if wanted != self._correction:
-            self._correction = wanted
+            wanted = departure if self._is_off(found) else self._overlay
+        if wanted != self._overlay:
+            self._overlay = wanted
             self._note(Change(kind=ChangeKind.CORRECTED, at_s=at_s, departure=wanted))
 
     def _is_off(self, found: _Estimate) -> bool:
         """Tell whether the estimate has left the correction by more than noise."""
-        off = found.values - values_of(self._correction)
+        off = found.values - values_of(self._overlay)
         squares = off @ np.linalg.solve(found.fit.covariance[:PARAMETERS, :PARAMETERS], off)
         return self._rows_px(off) >= _FOLLOW_PX and bool(squares > _FOLLOW_SIGMAS**2)
 

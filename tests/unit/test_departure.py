@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.model import UNCORRECTED, Correction, Epipolar, Side
+from phone_host.model import AS_CALIBRATED, Departure, Epipolar, Side
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.correction import corrected_rectification, corrected_rig
+from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.evidence import maps_of
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.match import MatchSettings
@@ -15,22 +15,22 @@ from phone_host.stereo.rectify import Rectifier, rectify_rig
 from phone_host.stereo.stacked import lying, upright_points, upright_steps
 from tests.support.drift_sightings import sight, two_webcams
 
-TURNED = Correction(turn_rad=(0.005, -0.003, 0.004), focal=1.01)
+TURNED = Departure(turn_rad=(0.005, -0.003, 0.004), focal=1.01)
 
 
 def test_nothing_changes_without_a_correction() -> None:
     """The rig, its rectification and its rectifier are the same objects."""
     rig, rectifier = two_webcams(), Rectifier(two_webcams())
     made = rectify_rig(rig)
-    assert corrected_rig(rig, UNCORRECTED) is rig
-    assert corrected_rectification(made, UNCORRECTED) is made
-    assert rectifier.corrected(UNCORRECTED) is rectifier
+    assert corrected_rig(rig, AS_CALIBRATED) is rig
+    assert corrected_rectification(made, AS_CALIBRATED) is made
+    assert rectifier.corrected(AS_CALIBRATED) is rectifier
 
 
 def test_a_turned_rig_with_its_correction_has_common_rows() -> None:
     """Points projected by the turned rig lie on common rows after the corrected rectification, and at the disparities of before."""
     made = sight()
-    seen, straight = made.features(1, TURNED, TURNED), made.features(1, UNCORRECTED)
+    seen, straight = made.features(1, TURNED, TURNED), made.features(1, AS_CALIBRATED)
     assert np.abs(seen.left_px - seen.right_px)[:, 1].max() < 1e-6
     assert np.abs(made.features(1, TURNED).left_px - made.features(1, TURNED).right_px)[:, 1].max() > 2
     assert np.abs(seen.right_px - straight.right_px).max() < 1e-6
@@ -55,9 +55,9 @@ def test_the_core_rectifies_the_next_pairs_with_it() -> None:
     plain = core.compute(left, right, now.monotonic_ns)
     core.correct(TURNED)
     turned = core.compute(left, right, now.monotonic_ns)
-    core.correct(UNCORRECTED)
+    core.correct(AS_CALIBRATED)
     again = core.compute(left, right, now.monotonic_ns)
-    assert [each.correction for each in (plain, turned, again)] == [UNCORRECTED, TURNED, UNCORRECTED]
+    assert [each.overlay for each in (plain, turned, again)] == [AS_CALIBRATED, TURNED, AS_CALIBRATED]
     assert np.array_equal(plain.pair.left, turned.pair.left)
     assert not np.array_equal(plain.pair.right, turned.pair.right)
     assert np.array_equal(plain.pair.right, again.pair.right)
@@ -73,9 +73,9 @@ def test_a_core_is_corrected_before_its_first_pair() -> None:
     core = StereoCore(MatchSettings(MatcherName.BLOCK, 16), Rectifier(two_webcams()))
     core.correct(TURNED)
     grey = np.zeros((240, 320), np.uint8)
-    assert core.compute(grey, grey, now.monotonic_ns).correction == TURNED
+    assert core.compute(grey, grey, now.monotonic_ns).overlay == TURNED
     assert (
-        StereoCore(MatchSettings(MatcherName.BLOCK, 16)).compute(grey, grey, now.monotonic_ns).correction == UNCORRECTED
+        StereoCore(MatchSettings(MatcherName.BLOCK, 16)).compute(grey, grey, now.monotonic_ns).overlay == AS_CALIBRATED
     )
 
 

@@ -9,21 +9,21 @@ from dataclasses import replace
 import numpy as np
 
 from phone_host.geometry.se3 import rotations_of
-from phone_host.model import UNCORRECTED, Correction, Rectification, Rig
+from phone_host.model import AS_CALIBRATED, Departure, Rectification, Rig
 
 
-def corrected_rig(rig: Rig, correction: Correction) -> Rig:
+def corrected_rig(rig: Rig, departure: Departure) -> Rig:
     """Return the rig as it stands now.
 
     Args:
         rig: as it was calibrated.
-        correction: how its right camera departs from that.
+        departure: how its right camera departs from that.
     """
-    if correction == UNCORRECTED:
+    if departure == AS_CALIBRATED:
         return rig
-    turn = rotations_of(np.array(correction.turn_rad))
+    turn = rotations_of(np.array(departure.turn_rad))
     matrix = rig.right.matrix.copy()
-    matrix[(0, 1), (0, 1)] *= correction.focal
+    matrix[(0, 1), (0, 1)] *= departure.focal
     return replace(
         rig,
         right=replace(rig.right, matrix=matrix),
@@ -32,13 +32,13 @@ def corrected_rig(rig: Rig, correction: Correction) -> Rig:
     )
 
 
-def corrected_rectification(made: Rectification, correction: Correction) -> Rectification:
+def corrected_rectification(made: Rectification, departure: Departure) -> Rectification:
     """Return the rectification of the corrected rig: that of the calibrated one but for the right camera's rotation.
 
     Args:
         made: of the rig as it was calibrated.
-        correction: how its right camera departs from that.
+        departure: how its right camera departs from that.
     """
-    if correction == UNCORRECTED:
+    if departure == AS_CALIBRATED:
         return made
-    return replace(made, R_right=made.R_right @ rotations_of(np.array(correction.turn_rad)).T)
+    return replace(made, R_right=made.R_right @ rotations_of(np.array(departure.turn_rad)).T)
