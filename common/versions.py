@@ -27,6 +27,9 @@ REPORT_FORMAT: Final = 1
 CAMERAS_FORMAT: Final = 1
 """cameras.json."""
 
+OVERLAY_FORMAT: Final = 1
+"""overlay.yaml."""
+
 
 def all_versions() -> str:
     """What `--version` prints, without the newline."""
@@ -35,6 +38,7 @@ def all_versions() -> str:
         "delays.jsonl": LEDGER_FORMAT,
         "report.json": REPORT_FORMAT,
         "cameras.json": CAMERAS_FORMAT,
+        "overlay.yaml": OVERLAY_FORMAT,
     }
     formats = ", ".join(f"{name} {version}" for name, version in files.items())
     return f"tandemscan {PACKAGE_VERSION} (protocol {PROTOCOL_VERSION}, {formats})"

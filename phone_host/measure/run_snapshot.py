@@ -15,6 +15,7 @@ from phone_host.measure.budget_words import with_budget
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.doubt_history import Episode
+from phone_host.measure.drift_words import drift_concerns
 from phone_host.measure.gone import gone_concerns
 from phone_host.measure.image_trust import ImageTrust
 from phone_host.measure.no_depth import no_depth
@@ -35,7 +36,7 @@ from phone_host.measure.trust import (
     timing_concerns,
     unbelieved_concerns,
 )
-from phone_host.model import BudgetAccount, DepthAccount, PairCounts, TimeOffset, Unwritten
+from phone_host.model import BudgetAccount, DepthAccount, Drift, PairCounts, TimeOffset, Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.phase import Alignment, Phase
@@ -80,6 +81,7 @@ class RunSnapshot:
         matcher_note: what is to be said of the choice of the matcher; empty: nothing.
         matcher_is_fastest: whether none of ours is faster than the one that runs.
         budget: how the time budget for each pair was held; None: there is none, or no pair yet.
+        drift: how the rig departs from its calibration; None: there is no rig.
     """
 
     ended: str
@@ -129,6 +131,7 @@ class RunSnapshot:
     matcher_note: str = ""
     matcher_is_fastest: bool = False
     budget: BudgetAccount | None = None
+    drift: Drift | None = None
 
     @property
     def shortfall(self) -> str:
@@ -253,8 +256,9 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     rejected = (REJECTED_RIG,) if run.rig_rejected else ()
     gone = gone_concerns(run.ended, run.away, run.camera, run.last_s, run.refused) if run.processed else ()
     told = (*spoiled_concerns(run.spoiled_counts), *settings_concerns(run.missed_locks))
+    moved = () if run.drift is None else drift_concerns(run.drift)
     timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
-    return gravest_first((*rejected, *numbers, *images, *told, *gone, *timing))
+    return gravest_first((*rejected, *numbers, *images, *moved, *told, *gone, *timing))
 
 
 def history(run: RunSnapshot) -> tuple[Episode, ...]:

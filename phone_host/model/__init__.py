@@ -5,6 +5,16 @@ Conventions: camera axes x right, y down, z forward; pixel centres are integers 
 """
 
 from phone_host.model.budget import BudgetAccount, BudgetChange, BudgetReason, BudgetStep
+from phone_host.model.drift import (
+    AS_CALIBRATED,
+    Change,
+    ChangeKind,
+    Departure,
+    Drift,
+    DriftState,
+    Trend,
+    Turn,
+)
 from phone_host.model.evidence import (
     Arrangement,
     Evidence,
@@ -53,6 +63,7 @@ from phone_host.model.run import (
 from phone_host.model.temporal import Searched, SearchedAs, TemporalAccount
 
 __all__ = [
+    "AS_CALIBRATED",
     "RIG_PARAMETERS",
     "UNMEASURED_NS",
     "Arrangement",
@@ -62,15 +73,20 @@ __all__ = [
     "BudgetReason",
     "BudgetStep",
     "CameraModel",
+    "Change",
+    "ChangeKind",
     "CloudImage",
     "Completed",
     "Confidence",
     "Crop",
     "CutCounts",
+    "Departure",
     "DepthAccount",
     "DepthLimits",
     "Disparity",
     "DisparityPlane",
+    "Drift",
+    "DriftState",
     "Epipolar",
     "Evidence",
     "Exposure",
@@ -97,5 +113,7 @@ __all__ = [
     "TemporalAccount",
     "Tiles",
     "TimeOffset",
+    "Trend",
+    "Turn",
     "Unwritten",
 ]

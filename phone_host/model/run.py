@@ -6,6 +6,7 @@ from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
+from phone_host.model.drift import AS_CALIBRATED, Departure
 from phone_host.model.images import (
     CloudImage,
     CutCounts,
@@ -83,6 +84,7 @@ class Processed:
         confidence: of each disparity; None without a core, or if the matcher has none.
         match_report: what the matcher corrected, in px of the rectified images; None without a core.
         completed: the disparity with completed holes, marked; None if nobody asked for it. The cloud never contains them.
+        overlay: how the right camera was taken to depart from the rig that was calibrated.
     """
 
     pair: RectifiedPair
@@ -96,6 +98,7 @@ class Processed:
     confidence: Confidence | None = None
     match_report: MatchReport | None = None
     completed: Completed | None = None
+    overlay: Departure = AS_CALIBRATED
 
 
 @dataclass(frozen=True, slots=True)

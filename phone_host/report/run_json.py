@@ -18,6 +18,7 @@ from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, SearchedAs, TemporalAccount, TimeOffset
 from phone_host.report.budget_report import budget_values
+from phone_host.report.drift_report import drift_values
 from phone_host.report.match_words import corrected_values
 from phone_host.sync.fifo import Overflow
 
@@ -60,6 +61,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "depth": _depth(run.depth),
         "matcher_note": run.matcher_note or None,
         "budget": budget_values(run.budget),
+        "drift": drift_values(run.drift),
         "regime": _regime(judge(figures(run))),
         "image_motion_px_per_s": _number(run.motion_px_s),
         "trust": _trust(run),

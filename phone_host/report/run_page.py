@@ -13,6 +13,7 @@ from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
 from phone_host.measure.budget_words import budget_lines, missed_words
 from phone_host.measure.doubt_history import saved_pairs
+from phone_host.measure.drift_words import drift_lines
 from phone_host.measure.headline import headline
 from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import Regime, judge
@@ -24,6 +25,7 @@ from phone_host.report.budget_report import budget_tables
 from phone_host.report.cut_words import cut_sentence, pixels_text
 from phone_host.report.depth_data import density, photograph
 from phone_host.report.depth_view import cloud_view, depth_view
+from phone_host.report.drift_report import drift_table
 from phone_host.report.page_frame import section
 from phone_host.report.page_links import FileLink
 from phone_host.report.report_page import Figure, Headline, PageData, Picture, Table, delay_series, page
@@ -68,7 +70,13 @@ def run_page(
             ),
             pictures=pictures(last, board_side),
             delays=delay_series(ledgers, timeless=run.timeless, after_gap_ns=run.after_gap_ns, statistics=run.delays),
-            tables=(*links_tables(run), *budget_tables(run.budget), unused_table(run), camera_table(run.camera)),
+            tables=(
+                *links_tables(run),
+                *budget_tables(run.budget),
+                *drift_table(run.drift),
+                unused_table(run),
+                camera_table(run.camera),
+            ),
             steps=steps(run),
             notes=notes(run),
             files=files(saved, doubtful_pairs(run)),
@@ -95,7 +103,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         *(f"Warning: {item.sentence}." for item in concerns(run)),
         *(f"Warning: {line}." for line in past_lines(run)),
         *(_sentence(line) for line in (*corrected_lines(run.depth), *budget_lines(run.budget))),
-        *(_sentence(line) for line in temporal_lines(run.depth.temporal)),
+        *(_sentence(line) for line in (*temporal_lines(run.depth.temporal), *drift_lines(run.drift))),
         *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 

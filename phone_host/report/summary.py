@@ -10,6 +10,7 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
 from phone_host.measure.budget_words import budget_lines, missed_words
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.doubt_history import history_lines
+from phone_host.measure.drift_words import drift_lines
 from phone_host.measure.headline import headline
 from phone_host.measure.image_trust import ImageTrust
 from phone_host.measure.numbers import pairing_words
@@ -60,6 +61,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += depth_lines(run.images)
     lines += cut_lines(run.depth)
     lines += corrected_lines(run.depth)
+    lines += drift_lines(run.drift)
     lines += [f"note: {run.matcher_note}"] if run.matcher_note else []
     lines += budget_lines(run.budget)
     lines += temporal_lines(run.depth.temporal)

@@ -1,4 +1,4 @@
-"""A run's results on disk: settings.json, delays.jsonl, pair folders, cameras.json, report.json and the page.
+"""A run's results on disk: settings.json, delays.jsonl, pair folders, cameras.json, overlay.yaml, report.json and the page.
 
 A full disk never stops the run and loses nothing that memory can hold. While writing fails, lines of delays.jsonl wait
 in memory (bounded) and pairs are counted as unsaved. Once there is room again, the waiting lines are written in order.
@@ -28,6 +28,7 @@ from phone_host.output.axes import Axes
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
+from phone_host.output.overlay_yaml import OVERLAY_NAME
 from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
 from phone_host.run.sinks import NotWrittenError, SinkQueue
 
@@ -47,7 +48,7 @@ _WRITERS: Final = 2
 
 _OFTEN: Final = 2
 
-NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|cameras\.json|index\.html|pair-[0-9]{6,}"
+NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|cameras\.json|overlay\.yaml|index\.html|pair-[0-9]{6,}"
 """The names that a run writes into its folder."""
 
 
@@ -232,13 +233,14 @@ class FileSink:
             lines=lost + self._lines.unwritten, pairs=self._unsaved_pairs, cause=cause or ("it hangs" if lost else "")
         )
 
-    def close(self, report: dict[str, object], page: str = "", cameras: str = "") -> None:
+    def close(self, report: dict[str, object], page: str = "", cameras: str = "", overlay: str = "") -> None:
         """Finish the queued work, write report.json and release the folder. May be called again.
 
         Args:
             report: the JSON object to write.
             page: the HTML document to write as index.html beside it; empty: none.
             cameras: content of cameras.json; empty: none.
+            overlay: content of overlay.yaml; empty: none.
         """
         if self._own is None:
             return
@@ -246,6 +248,7 @@ class FileSink:
             "report.json": json_text(report, indent=1) + "\n",
             "index.html": page,
             CAMERAS_NAME: cameras,
+            OVERLAY_NAME: overlay,
         }
         try:
             self.finish()

@@ -19,6 +19,7 @@ from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.model import Processed, Result, Side
 from phone_host.run.doubt_log import DoubtLog
+from phone_host.run.drift_keeper import DriftKeeper
 from phone_host.run.file_sink import FileSink
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.host_settings import EndReason, HostSettings
@@ -86,7 +87,20 @@ class Host:
             settings=settings.resolved,
             axes=settings.axes,
         )
-        self._trust = TrustSink(core, period_ns=0 if demand.paces_own_camera else PERIOD_NS)
+        is_timeless = demand.paces_own_camera
+        self._keeper = (
+            None
+            if core is None or core.rig is None
+            else DriftKeeper(
+                core,
+                settings.board_side,
+                corrects=settings.corrects,
+                start=settings.overlay,
+                is_timeless=is_timeless,
+                interpolates=settings.interpolate,
+            )
+        )
+        self._trust = TrustSink(core, period_ns=0 if is_timeless else PERIOD_NS, keeper=self._keeper)
         motion = FunctionSink(_MOTION, self._measure_motion)
         self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *sinks)
         self._queue = PairQueue(
@@ -201,7 +215,8 @@ class Host:
         Returns:
             Whether all results of the run were written.
         """
-        self._files.close(report, page, self._cameras.text())
+        overlay = "" if self._keeper is None else self._keeper.overlay
+        self._files.close(report, page, self._cameras.text(), overlay)
         return self._files.complete
 
     def cameras_text(self) -> str:
@@ -293,6 +308,7 @@ class Host:
             matcher_note=self._settings.matcher_note,
             matcher_is_fastest=self._matcher_is_fastest,
             budget=None if self._budget is None else self._budget.account,
+            drift=None if self._keeper is None else self._keeper.drift,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:

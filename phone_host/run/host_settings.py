@@ -6,7 +6,7 @@ from enum import Enum
 from pathlib import Path
 
 from common.imagesize.head import MOST_PIXELS
-from phone_host.model import Side, TimeOffset
+from phone_host.model import AS_CALIBRATED, Departure, Side, TimeOffset
 from phone_host.output.axes import Axes
 from phone_host.stereo.budget_ladder import BudgetWanted
 from phone_host.sync.fifo import FifoSettings
@@ -43,6 +43,8 @@ class HostSettings:
         axes: of the points in saved clouds.
         matcher_note: what the summary says of the choice of the matcher; empty: nothing.
         budget: time budget for each pair; None: there is none. Only with a core that was built from settings.
+        corrects: whether a rig that has turned since its calibration is corrected; it is watched in any case.
+        overlay: the correction of an earlier run, in use from the start.
     """
 
     board_side: Side = Side.LEFT
@@ -61,3 +63,5 @@ class HostSettings:
     axes: Axes = Axes.CAMERA
     matcher_note: str = ""
     budget: BudgetWanted | None = None
+    corrects: bool = True
+    overlay: Departure = AS_CALIBRATED

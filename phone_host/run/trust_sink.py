@@ -9,9 +9,10 @@ from common import now
 from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.image_trust import ImageTrust
 from phone_host.model import DepthLimits, Result, StereoGeometry
+from phone_host.run.drift_keeper import DriftKeeper, Moment
 from phone_host.run.sinks import OneQueueSink, SinkQueue
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
+from phone_host.stereo.evidence import has_depth, look_at, maps_of
 
 PERIOD_NS: Final = 500_000_000
 """A mistake must be named within 2 s. Two of three judgements name it: 1 s, and at most one period until the first."""
@@ -27,13 +28,19 @@ class TrustSink(OneQueueSink):
         core: the run's stereo core; None: only brightness is judged.
         clock: monotonic, ns.
         period_ns: least time between the pairs that are judged, ns; 0 for stills, each of which may show another scene.
+        keeper: is shown what the judged pairs show; None: nobody watches over the rig.
     """
 
     def __init__(
-        self, core: StereoCore | None, clock: Callable[[], int] = now.monotonic_ns, *, period_ns: int = PERIOD_NS
+        self,
+        core: StereoCore | None,
+        clock: Callable[[], int] = now.monotonic_ns,
+        *,
+        period_ns: int = PERIOD_NS,
+        keeper: DriftKeeper | None = None,
     ) -> None:
-        super().__init__(SinkQueue[tuple[Result, int]]("trust", self._take, depth=_DEPTH))
-        self._core, self._clock, self._period_ns = core, clock, period_ns
+        super().__init__(SinkQueue[tuple[Result, Moment | None, int]]("trust", self._take, depth=_DEPTH))
+        self._core, self._clock, self._period_ns, self._keeper = core, clock, period_ns, keeper
         self._judge = ImageJudge()
         self._lock = threading.Lock()
         self._due_ns = 0
@@ -54,11 +61,12 @@ class TrustSink(OneQueueSink):
         # Not the core's: images of another size than the calibration's have another geometry.
         self._limits, self._geometry = processed.limits or self._limits, processed.geometry or self._geometry
         now_ns = self._clock()
+        moment = None if self._keeper is None else self._keeper.note(result, (now_ns - self._started_ns) / 1e9)
         if now_ns < self._due_ns or self._is_busy:
             return
         self._due_ns = now_ns + self._period_ns
         self._is_busy = True  # before the offer: the thread may be done with it before this one goes on
-        self._queue.offer((result, now_ns))  # refused only if the sink has failed or ends
+        self._queue.offer((result, moment, now_ns))  # refused only if the sink has failed or ends
 
     @property
     def trust(self) -> ImageTrust:
@@ -77,11 +85,15 @@ class TrustSink(OneQueueSink):
                 disparity_error_px=math.nan if self._limits is None else self._limits.disparity_error_px,
             )
 
-    def _take(self, judged: tuple[Result, int]) -> None:
-        result, done_ns = judged
-        processed = result.processed
+    def _take(self, judged: tuple[Result, Moment | None, int]) -> None:
+        result, moment, done_ns = judged
+        processed, at_s = result.processed, (done_ns - self._started_ns) / 1e9
         maps = None if self._core is None else maps_of(self._core, processed)
-        evidence = measure_evidence(processed, maps)
+        look = look_at(processed, maps)
+        if self._keeper is not None and moment is not None:
+            self._keeper.judge(moment, look, at_s)
+            if self._keeper.is_unsure:
+                self._due_ns = 0  # was the rig knocked? The next pair tells
         with self._lock:
-            self._judge.add(evidence, at_s=(done_ns - self._started_ns) / 1e9, pair=result.number)
+            self._judge.add(look.evidence, at_s=at_s, pair=result.number)
             self._is_busy = False

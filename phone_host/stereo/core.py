@@ -15,9 +15,11 @@ import numpy as np
 
 from common.ledger import StageTimes
 from phone_host.model import (
+    AS_CALIBRATED,
     CloudImage,
     Completed,
     CutCounts,
+    Departure,
     DepthLimits,
     Disparity,
     Epipolar,
@@ -80,6 +82,25 @@ class _Ready:
     limits: DepthLimits | None
 
 
+class _InUse:
+    """A correction, and the rectifiers that have it.
+
+    Args:
+        departure: how the right camera departs from the rig that was calibrated.
+        made: corrected rectifiers, by the calibrated ones.
+    """
+
+    def __init__(self, departure: Departure, made: dict[Rectifier, Rectifier]) -> None:
+        self.overlay, self._made = departure, made
+
+    def of(self, rectifier: Rectifier) -> Rectifier:
+        """Return the corrected rectifier of a calibrated one; make it if it is new."""
+        found = self._made.get(rectifier)
+        if found is None:
+            found = self._made[rectifier] = rectifier.corrected(self.overlay)
+        return found
+
+
 class StereoCore:
     """Computes a point cloud image from two images.
 
@@ -113,6 +134,7 @@ class StereoCore:
         self.geometry = geometry if rectifier is None else rectifier.geometry
         self.wanted = wanted
         self._kept: dict[_Key, _Ready] = {}
+        self._in_use = _InUse(AS_CALIBRATED, {})
         native()  # a wrong TANDEMSCAN_SIMD is told before the first pair comes
         if isinstance(matcher, MatchSettings):
             create_matcher(matcher)  # so is a name or a number that is wrong is told before the first pair comes
@@ -152,7 +174,8 @@ class StereoCore:
         """
         start_ns = clock()
         ready = self._ready(*(whole_px or (size_px(left), size_px(right))), choice)
-        pair = RectifiedPair(left, right) if ready.rectifier is None else ready.rectifier.rectify(left, right)
+        rectifier = None if ready.rectifier is None else self._in_use.of(ready.rectifier)
+        pair = RectifiedPair(left, right) if rectifier is None else rectifier.rectify(left, right)
         rectified_ns = clock()
         matched = _match(pair, ready)
         matched_ns = clock()
@@ -176,7 +199,17 @@ class StereoCore:
             confidence=confidence,
             match_report=matched.report,
             completed=filled,
+            overlay=AS_CALIBRATED if rectifier is None else rectifier.overlay,
         )
+
+    def correct(self, departure: Departure) -> None:
+        """Rectify the next pairs with a corrected rig. Any thread may call it: the maps are made first, in this thread.
+
+        Args:
+            departure: how the right camera departs from the rig that was calibrated.
+        """
+        known = {ready.rectifier for ready in list(self._kept.values()) if ready.rectifier is not None}
+        self._in_use = _InUse(departure, {rectifier: rectifier.corrected(departure) for rectifier in known})
 
     def reductions(self, left_px: tuple[int, int], right_px: tuple[int, int]) -> tuple[int, int]:
         """Return by how much images of these sizes may be decoded smaller, left and right; see `Rectifier.reductions`.
@@ -230,7 +263,7 @@ class StereoCore:
             scaled_rig(self.rig, left_px, right_px)
 
     def rectifier_for(self, size_px: tuple[int, int]) -> Rectifier | None:
-        """Return what has rectified images to a size; None if they came rectified.
+        """Return what rectifies images to a size, as the rig was calibrated; None if they came rectified.
 
         Args:
             size_px: width and height of the rectified images, px.

@@ -5,6 +5,7 @@
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 import cv2
@@ -14,12 +15,13 @@ from numpy.typing import NDArray
 from phone_host.model import Disparity, Evidence, Image, OffMiddle, Processed, Search
 from phone_host.stereo import filters
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
 from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
 from phone_host.stereo.evidence_sample import sampled_places
 from phone_host.stereo.evidence_search import ambiguity, measure_fit
-from phone_host.stereo.match_align import with_levels_of
+from phone_host.stereo.evidence_track import reduced_grey, tracked
 from phone_host.stereo.plausible import is_off_the_middle
 from phone_host.stereo.stacked import lying, lying_pair
 
@@ -33,10 +35,6 @@ _CHECKS: Final = 160
 _PATCH_PX: Final = 9
 _BACK_PX: Final = 1.5
 """A disparity is consistent if the search from right to left returns within this distance at the size of the check."""
-
-_TRACK_WIDTH_PX: Final = 1280
-_TRACKED_PX: Final = 4.0
-"""Features found at a quarter of the size are off by less."""
 
 _CHANCE_SHARE: Final = 0.005
 """A black image beside a good one is matched at 0.1 % of its pixels, a plain wall at 0.2 %; the sparsest good pair at 21 %."""
@@ -62,7 +60,10 @@ def maps_of(core: StereoCore, processed: Processed) -> PointMaps:
     height_px, width_px = processed.pair.left.shape[:2]
     rectifier = core.rectifier_for((width_px, height_px))
     if rectifier is not None:
-        return ThroughRig(rectifier.rig, rectifier.rectification)
+        turned = processed.overlay
+        return ThroughRig(
+            corrected_rig(rectifier.rig, turned), corrected_rectification(rectifier.rectification, turned)
+        )
     return Unmoved(width_px, height_px)
 
 
@@ -90,7 +91,29 @@ def density(processed: Processed) -> float:
     return int(np.count_nonzero(np.isfinite(processed.disparity))) / max(1, inside)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """What was seen in one pair.
+
+    Attributes:
+        evidence: what it says about the depth.
+        left: the left image, (H, W) uint8 grey, laid so that its epipolar lines are rows.
+        right: the right one.
+        matches: features of both that belong together and stand upright, px of these images.
+    """
+
+    evidence: Evidence
+    left: Image
+    right: Image
+    matches: Matches
+
+
 def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
+    """Measure the evidence in one pair; see `look_at`."""
+    return look_at(processed, maps).evidence
+
+
+def look_at(processed: Processed, maps: PointMaps | None) -> Look:
     """Measure the evidence in one pair.
 
     Args:
@@ -100,9 +123,10 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
             and sharpness are measured.
     """
     pair, disparity, epipolar = lying_pair(processed.pair), processed.disparity, processed.pair.epipolar
-    left, right = _grey(pair.left), _grey(pair.right)
+    left, right = grey(pair.left), grey(pair.right)
     if maps is None or disparity is None:
-        return Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
+        blind = Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
+        return Look(blind, left, right, Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, np.float32)))
     height_px, width_px = left.shape
     from_rig = isinstance(maps, ThroughRig)
     is_cropped = isinstance(maps, ThroughRig) and maps.rig.is_cropped
@@ -110,14 +134,14 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         # Points then take the way of images that came rectified: a turned camera's axis is taken for the image's middle.
         disparity, maps = lying(disparity, epipolar), Unmoved(width_px, height_px)
     scale = min(1.0, math.sqrt(_FEATURE_PX / left.size))
-    found = [find_features(_stretched(_reduced(image, scale)), scale) for image in (left, right)]
+    found = [find_features(_stretched(reduced_grey(image, scale)), scale) for image in (left, right)]
     plain, turned_over = (match(*found, is_mirrored=mirror) for mirror in (False, True))
-    upright = _tracked(left, right, plain.turned_by(0))
+    upright = tracked(left, right, plain.turned_by(0))
     vertical_px, offset_px = _vertical(upright, height_px)
     fit = measure_fit(upright, processed, disparity)
     check = min(1.0, _CHECK_WIDTH_PX / width_px)
     few = disparity[::8, ::8]
-    return Evidence(
+    evidence = Evidence(
         left=measure_exposure(left, len(found[0].points_px)),
         right=measure_exposure(right, len(found[1].points_px)),
         density=density(processed),
@@ -133,13 +157,18 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
         enough_from_m=fit.enough_from_m,
         skew_px=fit.skew_px,
         ambiguous_share=ambiguity(
-            _reduced(left, check), _reduced(right, check), disparity, (processed.search or Search()).disparities, check
+            reduced_grey(left, check),
+            reduced_grey(right, check),
+            disparity,
+            (processed.search or Search()).disparities,
+            check,
         ),
         from_rig=from_rig,
         is_cropped=is_cropped,
         off_middle=None if from_rig else _off_middle(processed),
         matched_scale=1.0 if processed.search is None else processed.search.scale,
     )
+    return Look(evidence, left, right, upright)
 
 
 def _wanted(disparity: Disparity, processed: Processed) -> Disparity:
@@ -191,15 +220,9 @@ def _middle(disparity: Disparity) -> float:
     return float(np.median(known)) if known.size else math.nan
 
 
-def _grey(image: Image) -> Image:
+def grey(image: Image) -> Image:
+    """Return an image in grey, (H, W) uint8."""
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
-
-
-def _reduced(image: Image, scale: float) -> Image:
-    if scale >= 1.0:
-        return image
-    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _stretched(image: Image) -> Image:
@@ -208,26 +231,6 @@ def _stretched(image: Image) -> Image:
     gain = min(255.0 / max(high - low, 1.0), 8.0)
     levels = np.clip((np.arange(256) - low) * gain, 0, 255).astype(np.uint8)
     return np.asarray(cv2.LUT(image, levels), np.uint8)
-
-
-def _tracked(left: Image, right: Image, matches: Matches) -> Matches:
-    """Follow matched features to a fraction of a pixel (Lucas and Kanade, IJCAI 1981). Those that get lost stay where they are."""
-    if not len(matches.left_px):
-        return matches
-    scale = min(1.0, _TRACK_WIDTH_PX / left.shape[1])
-    before = _reduced(left, scale)
-    after = with_levels_of(before, _reduced(right, scale))  # tracking takes another exposure for motion
-    start, guess = (
-        ((points + 0.5) * scale - 0.5).astype(np.float32).reshape(-1, 1, 2)
-        for points in (matches.left_px, matches.right_px)
-    )
-    ahead, found, _ = cv2.calcOpticalFlowPyrLK(
-        before, after, start, guess.copy(), winSize=(15, 15), maxLevel=1, flags=cv2.OPTFLOW_USE_INITIAL_FLOW
-    )
-    near = np.linalg.norm((ahead - guess).reshape(-1, 2), axis=1) <= _TRACKED_PX
-    kept = (found.ravel() == 1) & near
-    better = (ahead.reshape(-1, 2).astype(np.float64) + 0.5) / scale - 0.5
-    return Matches(matches.left_px, np.where(kept[:, np.newaxis], better, matches.right_px), matches.turns_deg)
 
 
 def _vertical(upright: Matches, height_px: int) -> tuple[float, float]:
@@ -253,7 +256,7 @@ def _consistency(left: Image, right: Image, disparity: Disparity, offset_px: flo
     """
     width = left.shape[1]
     scale = min(1.0, _CHECK_WIDTH_PX / width)
-    small = _reduced(left, scale), _reduced(right, scale)
+    small = reduced_grey(left, scale), reduced_grey(right, scale)
     half = _PATCH_PX // 2
     sample = sampled_places(disparity, _CHECKS)
     if not len(sample):

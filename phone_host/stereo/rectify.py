@@ -19,6 +19,7 @@ pairs", 2000; OpenCV's calib3d documentation for P1, P2 and Q.
 """
 
 import math
+from copy import copy
 
 import cv2
 import numpy as np
@@ -27,7 +28,20 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from common.imagesize.head import size_text
 from phone_host.geometry.lens import project, rays_through
-from phone_host.model import CameraModel, Epipolar, Image, Lens, Rectification, RectifiedPair, Rig, Side, StereoGeometry
+from phone_host.model import (
+    AS_CALIBRATED,
+    CameraModel,
+    Departure,
+    Epipolar,
+    Image,
+    Lens,
+    Rectification,
+    RectifiedPair,
+    Rig,
+    Side,
+    StereoGeometry,
+)
+from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.images import size_px
 from phone_host.stereo.remap import Maps, remap
 from phone_host.stereo.two_threads import in_two_threads
@@ -157,9 +171,10 @@ class Rectifier:
     """Remaps the images of a rig to a rectified pair; the maps are computed once.
 
     Attributes:
-        rig: the rig it was made for.
+        rig: the rig it was made for, as it stands now.
         rectification: rotations, projections and size.
         geometry: of the rectified pair.
+        overlay: how the right camera departs from the rig that was calibrated.
 
     Args:
         rig: two calibrated cameras.
@@ -172,8 +187,24 @@ class Rectifier:
         self.rig = rig
         self.rectification = rectify_rig(rig)
         self.geometry = self.rectification.geometry
+        self.overlay = AS_CALIBRATED
         self._left = _Remap(rig.left, self.rectification.R_left, self.rectification)
         self._right = _Remap(rig.right, self.rectification.R_right, self.rectification)
+
+    def corrected(self, departure: Departure) -> "Rectifier":
+        """Return a rectifier for the same rig whose right camera has turned since; the left image's maps are shared.
+
+        Args:
+            departure: how the right camera departs from the rig that was calibrated.
+        """
+        if departure == self.overlay:
+            return self
+        made = copy(self)
+        made.rig = corrected_rig(self.rig, departure)
+        made.rectification = corrected_rectification(self.rectification, departure)
+        made.overlay = departure
+        made._right = _Remap(made.rig.right, made.rectification.R_right, made.rectification, self._right.shrink)  # noqa: SLF001  # its own
+        return made
 
     @property
     def reductions(self) -> tuple[int, int]:
@@ -222,19 +253,22 @@ class _Remap:
     The maps of large images are not kept but computed strip by strip: those of 50 megapixels would take 300 MB a side.
     """
 
-    def __init__(self, model: CameraModel, rotation: Matrix, rectification: Rectification) -> None:
+    def __init__(
+        self, model: CameraModel, rotation: Matrix, rectification: Rectification, shrink: int | None = None
+    ) -> None:
         self._model, self._rotation = model, rotation
         self._projection = rectification.P_left[:, :3]  # P_right's first three columns are the same
         self._width, self._height = rectification.width_px, rectification.height_px
         # Bilinear interpolation reads 2 x 2 pixels. A camera twice as fine as the result would alias, so average it
         # down first.
-        self._shrink = max(1, int(_mean_focal_px(model) / rectification.geometry.focal_px + 1e-6))
+        finer = max(1, int(_mean_focal_px(model) / rectification.geometry.focal_px + 1e-6))
+        self.shrink = finer if shrink is None else shrink  # a corrected focal length decodes as the calibrated one
         self._kept = self._maps(0, self._height) if self._width * self._height <= _MOST_KEPT_PIXELS else None
 
     @property
     def reduction(self) -> int:
         """The largest power of 2, up to 8, that divides the factor by which images are averaged down."""
-        return min(self._shrink & -self._shrink, 8)
+        return min(self.shrink & -self.shrink, 8)
 
     def whole_px(self, size_px: tuple[int, int]) -> tuple[int, int]:
         """Return the size of the image that was decoded to this size, px; the size itself if it was not reduced."""
@@ -242,7 +276,7 @@ class _Remap:
         return (width, height) if (width, height) == (self._model.width_px, self._model.height_px) else size_px
 
     def apply(self, image: Image) -> Image:
-        shrink = self._shrink if image.shape[1] == self._model.width_px else self._shrink // self.reduction
+        shrink = self.shrink if image.shape[1] == self._model.width_px else self.shrink // self.reduction
         if shrink > 1:
             height, width = (length // shrink for length in image.shape[:2])
             whole_blocks = image[: height * shrink, : width * shrink]
@@ -265,8 +299,8 @@ class _Remap:
             x, y = cv2.fisheye.initUndistortRectifyMap(k, distortion, self._rotation, new, size, cv2.CV_32FC1)
         else:
             x, y = cv2.initUndistortRectifyMap(k, distortion, self._rotation, new, size, cv2.CV_32FC1)
-        if self._shrink > 1:
-            x, y = ((axis + 0.5) / self._shrink - 0.5 for axis in (x, y))
+        if self.shrink > 1:
+            x, y = ((axis + 0.5) / self.shrink - 0.5 for axis in (x, y))
         return cv2.convertMaps(x, y, cv2.CV_16SC2)  # half the time of float maps, the same 1/32 px
 
 

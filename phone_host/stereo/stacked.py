@@ -56,3 +56,25 @@ def upright_again(values: NDArray[Values], epipolar: Epipolar) -> NDArray[Values
         (H, W) or (H, W, 3).
     """
     return np.asarray(cv2.rotate(values, _BACK[epipolar]), values.dtype) if epipolar.is_vertical else values
+
+
+def upright_points(points_px: NDArray[np.float64], epipolar: Epipolar, size_px: tuple[int, int]) -> NDArray[np.float64]:
+    """Return where points of a lying image are in the upright one.
+
+    Args:
+        points_px: (N, 2), px of the lying image.
+        epipolar: which way the lines run in the upright one.
+        size_px: width and height of the upright image.
+    """
+    if not epipolar.is_vertical:
+        return points_px
+    far = np.array([size_px[0] - 1.0, 0.0]) if epipolar is Epipolar.UP else np.array([0.0, size_px[1] - 1.0])
+    return np.asarray(upright_steps(points_px, epipolar) + far, np.float64)
+
+
+def upright_steps(steps: NDArray[np.float64], epipolar: Epipolar) -> NDArray[np.float64]:
+    """Return steps of a lying image, (N, 2), as they are in the upright one."""
+    if not epipolar.is_vertical:
+        return steps
+    x, y = steps.T
+    return np.column_stack([-y, x] if epipolar is Epipolar.UP else [y, -x])

@@ -1,6 +1,7 @@
 """The options for the stereo core, shared by the verbs that need one. Light: the arguments halves import it."""
 
 import argparse
+from pathlib import Path
 from typing import Final
 
 from phone_host.declared_settings import NEAR_M
@@ -40,6 +41,16 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("camera", "y-up"),
         default="camera",
         help="axes of the points in files: the camera's (x right, y down, z forward), or y up and z backward as many viewers expect",
+    )
+
+
+def add_overlay_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare --overlay."""
+    parser.add_argument(
+        "--overlay",
+        type=Path,
+        metavar="FILE",
+        help="overlay.yaml that a run saved: how the cameras had turned against each other since the calibration",
     )
 
 

@@ -9,9 +9,10 @@ from typing import Final
 
 from common.errors import DataError, SettingsError
 from phone_host.declared_settings import NEAR_M
-from phone_host.model import Rig, Side, StereoGeometry
+from phone_host.model import AS_CALIBRATED, Departure, Rig, Side, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import KittiCameras, is_calib_txt, read_calib_txt
+from phone_host.output.overlay_yaml import read_overlay
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
@@ -100,6 +101,24 @@ def build_core(
                 "--rectified without --disparities", "give the number of disparities, for example --disparities 64"
             )
     return StereoCore(_matcher(chosen, options.disparities, temporal=temporal), None, geometry, wanted), None
+
+
+def overlay_of(options: argparse.Namespace, core: StereoCore | None) -> Departure:
+    """Read --overlay; no correction without it.
+
+    Args:
+        options: options as `add_overlay_argument` declares it.
+        core: the stereo core; None: there is none.
+
+    Raises:
+        SettingsError: there is no rig that it could belong to.
+        DataError: it is not valid, or belongs to another rig.
+    """
+    if options.overlay is None:
+        return AS_CALIBRATED
+    if core is None or core.rig is None:
+        raise SettingsError("--overlay without a rig.yaml that it belongs to", "add --calibration rig.yaml")
+    return read_overlay(options.overlay, core.rig)
 
 
 def depth_wanted(options: argparse.Namespace) -> DepthWanted:

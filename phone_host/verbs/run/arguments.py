@@ -7,7 +7,7 @@ from common.camera.options import TURNED
 from common.program.quantities import milliseconds, reading, seconds
 from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.stereo_arguments import add_stereo_arguments
+from phone_host.verbs.stereo_arguments import add_overlay_argument, add_stereo_arguments
 
 SUMMARY = "pair the board's frames with those of this machine's camera, compute depth, measure every delay"
 
@@ -25,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     _add_sources(parser)
     add_stereo_arguments(parser)
+    add_overlay_argument(parser)
+    parser.add_argument(
+        "--no-correction",
+        action="store_true",
+        help="only tell when the cameras have turned since the calibration; correct nothing",
+    )
     _add_pairing(parser)
     _add_ends(parser)
     _add_results(parser)

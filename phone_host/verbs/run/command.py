@@ -44,7 +44,7 @@ from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
 from phone_host.verbs.run.budget import budget_wanted
-from phone_host.verbs.stereo_options import build_core, output_options
+from phone_host.verbs.stereo_options import build_core, output_options, overlay_of
 
 _CHECK_FAILED = 4
 
@@ -67,10 +67,11 @@ def run(options: argparse.Namespace) -> int:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     _check_numbers(options)
     if options.out is not None:
-        spare(options.out, replayed(settings.camera), settings.calibration)
+        spare(options.out, replayed(settings.camera), settings.calibration, options.overlay)
     fifo = FifoSettings.parse(settings.fifo)
     camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
     core, board_side = _core(options, settings, upright_px(camera))
+    overlay = overlay_of(options, core)
     budget = budget_wanted(options, resolved, core)
     keys = key_folder(settings.keys)
     named = settings.link or (find_board_and_say(keys.path, patience_s(options.wait, options.seconds)),)
@@ -83,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
     signals = StopSignals()
     if options.out is not None:
         keep_other_report(options.out, "run")
-    host_settings = replace(_host_settings(options, resolved, fifo, board_side, core), budget=budget)
+    host_settings = replace(_host_settings(options, resolved, fifo, board_side, core), budget=budget, overlay=overlay)
     host = Host(host_settings, camera, links, core)
     on_terminal = sys.stderr.isatty()
     live = LiveTable(host.snapshot, pairs=options.pairs, seconds=options.seconds) if on_terminal else None
@@ -133,18 +134,19 @@ def _report_failure(options: argparse.Namespace, host: Host, failure: Trouble, b
         print(json_text(report))
 
 
-def spare(out: Path, replay: str, calibration: str) -> None:
+def spare(out: Path, replay: str, calibration: str, overlay: Path | None = None) -> None:
     """Refuse a results folder that would lose the inputs, or holds the replay's photographs.
 
     Args:
         out: folder for the results.
         replay: folder, glob or file that the own camera replays; empty: another camera.
         calibration: path of the rig; empty: none.
+        overlay: correction of an earlier run; None: none.
 
     Raises:
         SettingsError: it is such a folder.
     """
-    inputs = {"--camera": replay, "--calibration": calibration}
+    inputs = {"--camera": replay, "--calibration": calibration, "--overlay": "" if overlay is None else str(overlay)}
     spare_inputs(out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
     if not replay:
         return
@@ -219,6 +221,7 @@ def _host_settings(
         out=options.out,
         save_every=options.save_every,
         axes=output_options(options).axes,
+        corrects=not options.no_correction,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
         interpolate=settings.interpolate,
         most_pixels=settings.most_pixels,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.verbs.orientation_arguments import add_orientation_arguments
-from phone_host.verbs.stereo_arguments import PAIRED, add_stereo_arguments
+from phone_host.verbs.stereo_arguments import PAIRED, add_overlay_argument, add_stereo_arguments
 
 SUMMARY = "compute disparity and point clouds of pairs of images"
 
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"images of the left and of the right camera: {PAIRED}",
     )
     add_stereo_arguments(parser)
+    add_overlay_argument(parser)
     add_orientation_arguments(parser)
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(

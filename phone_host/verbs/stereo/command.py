@@ -26,7 +26,7 @@ from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
 from phone_host.verbs.stereo.next_commands import Typed, next_commands
-from phone_host.verbs.stereo_options import build_core, output_options
+from phone_host.verbs.stereo_options import build_core, output_options, overlay_of
 
 _CHECK_FAILED: Final = 4
 
@@ -77,6 +77,7 @@ def _core(options: argparse.Namespace, matcher: str, size_px: Size, image: Path)
     core, _ = build_core(options, options.calibration or "", matcher, size_px, image)
     if core is None:  # cannot happen: one of the two options was checked above
         raise SettingsError("no stereo core", "give --calibration or --rectified")
+    core.correct(overlay_of(options, core))
     return core
 
 

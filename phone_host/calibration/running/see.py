@@ -1,0 +1,58 @@
+"""Turns a judged pair into a sighting: its features followed, and taken back to the rig as it was calibrated. Pure."""
+
+import math
+from dataclasses import dataclass
+
+from phone_host.calibration.running.rows import RowModel, Sighting
+from phone_host.model import Image, Processed
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence import Look, grey, maps_of
+from phone_host.stereo.evidence_points import ThroughRig
+from phone_host.stereo.evidence_track import Followed, follow
+from phone_host.stereo.stacked import lying, upright_points, upright_steps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Timed:
+    """When a pair's images were exposed, and what the left camera saw before.
+
+    Attributes:
+        late_s: by how much later the left image was exposed than the right one, by their stamps, s; 0 for stills.
+        before: left image of an earlier pair, rectified; None: there is none, or it is not known when it was taken.
+        seconds: how much earlier that was, s.
+    """
+
+    late_s: float = 0.0
+    before: Image | None = None
+    seconds: float = math.nan
+
+
+def sighting_of(core: StereoCore, processed: Processed, look: Look, timed: Timed) -> tuple[RowModel, Sighting] | None:
+    """Follow the features of a judged pair.
+
+    Args:
+        core: that has processed it.
+        processed: the pair.
+        look: what was seen in it.
+        timed: when it was exposed.
+
+    Returns:
+        The rig's model at this size, the same object as long as the size stays, and what was seen; None if no rig has
+        rectified the pair.
+    """
+    height_px, width_px = processed.pair.left.shape[:2]
+    rectifier = core.rectifier_for((width_px, height_px))
+    if rectifier is None:
+        return None
+    epipolar = processed.pair.epipolar
+    before = None if timed.before is None else lying(grey(timed.before), epipolar)
+    seen = follow(look.left, look.right, look.matches, before, timed.seconds)
+    size_px = (width_px, height_px)
+    upright = Followed(
+        upright_points(seen.left_px, epipolar, size_px),
+        upright_points(seen.right_px, epipolar, size_px),
+        upright_steps(seen.velocity_px_s, epipolar),
+    )
+    model = RowModel(rectifier.rig, rectifier.rectification)
+    calibrated = ThroughRig(rectifier.rig, rectifier.rectification)
+    return model, model.sighting(upright, maps_of(core, processed), calibrated, timed.late_s)

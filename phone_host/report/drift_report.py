@@ -1,0 +1,93 @@
+"""How a running rig departs from its calibration, as JSON and as a table of a page. Pure."""
+
+import math
+
+from phone_host.measure.drift_words import is_late, turn_words
+from phone_host.model import Change, ChangeKind, Departure, Drift, Turn
+from phone_host.report.report_page import Table
+
+_WORDS = {
+    ChangeKind.KNOCKED: "knocked",
+    ChangeKind.RETURNED: "a camera or the board was away; measured afresh",
+    ChangeKind.CORRECTED: "corrected for",
+    ChangeKind.BEYOND: "too far to be corrected",
+}
+
+
+def drift_values(drift: Drift | None) -> dict[str, object] | None:
+    """Return the object `drift` of report.json; None without a rig.
+
+    Args:
+        drift: of the run.
+    """
+    if drift is None:
+        return None
+    trend = drift.trend
+    return {
+        "state": drift.state.value,
+        "departure": _departure(drift.departure),
+        "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
+        "focal_sigma_percent": _rounded(100 * drift.focal_sigma),
+        "overlay": _departure(drift.overlay),
+        "vertical_error_px": _rounded(drift.rows_px),
+        "vertical_error_sigma_px": _rounded(drift.rows_sigma_px),
+        "vertical_error_left_px": _rounded(drift.left_px),
+        "zero_sigma_px": _rounded(drift.zero_sigma_px),
+        "features": drift.features,
+        "pairs_used": drift.measurements,
+        "pairs_judged": drift.judged,
+        "trend": {
+            "seconds": _rounded(trend.seconds),
+            "turn_deg_per_min": _degrees(trend.turn_rad_s, 60.0),
+            "turn_sigma_deg_per_min": _degrees(trend.sigma_rad_s, 60.0),
+            "vertical_error_px_per_min": _rounded(60 * trend.rows_px_s),
+        },
+        "late_left_ms": _rounded(drift.late_ns / 1e6),
+        "late_sigma_ms": _rounded(drift.late_sigma_ns / 1e6),
+        "is_late": is_late(drift),
+        "changes": [_change(change) for change in drift.changes],
+    }
+
+
+def drift_table(drift: Drift | None) -> tuple[Table, ...]:
+    """Make a table of what happened to the rig; none if nothing did.
+
+    Args:
+        drift: of the run; None without a rig.
+    """
+    if drift is None or not drift.changes:
+        return ()
+    rows = tuple(
+        (f"{change.at_s:.1f} s", _WORDS[change.kind], turn_words(change.departure) or "none")
+        for change in drift.changes
+    )
+    return (Table("The rig while it ran", ("when", "what", "right camera against its calibration"), rows),)
+
+
+def _change(change: Change) -> dict[str, object]:
+    values: dict[str, object] = {
+        "what": change.kind.value,
+        "at_s": round(change.at_s, 3),
+        "departure": _departure(change.departure),
+    }
+    if change.kind is ChangeKind.KNOCKED:
+        values["step"] = _departure(change.step)
+    if change.kind is ChangeKind.RETURNED:
+        values["away_s"] = round(change.away_s, 3)
+    return values
+
+
+def _departure(departure: Departure) -> dict[str, object]:
+    return {
+        "turn_deg": _degrees(departure.turn_rad),
+        "focal_percent": _rounded(100 * (departure.focal - 1)),
+    }
+
+
+def _degrees(turn: Turn, times: float = 1.0) -> list[float | None]:
+    """Pitch, yaw and roll: about the right camera's x, y and z axis."""
+    return [_rounded(math.degrees(angle) * times) for angle in turn]
+
+
+def _rounded(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 6)

@@ -1,0 +1,358 @@
+"""Whether a rig that turns while it runs is noticed and corrected, and a steady one left alone: `python -m tests.bench.bench_drift [--help]`.
+
+Rendered films of a room through the core that `run` has, judged twice a second as `run` judges: the right camera turns by 0.3
+degrees about each axis at once and in steps, its focal length changes by 1 %, somebody walks through half of the image, walls
+are bare, the light is out, a pattern repeats. Ten rendered minutes and the given sequences of $SCAN_DATA that came with a rig,
+in a loop, must raise no alarm. One film goes through real `board-agent` and `phone-host run`. Exit 4 when a figure is missed, 3 without SCAN_DATA.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from phone_host.calibration.running.fit import fit_rows
+from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, values_of
+from phone_host.calibration.running.see import Timed, sighting_of
+from phone_host.calibration.running.watch import WINDOW, DriftWatch
+from phone_host.measure.drift_words import drift_concerns
+from phone_host.model import AS_CALIBRATED, Change, Departure, Drift
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.evidence import look_at, maps_of
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.rectify import Rectifier
+from tests.bench.depth_scenes import Image
+from tests.bench.drift_films import (
+    Play,
+    bare_room,
+    checked_wall,
+    dark,
+    furnished_room,
+    in_steps,
+    judged_pairs,
+    play_rig,
+    turned,
+    with_walker,
+)
+from tests.bench.drift_run import seconds_until_told
+from tests.bench.figures import Verdict, exit_code
+from tests.bench.machine import machine
+from tests.bench.trust_scenes import GivenPair, given_pairs
+
+_PERIOD_S: Final = 0.5
+_TURN_S: Final = 3.0
+_TOLD_S: Final = 2.0
+_LEFT_PX: Final = 0.3
+_PERSON_PX: Final = 0.05
+_FEW: Final = ("bare", "dark", "repeated")
+"""Films that show too little: whoever corrects there must be right."""
+
+_MINUTES: Final = 10
+_LOOPS: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One film or sequence.
+
+    Attributes:
+        name: of the film.
+        told_s: from the change until it was told, s; NaN: not told, or nothing to tell.
+        left_px: true vertical error that is left at the end, 95th percentile over the image.
+        worst_px: of the estimate that was used, at any moment after it was told.
+        alarms: what was told: changes and concerns.
+        features: the last estimate rests on.
+        cpu_ms: CPU time of a sighting and its estimate, median.
+    """
+
+    name: str
+    told_s: float
+    left_px: float
+    worst_px: float
+    alarms: tuple[str, ...]
+    features: int
+    cpu_ms: float
+
+
+class Watched:
+    """A core and the watch over its rig, as a run has them.
+
+    Args:
+        core: of the rig.
+    """
+
+    def __init__(self, core: StereoCore) -> None:
+        self.core, self.watch = core, DriftWatch()
+        self.model: RowModel | None = None
+        self.seen: list[Sighting] = []
+        self.cpu_ms: list[float] = []
+
+    def look(self, t_s: float, left: Image, right: Image, before: Image | None, seconds: float) -> Drift:
+        """Judge a pair.
+
+        Args:
+            t_s: when.
+            left: as the camera sent it.
+            right: the same.
+            before: what the left camera sent before; None: nothing.
+            seconds: how much earlier, s.
+        """
+        processed = self.core.compute(left, right, time.monotonic_ns)
+        look = look_at(processed, maps_of(self.core, processed))
+        earlier = None
+        if before is not None:
+            rectifier = self.core.rectifier_for((processed.pair.left.shape[1], processed.pair.left.shape[0]))
+            assert rectifier is not None
+            earlier = rectifier.rectify(before, right).left
+        began = time.process_time()
+        found = sighting_of(self.core, processed, look, Timed(0.0, earlier, seconds))
+        assert found is not None
+        self.watch.add(*found, t_s)
+        self.cpu_ms.append((time.process_time() - began) * 1e3)
+        self.model, self.seen = found[0], [*self.seen, found[1]][-WINDOW:]
+        drift = self.watch.drift
+        if drift.overlay != processed.overlay:
+            self.core.correct(drift.overlay)
+        return drift
+
+    def left_px(self, true: Departure) -> float:
+        """Return the vertical error that the correction in use leaves, 95th percentile over the image, px."""
+        assert self.model is not None
+        off = values_of(true) - values_of(self.watch.overlay)
+        return float(np.percentile(np.abs(self.model.everywhere() @ off), 95))
+
+    def raw_rows_px(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        """Return the rows that the latest sightings say, all over the image, px, whether proven or not."""
+        assert self.model is not None
+        values = fit_rows(self.model, self.seen).values[:PARAMETERS]
+        return np.asarray(self.model.everywhere() @ values, np.float64)
+
+
+def _core() -> StereoCore:
+    """The disparities do not matter here: the half size is fast."""
+    return StereoCore(MatchSettings(MatcherName.SGBM, 96), Rectifier(play_rig()), None, DepthWanted(scale=0.5))
+
+
+def watch_film(play: Play) -> Row:
+    """Watch a film."""
+    return _watched(play)[0]
+
+
+def _watched(play: Play) -> tuple[Row, Watched]:
+    watched, told_s, worst, drift = Watched(_core()), float("nan"), 0.0, Drift()
+    for t_s, left, right, before in judged_pairs(play, play_rig(), _PERIOD_S):
+        drift = watched.look(t_s, left, right, before, 1 / play.fps)
+        begun = next((act.from_s for act in play.acts), float("inf"))
+        if np.isnan(told_s) and any(change.at_s >= begun for change in drift.changes):
+            told_s = t_s - begun
+        if not np.isnan(told_s) or not play.acts:
+            worst = max(worst, watched.left_px(play.departure_at(t_s)))
+    alarms = (*_told(drift.changes), *(concern.doubt.value for concern in drift_concerns(drift)))
+    row = Row(
+        play.name,
+        told_s,
+        watched.left_px(play.departure_at(play.seconds)),
+        worst,
+        alarms,
+        drift.features,
+        float(np.median(watched.cpu_ms)),
+    )
+    return row, watched
+
+
+def _told(changes: Iterable[Change]) -> Iterator[str]:
+    return (f"{change.kind.value} {change.at_s:.1f} s" for change in changes)
+
+
+def films() -> list[Play]:
+    """All films but the walker's and the long one."""
+    found = []
+    for fps in (15, 30):
+        for axis, name in enumerate(("pitch", "yaw", "roll")):
+            for angle in (0.3, -0.3):
+                act = turned(_TURN_S + 0.2, axis, angle)
+                scene = furnished_room(2 * axis + (angle > 0) + fps)
+                found.append(Play(name=f"{name} {angle:+} at {fps}/s", scene=scene, acts=(act,), seconds=6, fps=fps))
+    for axis, name in enumerate(("pitch", "yaw", "roll")):
+        steps = in_steps(_TURN_S, axis, 0.3, count=6, seconds=6)
+        found.append(Play(name=f"{name} +0.3 in 6 steps", scene=furnished_room(40 + axis), acts=steps, seconds=13))
+    focus = (replace(turned(_TURN_S, 0, 0.0), departure=Departure(focal=1.01)),)
+    found.append(Play(name="focus +1 %", scene=furnished_room(50), acts=focus, seconds=6))
+    walker = with_walker(furnished_room(51))
+    turn = (turned(_TURN_S, 0, 0.3),)
+    found.append(Play(name="pitch +0.3, walker", scene=walker, acts=turn, seconds=7))
+    found.append(Play(name="pitch +0.3, walker 20 ms late", scene=walker, acts=turn, seconds=7, late_s=0.02))
+    for name, scene in (("bare room", bare_room()), ("repeated pattern", checked_wall())):
+        found.append(Play(name=f"{name}, pitch +0.3", scene=scene, acts=turn, seconds=7))
+    found.append(dark(Play(name="dark room, pitch +0.3", scene=furnished_room(52), acts=turn, seconds=7)))
+    return found
+
+
+def person_px(late_s: float) -> tuple[str, float, float]:
+    """Return by how much somebody who walks through half of the image moves the rows: the median over time, and what is corrected.
+
+    Args:
+        late_s: by how much later than stated the left image is exposed.
+    """
+    room, moved, rows, used = furnished_room(51), [], [], 0.0
+    for scene in (room, with_walker(room)):
+        watched, each = Watched(_core()), []
+        play = Play(name="person", scene=scene, seconds=9, late_s=late_s)
+        for t_s, left, right, before in judged_pairs(play, play_rig(), _PERIOD_S):
+            drift = watched.look(t_s, left, right, before, 1 / play.fps)
+            used = max(used, watched.left_px(AS_CALIBRATED), drift.rows_px if drift.judged > WINDOW else 0.0)
+            if drift.judged > WINDOW:
+                each.append(watched.raw_rows_px())
+        rows.append(each)
+    moved = [float(np.percentile(np.abs(one - other), 95)) for one, other in zip(*rows, strict=True)]
+    return f"{1e3 * late_s:.0f} ms", max(moved), used
+
+
+def long_steady(minute: int) -> Play:
+    """One of the ten rendered minutes: a room of its own, every second one with somebody in it."""
+    scene = furnished_room(60 + minute, contrast=0.25 if minute % 3 == 0 else 0.5)
+    scene = with_walker(scene) if minute % 2 else scene
+    return Play(name=f"minute {minute + 1}", scene=scene, seconds=60, fps=15)
+
+
+def _sequences(data: Path) -> list[Row]:
+    """Loop the given sequences, each pair as a still; every rig as it was calibrated or published."""
+    rows = []
+    families = groupby(given_pairs(data), key=_family)
+    for family, pairs in families:
+        some = list(pairs)
+        if not family or some[0].rig is None:
+            continue
+        rows.append(_looped(family, some))
+    return rows
+
+
+def _family(pair: GivenPair) -> str:
+    known = ("euroc", "stereopi", "simplestereo board", "opencv board", "sourishg board")
+    return next((name for name in known if pair.name.startswith(name)), "")
+
+
+def _looped(family: str, pairs: Sequence[GivenPair]) -> Row:
+    watched = Watched(pairs[0].core())
+    drift, count = Drift(), 0
+    for _ in range(_LOOPS if len(pairs) > 2 else 2 * _LOOPS):
+        for pair in pairs:
+            drift = watched.look(_PERIOD_S * count, pair.left, pair.right, None, float("nan"))
+            count += 1
+    alarms = (*_told(drift.changes), *(concern.doubt.value for concern in drift_concerns(drift)))
+    return Row(
+        f"{family}, {count} pairs ({drift.state.value})",
+        float("nan"),
+        drift.rows_px,
+        0.0,
+        alarms,
+        drift.features,
+        float(np.median(watched.cpu_ms)),
+    )
+
+
+def euroc_px(data: Path) -> float:
+    """Return the mean distance of euroc's features from their rows with the imported calibration, px."""
+    off: list[float] = []
+    for pair in given_pairs(data):
+        if not pair.name.startswith("euroc"):
+            if off:
+                break
+            continue
+        watched = Watched(pair.core())
+        watched.look(0.0, pair.left, pair.right, None, float("nan"))
+        assert watched.model is not None
+        seen = watched.seen[-1].off_px
+        off.append(float(np.abs(seen[np.abs(seen) < 2.0]).mean()))
+    return float(np.mean(off))
+
+
+def _verdicts(
+    rows: Sequence[Row], people: Sequence[tuple[str, float, float]], steady: Sequence[Row], run_s: float
+) -> list[Verdict]:
+    few = [row for row in rows if row.name.startswith(_FEW)]
+    turns = [row for row in rows if row not in few]
+    slowest = max((row.told_s if not np.isnan(row.told_s) else 99.0) for row in turns)
+    left = max(row.left_px for row in turns)
+    alarms = [f"{row.name}: {', '.join(row.alarms)}" for row in steady if row.alarms]
+    wrong = [
+        row.name for row in few if any(word.startswith("corrected") for word in row.alarms) and row.left_px > _LEFT_PX
+    ]
+    return [
+        Verdict("told after", slowest <= _TOLD_S, f"{slowest:.2f} s", f"{_TOLD_S:g} s"),
+        Verdict("vertical error left, p95", left <= _LEFT_PX, f"{left:.2f} px", f"{_LEFT_PX} px"),
+        Verdict("alarms of steady rigs", not alarms, "; ".join(alarms) or "none", "none"),
+        Verdict("person moves the rows", people[0][1] < _PERSON_PX, f"{people[0][1]:.3f} px", f"{_PERSON_PX} px"),
+        Verdict(
+            "person 20 ms late: what is used", people[1][2] < _PERSON_PX, f"{people[1][2]:.3f} px", f"{_PERSON_PX} px"
+        ),
+        Verdict("corrected from too few", not wrong, ", ".join(wrong) or "never", "never"),
+        Verdict("real run, told after", run_s <= _TOLD_S, f"{run_s:.2f} s", f"{_TOLD_S:g} s"),
+    ]
+
+
+def main() -> int:
+    """Run everything, print tables, and return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=int, default=_MINUTES, help="rendered minutes of a steady rig (figure: 10)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the rows")
+    options = parser.parse_args()
+    data = os.environ.get("SCAN_DATA", "")
+    if not data:
+        print("bench_drift: SCAN_DATA is not set: name the folder of the given sequences", file=sys.stderr)
+        return 3
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=spawn) as pool:
+        minutes = pool.map(watch_film, [long_steady(minute) for minute in range(options.minutes)])
+        turning = pool.map(watch_film, films())
+        people = pool.map(person_px, (0.0, 0.02))
+        given, euroc = pool.submit(_sequences, Path(data)), pool.submit(euroc_px, Path(data))
+        rows, walked = list(turning), list(people)
+        steady = [*minutes, *given.result()]
+        mean_px = euroc.result()
+    run_s = seconds_until_told()
+    console = Console(width=150)
+    console.print(machine())
+    console.print(_table("a rig that turns", rows))
+    console.print(_table("a steady rig", steady))
+    verdicts = _verdicts(rows, walked, steady, run_s)
+    verdicts.append(Verdict("euroc, imported: |y| mean", mean_px <= 0.13, f"{mean_px:.3f} px", "0.13 px"))
+    for verdict in verdicts:
+        console.print(str(verdict))
+    if options.json:
+        options.json.write_text(json.dumps([str(row) for row in (*rows, *steady)], indent=1))
+    return exit_code(verdicts)
+
+
+def _table(title: str, rows: Sequence[Row]) -> Table:
+    table = Table(title=title)
+    for name in ("film", "told after, s", "left p95, px", "worst after, px", "features", "CPU, ms", "told"):
+        table.add_column(name)
+    for row in rows:
+        numbers = (
+            f"{row.told_s:.2f}",
+            f"{row.left_px:.2f}",
+            f"{row.worst_px:.2f}",
+            str(row.features),
+            f"{row.cpu_ms:.1f}",
+        )
+        table.add_row(row.name, *numbers, ", ".join(row.alarms))
+    return table
+
+
+if __name__ == "__main__":
+    sys.exit(main())
