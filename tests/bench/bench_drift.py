@@ -267,7 +267,7 @@ def _looped(family: str, pairs: Sequence[GivenPair]) -> Row:
 
 def euroc_px(data: Path) -> float:
     """Return the mean distance of euroc's features from their rows with the imported calibration, px."""
-    off = []
+    off: list[float] = []
     for pair in given_pairs(data):
         if not pair.name.startswith("euroc"):
             if off:
