@@ -98,6 +98,7 @@ def test_the_line_says_what_is_known() -> None:
         in drift_lines(replace(KNOWN, state=DriftState.STEADY))[0]
     )
     assert "not corrected" in drift_lines(replace(corrected(FAR), state=DriftState.DEPARTED))[0]
+    assert "focal length +1.00 %; corrected" in drift_lines(corrected(ZOOMED))[0]
     assert "as calibrated; corrected" in drift_lines(corrected(AS_CALIBRATED))[0]
     trend = Trend(turn_rad_s=(1e-4, 0, 0), sigma_rad_s=(1e-6, 1e-6, 1e-6), rows_px_s=0.1, seconds=60.0)
     [line] = drift_lines(replace(corrected(FAR), trend=trend))

@@ -23,13 +23,19 @@ def test_every_command_prints_all_versions(command: str) -> None:
 
 
 def test_the_line_names_each_version() -> None:
-    """Package, wire and the four kinds of files."""
+    """Package, wire and the five kinds of files."""
     found = re.fullmatch(
-        r"tandemscan (\S+) \(protocol (\d+), rig\.yaml (\d+), delays\.jsonl (\d+), report\.json (\d+), cameras\.json (\d+)\)",
+        r"tandemscan (\S+) \(protocol (\d+), rig\.yaml (\d+), delays\.jsonl (\d+), report\.json (\d+), cameras\.json (\d+), overlay\.yaml (\d+)\)",
         all_versions(),
     )
     assert found is not None
-    formats = (versions.RIG_FORMAT, versions.LEDGER_FORMAT, versions.REPORT_FORMAT, versions.CAMERAS_FORMAT)
+    formats = (
+        versions.RIG_FORMAT,
+        versions.LEDGER_FORMAT,
+        versions.REPORT_FORMAT,
+        versions.CAMERAS_FORMAT,
+        versions.OVERLAY_FORMAT,
+    )
     assert found.groups() == tuple(map(str, (PACKAGE_VERSION, PROTOCOL_VERSION, *formats)))
 
 

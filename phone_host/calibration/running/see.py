@@ -1,6 +1,5 @@
 """Turns a judged pair into a sighting: its features followed, and taken back to the rig as it was calibrated. Pure."""
 
-import math
 from dataclasses import dataclass
 
 from phone_host.calibration.running.rows import RowModel, Sighting
@@ -19,12 +18,12 @@ class Timed:
     Attributes:
         late_s: by how much later the left image was exposed than the right one, by their stamps, s; 0 for stills.
         before: left image of an earlier pair, rectified; None: there is none, or it is not known when it was taken.
-        seconds: how much earlier that was, s.
+        seconds: how much earlier that was, s; 0: not known.
     """
 
     late_s: float = 0.0
     before: Image | None = None
-    seconds: float = math.nan
+    seconds: float = 0.0
 
 
 def sighting_of(core: StereoCore, processed: Processed, look: Look, timed: Timed) -> tuple[RowModel, Sighting] | None:
