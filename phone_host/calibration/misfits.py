@@ -11,6 +11,8 @@ from phone_host.stereo.rectify import across_lines_px, rectify_points, rectify_r
 
 # A pair is rejected when its error is twice the median pair's, but never below this floor: smaller errors do no harm.
 _OUTLIER_FACTOR, _OUTLIER_FLOOR_PX = 2.0, 0.3
+# Lenses bend as little as few pairs allow, which one pair shows more than another: less than this many need an error of three times the median pair's.
+_FEW_PAIRS, _FEW_FACTOR = 8, 3.0
 # Row errors carry a third of the information and scatter more from pair to pair.
 _ROWS_FACTOR = 2.5
 
@@ -19,7 +21,8 @@ def misfits(pairs: list[BoardPair], result: BundleResult, points_m: Vector) -> l
     """Find pairs that fit much worse than the others, worst first: by reprojection error, or by rows that do not match."""
     errors = np.fmax(*result.view_rms_px())
     usual = float(np.median(errors))
-    by_error = errors / max(_OUTLIER_FACTOR * usual, _OUTLIER_FLOOR_PX)
+    factor = _FEW_FACTOR if len(pairs) < _FEW_PAIRS else _OUTLIER_FACTOR
+    by_error = errors / max(factor * usual, _OUTLIER_FLOOR_PX)
     found = [
         (
             by_error[index],
