@@ -39,8 +39,11 @@ START_PX: Final = 0.25
 
 _END_PX: Final = 0.15
 _FOLLOW_PX: Final = 0.1
-_FOLLOW_SIGMAS: Final = 2.0
-"""A correction follows the estimate in steps of this size, if it is not mere noise."""
+_FOLLOW_CHI2: Final = 25.0
+"""A correction follows the estimate, or ends, in steps of at least this size, if that is proven: 4 sigmas in four dimensions."""
+
+_START_SIGMAS: Final = 5.0
+"""What proves that a correction is needed at all: more than what names its parts, or it would come and go."""
 
 _AT_FIRST: Final = 3
 """Sightings before anything is said: one that is wrong must not be half of them."""
@@ -236,20 +239,23 @@ class DriftWatch:
         if is_beyond or not self._corrects:
             return
         if self._overlay == AS_CALIBRATED:
-            wanted = departure if self._rows_px(values) >= START_PX else AS_CALIBRATED
-        elif self._rows_px(values) < _END_PX:
-            wanted = AS_CALIBRATED
+            is_needed = self._rows_px(values) >= START_PX and proven(found.fit, _START_SIGMAS).any()
+            wanted = departure if is_needed else AS_CALIBRATED
+        elif self._is_off(found):
+            wanted = AS_CALIBRATED if self._rows_px(values) < _END_PX else departure
         else:
-            wanted = departure if self._is_off(found) else self._overlay
+            wanted = self._overlay
         if wanted != self._overlay:
             self._overlay = wanted
             self._note(Change(kind=ChangeKind.CORRECTED, at_s=at_s, departure=wanted))
 
     def _is_off(self, found: _Estimate) -> bool:
         """Tell whether the estimate has left the correction by more than noise."""
-        off = found.values - values_of(self._overlay)
-        squares = off @ np.linalg.solve(found.fit.covariance[:PARAMETERS, :PARAMETERS], off)
-        return self._rows_px(off) >= _FOLLOW_PX and bool(squares > _FOLLOW_SIGMAS**2)
+        off = found.fit.values[:PARAMETERS] - values_of(self._overlay)
+        information = np.linalg.inv(found.fit.covariance[:PARAMETERS, :PARAMETERS])
+        return self._rows_px(found.values - values_of(self._overlay)) >= _FOLLOW_PX and bool(
+            off @ information @ off > _FOLLOW_CHI2
+        )
 
     def _note(self, change: Change) -> None:
         if len(self._changes) >= _MOST_CHANGES:
