@@ -96,7 +96,7 @@ class Painter:
             sigma = self._blur_px(middle)
             layer = np.asarray(cv2.GaussianBlur(layer, (0, 0), sigma), np.float32)
             value, opacity = cv2.split(layer)
-            light = 0.65 + 0.45 * abs(float(middle.R[:, 2] @ _LAMP))
+            light = 0.6 + 0.4 * abs(float(middle.R[:, 2] @ _LAMP))
             there = np.s_[y0:y1, x0:x1]
             seen[there] = seen[there] * (1 - opacity * (1 / 255)) + value * self._shade[there] * light
         return self._noisy(seen)
