@@ -13,7 +13,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from common import now
-from common.errors import DataError
+from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
@@ -207,7 +207,7 @@ class _Work:
         """Compute and write a pair, or say why not."""
         try:
             return self.computed(folder, left, right)
-        except DataError as error:
+        except (DataError, SettingsError) as error:  # or a --crop that lies outside images of this size
             if self._cores.has_none:  # no pair can be computed without one
                 raise
             return FailedPair(name=folder, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy)

@@ -67,7 +67,7 @@ def test_a_rig_is_exported_into_folders_beside_it(
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ([], 2, "neither pictures nor --import"),
+        ([], 2, "neither pictures nor --live nor --import"),
         (["l", "r", "--board", "9x6"], 2, "--square is missing"),
         (["l", "r", "--board", "9x6", "--square", "25mm", "--unit", "1mm"], 2, "--unit without --import"),
         (["l", "r", "--import", "C"], 2, "--import and pictures contradict"),

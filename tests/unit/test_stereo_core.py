@@ -130,7 +130,7 @@ def test_a_crop_outside_is_told_before_images_are_decoded() -> None:
     """The sizes alone show that nothing of the crop lies in the rectified image of about 560 x 330 px."""
     crop = Crop(x_px=700, y_px=0, width_px=10, height_px=10)
     core = StereoCore(MatchSettings(), Rectifier(unlike_rig()), wanted=DepthWanted(search_from_m=0.5, crop=crop))
-    with pytest.raises(DataError, match="--crop 700,0,10,10"):
+    with pytest.raises(SettingsError, match="--crop 700,0,10,10"):
         core.require_sizes((640, 480), (1280, 720))
 
 
