@@ -87,7 +87,7 @@ def test_a_perfect_rig_measures_exactly() -> None:
 
 @pytest.mark.parametrize(
     ("aside_m", "grip", "part", "whole"),
-    [(0.0, 0, (9, 6), (9, 6)), (0.18, 0, (6, 4), None), (0.0, 1, (8, 6), None)],
+    [(0.0, 0, (9, 6), (9, 6)), (0.18, 0, (7, 6), None), (0.0, 1, (8, 6), None)],
     ids=["whole", "half outside", "held over squares"],
 )
 def test_a_part_of_a_board_is_no_smaller_board(
