@@ -81,9 +81,7 @@ class Show:
 
 def test_a_person_who_follows_the_words_is_done_with_few_views() -> None:
     """Two minutes and 25 views at most; views are unlike each other, and no kind of view is forgotten."""
-    guide = follow(
-        unlike_rig(), BOARD, np.random.default_rng(1), lambda views: grown(views, Verdict.GOOD), most_s=150
-    )
+    guide = follow(unlike_rig(), BOARD, np.random.default_rng(1), lambda views: grown(views, Verdict.GOOD), most_s=150)
     assert guide.ended is Ended.GOOD
     assert 10 <= len(guide.views) <= 25
     assert guide.views[-1].sighting.at_ns < 120 * SECOND_NS

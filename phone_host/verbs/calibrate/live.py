@@ -185,8 +185,6 @@ def _check(options: argparse.Namespace) -> None:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     if not _LEAST_VIEWS <= options.views <= _MOST_VIEWS:
         raise SettingsError(f"--views is {options.views}", f"give {_LEAST_VIEWS} to {_MOST_VIEWS}")
-    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
-        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")
     if len(options.images) not in {0, 2}:
         raise SettingsError(
             f"--live with {counted(len(options.images), 'folder')}",

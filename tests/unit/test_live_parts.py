@@ -1,0 +1,160 @@
+"""The parts of a live calibration beside the guide: finding a moving board, the folders of pictures, the voice, the lines that are written."""
+
+import argparse
+import io
+import threading
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from rich.console import Console
+
+from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.calibration.guide.snapshot import before_board
+from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
+from phone_host.calibration.target import Board, find_corners
+from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken
+from phone_host.live.newest import Newest
+from phone_host.live.view_folders import Pictures, ViewFolders
+from phone_host.live.voice import Voice, speech_program
+from phone_host.verbs.calibrate.arguments import add_arguments
+from phone_host.verbs.calibrate.command import run
+from tests.support.boards import BOARD, poses, render_pair
+from tests.support.programs import until
+from tests.support.rigs import small_rig
+
+_PAIR = render_pair(small_rig(), poses(1, seed=8, depth_m=(0.4, 0.5))[0])
+
+
+def test_a_moving_board_is_found_roughly_and_then_exactly() -> None:
+    """Both ways agree to half a pixel; the second look, near the first place, finds the same; an empty image has none."""
+    finder = BoardFinder(BOARD)
+    rough, exact = finder.find(*_PAIR), finder.find_exactly(*_PAIR)
+    again = finder.find(*_PAIR)
+    for image, one, two, three in zip(_PAIR, rough, exact, again, strict=True):
+        np.testing.assert_allclose(two, find_corners(image, BOARD), atol=1e-6)
+        assert np.abs(one - two).max() < 0.5
+        assert np.abs(three - two).max() < 0.5
+    left, right = finder.find(_PAIR[0], np.full_like(_PAIR[1], 128))
+    assert (len(left), len(right)) == (54, 0)
+
+
+def test_the_boards_size_is_found_and_a_wrong_one_is_named() -> None:
+    """After a few pairs the size is known; a board that was named otherwise is refused with the right size."""
+    finder = SizeFinder(0.025)
+    found = [finder.find(*_PAIR) for _ in range(3)]
+    assert found[-1] == BOARD
+    check = SizeCheck(Board(8, 6, 0.025))
+    for _ in range(12):
+        check.missed(*_PAIR)
+    with pytest.raises(SettingsError, match="this board has 9x6 inner corners, --board says 8x6"):
+        check.missed(*_PAIR)
+
+
+def test_a_board_of_marks_is_not_taken_for_a_chessboard() -> None:
+    """A ChArUco board is refused by name."""
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_1000)
+    board = cv2.aruco.CharucoBoard((8, 6), 0.03, 0.022, family)
+    image = np.asarray(board.generateImage((640, 480), marginSize=20), np.uint8)
+    finder = SizeFinder(0.03)
+    assert finder.find(image, image) is None
+    with pytest.raises(DataError, match="ArUco 5x5"):
+        finder.find(image, image)
+
+
+def test_pictures_replace_those_of_an_earlier_session_only(tmp_path: Path) -> None:
+    """Pictures are exact and numbered; a second session removes them; pictures of other names are refused."""
+    left, right = tmp_path / "left", tmp_path / "right"
+    folders = ViewFolders(left, right)
+    folders.write(Pictures("01", *_PAIR))
+    folders.close("{}")
+    assert np.array_equal(np.asarray(cv2.imread(str(right / "01.png"), cv2.IMREAD_GRAYSCALE)), _PAIR[1])
+    assert (left / "cameras.json").read_text() == "{}"
+    ViewFolders(left, right).close("")
+    assert not list(left.glob("*.png"))
+    (right / "holiday.jpg").write_bytes(b"")
+    with pytest.raises(UnavailableError, match="holds other pictures"):
+        ViewFolders(left, right)
+
+
+def test_only_the_newest_thing_is_worked_on() -> None:
+    """What comes while one is worked on replaces what waits; the end waits for the last; a failure is kept."""
+    begun, go, seen = threading.Event(), threading.Event(), list[int]()
+
+    def work(number: int) -> None:
+        begun.set()
+        go.wait(60)
+        seen.append(number)
+        if number == 4:
+            raise ValueError
+
+    newest = Newest("test", work)
+    newest.offer(1)
+    begun.wait(60)
+    for number in (2, 3):
+        newest.offer(number)
+    assert newest.is_busy
+    go.set()
+    until(lambda: not newest.is_busy, "the third")
+    newest.offer(4)
+    newest.finish()
+    assert seen == [1, 3, 4]
+    assert isinstance(newest.failure, ValueError)
+
+
+def test_words_are_spoken_by_the_systems_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program that is there gets the words as one argument; without one there is no command."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert speech_program() == ()
+    script = tmp_path / "espeak-ng"
+    script.write_text(f'#!/bin/sh\necho "$1" >> {tmp_path}/said\n')
+    script.chmod(0o755)
+    assert speech_program() == ("espeak-ng",)
+    voice = Voice(speech_program())
+    spoken = Spoken(voice.say)
+    for _ in range(2):
+        spoken.show(before_board("hold still", 25, 1.0), (), "")
+    voice.finish()
+    assert (tmp_path / "said").read_text() == "hold still\n"
+
+
+def test_lines_are_written_when_they_are_new(capsys: pytest.CaptureFixture[str]) -> None:
+    """The same words and the same note are written once."""
+    lines = Lines()
+    for words, note in (("hold still", ""), ("hold still", "waiting"), ("closer", "waiting"), ("closer", "")):
+        lines.show(before_board(words, 25, 1.0), (), note)
+    assert capsys.readouterr().err == "say: hold still\nnote: waiting\nsay: closer\n"
+
+
+def test_the_picture_and_the_files_show_the_words(tmp_path: Path) -> None:
+    """On a terminal of 48 columns, and in guide.json and guide.svg."""
+    console = Console(file=io.StringIO(), force_terminal=True, width=48, height=20)
+    with Picture(console) as picture:
+        picture.show(before_board("hold still", 25, 1.0), (), "waiting for a board")
+    assert isinstance(console.file, io.StringIO)
+    assert "hold still" in console.file.getvalue()
+    assert "waiting for a board" in console.file.getvalue()
+    SnapshotFiles(tmp_path / "shown").show(before_board("hold still", 25, 1.0), (), "")
+    assert sorted(path.name for path in (tmp_path / "shown").iterdir()) == ["guide.json", "guide.svg"]
+    assert '"words": "hold still"' in (tmp_path / "shown" / "guide.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        (["--live"], "no camera of this machine"),
+        (["--live", "--camera", "replay:x", "--views", "2"], "--views is 2"),
+        (["--live", "--camera", "replay:x", "left"], "--live with 1 folder"),
+        (["--live", "--camera", "replay:x", "--rotate-left", "90"], "--live does not take"),
+        (["left", "right", "--camera", "replay:x"], "--camera without --live"),
+        ([], "neither pictures nor --live nor --import"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(tmp_path: Path, options: list[str], problem: str) -> None:
+    """Each in one line, before a camera is opened."""
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true")
+    with pytest.raises(SettingsError, match=problem):
+        run(parser.parse_args([*options, "--square", "25mm", "--out", str(tmp_path / "rig.yaml")]))
