@@ -30,8 +30,8 @@ _SEARCHED_PX: Final = 800
 _SEED: Final = (3, 3)
 """The smallest lattice from which the detector may grow; what is no larger may be any pattern."""
 
-_MARGIN, _LEAST_MARGIN = 1.5, 0.65
-"""So many squares beside the outermost corners is the middle of the margin; so much of it must be seen. Fingers may lie on the rest; of a row of
+_MARGIN, _LEAST_MARGIN = 1.25, 0.65
+"""So many squares beside the outermost corners is the margin, be it half a square wide; so much of it must be seen. Fingers may lie on the rest; of a row of
 squares about half is white."""
 
 _SAMPLE: Final = 24
