@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Final
 
 import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, TandemError
 from common.imagesize.head import MOST_PIXELS
 from phone_host.calibration.marks_seen import marks_seen
-from phone_host.calibration.target import shrunk
+from phone_host.calibration.target import Corners, shrunk
 from phone_host.calibration.threads import side_by_side
 from phone_host.model import Image
 from phone_host.stereo.images import decode_file, open_image, to_grey
@@ -27,6 +29,10 @@ _SEARCHED_PX: Final = 800
 
 _SEED: Final = (3, 3)
 """The smallest lattice from which the detector may grow; what is no larger may be any pattern."""
+
+_MARGIN, _LEAST_MARGIN = 1.25, 0.65
+"""So many squares beside the outermost corners is the margin, be it half a square wide; so much of it must be seen. Fingers may lie on the rest; of a row of
+squares about half is white."""
 
 _SAMPLE: Final = 24
 """At most so many images are asked: 12 photographs of 12 MPx take 1.5 s on two cores."""
@@ -89,15 +95,58 @@ def size_seen(grey: Image) -> Size | None:
     Returns:
         The two counts, the larger first. It may be a part of the board.
     """
-    small, _ = shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))
-    found, _, meta = cv2.findChessboardCornersSBWithMeta(
-        small, _SEED, flags=cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
+    return _size_of(_lattice(_searched(grey)))
+
+
+def whole_size_seen(grey: Image) -> Size | None:
+    """Return the inner corners of the chessboard in an image, if its white margin is seen on all four sides.
+
+    A board that reaches beyond the image, or that a hand covers, looks like a smaller one. On the side where it is cut there are more
+    squares, a hand or nothing beside the outermost corners instead of a black-and-white row and then the margin.
+
+    Args:
+        grey: (H, W) uint8.
+
+    Returns:
+        The two counts, the larger first.
+    """
+    small = _searched(grey)
+    grid = _lattice(small)
+    size = _size_of(grid)
+    if size is None:
+        return None
+    squares = _levels(small, (grid[:-1, :-1] + grid[1:, 1:]) / 2)
+    limit = (np.percentile(squares, 10) + np.percentile(squares, 90)) / 2
+    sides = (grid, grid[::-1], grid.transpose(1, 0, 2), grid[:, ::-1].transpose(1, 0, 2))
+    margins = (_levels(small, side[0] + _MARGIN * (side[0] - side[1])) for side in sides)
+    return size if all((levels > limit).mean() >= _LEAST_MARGIN for levels in margins) else None
+
+
+def _searched(grey: Image) -> Image:
+    return shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))[0]
+
+
+def _lattice(grey: Image) -> Corners:
+    """Return the corners that hang together, (rows, columns, 2) px; empty: there are none."""
+    found, corners, meta = cv2.findChessboardCornersSBWithMeta(
+        grey, _SEED, flags=cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
     )
     if not found or meta is None:
-        return None
-    rows, columns = meta.shape[:2]
-    size = max(rows, columns), min(rows, columns)
-    return None if size == _SEED else size
+        return np.empty((0, 0, 2))
+    return np.asarray(corners, np.float64).reshape(*meta.shape[:2], 2)
+
+
+def _size_of(grid: Corners) -> Size | None:
+    size = max(grid.shape[:2]), min(grid.shape[:2])
+    return None if size in {_SEED, (0, 0)} else size
+
+
+def _levels(grey: Image, points: Corners) -> NDArray[np.float64]:
+    """Return grey levels at some points; 0 outside of the image."""
+    x, y = np.rint(points.reshape(-1, 2)).astype(int).T
+    height, width = grey.shape
+    inside = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+    return np.where(inside, grey[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)], 0).astype(np.float64)
 
 
 def vote(images: Iterator[Path], look: Callable[[Path], Size | None]) -> Vote:

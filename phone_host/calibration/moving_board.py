@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.board_size import Size, Vote, size_seen, size_text
+from phone_host.calibration.board_size import Size, Vote, size_text, whole_size_seen
 from phone_host.calibration.marks_seen import marks_seen
 from phone_host.calibration.target import Board, Corners, agree, find_corners, order_by_colour, shrunk
 from phone_host.calibration.threads import side_by_side
@@ -87,7 +87,7 @@ class BoardFinder:
 
 
 class SizeFinder:
-    """Finds out which chessboard a person shows, from pair after pair.
+    """Finds out which chessboard a person shows, from pair after pair. Only whole boards count: the first one that is seen is often half outside.
 
     Args:
         square_m: side of its squares, m.
@@ -107,7 +107,7 @@ class SizeFinder:
         Raises:
             DataError: the person shows a board of coded marks.
         """
-        sizes = side_by_side(size_seen, (left, right))
+        sizes = side_by_side(whole_size_seen, (left, right))
         self._vote = Vote(self._vote.asked + 2, self._vote.sizes + Counter(size for size in sizes if size is not None))
         size = self._vote.leader if self._vote.is_over else None
         if size is None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from phone_host.calibration.board_size import size_seen, whole_size_seen
 from phone_host.calibration.target import find_corners
 from phone_host.geometry.lens import project
 from tests.support.novice.hands import Plan, Stroke, motion
@@ -82,3 +83,18 @@ def test_a_perfect_rig_measures_exactly() -> None:
     assert depth_error_m(replace(rig, t_right_left_m=rig.t_right_left_m * 1.01), rig, 1.0) == pytest.approx(
         0.01, rel=1e-3
     )
+
+
+@pytest.mark.parametrize(
+    ("aside_m", "grip", "part", "whole"),
+    [(0.0, 0, (9, 6), (9, 6)), (0.18, 0, (7, 6), None), (0.0, 1, (8, 6), None)],
+    ids=["whole", "half outside", "held over squares"],
+)
+def test_a_part_of_a_board_is_no_smaller_board(
+    aside_m: float, grip: int, part: tuple[int, int], whole: tuple[int, int] | None
+) -> None:
+    """A board beyond the image's edge, or under a hand, looks like a smaller one; its size counts only with its margin on all sides."""
+    pose = motion(np.array([aside_m, 0.02, 0.42, 0.1, 0.1, 0]), MIDDLE_M)
+    image = Painter(novice_scene(1).left, BOARD, 1).paint((Moment(pose, grip),) * 2)
+    assert size_seen(image) == part
+    assert whole_size_seen(image) == whole
