@@ -18,7 +18,7 @@ from common.errors import DataError
 from common.link.base import Link
 from phone_host.calibration.board_views import Size
 from phone_host.calibration.causes.looks import look_at
-from phone_host.calibration.guide.gates import Gate, Sighting
+from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
@@ -193,8 +193,8 @@ class LiveCalibration:
             return
         guide, finder = self._guide, self._finder
 
-        def sighting(corners: tuple[Corners, Corners]) -> Sighting:
-            return Sighting(
+        def glance(corners: tuple[Corners, Corners]) -> Glance:
+            return Glance(
                 at_ns=result.ledger.host.exposed_ns,
                 skew_ns=result.pair.time_skew_ns,
                 left_px=corners[0],
@@ -202,15 +202,15 @@ class LiveCalibration:
                 sizes_px=((left.shape[1], left.shape[0]), (right.shape[1], right.shape[0])),
             )
 
-        seen = sighting(finder.find(left, right))
+        seen = glance(finder.find(left, right))
         with self._lock:
             gate = guide.see(seen, now.monotonic_ns())
         if gate is Gate.NOT_FOUND and self._check is not None and not guide.views:
             self._check.missed(left, right)
         if gate is Gate.READY:
-            self._examine(guide, sighting(finder.find_exactly(left, right)), (left, right), (pair.left, pair.right))
+            self._examine(guide, glance(finder.find_exactly(left, right)), (left, right), (pair.left, pair.right))
 
-    def _examine(self, guide: Guide, exact: Sighting, greys: tuple[Image, Image], images: tuple[Image, Image]) -> None:
+    def _examine(self, guide: Guide, exact: Glance, greys: tuple[Image, Image], images: tuple[Image, Image]) -> None:
         looks = [
             look_at(grey, corners, guide.board)
             for grey, corners in zip(greys, (exact.left_px, exact.right_px), strict=True)
@@ -225,6 +225,6 @@ class LiveCalibration:
 
     def _solve(self, views: tuple[View, ...]) -> None:
         assert self._guide is not None
-        progress = self._grow(views, self._guide.board, views[0].sighting.sizes_px)
+        progress = self._grow(views, self._guide.board, views[0].glance.sizes_px)
         with self._lock:
             self._guide.grow(progress, now.monotonic_ns())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.calibration.causes.looks import Look
-from phone_host.calibration.guide.gates import Gate, Sighting
+from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended
@@ -124,9 +124,9 @@ def follow(
         hand.move(_STEP_NS / 1e9, random)
         corners = seen(rig, board, hand.at, random, _NOISE_PX)
         skew_ns = int(random.uniform(-16e6, 16e6))
-        sighting = Sighting(at_ns=now_ns, skew_ns=skew_ns, left_px=corners[0], right_px=corners[1], sizes_px=sizes)
+        glance = Glance(at_ns=now_ns, skew_ns=skew_ns, left_px=corners[0], right_px=corners[1], sizes_px=sizes)
         look = Look(2.5, 0.0, 0.1)
-        if guide.see(sighting, now_ns) is Gate.READY and guide.examine(sighting, (look, look), now_ns) is Gate.TAKEN:
+        if guide.see(glance, now_ns) is Gate.READY and guide.examine(glance, (look, look), now_ns) is Gate.TAKEN:
             solve_at = now_ns + _SOLVE_NS
         if solve_at and now_ns >= solve_at and len(guide.views) >= 3:
             guide.grow(grow(tuple(guide.views)), now_ns)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.looks import Look
-from phone_host.calibration.guide.gates import Gate, Sighting, is_alike
+from phone_host.calibration.guide.gates import Gate, Glance, is_alike
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.picture import guide_svg
 from phone_host.calibration.guide.progress import Progress, Taught, lessons
@@ -58,7 +58,7 @@ class Show:
         for _ in range(math.ceil(seconds * SECOND_NS / step_ns)):
             self.now_ns += step_ns
             scale = np.array(SIZES[1]) / SIZES[0]
-            seen = Sighting(
+            seen = Glance(
                 at_ns=self.now_ns,
                 skew_ns=0,
                 left_px=left,
@@ -84,10 +84,10 @@ def test_a_person_who_follows_the_words_is_done_with_few_views() -> None:
     guide = follow(unlike_rig(), BOARD, np.random.default_rng(1), lambda views: grown(views, Verdict.GOOD), most_s=150)
     assert guide.ended is Ended.GOOD
     assert 10 <= len(guide.views) <= 25
-    assert guide.views[-1].sighting.at_ns < 120 * SECOND_NS
-    sightings = [view.sighting for view in guide.views]
-    assert not any(is_alike(a, b) for i, a in enumerate(sightings) for b in sightings[:i])
-    wanted = guide.snapshot(guide.views[-1].sighting.at_ns).coverage[0]
+    assert guide.views[-1].glance.at_ns < 120 * SECOND_NS
+    glances = [view.glance for view in guide.views]
+    assert not any(is_alike(a, b) for i, a in enumerate(glances) for b in glances[:i])
+    wanted = guide.snapshot(guide.views[-1].glance.at_ns).coverage[0]
     assert all(wanted.tilts[1:])
 
 
@@ -129,7 +129,7 @@ def test_it_ends_when_the_verdict_is_good_and_no_wanted_view_helps(
     assert len(show.guide.views) == views
     calibration = replace(_calibration(), depths=((0.3, 0.0), (0.5, 0.0), (1.0, 0.004), (2.0, 0.0)))
     progress = grown(tuple(show.guide.views), Verdict.GOOD, *(Taught(want, after_m) for want in ORDER))
-    begun = show.guide.views[0].sighting.at_ns
+    begun = show.guide.views[0].glance.at_ns
     now_ns = begun + 80 * SECOND_NS if not late_s else begun + round(late_s * SECOND_NS)
     show.guide.grow(replace(progress, calibration=calibration), now_ns)
     assert show.guide.ended is ended
@@ -187,7 +187,7 @@ def test_a_board_that_left_a_picture_is_told_the_way_back() -> None:
 def test_exact_corners_are_judged_too() -> None:
     """A board that is found small and not at full size is not taken."""
     show = Show()
-    seen = Sighting(at_ns=0, skew_ns=0, left_px=NONE, right_px=corners(), sizes_px=SIZES)
+    seen = Glance(at_ns=0, skew_ns=0, left_px=NONE, right_px=corners(), sizes_px=SIZES)
     assert show.guide.examine(seen, (SHARP, SHARP), 0) is Gate.NOT_FOUND_LEFT
     assert not show.guide.views
 

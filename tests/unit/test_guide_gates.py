@@ -14,7 +14,7 @@ from phone_host.calibration.causes.looks import Look
 from phone_host.calibration.guide.coverage import COLUMNS, ROWS, Coverage, Depth, Tilt, depth_of, tilt_of
 from phone_host.calibration.guide.gates import (
     Gate,
-    Sighting,
+    Glance,
     found,
     is_alike,
     is_far,
@@ -51,11 +51,11 @@ def tilted(across_deg: float, down_deg: float) -> NDArray[np.float64]:
     return np.asarray(pixels[:, :2] / pixels[:, 2:], np.float64)
 
 
-def sighting(left: NDArray[np.float64], right: NDArray[np.float64] | None = None, at_ns: int = 0) -> Sighting:
+def glance(left: NDArray[np.float64], right: NDArray[np.float64] | None = None, at_ns: int = 0) -> Glance:
     """Both cameras see the same, each at its own size."""
     scale = np.array([SIZES[1][0] / SIZES[0][0], SIZES[1][1] / SIZES[0][1]])
     other = left * scale if right is None else right
-    return Sighting(at_ns=at_ns, skew_ns=0, left_px=left, right_px=other, sizes_px=SIZES)
+    return Glance(at_ns=at_ns, skew_ns=0, left_px=left, right_px=other, sizes_px=SIZES)
 
 
 def placed(left: NDArray[np.float64], right: NDArray[np.float64] | None = None) -> Placed:
@@ -75,25 +75,25 @@ def placed(left: NDArray[np.float64], right: NDArray[np.float64] | None = None) 
 )
 def test_the_board_must_be_in_both_images(left: NDArray[np.float64], right: NDArray[np.float64], gate: Gate) -> None:
     """The gate names the image in which it is missing."""
-    assert found(sighting(left, right)) is gate
+    assert found(glance(left, right)) is gate
 
 
 def test_of_a_board_with_marks_enough_corners_must_be_common() -> None:
     """Twenty corners that both see are enough; ten are not, whatever each sees alone."""
     few, enough = corners(), corners()
     few[10:], enough[20:] = math.nan, math.nan
-    assert found(sighting(corners(), few)) is Gate.PART
-    assert found(sighting(corners(), enough)) is Gate.READY
+    assert found(glance(corners(), few)) is Gate.PART
+    assert found(glance(corners(), enough)) is Gate.READY
 
 
 @given(speed=st.floats(0, 0.2), noise=st.integers(0, 2**31))
 def test_the_speed_is_that_of_the_faster_image(speed: float, noise: int) -> None:
     """The board moves across the right image only; noise of 0.1 px adds little."""
     random = np.random.default_rng(noise)
-    before = sighting(corners() + random.normal(0, 0.1, (54, 2)))
+    before = glance(corners() + random.normal(0, 0.1, (54, 2)))
     moved = corners(size=SIZES[1]) + np.array([speed * SIZES[1][0] * FRAME_NS / 1e9, 0])
     start = replace(before, right_px=corners(size=SIZES[1]))
-    now = sighting(corners() + random.normal(0, 0.1, (54, 2)), moved, FRAME_NS)
+    now = glance(corners() + random.normal(0, 0.1, (54, 2)), moved, FRAME_NS)
     assert speed_widths_s(start, now) == pytest.approx(speed, abs=0.006)
 
 
@@ -101,15 +101,15 @@ def test_a_speed_needs_two_looks_close_in_time_at_the_same_corners() -> None:
     """Otherwise it is infinite, which is not still."""
     unseen = corners()
     unseen[3:] = math.nan
-    for before in (None, sighting(corners(), at_ns=-FRAME_NS * 20), sighting(NONE, NONE), sighting(unseen)):
-        assert speed_widths_s(before, sighting(corners(), at_ns=FRAME_NS)) == math.inf
+    for before in (None, glance(corners(), at_ns=-FRAME_NS * 20), glance(NONE, NONE), glance(unseen)):
+        assert speed_widths_s(before, glance(corners(), at_ns=FRAME_NS)) == math.inf
     assert not is_still(math.inf)
-    assert is_still(speed_widths_s(sighting(corners()), sighting(corners(), at_ns=FRAME_NS)))
+    assert is_still(speed_widths_s(glance(corners()), glance(corners(), at_ns=FRAME_NS)))
 
 
 def test_a_pair_is_paired_well_if_the_board_hardly_moves_between_its_exposures() -> None:
     """0.02 widths per second are 13 px/s at 640 px and 26 px/s at 1280: in 5 ms the board moves by 0.13 px, in 16 ms by 0.4 px."""
-    late = replace(sighting(corners()), skew_ns=-16_000_000)
+    late = replace(glance(corners()), skew_ns=-16_000_000)
     assert is_paired_well(replace(late, skew_ns=5_000_000), 0.02)
     assert not is_paired_well(late, 0.02)
     assert is_paired_well(late, 0.0)
@@ -135,21 +135,21 @@ def test_a_view_must_be_sharp_by_the_cameras_own_measure(
 
 def test_views_are_alike_if_the_board_is_at_nearly_the_same_place_in_both() -> None:
     """A fiftieth of the width apart is alike, a tenth is not; a move that one camera alone sees counts."""
-    here, there = sighting(corners()), sighting(corners(0.6))
-    assert is_alike(here, sighting(corners(0.52)))
+    here, there = glance(corners()), glance(corners(0.6))
+    assert is_alike(here, glance(corners(0.52)))
     assert not is_alike(here, there)
     assert not is_alike(here, replace(here, right_px=there.right_px))
-    assert not is_alike(sighting(tilted(0, 0)), sighting(tilted(25, 0)))
-    assert not is_alike(here, sighting(np.full((54, 2), math.nan)))
+    assert not is_alike(glance(tilted(0, 0)), glance(tilted(25, 0)))
+    assert not is_alike(here, glance(np.full((54, 2), math.nan)))
 
 
 def test_views_are_far_from_each_other_by_place_or_shape() -> None:
     """A fifth of the width apart is far, a tenth is not; nearer by half is far; what has no corner in common is, too."""
-    here = sighting(corners())
-    assert is_far(here, sighting(corners(0.7)))
-    assert not is_far(here, sighting(corners(0.6)))
-    assert is_far(here, sighting(corners(square=0.075)))
-    assert is_far(here, sighting(np.full((54, 2), math.nan)))
+    here = glance(corners())
+    assert is_far(here, glance(corners(0.7)))
+    assert not is_far(here, glance(corners(0.6)))
+    assert is_far(here, glance(corners(square=0.075)))
+    assert is_far(here, glance(np.full((54, 2), math.nan)))
 
 
 @given(across=st.floats(-45, 45), down=st.floats(-45, 45))

@@ -66,7 +66,7 @@ NOT_SEEN: Final = frozenset({Gate.NOT_FOUND, Gate.NOT_FOUND_LEFT, Gate.NOT_FOUND
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Sighting:
+class Glance:
     """A board in both images of a pair.
 
     Attributes:
@@ -84,9 +84,9 @@ class Sighting:
     sizes_px: tuple[Size, Size]
 
 
-def found(sighting: Sighting) -> Gate:
+def found(glance: Glance) -> Gate:
     """Return whether both cameras see enough of the board: READY, or why not."""
-    match len(sighting.left_px) > 0, len(sighting.right_px) > 0:
+    match len(glance.left_px) > 0, len(glance.right_px) > 0:
         case False, False:
             return Gate.NOT_FOUND
         case False, True:
@@ -95,12 +95,12 @@ def found(sighting: Sighting) -> Gate:
             return Gate.NOT_FOUND_RIGHT
         case _:
             pass
-    both = np.isfinite(sighting.left_px).all(axis=1) & np.isfinite(sighting.right_px).all(axis=1)
+    both = np.isfinite(glance.left_px).all(axis=1) & np.isfinite(glance.right_px).all(axis=1)
     is_enough = (both.sum() >= _LEAST_CORNERS and both.mean() >= _LEAST_SEEN) or bool(both.all())
     return Gate.READY if is_enough else Gate.PART
 
 
-def speed_widths_s(before: Sighting | None, now: Sighting) -> float:
+def speed_widths_s(before: Glance | None, now: Glance) -> float:
     """Return how fast the board moves in the faster of the two images, image widths per second; infinite: it cannot be told.
 
     An affine motion is fitted to the corners, so that their noise does not count as motion.
@@ -133,11 +133,11 @@ def is_still(speed: float) -> bool:
     return speed <= _STILL_WIDTHS_S
 
 
-def is_paired_well(sighting: Sighting, speed: float) -> bool:
+def is_paired_well(glance: Glance, speed: float) -> bool:
     """Return whether the board moves little enough between the two exposures."""
     return all(
-        speed * width_px * abs(sighting.skew_ns) / 1e9 <= _APART_PX * _factor((width_px, height_px))
-        for width_px, height_px in sighting.sizes_px
+        speed * width_px * abs(glance.skew_ns) / 1e9 <= _APART_PX * _factor((width_px, height_px))
+        for width_px, height_px in glance.sizes_px
     )
 
 
@@ -159,7 +159,7 @@ def sharp(looks: tuple[Look, Look], sizes_px: tuple[Size, Size], sharpest_px: tu
     return Gate.READY
 
 
-def is_alike(one: Sighting, other: Sighting) -> bool:
+def is_alike(one: Glance, other: Glance) -> bool:
     """Return whether two views show the board in nearly the same place and attitude."""
     for a, b, size_px in zip((one.left_px, one.right_px), (other.left_px, other.right_px), one.sizes_px, strict=True):
         apart, reshaped = _differences(a, b, size_px[0])
@@ -168,7 +168,7 @@ def is_alike(one: Sighting, other: Sighting) -> bool:
     return True
 
 
-def is_far(one: Sighting, other: Sighting) -> bool:
+def is_far(one: Glance, other: Glance) -> bool:
     """Return whether two views differ so much in place, size or attitude that each teaches what the other does not."""
     apart, reshaped = _differences(one.left_px, other.left_px, one.sizes_px[0][0])
     return apart > _FAR or reshaped > _OTHER_SHAPE

@@ -21,7 +21,7 @@ from phone_host.calibration.guide.gates import (
     NOT_SEEN,
     STILL_NS,
     Gate,
-    Sighting,
+    Glance,
     found,
     is_alike,
     is_far,
@@ -91,18 +91,18 @@ class View:
 
     Attributes:
         name: how reports name it.
-        sighting: the board's corners in it.
+        glance: the board's corners in it.
         looks: how it looks, left and right.
     """
 
     name: str
-    sighting: Sighting
+    glance: Glance
     looks: tuple[Look, Look]
 
     @property
     def pair(self) -> BoardPair:
         """Its corners, as the calibration takes them."""
-        return BoardPair(self.name, self.sighting.left_px, self.sighting.right_px)
+        return BoardPair(self.name, self.glance.left_px, self.glance.right_px)
 
 
 class Guide:
@@ -121,7 +121,7 @@ class Guide:
         self._began_ns = self._seen_ns = now_ns
         self._has_seen = False
         self._gate = Gate.NOT_FOUND
-        self._last: Sighting | None = None
+        self._last: Glance | None = None
         self._placed: Placed | None = None
         self._still_since_ns: int | None = None
         self._sharpest_px = (math.nan, math.nan)
@@ -134,43 +134,43 @@ class Guide:
         self._words, self._next_words, self._next_since_ns = "", "", now_ns
         self._taken_ns: int | None = None
 
-    def see(self, sighting: Sighting, now_ns: int) -> Gate:
+    def see(self, glance: Glance, now_ns: int) -> Gate:
         """Judge a look at a pair.
 
         Args:
-            sighting: the board in it, found quickly.
+            glance: the board in it, found quickly.
             now_ns: now.
 
         Returns:
             READY: `examine` is to be called with its exact corners; else why the view is refused.
         """
-        gate = found(sighting)
-        speed = speed_widths_s(self._last, sighting)
+        gate = found(glance)
+        speed = speed_widths_s(self._last, glance)
         if gate is Gate.READY:
-            placed = self._place(sighting)
-            gate = self._judged(sighting, placed, speed, now_ns)
-            if gate is Gate.NOTHING_NEW and self._is_coming(sighting, placed):
+            placed = self._place(glance)
+            gate = self._judged(glance, placed, speed, now_ns)
+            if gate is Gate.NOTHING_NEW and self._is_coming(glance, placed):
                 gate = Gate.MOVING
-            self._last, self._placed, self._has_seen, self._seen_ns = sighting, placed, True, now_ns
+            self._last, self._placed, self._has_seen, self._seen_ns = glance, placed, True, now_ns
         else:
             self._last = self._still_since_ns = None
         self._give_up(now_ns)
         return self._note(gate)
 
-    def examine(self, sighting: Sighting, looks: tuple[Look, Look], now_ns: int) -> Gate:
+    def examine(self, glance: Glance, looks: tuple[Look, Look], now_ns: int) -> Gate:
         """Judge a view that was READY by its exact corners, and take it unless it is blurred.
 
         Args:
-            sighting: the board in it.
+            glance: the board in it.
             looks: how sharp and evenly lit the board is in both images.
             now_ns: now.
 
         Returns:
             TAKEN, or why not.
         """
-        gate = found(sighting)
+        gate = found(glance)
         if gate is Gate.READY:
-            gate = sharp(looks, sighting.sizes_px, self._sharpest_px)
+            gate = sharp(looks, glance.sizes_px, self._sharpest_px)
             best = [
                 look.edge_px if math.isnan(known) else min(known, look.edge_px)
                 for known, look in zip(self._sharpest_px, looks, strict=True)
@@ -178,13 +178,13 @@ class Guide:
             self._sharpest_px = best[0], best[1]
         if gate is not Gate.READY:
             return self._note(gate)
-        placed = self._place(sighting)
-        self.views.append(View(f"{len(self.views) + 1:02}", sighting, looks))
-        coverage = self._coverage or tuple(Coverage(size_px) for size_px in sighting.sizes_px)
+        placed = self._place(glance)
+        self.views.append(View(f"{len(self.views) + 1:02}", glance, looks))
+        coverage = self._coverage or tuple(Coverage(size_px) for size_px in glance.sizes_px)
         self._coverage = tuple(
             each.with_view(corners, where)
             for each, corners, where in zip(
-                coverage, (sighting.left_px, sighting.right_px), (placed.left, placed.right), strict=True
+                coverage, (glance.left_px, glance.right_px), (placed.left, placed.right), strict=True
             )
         )
         self._open -= {want for want in self._open if is_there(want, placed)}
@@ -253,39 +253,39 @@ class Guide:
             refused=tuple((gate, self._refused[gate]) for gate in Gate if self._refused[gate]),
         )
 
-    def _judged(self, sighting: Sighting, placed: Placed, speed: float, now_ns: int) -> Gate:
+    def _judged(self, glance: Glance, placed: Placed, speed: float, now_ns: int) -> Gate:
         """Judge a view in which the board was found."""
         if not is_still(speed):
             self._still_since_ns = None
         elif self._still_since_ns is None:
-            self._still_since_ns = sighting.at_ns
-        rests = self._still_since_ns is not None and sighting.at_ns - self._still_since_ns >= STILL_NS
-        wanted = self._is_wanted(placed) or (rests and self._is_new(sighting, now_ns))
-        if self.is_full or not wanted or any(is_alike(sighting, each.sighting) for each in self.views):
+            self._still_since_ns = glance.at_ns
+        rests = self._still_since_ns is not None and glance.at_ns - self._still_since_ns >= STILL_NS
+        wanted = self._is_wanted(placed) or (rests and self._is_new(glance, now_ns))
+        if self.is_full or not wanted or any(is_alike(glance, each.glance) for each in self.views):
             return Gate.NOTHING_NEW
         if not rests:
             return Gate.MOVING
-        return Gate.READY if is_paired_well(sighting, speed) else Gate.APART
+        return Gate.READY if is_paired_well(glance, speed) else Gate.APART
 
-    def _is_coming(self, sighting: Sighting, placed: Placed) -> bool:
+    def _is_coming(self, glance: Glance, placed: Placed) -> bool:
         """Return whether the wanted view will be there by the time a person has heard to hold still."""
         if self._last is None or self._placed is None or self._still_since_ns is not None or self.is_full:
             return False
-        steps = _REACTION_NS / max(1, sighting.at_ns - self._last.at_ns)
+        steps = _REACTION_NS / max(1, glance.at_ns - self._last.at_ns)
         return bool(self.views) and is_there(self._asked, ahead(self._placed, placed, steps))
 
     def _is_wanted(self, placed: Placed) -> bool:
         wants = {Want.ANY} if not self.views else self._open | {self._asked}
         return any(is_there(want, placed) for want in wants)
 
-    def _is_new(self, sighting: Sighting, now_ns: int) -> bool:
+    def _is_new(self, glance: Glance, now_ns: int) -> bool:
         """Return whether a view that nobody asked for is to be taken, because what was asked for is not reached."""
-        return now_ns - self._asked_ns > _VAIN_NS and all(is_far(sighting, each.sighting) for each in self.views)
+        return now_ns - self._asked_ns > _VAIN_NS and all(is_far(glance, each.glance) for each in self.views)
 
-    def _place(self, sighting: Sighting) -> Placed:
+    def _place(self, glance: Glance) -> Placed:
         rig = self._rig
-        left, right = map(usual_camera, sighting.sizes_px) if rig is None else (rig.left, rig.right)
-        return Placed(placement(sighting.left_px, self.board, left), placement(sighting.right_px, self.board, right))
+        left, right = map(usual_camera, glance.sizes_px) if rig is None else (rig.left, rig.right)
+        return Placed(placement(glance.left_px, self.board, left), placement(glance.right_px, self.board, right))
 
     @property
     def _outlines(self) -> tuple[Outline, Outline]:
@@ -329,7 +329,7 @@ class Guide:
         """Return whether the verdict is good and more views no longer help, or it has taken long."""
         if progress.verdict is not Verdict.GOOD:
             return False
-        if now_ns - self.views[0].sighting.at_ns > _LONG_NS and len(self.views) >= _LONG_VIEWS:
+        if now_ns - self.views[0].glance.at_ns > _LONG_NS and len(self.views) >= _LONG_VIEWS:
             return True
         best_m = min(
             (progress.after_m(want) for want in self._open if math.isfinite(progress.after_m(want))), default=0
