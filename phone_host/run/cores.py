@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from common.errors import DataError
+from common.errors import DataError, SettingsError
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import EncodedFile, require_same_size
 
@@ -30,12 +30,13 @@ class Cores:
 
         Raises:
             DataError: they do not fit it, or none can be made.
+            SettingsError: the crop lies outside of them, or none can be made so.
         """
         is_rectified = self._core is not None and self._core.rig is None
         if self._core is None or (is_rectified and left.size_px != self._size_px):
             try:
                 made = self._make(left.size_px)
-            except DataError:
+            except (DataError, SettingsError):
                 self.has_none = self._core is None
                 raise
             self._core, self._size_px = made, left.size_px
