@@ -10,13 +10,14 @@ To reach: 95 % of 200 mistakes named rightly; none of 50 good sessions accused. 
 """
 
 import argparse
+import json
 import multiprocessing
 import os
 import sys
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 import cv2
@@ -74,6 +75,11 @@ def main() -> int:
         for each in pool.map(_judge, cases):
             judged.append(each)
             bar.advance(task)
+    verdicts = _verdicts(judged)
+    if options.json:
+        said = {"verdicts": [asdict(verdict) for verdict in verdicts], "named": _counts(judged)}
+        print(json.dumps({"machine": str(machine()), **said}))
+        return exit_code(verdicts)
     console.print(f"{machine()}")
     console.print(_matrix(judged))
     for each in judged:
@@ -83,7 +89,6 @@ def main() -> int:
             )
     for name, said in real_sessions():
         console.print(f"  real  {name}: {said}")
-    verdicts = _verdicts(judged)
     for verdict in verdicts:
         console.print(str(verdict))
     return exit_code(verdicts)
@@ -99,6 +104,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--good", type=int, default=_GOOD, help="how many good sessions (default 50)")
     parser.add_argument("--seed", type=int, default=0, help="of the first session of each kind (default 0)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default 2)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser.parse_args()
 
 
@@ -135,6 +141,14 @@ def _matrix(judged: list[_Judged]) -> Table:
             f"{sum(each.is_right for each in held)}/{len(held)}",
         )
     return table
+
+
+def _counts(judged: list[_Judged]) -> dict[str, dict[str, int]]:
+    """The confusion matrix: made, then named, then how often."""
+    found: dict[str, Counter[str]] = {}
+    for each in judged:
+        found.setdefault(_word(each.case.made), Counter())[_word(each.named)] += 1
+    return {made: dict(named) for made, named in found.items()}
 
 
 def _word(mistake: Mistake | None) -> str:

@@ -52,7 +52,8 @@ def main() -> int:
     sessions.sort(key=lambda each: each.seed)
     verdicts = _verdicts(sessions)
     if options.json:
-        print(json.dumps({"machine": str(machine()), "sessions": [asdict(each) for each in sessions]}))
+        said = {"verdicts": [asdict(verdict) for verdict in verdicts]}
+        print(json.dumps({"machine": str(machine()), "sessions": [asdict(each) for each in sessions], **said}))
         return exit_code(verdicts)
     console.print(f"{machine()}; cores busy {busy.percents} %; {options.fps} frames/s, {options.jobs} at once")
     console.print(_table(sessions))

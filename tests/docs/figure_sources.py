@@ -1,6 +1,6 @@
 """Where the figures of docs/figures.md come from: a command line for each, and how its JSON becomes rows.
 
-The arguments keep `make figures` within about fifteen minutes on two cores. Where a reference measurement exists, it
+All of them together take about three quarters of an hour on two cores. Where a reference measurement exists, it
 comes from the same run; otherwise its origin is stated.
 """
 
@@ -169,6 +169,24 @@ def _opencv_images(data: Data) -> Iterator[Figure]:
     return _calibration(data, f"OpenCV's stereoCalibrate, in a run of its own: {_OPENCV_RMS_PX} px", "")
 
 
+def _rigs(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for row in data["real"]:
+        beside, name = row["recipe"], f"{row['rig']}{', unlike' if row['is_unlike'] else ''}"
+        yield Figure(
+            f"{name}: pairs used; RMS stereo; rows p95; baseline",
+            f"{row['used']} of {row['pairs']}; {row['rms_px']:.3f} px; {row['p95_px']:.2f} px;"
+            f" {row['baseline_mm']:.2f} +- {row['baseline_sigma_mm']:.2f} mm",
+            f"stereo_calib: {beside['used']}; {beside['rms_px']:.3f} px; {beside['vertical_p95_px']:.2f} px; {1e3 * beside['baseline_m']:.2f} mm",
+        )
+
+
+def _corners(data: Data) -> Iterator[Figure]:
+    for name, found in data["rows"].items():
+        beside = ", ".join(f"{who}: {found[who]['rms_px']:.3f} px" for who in ("cornerSubPix", "sectors"))
+        yield Figure(f"{name}: error of a corner, RMS", f"{found['ours']['rms_px']:.3f} px", beside)
+
+
 _TRANSPORTS: Final = {
     "tandemscan": "tandemscan over tcp",
     "tandemscan-curve": "tandemscan over tcp with keys",
@@ -287,6 +305,12 @@ SOURCES: Final = (
     Source("sizes", Topic.DEPTH, "Photographs of a rendered scene through `phone-host stereo` and a rig, from start to exit. Time counts other jobs of the machine, CPU time does not.", f"{_BENCH}bench_sizes --quick --json", _sizes, 150),
     Source("rig1", Topic.CALIBRATION, "A published rig, 1280x720.", _CALIBRATE.format(left="simplestereo_rig1/calib/*_L.png", right="simplestereo_rig1/calib/*_R.png", board="7x6", square="60.5mm", name="rig1"), _published, 20),
     Source("opencv", Topic.CALIBRATION, "OpenCV's example images, 640x480. The side of the squares is unknown.", _CALIBRATE.format(left="opencv_stereo_calib/left*.jpg", right="opencv_stereo_calib/right*.jpg", board="9x6", square="25mm", name="opencv"), _opencv_images, 10),
+    Source("rigs", Topic.CALIBRATION, "Real rigs, the same made unlike (right images cropped, scaled by 0.6, re-exposed, compressed again), and ten rendered rigs whose truth is known, beside OpenCV's `stereo_calib` recipe.", f"{_BENCH}bench_calibration --json", _rigs, 90),
+    Source("corners", Topic.CALIBRATION, "Corners of rendered chessboards. `cornerSubPix` starts where ours does; `sectors` is OpenCV's findChessboardCornersSB.", f"{_BENCH}bench_corners --json", _corners, 60),
+    Source("causes", Topic.CALIBRATION, "Sessions of board views with one mistake each, and good ones: is the cause named?", f"{_BENCH}bench_causes --json", _verdicts, 300),
+    Source("guide", Topic.CALIBRATION, "A simulated novice who follows the words of `calibrate --live`, with two painted cameras and a real link.", f"{_BENCH}bench_guide --jobs 2 --json", _verdicts, 900),
+    Source("drift", Topic.CALIBRATION, "A rig that turns while it runs, and rigs that stand.", f"{_BENCH}bench_drift --json", _verdicts, 600),
+    Source("measure", Topic.DEPTH, "Points of rendered rooms, measured as `phone-host measure` does: does the truth lie within what is stated?", f"{_BENCH}bench_measure --json", _verdicts, 300),
     Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),
     Source("serial", Topic.LINKS, "Serial lines: a pseudo terminal, and emulated slow cables.", f"{_BENCH}bench_serial --runs 2 --seconds 10 --json", _serial, 80),
     Source("switches", Topic.LINKS, "The better of two links is lost and comes back.", f"{_BENCH}bench_links --losses 2 --json", _switches, 70),
