@@ -172,13 +172,17 @@ def _opencv_images(data: Data) -> Iterator[Figure]:
 def _rigs(data: Data) -> Iterator[Figure]:
     yield from _verdicts(data)
     for row in data["real"]:
-        beside, name = row["recipe"], f"{row['rig']}{', unlike' if row['is_unlike'] else ''}"
+        name = f"{row['rig']}{', unlike' if row['is_unlike'] else ''}"
         yield Figure(
             f"{name}: pairs used; RMS stereo; rows p95; baseline",
             f"{row['used']} of {row['pairs']}; {row['rms_px']:.3f} px; {row['p95_px']:.2f} px;"
             f" {row['baseline_mm']:.2f} +- {row['baseline_sigma_mm']:.2f} mm",
-            f"stereo_calib: {beside['used']}; {beside['rms_px']:.3f} px; {beside['vertical_p95_px']:.2f} px; {1e3 * beside['baseline_m']:.2f} mm",
+            f"stereo_calib: {_recipe(row['recipe'])}, from our corners: {_recipe(row['recipe_on_ours'])}",
         )
+
+
+def _recipe(found: Data) -> str:
+    return f"{found['used']}; {found['rms_px']:.3f} px; {found['vertical_p95_px']:.2f} px; {1e3 * found['baseline_m']:.2f} mm"
 
 
 def _corners(data: Data) -> Iterator[Figure]:
