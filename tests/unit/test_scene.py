@@ -42,7 +42,7 @@ from phone_host.scene.scene import (
     unlike_rig,
 )
 from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import small_rig
 
 SMALL_VIEW = RectifiedView(StereoGeometry(focal_px=200.0, baseline_m=0.1, cx_px=79.5, cy_px=59.5), 160, 120)

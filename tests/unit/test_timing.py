@@ -35,7 +35,7 @@ from phone_host.scene.scene import (
     rig_poses,
 )
 from phone_host.stereo.raw_images import EncodedImage
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import small_rig
 
 REFRESH_S = 1 / 59.94
