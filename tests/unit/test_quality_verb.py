@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,17 @@ import numpy as np
 import pytest
 
 from phone_host.cli import main
-from phone_host.model import Processed
 from phone_host.output.rig_yaml import write_rig
+from phone_host.run.quality_job import QualityJob, run_quality
 from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK, plane_scene, unlike_rig
 from phone_host.scene.scene_model import Body, Box, Scene, Texture, rig_poses, rotation
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_rig
+from phone_host.stereo.view_files import pair_files
 from tests.support.boards import BOARD, render_pair
 from tests.support.html import Page
 from tests.support.rigs import project_points
@@ -57,25 +62,38 @@ def report_of(out: Path) -> dict[str, Any]:
     return report
 
 
-def test_what_was_measured_before_ctrl_c_is_written(
-    room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Ctrl-C during the second pair: exit 130, and report and page of the first one, which say so. During the first one nothing is written."""
-    core, calls = StereoCore.compute, iter((False, True, True))
+class _Impatient:
+    """Somebody who presses Ctrl-C when these words are shown."""
 
-    def compute(self: StereoCore, *given: Any, **named: Any) -> Processed:
-        if next(calls):
+    def __init__(self, words: str) -> None:
+        self._words = words
+
+    def __call__(self, amount: int = 1) -> None:
+        """Wait on."""
+
+    def say(self, what: str) -> None:
+        """Read what is being done."""
+        if what == self._words:
             raise KeyboardInterrupt
-        return core(self, *given, **named)
 
-    monkeypatch.setattr(StereoCore, "compute", compute)
-    given = [str(room / "left"), str(room / "right"), "--out"]
-    assert run(room, *given, str(tmp_path / "o")) == 130
+
+def test_what_was_measured_before_ctrl_c_is_written(room: Path, tmp_path: Path) -> None:
+    """Ctrl-C during the second pair: report and page are of the first one, and say so. During the first one nothing is written."""
+    core = StereoCore(MatchSettings(MatcherName.SGBM, 96), Rectifier(unlike_rig()))
+    job = QualityJob(
+        files=pair_files(str(room / "left"), str(room / "right")),
+        out=tmp_path / "o",
+        make_core=lambda _: core,
+        matcher="sgbm",
+    )
+    with pytest.raises(KeyboardInterrupt):
+        run_quality(job, _Impatient("matching 2.png"))
     report = report_of(tmp_path / "o")
     assert (report["interrupted_of"], len(report["pairs"])) == (2, 1)
     assert report["headline"].startswith("Interrupted after 1 of 2 pairs. At ")
     assert "Interrupted after 1 of 2 pairs" in (tmp_path / "o" / "index.html").read_text()
-    assert run(room, *given, str(tmp_path / "none")) == 130
+    with pytest.raises(KeyboardInterrupt):
+        run_quality(replace(job, out=tmp_path / "none"), _Impatient("matching 1.png"))
     assert not (tmp_path / "none").exists()
 
 
