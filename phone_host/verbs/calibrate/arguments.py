@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.orientation_arguments import add_orientation_arguments
+from phone_host.verbs.orientation_arguments import add_image_arguments
 from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
 
 SUMMARY = "calibrate two cameras, live or from pictures of a board"
@@ -72,8 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("left", "right"),
         help="which of the two is the board's camera (default left, or as in --from)",
     )
-    add_orientation_arguments(parser)
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    add_image_arguments(parser)
     parser.add_argument(
         "--out",
         type=Path,
