@@ -3,6 +3,7 @@
 import math
 import os
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -29,6 +30,7 @@ def _random(seed: int) -> np.random.Generator:
     return np.random.default_rng([7, seed])
 
 
+@cache
 def _unstiff(course: Course) -> tuple[Made, Finding]:
     """The first made session whose cameras turn in a way, and what is named."""
     word = {Course.DRIFT: "drift", Course.KNOCK: "knock", Course.LOOSE: "loose"}[course]
