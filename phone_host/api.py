@@ -51,7 +51,7 @@ from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.sync.fifo import FifoSettings
 
 __all__ = [

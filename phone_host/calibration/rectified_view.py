@@ -15,7 +15,8 @@ from phone_host.calibration.target import Corners
 from phone_host.model import CameraModel, Rectification, Rig
 from phone_host.model.calibration_session import RectifiedView
 from phone_host.stereo.images import decode_file, open_image
-from phone_host.stereo.rectify import Rectifier, rectify_points
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_points
 from phone_host.stereo.scaled_rig import scaled_rig
 
 _MOST_PX: Final = 640

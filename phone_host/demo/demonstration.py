@@ -24,7 +24,7 @@ from phone_host.scene.film import Film
 from phone_host.scene.scene import RectifiedView, Scene, rig_poses, truth
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 
 FPS: Final = 15

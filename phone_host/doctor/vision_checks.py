@@ -19,7 +19,7 @@ from phone_host.camera.http_uri import is_http
 from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
 from phone_host.model import Side
 from phone_host.output.rig_files.imported import read_own_rig
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver

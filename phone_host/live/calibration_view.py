@@ -2,19 +2,14 @@
 
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
-from threading import RLock
-from types import TracebackType
-from typing import Final, Protocol, Self
+from typing import Final, Protocol
 
 from rich.console import Console
-from rich.live import Live
 from rich.text import Text
 
 from common import now
 from common.places import make_folder
-from common.program import logs
 from common.program.terminal import say
 from phone_host.calibration.guide.guide import View
 from phone_host.calibration.guide.picture import guide_svg
@@ -22,7 +17,7 @@ from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.text_picture import figure_lines, picture_lines, verdict_lines
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
-from phone_host.run.terminal_view import Part, fitted
+from phone_host.run.redrawn import Part, Redrawn
 
 _EVERY_NS: Final = 250_000_000
 """Pictures are redrawn, and snapshots written, at most so often."""
@@ -65,7 +60,7 @@ class Lines:
                 _write(f"note: {note}")
 
 
-class Picture:
+class Picture(Redrawn):
     """Redraws the picture on a terminal; a context manager.
 
     Args:
@@ -74,26 +69,10 @@ class Picture:
     """
 
     def __init__(self, console: Console | None = None, *, rings: bool = False) -> None:
-        self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
-        self._drawing = RLock()
-        self._ending = ExitStack()
+        super().__init__(console)
         self._rings = rings
         self._views = 0
         self._shown_ns = 0
-
-    def __enter__(self) -> Self:
-        with ExitStack() as begun:
-            begun.enter_context(logs.written_by(self._say))
-            self._live.start()
-            begun.callback(self._live.stop)
-            self._ending = begun.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        with self._drawing:
-            self._ending.close()
 
     def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
         """See Shows."""
@@ -106,16 +85,8 @@ class Picture:
         parts += [Part(2, Text(line)) for line in figure_lines(snapshot)]
         parts += [Part(4, Text(snapshot.remedy, style="dim"))] if snapshot.remedy else []
         parts += [Part(3, Text(line, no_wrap=True)) for line in picture_lines(snapshot)]
-        with self._drawing:
-            if self._rings and len(views) > self._views:
-                self._live.console.bell()
-            self._live.update(fitted(parts, self._live.console), refresh=True)
+        self.draw(parts, rings=self._rings and len(views) > self._views)
         self._views = len(views)
-
-    def _say(self, line: str) -> None:
-        """Write a line of the log above the picture."""
-        with self._drawing:
-            self._live.console.print(Text(line, overflow="fold"))
 
 
 class SnapshotFiles:

@@ -59,6 +59,11 @@ class CameraModel:
     distortion: NDArray[np.float64]
     lens: Lens = Lens.PINHOLE
 
+    @property
+    def mean_focal_px(self) -> float:
+        """The mean of both focal lengths, px: how fine its pixels are."""
+        return float(self.matrix[0, 0] + self.matrix[1, 1]) / 2
+
 
 UNMEASURED_NS: Final = 16_700_000
 """Assumed limit of the time offset until it is measured: one readout, taken as half the period of 30 frames/s."""

@@ -6,8 +6,9 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
+from common.errors import DataError, TandemError
 from common.words import counted
 from phone_host.measure.trust import Doubt
 from phone_host.model import CutCounts, DepthLimits, MatchReport, Search, StereoGeometry
@@ -143,6 +144,18 @@ class FailedPair:
     right: str
     problem: str
     remedy: str
+
+    @classmethod
+    def because(cls, error: TandemError, name: str, left: str, right: str) -> Self:
+        """Make it of what went wrong."""
+        return cls(name=name, left=left, right=right, problem=error.problem, remedy=error.remedy)
+
+    def none_of(self, pairs: int) -> DataError:
+        """Return the error if this is the first of so many pairs, and none could be computed."""
+        return DataError(
+            f"none of the {pairs} pairs can be computed; the first: {self.problem} ({self.remedy})",
+            "mend what this names, then try again",
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,7 +20,8 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image, require_same_size, size_px
 from phone_host.stereo.measured_point import MeasuredPoint, measured_point
 from phone_host.stereo.point_match import PointMatch, match_point
-from phone_host.stereo.rectify import Rectifier, rectify_points
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_points
 from phone_host.stereo.wide_limits import Wide, why_wide
 
 Point = tuple[float, float]

@@ -118,19 +118,13 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
             except DataError as error:
                 if is_only or cores.has_none:
                     raise
-                failed = FailedPair(
-                    name=left.name, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy
-                )
-                pairs.append(failed)
+                pairs.append(FailedPair.because(error, left.name, str(left), str(right)))
             watcher()
     report = _report(job, pairs)
     if not report.measured:
         first = report.pairs[0]
         assert isinstance(first, FailedPair)
-        raise DataError(
-            f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
-            "mend what this names, then try again",
-        )
+        raise first.none_of(len(pairs))
     _write(job.out, report)
     return report
 

@@ -123,11 +123,7 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
                 watcher()
         report = _set(job, tuple(pairs))
         if not report.computed:
-            first = report.failed[0]
-            raise DataError(
-                f"none of the {len(pairs)} pairs can be computed; the first: {first.problem} ({first.remedy})",
-                "mend what this names, then try again",
-            )
+            raise report.failed[0].none_of(len(pairs))
         _write_set(job, results, work, report)
         return report
 
@@ -210,7 +206,7 @@ class _Work:
         except (DataError, SettingsError) as error:  # or a --crop that lies outside images of this size
             if self._cores.has_none:  # no pair can be computed without one
                 raise
-            return FailedPair(name=folder, left=str(left), right=str(right), problem=error.problem, remedy=error.remedy)
+            return FailedPair.because(error, folder, str(left), str(right))
 
     def computed(self, folder: str, left: Path, right: Path) -> PairReport:
         """Compute and write a pair. `folder` is empty for the only one."""

@@ -1,21 +1,14 @@
-"""The live table that a terminal shows during a run. Log lines go above it, and it is never higher than the terminal."""
+"""The live table that a terminal shows during a run."""
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass
-from threading import RLock
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
-from rich.console import Console, RenderableType
-from rich.live import Live
+from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
-from rich.segment import Segment, Segments
 from rich.table import Table
 from rich.text import Text
 
 from common import now
-from common.program import logs
 from common.words import counted
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import rung_lines
@@ -27,6 +20,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.report.summary import camera_troubles, corrected_lines, depth_lines, phase_lines
+from phone_host.run.redrawn import Part, Redrawn
 
 _REFRESH_S: Final = 0.25
 _WIDE: Final = 64
@@ -36,20 +30,7 @@ _RECENT: Final = 300
 """Percentiles cover this many newest pairs: ten seconds at 30 pairs per second."""
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A part of a view.
-
-    Attributes:
-        rank: parts of a lower rank get room first.
-        shown: its content.
-    """
-
-    rank: int
-    shown: RenderableType
-
-
-class LiveTable:
+class LiveTable(Redrawn):
     """Shows a run's delays while it is running; a context manager.
 
     Args:
@@ -69,11 +50,8 @@ class LiveTable:
         pairs: int = 0,
         refresh_s: float = _REFRESH_S,
     ) -> None:
+        super().__init__(console)
         self._snapshot, self._refresh_s = snapshot, refresh_s
-        self._live = Live(console=console or Console(stderr=True), auto_refresh=False, transient=True)
-        # Two threads that draw at once would each move the cursor from where the other one had left it.
-        self._drawing = RLock()
-        self._ending = ExitStack()
         self._seconds = seconds
         self._begun_s = 0.0
         self._shown_s = 0.0
@@ -84,20 +62,6 @@ class LiveTable:
         )
         total = seconds or pairs
         self._task = self._progress.add_task("seconds" if seconds else "pairs", total=total) if total else None
-
-    def __enter__(self) -> Self:
-        with ExitStack() as begun:
-            begun.enter_context(logs.written_by(self._say))
-            self._live.start()
-            begun.callback(self._live.stop)
-            self._ending = begun.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        with self._drawing:
-            self._ending.close()
 
     def refresh(self) -> None:
         """Show the present state, at most a few times a second."""
@@ -115,9 +79,7 @@ class LiveTable:
         if self._task is not None:
             lasted_s = min(self._seconds, now_s - self._begun_s) if self._begun_s else 0.0
             self._progress.update(self._task, completed=lasted_s if self._seconds else run.processed)
-        with self._drawing:
-            console = self._live.console
-            self._live.update(fitted(self._parts(run, console.width), console), refresh=True)
+        self.draw(self._parts(run, self.console.width))
 
     def _parts(self, run: RunSnapshot, width: int) -> Sequence[Part]:
         """Return the view from top to bottom; on a low terminal warnings, bar and table are what stays."""
@@ -140,26 +102,6 @@ class LiveTable:
             Part(4, _state(run)),
             *bar,
         )
-
-    def _say(self, line: str) -> None:
-        """Write a line of the log above the view."""
-        with self._drawing:
-            self._live.console.print(Text(line, overflow="fold"))
-
-
-def fitted(parts: Sequence[Part], console: Console) -> Segments:
-    """Draw parts below each other in the rows of a terminal; the last parts to get room are cut or left out.
-
-    One row stays free: a view as high as the terminal would scroll when it ends, and its top could not be removed.
-    """
-    room = console.height - 1
-    drawn: dict[int, list[list[Segment]]] = {}
-    for place in sorted(range(len(parts)), key=lambda each: (parts[each].rank, each)):
-        drawn[place] = console.render_lines(parts[place].shown, pad=False)[: max(room, 0)]
-        room -= len(drawn[place])
-    lines = [line for place in range(len(parts)) for line in drawn[place]]
-    ended = [[*line, Segment.line()] for line in lines[:-1]]
-    return Segments([segment for line in (*ended, *lines[-1:]) for segment in line])
 
 
 def _table(run: RunSnapshot, rate: float, width: int) -> Table:

@@ -57,7 +57,7 @@ class Renderer:
         self._scene = scene
         self._look = Look() if look is None else look
         self._size = (model.height_px, model.width_px)
-        self._focal_px = float(model.matrix[0, 0] + model.matrix[1, 1]) / 2.0
+        self._focal_px = model.mean_focal_px
         self._centre = pose.centre_m.astype(np.float32)
         rays = np.tensordot(pose.R_camera_scene.T, pixel_rays(model), axes=1)
         self._rays = rays.astype(np.float32).reshape(3, -1)

@@ -46,7 +46,7 @@ from phone_host.stereo.matcher_names import FASTEST
 from phone_host.stereo.matcher_protocol import Matcher, matched_by
 from phone_host.stereo.native.library import native
 from phone_host.stereo.points import points_of
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.stereo.stacked import lying_pair, upright_again

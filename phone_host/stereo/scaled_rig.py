@@ -92,7 +92,7 @@ def scaled_geometry(
 
 def coarser_focal_px(left: CameraModel, right: CameraModel) -> float:
     """Return the smaller mean focal length of two cameras, px: that of their rectified images."""
-    return min(float(model.matrix[0, 0] + model.matrix[1, 1]) / 2 for model in (left, right))
+    return min(left.mean_focal_px, right.mean_focal_px)
 
 
 def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraModel:

@@ -1,8 +1,9 @@
-"""The options that turn and mirror image files, shared by the verbs that read pairs of them. Light."""
+"""The options that say how image files are read, turned and mirrored, shared by the verbs that read pairs of them. Light."""
 
 import argparse
 
 from common.orientation import Flip, Orientation
+from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 
 _TURNS = (90, 180, 270)
 
@@ -24,6 +25,12 @@ def add_orientation_arguments(parser: argparse.ArgumentParser) -> None:
             default=Flip.NONE.value,
             help=f"mirror the {side} images, after turning them: h exchanges left and right, v top and bottom",
         )
+
+
+def add_image_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare those, and --max-megapixels."""
+    add_orientation_arguments(parser)
+    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
 
 
 def orientations(options: argparse.Namespace) -> tuple[Orientation, Orientation]:

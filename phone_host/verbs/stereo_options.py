@@ -19,7 +19,7 @@ from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import AnyMatcher, matcher_named
 from phone_host.stereo.plausible import require_plausible, require_plausible_file
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.scaled_rig import scaled_geometry
 from phone_host.verbs.stereo_numbers import crop_of, pixels, point_px, scale_of
 from phone_host.verbs.units import baseline_mm, limit_mm

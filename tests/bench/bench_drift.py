@@ -34,7 +34,7 @@ from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.evidence import look_at, maps_of
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.bench.depth_scenes import Image
 from tests.bench.drift_films import (
     Play,

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.output.rig_yaml import read_rig
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.bench.depth_accuracy import ANCHORS, MakeMatcher, by_maker, matching
 from tests.bench.depth_scenes import Image, Values
 

@@ -21,7 +21,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_pair
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import matcher_named
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.bench.depth_accuracy import three_way
 from tests.bench.depth_rooms import view_of
 from tests.bench.depth_scenes import Image

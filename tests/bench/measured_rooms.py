@@ -14,7 +14,8 @@ from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.measured_point import MeasuredPoint, Within, distance_between, measured_point
 from phone_host.stereo.point_match import PointMatch, match_point
-from phone_host.stereo.rectify import Rectifier, rectify_points
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_points
 from phone_host.stereo.reproject import disparities_for_near
 from tests.bench.trust_rooms import Room, room
 

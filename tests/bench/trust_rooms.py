@@ -12,7 +12,7 @@ from phone_host.scene.scene import Body, Box, Look, Plane, Renderer, Scene, Sphe
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 from tests.bench.depth_scenes import Image
 

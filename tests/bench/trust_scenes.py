@@ -19,7 +19,7 @@ from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
 from tests.bench.depth_scenes import Image
 

@@ -55,8 +55,8 @@ def render_board(
     columns, rows = np.meshgrid(steps_x, steps_y)
     pixels = np.column_stack([columns.ravel(), rows.ravel()])
     rays = rays_through(pixels, model)
-    grid = (rays[:, :2] / rays[:, 2:]).reshape(*columns.shape, 2)
-    x, y = _squares(grid, rotation, translation_m, board)
+    grid = [np.reshape(rays[:, i] / rays[:, 2], columns.shape) for i in range(2)]
+    x, y = _squares(grid[0], grid[1], rotation, translation_m, board)
     # Something is visible only near the paper: two squares or two solved rays beyond it everything is grey.
     near = (x >= -3) & (x < board.columns + 4) & (y >= -3) & (y < board.rows + 4)
     part = tuple(
@@ -65,23 +65,28 @@ def render_board(
     image: Image = np.full((model.height_px, model.width_px), 120, dtype=np.uint8)
     seen = image[tuple(slice(at.start * coarse, at.stop * coarse) for at in part)]
     fine_size = (seen.shape[1] * fine, seen.shape[0] * fine)
-    dense = np.asarray(cv2.resize(grid[part], fine_size, interpolation=cv2.INTER_LINEAR), dtype=np.float64)
-    x, y = _squares(dense, rotation, translation_m, board)
-    black = (np.floor(x) + np.floor(y)) % 2 == 0
+    dense = [np.asarray(cv2.resize(axis[part], fine_size, interpolation=cv2.INTER_LINEAR), np.float64) for axis in grid]
+    x, y = _squares(dense[0], dense[1], rotation, translation_m, board)
+    black = (np.floor(x).astype(np.int32) + np.floor(y).astype(np.int32)) & 1 == 0
     inside = (x >= 0) & (x < board.columns + 1) & (y >= 0) & (y < board.rows + 1)
     paper = (x >= -1) & (x < board.columns + 2) & (y >= -1) & (y < board.rows + 2)
-    value = np.where(inside & black, 20.0, np.where(paper, 230.0, 120.0)).astype(np.float32)
+    value = np.full(x.shape, 120.0, np.float32)
+    value[paper] = 230.0
+    value[inside & black] = 20.0
     seen[:] = np.rint(cv2.resize(value, (seen.shape[1], seen.shape[0]), interpolation=cv2.INTER_AREA))
     return image
 
 
 def _squares(
-    slopes: NDArray[np.float64], rotation: NDArray[np.float64], translation_m: NDArray[np.float64], board: Board
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    translation_m: NDArray[np.float64],
+    board: Board,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where rays (x, y, 1) meet the board's plane, in squares from its outer corner."""
     # Rotate the rays into the board's axes and intersect them with its plane z = 0; written out, this takes a third of
     # the time of a matrix product.
-    x, y = (np.ascontiguousarray(slopes[..., i]) for i in range(2))
     along, down, away = (x * rotation[0, i] + y * rotation[1, i] + rotation[2, i] for i in range(3))
     origin = -rotation.T @ translation_m
     depth = origin[2] / away

@@ -151,11 +151,9 @@ def _seen(rig: Rig, points: Vector, motion: _Motion) -> tuple[Vector, Vector]:
         return left, right
     rolled = []
     for side, (seen, lens) in enumerate(((left, rig.left), (right, rig.right))):
-        own = []
-        for index, pixel in enumerate(seen):
-            share = pixel[1] / lens.height_px - 0.5  # of the readout; a second round would move a corner by 1 % of that
-            own.append(project_points(_moved(points, motion.speed * share), rig)[side][index])
-        rolled.append(np.array(own))
+        shares = seen[:, 1] / lens.height_px - 0.5  # of the readout; a second round would move a corner by 1 % of that
+        own = np.array([_moved(points, motion.speed * share)[index] for index, share in enumerate(shares)])
+        rolled.append(project_points(own, rig)[side])
     return rolled[0], rolled[1]
 
 

@@ -28,10 +28,10 @@ _MIRROR = Orientation(0, Flip.H)
 
 
 def _seen(board: Board) -> list[BoardPair]:
-    """Ten boards before a rig, with 0.1 px of noise."""
+    """Seven boards before a rig, with 0.1 px of noise."""
     rig, random = unlike_rig(), np.random.default_rng(4)
     pairs = []
-    for index, pose in enumerate(poses(10, seed=12)):
+    for index, pose in enumerate(poses(7, seed=12)):
         points = board.points_m() @ np.asarray(cv2.Rodrigues(pose[:3])[0]).T + pose[3:]
         left, right = (seen + random.normal(0, 0.1, seen.shape) for seen in project_points(points, rig))
         pairs.append(BoardPair(str(index), left, agree(left, right, board)))

@@ -101,7 +101,7 @@ def test_names_that_are_taken_get_a_number() -> None:
 def test_the_pose_is_solved_anew_after_a_knock() -> None:
     """Four pairs after a knock and the earlier lenses give the new pose, within four of its stated standard deviations; the lenses stay as they were."""
     truth = unlike_rig()
-    earlier = calibrate(exact_pairs(truth, poses(15, seed=1), noise_px=0.1, seed=4), BOARD, _SIZES).rig
+    earlier = calibrate(exact_pairs(truth, poses(8, seed=1), noise_px=0.1, seed=4), BOARD, _SIZES).rig
     found = solve_pose(exact_pairs(_moved(truth), poses(4, seed=9), noise_px=0.1, seed=5), BOARD, earlier)
     np.testing.assert_array_equal(found.rig.left.matrix, earlier.left.matrix)
     np.testing.assert_array_equal(found.rig.right.distortion, earlier.right.distortion)
@@ -117,7 +117,7 @@ def test_the_pose_is_solved_anew_after_a_knock() -> None:
 def test_lenses_are_scaled_to_new_pictures_and_that_is_said(tmp_path: Path) -> None:
     """Left pictures of twice the size and right ones cut at top and bottom: the pose alone comes out right, adding is refused with the way out."""
     truth = unlike_rig()
-    path = _written(tmp_path, exact_pairs(truth, poses(10, seed=1), noise_px=0.02), with_views=False)
+    path = _written(tmp_path, exact_pairs(truth, poses(7, seed=1), noise_px=0.02), with_views=False)
     sizes = ((1280, 960), (1280, 680))
     seen = exact_pairs(scaled_rig(truth, *sizes), poses(6, seed=2), noise_px=0.02)
     session = _session(_options(tmp_path, "--from", str(path), "--pose-only", "--board", "9x6", "--square", "25mm"))
@@ -126,7 +126,7 @@ def test_lenses_are_scaled_to_new_pictures_and_that_is_said(tmp_path: Path) -> N
     said = notes(session, seen, sizes)
     assert said[1].endswith("the left lens is scaled: 640x480 to 1280x960 px")
     assert said[2].endswith("the right lens is cropped to its middle: 1280x720 to 1280x680 px")
-    path = _written(tmp_path, exact_pairs(truth, poses(10, seed=1)))
+    path = _written(tmp_path, exact_pairs(truth, poses(5, seed=1)))
     with pytest.raises(DataError, match=r"the new left pictures are 1280x960 px, those of .*rig.yaml 640x480 px"):
         calibrated(_session(_options(tmp_path, "--from", str(path))), seen, sizes)
 
@@ -252,7 +252,7 @@ def test_unlike_lenses_are_chosen_by_views_that_were_held_out() -> None:
     wide = replace(rig.right, matrix=np.array([[640.0, 0, 652], [0, 641, 351], [0, 0, 1]]))
     truth = replace(rig, left=bent, right=replace(wide, distortion=np.array([-0.1, 0.02, 0.0, 0.0, 0.0])))
     random, boards = np.random.default_rng(2), list[np.ndarray]()
-    while len(boards) < 14:
+    while len(boards) < 10:
         turn, depth_m = random.uniform(-0.5, 0.5, 3), random.uniform(0.2, 0.45)
         centre = np.array([*random.uniform(-0.75, 0.75, 2), 1.0]) * depth_m
         pose = np.concatenate([turn, centre - np.asarray(cv2.Rodrigues(turn)[0]) @ BOARD.points_m().mean(axis=0)])
@@ -265,7 +265,7 @@ def test_unlike_lenses_are_chosen_by_views_that_were_held_out() -> None:
     pairs = exact_pairs(truth, np.array(boards), noise_px=0.05, seed=1)
     found = calibrate(pairs, BOARD, _SIZES)
     assert [bend.lens for bend in found.bends] == [Lens.FISHEYE, Lens.PINHOLE]
-    assert len(found.used) == 14
+    assert len(found.used) == 10
     off_m = np.linalg.norm(found.rig.t_right_left_m) - np.linalg.norm(truth.t_right_left_m)
     assert abs(off_m) < 4 * found.baseline_sigma_m < 1e-3
     assert judge(found, ()).verdict is Verdict.GOOD

@@ -12,7 +12,7 @@ from phone_host.cli import main
 from phone_host.output.rig_files.imported import import_rig, read_own_rig
 from phone_host.output.rig_yaml import read_rig
 from tests.unit.test_report_keys import _described, _keys
-from tests.unit.test_rig_files import KALIBR
+from tests.unit.test_rig_files_kalibr import KALIBR
 
 _UPRIGHT = KALIBR.replace("- [0.0, -1.0, 0.0, 0.0]", "- [1, 0, 0, -0.12]").replace(
     "- [1.0, 0.0, 0.0, -0.12]", "- [0, 1, 0, 0]"

@@ -3,6 +3,7 @@
 import math
 import os
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -24,15 +25,20 @@ from tests.support.cause_real import real_pairs, variants
 from tests.support.cause_sessions import MAKERS, Made, good, good_pictures, partners, unstiff
 from tests.support.rigs import small_rig
 
+_FEW = 11
+"""A session of that many views is solved in half the time of most; of those of images, three pairs are looked at."""
+
 
 def _random(seed: int) -> np.random.Generator:
     return np.random.default_rng([7, seed])
 
 
+@cache
 def _unstiff(course: Course) -> tuple[Made, Finding]:
-    """The first made session whose cameras turn in a way, and what is named."""
+    """The first small session whose cameras turn in a way, and what is named."""
     word = {Course.DRIFT: "drift", Course.KNOCK: "knock", Course.LOOSE: "loose"}[course]
-    made = next(made for made in (unstiff(_random(seed)) for seed in range(30)) if made.truth.startswith(word))
+    sessions = (unstiff(_random(seed)) for seed in range(99))
+    made = next(made for made in sessions if made.truth.startswith(word) and len(made.pairs) <= _FEW)
     found = deviation(tuple(made.pairs), made.board, made.sizes_px)
     assert found is not None
     return made, found
@@ -41,7 +47,8 @@ def _unstiff(course: Course) -> tuple[Made, Finding]:
 @pytest.mark.parametrize("mistake", list(Mistake))
 def test_each_mistake_is_named(mistake: Mistake) -> None:
     """A session of random cameras and boards with one mistake: its name, a sentence with figures and a remedy are given."""
-    found = finding_of(MAKERS[mistake](_random(1)))
+    made = next(made for made in (MAKERS[mistake](_random(seed)) for seed in range(30)) if len(made.pairs) <= _FEW)
+    found = finding_of(replace(made, images=made.images[:3]))
     assert found is not None
     assert found.mistake is mistake
     assert found.sentence

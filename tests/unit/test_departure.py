@@ -11,7 +11,8 @@ from phone_host.stereo.evidence import maps_of
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier, rectify_rig
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.stacked import lying, upright_points, upright_steps
 from tests.support.drift_sightings import sight, two_webcams
 

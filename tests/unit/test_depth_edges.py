@@ -19,7 +19,7 @@ from phone_host.stereo.match_told import MOST_PIXELS, untold
 from phone_host.stereo.plane_fit import fit_plane, plane_at
 from phone_host.stereo.plane_quality import NoTruth, measure_plane
 from phone_host.stereo.point_match import PointMatch, Unmatched, match_point
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.planes import noise, plane
 from tests.support.rigs import unlike_rig
 from tests.support.talk import NAMES, Talk

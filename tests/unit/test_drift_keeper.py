@@ -15,7 +15,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.departure import corrected_rig
 from phone_host.stereo.evidence import look_at, maps_of
 from phone_host.stereo.match import MatchSettings
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import small_rig
 from tests.unit.test_sinks import result
 

@@ -201,7 +201,7 @@ def test_a_bad_line_loses_frames_and_alters_none(seed: int) -> None:
     chance = random.Random(seed)
     made = line(500_000, MS, chance)
     film = Film(8000)
-    made.run(made.now_ns + 10 * S, film)
+    made.run(made.now_ns + 6 * S, film)
     frames = [(at, whole) for at, whole in made.came[HOST] if isinstance(whole, Whole) and whole.lane is Lane.FRAMES]
     assert all(bytes(whole.payload) == film.frame for _, whole in frames)
     numbers = [int(bytes(whole.header)) for _, whole in frames]

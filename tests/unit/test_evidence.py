@@ -38,7 +38,7 @@ from phone_host.stereo.evidence import density, has_depth, maps_of, measure_evid
 from phone_host.stereo.evidence_points import ThroughRig, Unmoved, turned_back
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import points_seen_by_both, stacked_rig, unlike_rig
 
 Pair = tuple[Image, Image]

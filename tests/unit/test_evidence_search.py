@@ -23,7 +23,7 @@ from phone_host.stereo.evidence_rows import row_skew_px
 from phone_host.stereo.evidence_search import beyond_search
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 
 Pair = tuple[Image, Image]
 

@@ -27,7 +27,8 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.match import MatchSettings
-from phone_host.stereo.rectify import Rectifier, rectify_points, rectify_rig
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_points, rectify_rig
 from tests.support.rigs import fisheye_rig, points_seen_by_both
 
 _MATRIX = np.array([[410.0, 0, 322], [0, 408, 237], [0, 0, 1]])

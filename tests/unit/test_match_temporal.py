@@ -150,7 +150,7 @@ def test_images_of_another_size_begin_anew() -> None:
 def test_one_pair_in_thirty_is_searched_in_full() -> None:
     """What is too small to be seen in a narrowed search stays unseen for 29 pairs at most."""
     matcher = temporal(MatcherName.TANDEM)
-    scene = layers([_WALL], width_px=240, height_px=100)
+    scene = layers([_WALL], width_px=160, height_px=60)
     found = [why(matcher.matched(scene.pair)) for _ in range(2 * DUE_EVERY)]
     assert [at for at, item in enumerate(found) if item is not SearchedAs.NARROWED] == [0, DUE_EVERY]
     assert found[DUE_EVERY] is SearchedAs.DUE
@@ -171,7 +171,7 @@ def test_columns_whose_partners_lie_outside_the_right_image_have_no_value() -> N
     assert ((matched.confidence == 0) == np.isnan(matched.disparity)).all()
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=12)
 @given(
     sizes=st.lists(st.tuples(st.integers(1, 40), st.integers(1, 70)), min_size=2, max_size=4),
     disparities=st.integers(1, 130),

@@ -36,7 +36,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.verbs.run.arguments import add_arguments
 from phone_host.verbs.run.budget import budget_wanted
 from tests.support.budget_accounts import ACCOUNT, BEST, MS, NARROW, SMALL

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +12,20 @@ import numpy as np
 import pytest
 
 from phone_host.cli import main
-from phone_host.model import Processed
 from phone_host.output.rig_yaml import write_rig
-from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK, plane_scene, unlike_rig
+from phone_host.run.quality_job import QualityJob, run_quality
+from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK, plane_scene
 from phone_host.scene.scene_model import Body, Box, Scene, Texture, rig_poses, rotation
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_rig
+from phone_host.stereo.view_files import pair_files
 from tests.support.boards import BOARD, render_pair
 from tests.support.html import Page
-from tests.support.rigs import project_points
+from tests.support.rigs import narrow_rig, project_points
 
 NEAR_M, FAR_M = 0.6, 1.2
 
@@ -29,7 +34,7 @@ NEAR_M, FAR_M = 0.6, 1.2
 def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the demo's rig: a wall at 0.6 m, tilted, and at 1.2 m (left/1, left/2), and the edge of a cupboard (edge_l, edge_r)."""
     folder = tmp_path_factory.mktemp("room")
-    rig = unlike_rig()
+    rig = narrow_rig()
     write_rig(folder / "rig.yaml", rig, rectify_rig(rig))
     turn = rotation((0.0, 1.0, 0.0), math.radians(45))
     cupboard = Scene((Body("cupboard", Box((0.8, 3.0, 0.8)), (0.0, 0.0, 1.3), Texture(seed=4), turn),))
@@ -57,25 +62,38 @@ def report_of(out: Path) -> dict[str, Any]:
     return report
 
 
-def test_what_was_measured_before_ctrl_c_is_written(
-    room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Ctrl-C during the second pair: exit 130, and report and page of the first one, which say so. During the first one nothing is written."""
-    core, calls = StereoCore.compute, iter((False, True, True))
+class _Impatient:
+    """Somebody who presses Ctrl-C when these words are shown."""
 
-    def compute(self: StereoCore, *given: Any, **named: Any) -> Processed:
-        if next(calls):
+    def __init__(self, words: str) -> None:
+        self._words = words
+
+    def __call__(self, amount: int = 1) -> None:
+        """Wait on."""
+
+    def say(self, what: str) -> None:
+        """Read what is being done."""
+        if what == self._words:
             raise KeyboardInterrupt
-        return core(self, *given, **named)
 
-    monkeypatch.setattr(StereoCore, "compute", compute)
-    given = [str(room / "left"), str(room / "right"), "--out"]
-    assert run(room, *given, str(tmp_path / "o")) == 130
+
+def test_what_was_measured_before_ctrl_c_is_written(room: Path, tmp_path: Path) -> None:
+    """Ctrl-C during the second pair: report and page are of the first one, and say so. During the first one nothing is written."""
+    core = StereoCore(MatchSettings(MatcherName.SGBM, 96), Rectifier(narrow_rig()))
+    job = QualityJob(
+        files=pair_files(str(room / "left"), str(room / "right")),
+        out=tmp_path / "o",
+        make_core=lambda _: core,
+        matcher="sgbm",
+    )
+    with pytest.raises(KeyboardInterrupt):
+        run_quality(job, _Impatient("matching 2.png"))
     report = report_of(tmp_path / "o")
     assert (report["interrupted_of"], len(report["pairs"])) == (2, 1)
     assert report["headline"].startswith("Interrupted after 1 of 2 pairs. At ")
     assert "Interrupted after 1 of 2 pairs" in (tmp_path / "o" / "index.html").read_text()
-    assert run(room, *given, str(tmp_path / "none")) == 130
+    with pytest.raises(KeyboardInterrupt):
+        run_quality(replace(job, out=tmp_path / "none"), _Impatient("matching 1.png"))
     assert not (tmp_path / "none").exists()
 
 
@@ -109,7 +127,7 @@ def test_one_wall_without_a_distance(room: Path, tmp_path: Path, capsys: pytest.
         str(room / "left/2.png"),
         str(room / "right/2.png"),
         "--roi",
-        "100,50,200,150",
+        "100,50,150,120",
         "--out",
         str(tmp_path / "o"),
     ]
@@ -118,7 +136,7 @@ def test_one_wall_without_a_distance(room: Path, tmp_path: Path, capsys: pytest.
     assert re.match(r"At 1\.[12]\d\d m depth scatters by [\d.]+ mm \(0\.\d\d%\)", lines[0])
     assert any("note: give --distance" in line for line in lines)
     [pair] = report_of(tmp_path / "o")["pairs"]
-    assert (pair["roi"], pair["pixels"], pair["bias_m"]) == ([100, 50, 200, 150], 30000, None)
+    assert (pair["roi"], pair["pixels"], pair["bias_m"]) == ([100, 50, 150, 120], 18000, None)
     page = Page((tmp_path / "o" / "index.html").read_text())
     assert page.open == []
     assert "give --distance" in page.words
@@ -163,10 +181,10 @@ def test_a_pair_that_fails_among_others_is_named(
 
 def test_a_board_gives_the_true_distance(room: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A rendered board is where its corners say, to 0.3 %, and its depth is measured inside its outline; squares taken for 1 % larger give 1 % of bias."""
-    rig = unlike_rig()
+    rig = narrow_rig()
     middle = BOARD.points_m().mean(axis=0)
     turn = np.array([0.1, 0.2, 0.05])
-    pose = np.concatenate([turn, np.array([0.02, 0.0, 0.45]) - np.asarray(cv2.Rodrigues(turn)[0]) @ middle])
+    pose = np.concatenate([turn, np.array([0.05, 0.0, 0.8]) - np.asarray(cv2.Rodrigues(turn)[0]) @ middle])
     rng = np.random.default_rng(5)
     for name, image in zip(("l.png", "r.png"), render_pair(rig, pose), strict=True):
         noisy = cv2.GaussianBlur(image, (0, 0), 0.7) + rng.normal(0, 1.5, image.shape)

@@ -12,7 +12,7 @@ from phone_host.model import Image
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, examine, size_px
 from phone_host.stereo.match import MatchSettings
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import unlike_rig
 
 

@@ -14,7 +14,7 @@ from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.match_input import check_pair, grey
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.planes import noise
 from tests.support.rigs import unlike_rig
 

@@ -35,7 +35,7 @@ from phone_host.scene.scene import (
     rig_poses,
 )
 from phone_host.stereo.raw_images import EncodedImage
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import small_rig
 
 REFRESH_S = 1 / 59.94
@@ -85,9 +85,9 @@ NOISE = np.random.default_rng(6).normal(0, 3, (13, 210, 280)).astype(np.float32)
 
 @cache
 def side_of_film(fps: float, phase_s: float, *, host: bool) -> tuple[Times, list[Reading | None]]:
-    """Eight seconds of the counting screen as one camera sees it: times from its start, and the numbers read; filmed once."""
+    """Five seconds of the counting screen as one camera sees it: times from its start, and the numbers read; filmed once."""
     reader = PatternReader()
-    moments = stamps(8.0, fps, phase_s) + START_S
+    moments = stamps(5.0, fps, phase_s) + START_S
     return moments - START_S, [reader.read(filmed(float(t), 0.008, host=host)) for t in moments]
 
 
@@ -113,7 +113,7 @@ def test_every_number_is_read() -> None:
     [(0.0, 29.6, 29.75, 2), (0.021, 29.6, 30.2, 2), (-0.0605, 29.6, 24.1, 2), (0.02, 30.0, 30.0, 18)],
 )
 def test_a_screen_gives_the_offset(offset: float, board_fps: float, host_fps: float, most_ms: float) -> None:
-    """The known delay of late stamps is measured, with an uncertainty that is small if every part of a refresh was seen in 8 s."""
+    """The known delay of late stamps is measured, with an uncertainty that is small if every part of a refresh was seen in 5 s."""
     measured = film_screen(offset, board_fps, host_fps)
     found, doubt = offset_ms(measured)
     assert measured.method is Method.SCREEN

@@ -15,7 +15,7 @@ from phone_host.calibration.timing.shared_motion import measure_shared_motion
 from phone_host.calibration.timing.shots import Measured, Shot, Times
 from phone_host.model import CameraModel, Image, Rig
 from phone_host.stereo.raw_images import EncodedImage
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 
 REFRESH_HZ = 60.0
 

@@ -19,7 +19,7 @@ from phone_host.run.trust_sink import TrustSink
 from phone_host.scene.scene import demo_scene, render, rig_poses, unlike_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import small_rig, stacked_rig
 from tests.unit.test_sinks import result
 

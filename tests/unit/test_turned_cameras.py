@@ -24,7 +24,7 @@ from phone_host.stereo.interpolate import Interpolator
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.raw_images import EncodedImage
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, write_film
 from tests.support.oriented import oriented
 from tests.support.planes import plane

@@ -4,10 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from common.program.quantities import milliseconds, reading, seconds
-from phone_host.camera.examples import EXAMPLE
-from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.orientation_arguments import add_orientation_arguments
+from phone_host.verbs.orientation_arguments import add_image_arguments
+from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
 
 SUMMARY = "calibrate two cameras, live or from pictures of a board"
 
@@ -73,8 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("left", "right"),
         help="which of the two is the board's camera (default left, or as in --from)",
     )
-    add_orientation_arguments(parser)
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    add_image_arguments(parser)
     parser.add_argument(
         "--out",
         type=Path,
@@ -90,13 +87,8 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="take the pictures now, from both cameras: says what to show, takes each view by itself, ends when it is enough",
     )
-    parser.add_argument(
-        "--link",
-        action="append",
-        metavar="URI",
-        help="for --live: address of the board (default: look for one, as `run` does)",
-    )
-    parser.add_argument("--camera", metavar="URI", help=f"for --live: camera of this machine: {EXAMPLE}")
+    add_source_arguments(parser, "for --live: ")
+    add_tolerance_argument(parser, "for --live: ")
     parser.add_argument(
         "--views",
         type=int,
@@ -116,19 +108,6 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="for --live: folder for guide.json and guide.svg, what is shown just now",
     )
-    parser.add_argument(
-        "--wait",
-        type=reading(seconds, "--wait"),
-        metavar="S",
-        help="for --live: seconds to wait for a board, then exit with code 3 (default: wait for ever)",
-    )
-    parser.add_argument(
-        "--tolerance",
-        type=reading(milliseconds, "--tolerance"),
-        metavar="MS",
-        help="for --live: greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
-    )
-    parser.add_argument("--keys", metavar="DIR", help="for --live: folder of keys (default ~/.config/tandemscan)")
 
 
 def _add_file_arguments(parser: argparse.ArgumentParser) -> None:

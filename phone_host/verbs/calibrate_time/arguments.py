@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from common.program.quantities import reading, seconds
-from phone_host.camera.examples import EXAMPLE
+from phone_host.verbs.source_arguments import add_source_arguments
 
 SUMMARY = "measure the time offset between the two cameras with a screen, a lamp or a moving scene"
 
@@ -27,9 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what both cameras film: the page of --pattern on a screen; a lamp that you switch at irregular moments; or, with"
         " --calibration, any textured thing that moves up and down (default screen)",
     )
-    parser.add_argument("--link", metavar="URI", help="address of the board (default: look for one, as `run` does)")
-    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
-    parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}")
+    add_source_arguments(parser, several=False)
     parser.add_argument(
         "--frames",
         type=Path,
@@ -38,12 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seconds", type=reading(seconds, "--seconds"), default=20.0, metavar="S", help="seconds to film (default 20)"
-    )
-    parser.add_argument(
-        "--wait",
-        type=reading(seconds, "--wait"),
-        metavar="S",
-        help="seconds to wait for a board, then exit with code 3 (default: wait for ever)",
     )
     parser.add_argument(
         "--calibration", type=Path, metavar="rig.yaml", help="calibration to write the result into; --by scene needs it"

@@ -39,7 +39,7 @@ from phone_host.recording.footage import Footage, film, keep, read
 from phone_host.run.progress_bar import share_bar
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, require_folder, unwritable
 
 _Reading = TypeVar("_Reading")

@@ -2,9 +2,8 @@
 
 import argparse
 
-from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 from phone_host.stereo.matcher_names import default_words
-from phone_host.verbs.orientation_arguments import add_orientation_arguments
+from phone_host.verbs.orientation_arguments import add_image_arguments
 from phone_host.verbs.stereo_arguments import DEFAULT_NEAR_MM
 
 SUMMARY = "measure points of a pair of images in millimetres, with their uncertainty"
@@ -47,8 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--disparities", type=int, metavar="N", help="search disparities from 0 to N-1 px (default: as --near needs)"
     )
     parser.add_argument("--matcher", metavar="NAME", help=f"as for phone-host stereo ({default_words()})")
-    add_orientation_arguments(parser)
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    add_image_arguments(parser)
     # What the stereo core could be told besides. Limits and crops would only hide the points that are asked for.
     parser.set_defaults(
         rectified=False,

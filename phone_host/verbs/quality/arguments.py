@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.orientation_arguments import add_orientation_arguments
+from phone_host.verbs.orientation_arguments import add_image_arguments
 from phone_host.verbs.stereo_arguments import PAIRED, add_core_arguments
 
 SUMMARY = "measure how good a rig's depth is, on a flat wall or board"
@@ -45,8 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " outermost inner corners)",
     )
     add_core_arguments(parser)
-    add_orientation_arguments(parser)
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    add_image_arguments(parser)
     parser.add_argument(
         "--out",
         type=Path,

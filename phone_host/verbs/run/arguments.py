@@ -3,10 +3,9 @@
 import argparse
 from pathlib import Path
 
-from common.camera.options import TURNED
 from common.program.quantities import milliseconds, reading, seconds
-from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
 from phone_host.verbs.stereo_arguments import add_overlay_argument, add_stereo_arguments
 
 SUMMARY = "pair the board's frames with those of this machine's camera, compute depth, measure every delay"
@@ -23,7 +22,8 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    _add_sources(parser)
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
+    add_source_arguments(parser, waiting="wait for ever; with --seconds S, S + 10 seconds")
     add_stereo_arguments(parser)
     add_overlay_argument(parser)
     parser.add_argument(
@@ -34,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_pairing(parser)
     _add_ends(parser)
     _add_results(parser)
-    parser.add_argument("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
     parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
     parser.add_argument(
         "--log-level",
@@ -43,30 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_sources(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
-    parser.add_argument(
-        "--link",
-        action="append",
-        metavar="URI",
-        help="address of the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: look for a board); repeat the option:"
-        " the frames come over the best link that is up",
-    )
-    parser.add_argument("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}; {TURNED}")
-
-
 def _add_pairing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--board-side",
         choices=("left", "right"),
         help="which view the board's camera gives (default: as in the calibration, else left)",
     )
-    parser.add_argument(
-        "--tolerance",
-        type=reading(milliseconds, "--tolerance"),
-        metavar="MS",
-        help="greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
-    )
+    add_tolerance_argument(parser)
     parser.add_argument(
         "--fifo",
         metavar="DEPTH:POLICY",
@@ -113,12 +95,6 @@ def _add_ends(parser: argparse.ArgumentParser) -> None:
         default=0.0,
         metavar="S",
         help="end S seconds after the first pair; exit with code 4 if none comes within 10 seconds more (default: no limit)",
-    )
-    parser.add_argument(
-        "--wait",
-        type=reading(seconds, "--wait"),
-        metavar="S",
-        help="seconds to wait for a board, then exit with code 3 (default: wait for ever; with --seconds S, S + 10 seconds)",
     )
 
 

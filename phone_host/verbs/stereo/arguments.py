@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
-from phone_host.verbs.orientation_arguments import add_orientation_arguments
+from phone_host.verbs.orientation_arguments import add_image_arguments
 from phone_host.verbs.stereo_arguments import PAIRED, add_overlay_argument, add_stereo_arguments
 
 SUMMARY = "compute disparity and point clouds of pairs of images"
@@ -28,8 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_stereo_arguments(parser)
     add_overlay_argument(parser)
-    add_orientation_arguments(parser)
-    parser.add_argument("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    add_image_arguments(parser)
     parser.add_argument(
         "--out",
         type=Path,
