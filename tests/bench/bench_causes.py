@@ -77,8 +77,8 @@ def main() -> int:
             bar.advance(task)
     verdicts = _verdicts(judged)
     if options.json:
-        said = {"verdicts": [asdict(verdict) for verdict in verdicts], "named": _counts(judged)}
-        print(json.dumps({"machine": str(machine()), **said}))
+        shown = {"verdicts": [asdict(verdict) for verdict in verdicts], "named": _counts(judged)}
+        print(json.dumps({"machine": str(machine()), **shown}))
         return exit_code(verdicts)
     console.print(f"{machine()}")
     console.print(_matrix(judged))
