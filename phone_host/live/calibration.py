@@ -22,6 +22,7 @@ from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
+from phone_host.calibration.guide.wants import Want
 from phone_host.calibration.guide.words import Words
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target import Board, Corners
@@ -58,6 +59,7 @@ class LiveSettings:
         most_views: end after so many.
         left: folder for the left pictures.
         right: folder for the right ones.
+        seen: the image corners that are known from an earlier calibration.
     """
 
     host: HostSettings
@@ -66,6 +68,7 @@ class LiveSettings:
     most_views: int
     left: Path
     right: Path
+    seen: frozenset[Want] = frozenset()
 
 
 class LiveCalibration:
@@ -180,7 +183,7 @@ class LiveCalibration:
         self._finder = BoardFinder(board)
         self._check = SizeCheck(board) if self._settings.board is not None else None
         with self._lock:
-            self._guide = Guide(board, self._settings.most_views, now.monotonic_ns())
+            self._guide = Guide(board, self._settings.most_views, now.monotonic_ns(), self._settings.seen)
 
     def _look(self, result: Result) -> None:
         """Look at a pair: called in the sink's thread."""
