@@ -8,11 +8,11 @@ import pytest
 from phone_host.calibration.board_size import size_seen, whole_size_seen
 from phone_host.calibration.target import find_corners
 from phone_host.geometry.lens import project
+from tests.support.novice.depth_truth import depth_error_m
 from tests.support.novice.hands import Plan, Stroke, motion
 from tests.support.novice.head import Novice
 from tests.support.novice.painter import Moment, Painter
 from tests.support.novice.scene import BOARD, novice_scene
-from tests.support.novice.depth_truth import depth_error_m
 
 MIDDLE_M = BOARD.points_m().mean(axis=0)
 

@@ -33,8 +33,8 @@ from phone_host.calibration.guide.gates import (
 from phone_host.calibration.guide.placement import placement, usual_camera
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
-from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.unseen import unseen, with_corners
+from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Speech, Words, done, taken
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Assessment, Verdict
@@ -134,7 +134,7 @@ class Guide:
         self._coverage: tuple[Coverage, ...] = ()
         self._refused = Counter[Gate]()
         self._asked, self._asked_ns = Want.ANY, now_ns
-        self._open = set(ORDER)
+        self._open: set[Want] = set(ORDER)
         self._given_up = Counter[Want]()
         self._places = list[Placed]()
         self._progress: Progress | None = None
@@ -319,8 +319,10 @@ class Guide:
         if not self.views:
             return
         if not self._open:
-            self._open = set(ORDER) - set(self._given_up) or set(ORDER)
-        self._open |= self._unseen
+            self._open.update(each for each in ORDER if not self._given_up[each])
+        if not self._open:
+            self._open.update(ORDER)
+        self._open.update(self._unseen)
         is_enough = self._progress is not None and self._is_enough(self._progress, now_ns)
         self._asked = min((is_enough and self._unseen) or self._open, key=self._rank)
         self._asked_ns = now_ns
@@ -340,10 +342,9 @@ class Guide:
         self._given_up[self._asked] += 1
         self._open.discard(self._asked)
         self._ask(now_ns)
-        progress = self._progress
-        if progress is not None and progress.views == len(self.views) and self._is_enough(progress, now_ns):
-            if all(self._given_up[want] >= _VAIN_TRIES for want in self._unseen):
-                self.ended = Ended.ENOUGH
+        progress, in_vain = self._progress, all(self._given_up[want] >= _VAIN_TRIES for want in self._unseen)
+        if in_vain and progress is not None and progress.views == len(self.views) and self._is_enough(progress, now_ns):
+            self.ended = Ended.ENOUGH if self._unseen else Ended.GOOD
 
     def _is_enough(self, progress: Progress, now_ns: int) -> bool:
         """Return whether the figures are good and more views no longer help, or it has taken long. Of unseen corners they know nothing."""

@@ -17,6 +17,7 @@ from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
+from common.program.terminal import say
 from common.stamp import HOST_CLOCK
 from common.words import counted
 from phone_host.boards.discovery import find_board_and_say
@@ -90,6 +91,9 @@ class Live:
         """Return it for the summary: where the pictures are, and how they are calibrated again."""
         again = [f"--board {options.board}"] if options.board else []
         again += [f"--square {options.square}"] if options.square else []
+        again += [f"--from {options.earlier}"] if options.earlier else []
+        again += ["--pose-only"] if options.pose_only else []
+        again += [f"--board-side {options.board_side}"] if options.board_side else []
         command = " ".join(["phone-host calibrate", *self.folders, *again, f"--out {options.out}"])
         views = counted(self.last.views, "view")
         return [f"live     {views} in {self.last.seconds:.0f} s; to calibrate from them again:", f"         {command}"]
@@ -138,17 +142,18 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
     except OSError as error:
         raise unwritable(settings.left, error, "LEFT or --snapshots") from error
     last = live.snapshot()
-    if last.views < _LEAST_VIEWS and signals.interrupted:
-        raise KeyboardInterrupt
     if last.views < _LEAST_VIEWS:
+        if last.views:
+            kept = f"{counted(last.views, 'view')} kept in {settings.left} and {settings.right}"
+            say(f"phone-host: {kept}; the next --live replaces them", sys.stderr, flush=True)
+        if signals.interrupted:
+            raise KeyboardInterrupt
         raise _too_few(last)
     stopped_with = None if not signals.stop else INTERRUPTED if signals.interrupted else 0
     return Live(last, settings.left, settings.right, stopped_with)
 
 
-def grown(
-    views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size], baseline_m: float
-) -> Progress:
+def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:
     """Calibrate from the views so far and judge, as the command does at the end.
 
     Args:

@@ -69,7 +69,7 @@ def _pattern(board: Board, n: int) -> NDArray[np.float64]:
     match board.marks:
         case None:
             checks = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == 0
-            return checks.repeat(n, 0).repeat(n, 1) * 255.0
+            return np.asarray(checks.repeat(n, 0).repeat(n, 1) * 255.0)
         case Charuco(family, share):
             dictionary = cv2.aruco.getPredefinedDictionary(family.value)
             sheet = cv2.aruco.CharucoBoard((columns, rows), 1.0, share, dictionary)
