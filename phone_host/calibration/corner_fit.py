@@ -282,4 +282,5 @@ def _sigma_px(patches: _Patches, equations: _Equations) -> Floats:
     variance = variance * used / np.maximum(used - _PARAMETERS, 1) * _NOISE_GAIN
     inverse = np.linalg.inv(equations.matrix + _TINY * np.eye(_PARAMETERS))
     spread = (inverse @ (np.swapaxes(weighted, 1, 2) @ weighted) @ inverse)[:, :2, :2]
-    return np.asarray(np.sqrt(variance * np.einsum("nii->n", spread) / 2), np.float64)
+    found = variance * np.einsum("nii->n", spread) / 2
+    return np.asarray(np.sqrt(np.where(found >= 0, found, np.inf)), np.float64)  # below: equations without a solution

@@ -22,6 +22,7 @@ from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
+from phone_host.calibration.guide.wants import Want
 from phone_host.calibration.guide.words import Words
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target import Board, Corners
@@ -29,6 +30,7 @@ from phone_host.live.newest import Newest
 from phone_host.live.view_folders import Pictures, ViewFolders
 from phone_host.measure.unused import unused
 from phone_host.model import Image, Result
+from phone_host.report.summary import camera_troubles
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.sinks import FunctionSink, SinkQueue
@@ -37,6 +39,9 @@ from phone_host.stream.demand_clock import has_own_time
 
 _NO_PAIRS_NS: Final = 5_000_000_000
 """So long after a board was met its first pair may take: a clock is known after a second."""
+
+_SILENT_NS: Final = 3_000_000_000
+"""A link that is back within this needs no words."""
 
 _LEAST_VIEWS: Final = 3
 """Fewer give no calibration."""
@@ -58,6 +63,7 @@ class LiveSettings:
         most_views: end after so many.
         left: folder for the left pictures.
         right: folder for the right ones.
+        seen: the image corners that are known from an earlier calibration.
     """
 
     host: HostSettings
@@ -66,6 +72,7 @@ class LiveSettings:
     most_views: int
     left: Path
     right: Path
+    seen: frozenset[Want] = frozenset()
 
 
 class LiveCalibration:
@@ -100,6 +107,7 @@ class LiveCalibration:
         self._pictures = SinkQueue[Pictures]("views", self._folders.write, depth=settings.most_views)
         self._looker = FunctionSink("guide", self._look, depth=1)
         self._met_ns: int | None = None
+        self._looked_ns = self._began_ns
         self.host = Host(settings.host, camera, links, None, (self._looker,))
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None]) -> Ended:
@@ -142,10 +150,12 @@ class LiveCalibration:
 
     @property
     def trouble(self) -> str:
-        """Why no pair has come though the board is there; empty: nothing is wrong yet."""
+        """Why no pairs come though the board was met; empty: nothing is wrong yet."""
         now_ns = now.monotonic_ns()
-        if not self.host.has_met_board or self.host.first_done_ns:
+        if not self.host.has_met_board:
             return ""
+        if self.host.first_done_ns:
+            return self._silence(now_ns)
         self._met_ns = self._met_ns or now_ns
         if now_ns - self._met_ns < _NO_PAIRS_NS:
             return ""
@@ -154,6 +164,20 @@ class LiveCalibration:
             return "no pairs yet: the board's clock is not known, because no echo of it has come back; check the link"
         lost = ", ".join(item.told for item in unused(run)) or "no frames come"
         return f"no pairs yet: {lost}; check both cameras, or give --tolerance"
+
+    def _silence(self, now_ns: int) -> str:
+        """Return why pairs that came come no longer."""
+        silent_ns = now_ns - self._looked_ns
+        if silent_ns < _SILENT_NS:
+            return ""
+        run = self.host.snapshot()
+        is_away = bool(run.away) and not run.away[-1].is_over
+        what = (
+            "the board is away: check its power and its link"
+            if is_away
+            else "; ".join(camera_troubles(run.camera)) or "a camera sends nothing: is it plugged in?"
+        )
+        return f"no pairs for some seconds: {what}; the views so far are kept"
 
     def snapshot(self) -> GuideSnapshot:
         """Return everything that presenters show, with the words that are to be said now."""
@@ -180,10 +204,11 @@ class LiveCalibration:
         self._finder = BoardFinder(board)
         self._check = SizeCheck(board) if self._settings.board is not None else None
         with self._lock:
-            self._guide = Guide(board, self._settings.most_views, now.monotonic_ns())
+            self._guide = Guide(board, self._settings.most_views, now.monotonic_ns(), self._settings.seen)
 
     def _look(self, result: Result) -> None:
         """Look at a pair: called in the sink's thread."""
+        self._looked_ns = now.monotonic_ns()
         pair = result.processed.pair
         left, right = to_grey(pair.left), to_grey(pair.right)
         if self._guide is None or self._finder is None:

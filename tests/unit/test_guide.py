@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.board_pairs import Calibration
+from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.looks import Look
 from phone_host.calibration.guide.gates import Gate, Glance, is_alike
@@ -19,11 +19,12 @@ from phone_host.calibration.guide.picture import guide_svg
 from phone_host.calibration.guide.progress import Progress, Taught, lessons
 from phone_host.calibration.guide.snapshot import Ended, before_board
 from phone_host.calibration.guide.text_picture import figure_lines, picture_lines
-from phone_host.calibration.guide.wants import ORDER, Want
-from phone_host.calibration.guide.words import Words
+from phone_host.calibration.guide.unseen import unseen_in, with_corners
+from phone_host.calibration.guide.wants import CORNERS, ORDER, Want
+from phone_host.calibration.guide.words import Speech, Words
 from phone_host.calibration.next_view import Spot, after_one_m
 from phone_host.calibration.rig_sigma import depth_sigma_m
-from phone_host.calibration.verdict import Verdict
+from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import Side
 from tests.support.boards import exact_pairs, poses
 from tests.support.guided import follow
@@ -89,6 +90,8 @@ def test_a_person_who_follows_the_words_is_done_with_few_views() -> None:
     assert not any(is_alike(a, b) for i, a in enumerate(glances) for b in glances[:i])
     wanted = guide.snapshot(guide.views[-1].glance.at_ns).coverage[0]
     assert all(wanted.tilts[1:])
+    rig = unlike_rig()
+    assert not unseen_in([view.pair for view in guide.views], BOARD, rig.left, rig.right)
 
 
 def test_it_ends_with_the_most_views_whatever_the_verdict() -> None:
@@ -122,9 +125,9 @@ def test_it_ends_when_the_verdict_is_good_and_no_wanted_view_helps(
 ) -> None:
     """Depth at 1 m is known to 4 mm. A view that leaves 3.9 mm is not waited for, one that leaves 3 mm is; after a minute and a half neither is."""
     show = Show()
-    shown = [tilted(a, b) for a, b in ((0, 0), (25, 0), (-25, 0), (0, 25), (0, -25))]
-    shown += [corners(x, y) for x in (0.34, 0.66) for y in (0.36, 0.64)]
-    for view in (*shown, corners(square=0.03))[:views]:
+    shown = [corners(x, y) for x in (0.34, 0.66) for y in (0.36, 0.64)]
+    shown += [tilted(a, b) for a, b in ((25, 0), (-25, 0), (0, 25), (0, -25))]
+    for view in (*shown, corners(square=0.03), corners(square=0.06))[:views]:
         show.show(view)
     assert len(show.guide.views) == views
     calibration = replace(_calibration(), depths=((0.3, 0.0), (0.5, 0.0), (1.0, 0.004), (2.0, 0.0)))
@@ -133,6 +136,55 @@ def test_it_ends_when_the_verdict_is_good_and_no_wanted_view_helps(
     now_ns = begun + 80 * SECOND_NS if not late_s else begun + round(late_s * SECOND_NS)
     show.guide.grow(replace(progress, calibration=calibration), now_ns)
     assert show.guide.ended is ended
+
+
+def test_a_verdict_promises_nothing_of_corners_that_were_not_seen() -> None:
+    """All but one corner of the images were seen: good becomes usable, with that corner as the remedy, and the guide does not end."""
+    show = Show()
+    shown = [corners(0.34, 0.36), corners(0.66, 0.36), corners(0.34, 0.64)]
+    shown += [tilted(a, b) for a, b in ((25, 0), (-25, 0), (0, 25), (0, -25))]
+    for view in (*shown, corners(square=0.03), corners(square=0.06), corners(0.28, 0.5, 0.03)):
+        show.show(view, 7.0)
+    guide = show.guide
+    assert len(guide.views) == 10
+    guide.grow(grown(tuple(guide.views), Verdict.GOOD), show.now_ns)
+    snapshot = guide.snapshot(show.now_ns)
+    assert (guide.ended, snapshot.verdict, snapshot.asked) == (Ended.RUNNING, "usable", Want.BOTTOM_RIGHT)
+    assert snapshot.remedy.startswith("no board was seen in the bottom right corner of the pictures")
+    show.show(corners(), 40.0)
+    assert (guide.ended, show.words) == (Ended.ENOUGH, "done: verdict usable"), "it was asked for three times in vain"
+    known = Guide(BOARD, 25, 0, CORNERS)
+    known.views, known._places = guide.views, guide._places
+    known.grow(grown(tuple(guide.views), Verdict.GOOD), show.now_ns)
+    assert known.ended is Ended.GOOD, "an earlier calibration saw the corners"
+
+
+def test_only_good_is_lowered_by_unseen_corners() -> None:
+    """Several corners are told in one sentence; any other verdict keeps its own remedy."""
+    good, poor = Assessment(Verdict.GOOD, ()), Assessment(Verdict.REJECT, ("fix it",))
+    assert with_corners(good, ()) is good
+    assert with_corners(poor, CORNERS) is poor
+    lowered = with_corners(good, {Want.BOTTOM_LEFT, Want.TOP_RIGHT})
+    assert lowered.verdict is Verdict.USABLE
+    assert "in the top right corner or bottom left corner of the pictures" in lowered.remedies[0]
+    one = BoardPair("1", corners(0.34, 0.36), corners(0.34, 0.36, size=SIZES[1]))
+    rig = unlike_rig()
+    left, right = (
+        replace(model, width_px=size[0], height_px=size[1])
+        for model, size in zip((rig.left, rig.right), SIZES, strict=True)
+    )
+    assert unseen_in([one], BOARD, left, right) == CORNERS - {Want.TOP_LEFT}
+
+
+def test_words_stand_until_they_can_be_read() -> None:
+    """Nothing but news replaces words within a second; what flickers for less than 0.4 s is never said."""
+    speech, said = Speech(), []
+    wants = [(0, "closer", False), (300, "hold still", False), (990, "hold still", False), (1000, "hold still", False)]
+    wants += [(2100, "glare", False), (2300, "hold still", False), (2400, "glare", False), (2700, "glare", False)]
+    wants += [(2800, "glare", False), (2900, "taken, 1", True), (3000, "", False)]
+    for at_ms, words, is_news in wants:
+        said.append(speech.say(words, at_ms * 1_000_000, is_news=is_news))
+    assert said == [*["closer"] * 3, *["hold still"] * 5, "glare", "taken, 1", "taken, 1"]
 
 
 def test_it_ends_early_if_no_view_can_mend_it() -> None:
@@ -159,6 +211,9 @@ def test_it_says_what_keeps_a_view_from_being_taken() -> None:
     assert show.words == Words.BLURRED.value
     assert show.show(corners(), 1.0, Look(2.0, 0.5, 0.0)) is Gate.GLARE
     assert show.words == Words.GLARE.value
+    for step in range(8):
+        show.show(corners(0.54 + step / 50), 0.1)
+    assert show.words == Words.GLARE.value, "somebody who turns the board away from the lamp is not told to hold still"
     assert show.show(corners(), 1.0) is Gate.TAKEN
     assert show.words == "taken, 1"
     show.show(corners(), 2.0)
@@ -195,11 +250,14 @@ def test_exact_corners_are_judged_too() -> None:
 def test_a_view_like_one_taken_is_not_taken_again() -> None:
     """When the kinds are wanted once more, the same place is refused, and the person is told to move a little."""
     show = Show()
+    for x in (0.34, 0.66):
+        for y in (0.36, 0.64):
+            show.show(corners(x, y))
     assert show.show(tilted(25, 0)) is Gate.TAKEN
     guide = show.guide
     guide.grow(grown((), Verdict.USABLE, Taught(Want.LEFT_AWAY, 0.001)), show.now_ns)
     for want in ORDER:  # all others are given up, one after the other
-        if guide.snapshot(show.now_ns).wanted == ORDER:
+        if guide.snapshot(show.now_ns).asked is Want.LEFT_AWAY:
             break
         show.show(corners(), 12.5)
         assert want in ORDER

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from phone_host.calibration.board_size import size_seen, whole_size_seen
+from phone_host.calibration.guide.placement import placement
 from phone_host.calibration.target import find_corners
 from phone_host.geometry.lens import project
+from tests.support.novice.depth_truth import depth_error_m, depths_in_places
 from tests.support.novice.hands import Plan, Stroke, motion
 from tests.support.novice.head import Novice
 from tests.support.novice.painter import Moment, Painter
-from tests.support.novice.scene import BOARD, novice_scene
-from tests.support.novice.session import depth_error_m
+from tests.support.novice.scene import BOARD, board_of, novice_scene
 
 MIDDLE_M = BOARD.points_m().mean(axis=0)
 
@@ -26,6 +27,23 @@ def test_painted_corners_lie_where_the_lens_puts_them(turned: float) -> None:
     off = find_corners(image, BOARD) - project(pose.apply(BOARD.points_m()), eye.model)
     assert float(np.sqrt((off**2).mean())) < 0.04
     assert float(np.abs(off.mean(axis=0)).max()) < 0.01
+
+
+@pytest.mark.parametrize("kind", ["charuco", "aprilgrid"])
+def test_painted_boards_with_marks_are_seen_in_part(kind: str) -> None:
+    """Half outside the image, the corners that are left lie where geometry puts them; the others are not seen."""
+    board, eye = board_of(kind), novice_scene(1).left
+    middle_m = board.points_m().mean(axis=0)
+    pose = motion(np.array([0.19, 0.01, 0.4, -0.2, 0.2, 0.02]), middle_m)
+    image = Painter(eye, board, 1).paint((Moment(pose), Moment(pose)))
+    off = find_corners(image, board) - project(pose.apply(board.points_m()), eye.model)
+    seen = np.isfinite(off).all(axis=1)
+    assert 0.3 < seen.mean() < 0.9
+    assert float(np.sqrt((off[seen] ** 2).mean())) < 0.04
+    placed = placement(find_corners(image, board), board, eye.model)
+    assert placed.reach(1, 1) > 0.2
+    assert placed.reach(-1, -1) < 0
+    assert len(placed.outline) < 4
 
 
 def test_a_moving_board_is_blurred() -> None:
@@ -83,6 +101,20 @@ def test_a_perfect_rig_measures_exactly() -> None:
     assert depth_error_m(replace(rig, t_right_left_m=rig.t_right_left_m * 1.01), rig, 1.0) == pytest.approx(
         0.01, rel=1e-3
     )
+
+
+def test_what_a_rig_states_in_the_corners_follows_from_its_covariance() -> None:
+    """A baseline that is known to 1 % gives depths at 1 m that are known to 10 mm everywhere, and one that is 1 % too long, that error."""
+    rig = novice_scene(2).rig
+    shift_m = rig.t_right_left_m * 0.01
+    covariance = np.zeros((30, 30))
+    covariance[-3:, -3:] = np.outer(shift_m, shift_m)
+    found = replace(rig, t_right_left_m=rig.t_right_left_m + shift_m, covariance=covariance)
+    places = depths_in_places(found, rig, 1.0)
+    assert len(places) == 5
+    for error_m, sigma_m in places:
+        assert error_m == pytest.approx(0.01, rel=1e-3)
+        assert sigma_m == pytest.approx(0.01, rel=0.02)
 
 
 @pytest.mark.parametrize(

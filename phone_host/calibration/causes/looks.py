@@ -73,12 +73,13 @@ def look_at(grey: Image, corners: Corners, board: Board) -> Look:
         return Look(float("nan"), float("nan"), bright, mirrored)
     grid = corners.reshape(board.rows, board.columns, 2)
     widths, contrasts = [], []
-    for before, after in ((grid[:, :-1], grid[:, 1:]), (grid[:-1], grid[1:])):
+    reaches = _reaches(grid, board)
+    for before, after, reach in ((grid[:, :-1], grid[:, 1:], reaches[0]), (grid[:-1], grid[1:], reaches[1])):
         starts, ends = before.reshape(-1, 2), after.reshape(-1, 2)
         seen = np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1)
         if not seen.any():
             continue
-        width, contrast = _edges(grey, starts[seen], ends[seen], _reach(board))
+        width, contrast = _edges(grey, starts[seen], ends[seen], reach)
         usual = float(np.median(contrast))
         clear = contrast > max(_FAINT * usual, _LEAST_CONTRAST)
         widths.append(float(np.median(width[clear])) if clear.any() else float("nan"))
@@ -89,6 +90,21 @@ def look_at(grey: Image, corners: Corners, board: Board) -> Look:
     # Half of the edges may be washed out: what is usual is told by the better ones.
     usual = float(np.percentile(together, 75))
     return Look(float(np.nanmax(widths)), float((together < _FAINT * usual).mean()), bright)
+
+
+def _reaches(grid: Vector, board: Board) -> tuple[float, float]:
+    """Return how far edges along the rows and along the columns are followed, in their own lengths.
+
+    A tilted board is narrower one way: beside its longer edges the marks are nearer.
+    """
+    reach = _reach(board)
+    if board.marks is None:
+        return reach, reach
+    across, down = (np.linalg.norm(np.diff(grid, axis=axis), axis=2) for axis in (1, 0))
+    if not np.isfinite(across).any() or not np.isfinite(down).any():
+        return reach, reach
+    ratio = float(np.nanmedian(down) / np.nanmedian(across))
+    return reach * min(1.0, ratio), reach * min(1.0, 1 / ratio)
 
 
 def _reach(board: Board) -> float:

@@ -33,10 +33,11 @@ from phone_host.calibration.guide.gates import (
 from phone_host.calibration.guide.placement import placement, usual_camera
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
+from phone_host.calibration.guide.unseen import unseen, with_corners
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
-from phone_host.calibration.guide.words import Words, done, taken
+from phone_host.calibration.guide.words import Speech, Words, done, taken
 from phone_host.calibration.target import Board
-from phone_host.calibration.verdict import Verdict
+from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import Rig
 
 _PATIENCE_NS: Final = 8_000_000_000
@@ -54,8 +55,8 @@ _LEFT_NS: Final = 4_000_000_000
 _REACTION_NS: Final = 500_000_000
 """So long after the words a hand stops. In this time a board that is moved to an edge leaves the picture."""
 
-_STEADY_NS: Final = 400_000_000
-"""Words must hold for so long before they replace others."""
+_COMPLAINT_NS: Final = 2_000_000_000
+"""So long it is said that a view was blurred or glared, unless the board leaves: a person needs the time to do something about it."""
 
 _HEARD_NS: Final = 1_200_000_000
 """So long it takes to say that a view was taken."""
@@ -77,6 +78,10 @@ _LEAST_GAIN, _LEAST_SAVED_M = 0.08, 0.0005
 """A view that lowers the depth error at 1 m by a smaller share, or by less, no longer helps: with twelve views every further one does
 so by about 4 %, and a matcher's own error is larger."""
 
+_VAIN_TRIES: Final = 3
+"""A corner that was asked for so often in vain cannot be shown, it seems."""
+
+_COMPLAINTS: Final = {Gate.BLURRED: Words.BLURRED, Gate.GLARE: Words.GLARE}
 _ABSENT: Final = {
     Gate.NOT_FOUND: Words.SHOW_BOTH,
     Gate.NOT_FOUND_LEFT: Words.SHOW_LEFT,
@@ -112,10 +117,11 @@ class Guide:
         board: the board.
         most_views: end after this many.
         now_ns: now.
+        seen: the image corners that are known from an earlier calibration.
     """
 
-    def __init__(self, board: Board, most_views: int, now_ns: int) -> None:
-        self.board, self._most = board, most_views
+    def __init__(self, board: Board, most_views: int, now_ns: int, seen: frozenset[Want] = frozenset()) -> None:
+        self.board, self._most, self._seen = board, most_views, seen
         self.views: list[View] = []
         self.ended = Ended.RUNNING
         self._began_ns = self._seen_ns = now_ns
@@ -128,10 +134,12 @@ class Guide:
         self._coverage: tuple[Coverage, ...] = ()
         self._refused = Counter[Gate]()
         self._asked, self._asked_ns = Want.ANY, now_ns
-        self._open = set(ORDER)
-        self._given_up = set[Want]()
+        self._open: set[Want] = set(ORDER)
+        self._given_up = Counter[Want]()
+        self._places = list[Placed]()
         self._progress: Progress | None = None
-        self._words, self._next_words, self._next_since_ns = "", "", now_ns
+        self._speech = Speech()
+        self._complaint, self._complained_ns = "", now_ns
         self._taken_ns: int | None = None
 
     def see(self, glance: Glance, now_ns: int) -> Gate:
@@ -176,9 +184,12 @@ class Guide:
                 for known, look in zip(self._sharpest_px, looks, strict=True)
             ]
             self._sharpest_px = best[0], best[1]
+        if gate in _COMPLAINTS:
+            self._complaint, self._complained_ns = _COMPLAINTS[gate].value, now_ns
         if gate is not Gate.READY:
             return self._note(gate)
         placed = self._place(glance)
+        self._places.append(placed)
         self.views.append(View(f"{len(self.views) + 1:02}", glance, looks))
         coverage = self._coverage or tuple(Coverage(size_px) for size_px in glance.sizes_px)
         self._coverage = tuple(
@@ -188,7 +199,7 @@ class Guide:
             )
         )
         self._open -= {want for want in self._open if is_there(want, placed)}
-        self._taken_ns, self._still_since_ns = now_ns, None
+        self._taken_ns, self._still_since_ns, self._complaint = now_ns, None, ""
         self._ask(now_ns)
         return self._note(Gate.TAKEN)
 
@@ -206,7 +217,7 @@ class Guide:
             return
         if progress.is_hopeless and progress.views >= _HOPELESS_VIEWS:
             self.ended = Ended.HOPELESS
-        elif self._is_good(progress, now_ns):
+        elif self._is_enough(progress, now_ns) and not self._unseen:
             self.ended = Ended.GOOD
         elif len(self.views) >= self._most:
             self.ended = Ended.ENOUGH
@@ -217,26 +228,16 @@ class Guide:
         return self.ended is not Ended.RUNNING or len(self.views) >= self._most
 
     def words(self, now_ns: int) -> str:
-        """Return what is to be said now. It changes only when the reason for it has lasted."""
-        wanted = self._wanted_words(now_ns)
-        if wanted != self._next_words:
-            self._next_words, self._next_since_ns = wanted, now_ns
-        at_once = (
-            self.ended is not Ended.RUNNING
-            or self._is_heard(now_ns)
-            or not self._words
-            or wanted == Words.STILL.value  # a moment later the board may have gone on
-        )
-        if wanted and (at_once or now_ns - self._next_since_ns >= _STEADY_NS):
-            self._words = wanted
-        return self._words
+        """Return what is to be said now."""
+        is_news = self.ended is not Ended.RUNNING or self._is_heard(now_ns)
+        return self._speech.say(self._wanted_words(now_ns), now_ns, is_news=is_news)
 
     def snapshot(self, now_ns: int) -> GuideSnapshot:
         """Return everything that presenters show."""
         progress = self._progress
         return GuideSnapshot(
             ended=self.ended,
-            words=self._words,
+            words=self._speech.words,
             gate=self._gate,
             board=f"{self.board.columns}x{self.board.rows}",
             views=len(self.views),
@@ -248,8 +249,8 @@ class Guide:
             wanted=tuple(want for want in ORDER if want in self._open),
             depth_error_m=math.nan if progress is None else progress.depth_error_m,
             next_error_m=math.nan if progress is None else progress.after_m(self._asked),
-            verdict="" if progress is None else progress.verdict.value,
-            remedy="" if progress is None else progress.remedy,
+            verdict="" if progress is None else self._verdict(progress).verdict.value,
+            remedy="" if progress is None else "; ".join(self._verdict(progress).remedies),
             refused=tuple((gate, self._refused[gate]) for gate in Gate if self._refused[gate]),
         )
 
@@ -302,31 +303,51 @@ class Guide:
             return None
         return progress.calibration.rig
 
+    @property
+    def _unseen(self) -> frozenset[Want]:
+        """The image corners that no view shows of those that the calibration uses."""
+        found = None if self._progress is None else self._progress.calibration
+        rejected = set() if found is None else {each.name for each in found.rejected}
+        used = (where for view, where in zip(self.views, self._places, strict=True) if view.name not in rejected)
+        return unseen(used) - self._seen
+
+    def _verdict(self, progress: Progress) -> Assessment:
+        return with_corners(Assessment(progress.verdict, tuple(filter(None, (progress.remedy,)))), self._unseen)
+
     def _ask(self, now_ns: int) -> None:
-        """Choose the view that is wanted next: the one that would lower the depth error most."""
+        """Choose the view that is wanted next: the one that would lower the depth error most, of those asked for least often in vain."""
         if not self.views:
             return
         if not self._open:
-            self._open = set(ORDER) - self._given_up or set(ORDER)
-        self._asked = min(self._open, key=self._rank)
+            self._open.update(each for each in ORDER if not self._given_up[each])
+        if not self._open:
+            self._open.update(ORDER)
+        self._open.update(self._unseen)
+        is_enough = self._progress is not None and self._is_enough(self._progress, now_ns)
+        self._asked = min((is_enough and self._unseen) or self._open, key=self._rank)
         self._asked_ns = now_ns
 
-    def _rank(self, want: Want) -> tuple[float, int]:
+    def _rank(self, want: Want) -> tuple[int, float, int]:
         after_m = math.nan if self._progress is None else self._progress.after_m(want)
         known = self._progress is not None and any(math.isfinite(each.after_m) for each in self._progress.taught)
-        return (after_m if math.isfinite(after_m) else math.inf) if known else 0.0, ORDER.index(want)
+        teaches = (after_m if math.isfinite(after_m) else math.inf) if known else 0.0
+        return self._given_up[want], teaches, ORDER.index(want)
 
     def _give_up(self, now_ns: int) -> None:
-        """Ask for another view if this one is not reached."""
+        """Ask for another view if this one is not reached; end if nothing is left but corners that cannot be shown."""
         if now_ns - self._seen_ns > _PATIENCE_NS / 2:  # nobody is there, so nobody tries
             self._asked_ns = now_ns
-        if self.views and now_ns - self._asked_ns > _PATIENCE_NS:
-            self._given_up.add(self._asked)
-            self._open.discard(self._asked)
-            self._ask(now_ns)
+        if not self.views or now_ns - self._asked_ns <= _PATIENCE_NS:
+            return
+        self._given_up[self._asked] += 1
+        self._open.discard(self._asked)
+        self._ask(now_ns)
+        progress, in_vain = self._progress, all(self._given_up[want] >= _VAIN_TRIES for want in self._unseen)
+        if in_vain and progress is not None and progress.views == len(self.views) and self._is_enough(progress, now_ns):
+            self.ended = Ended.ENOUGH if self._unseen else Ended.GOOD
 
-    def _is_good(self, progress: Progress, now_ns: int) -> bool:
-        """Return whether the verdict is good and more views no longer help, or it has taken long."""
+    def _is_enough(self, progress: Progress, now_ns: int) -> bool:
+        """Return whether the figures are good and more views no longer help, or it has taken long. Of unseen corners they know nothing."""
         if progress.verdict is not Verdict.GOOD:
             return False
         if now_ns - self.views[0].glance.at_ns > _LONG_NS and len(self.views) >= _LONG_VIEWS:
@@ -350,21 +371,24 @@ class Guide:
 
     def _wanted_words(self, now_ns: int) -> str:
         if self.ended is not Ended.RUNNING:
-            return done("" if self._progress is None else self._progress.verdict.value, len(self.views))
+            verdict = "" if self._progress is None else self._verdict(self._progress).verdict.value
+            return done(verdict, len(self.views))
         if self._is_heard(now_ns):
             return taken(len(self.views))
         if self._gate in NOT_SEEN:
             return self._words_for_absent(now_ns)
         if self._gate is Gate.NOTHING_NEW and self._placed is not None:
             return missing(self._asked, self._placed) or Words.ELSEWHERE.value
-        return {Gate.BLURRED: Words.BLURRED, Gate.GLARE: Words.GLARE}.get(self._gate, Words.STILL).value
+        if self._complaint and now_ns - self._complained_ns < _COMPLAINT_NS:
+            return self._complaint
+        return Words.STILL.value
 
     def _words_for_absent(self, now_ns: int) -> str:
         if not self._has_seen:
             never = now_ns - self._began_ns > _NEVER_NS
             return Words.HELP.value if never else Words.SHOW_BOTH.value
         if now_ns - self._seen_ns < _LOST_NS:
-            return self._words
+            return self._speech.words
         way = ""
         if self._placed is not None and now_ns - self._seen_ns < _LEFT_NS:
             left, right = self._placed.left, self._placed.right

@@ -15,6 +15,9 @@ from phone_host.model import CameraModel
 _FOCAL_WIDTHS: Final = 0.9
 """Focal length of a usual webcam, in image widths; only until the first calibration is there."""
 
+CORNERS: Final = ((-1, -1), (1, -1), (-1, 1), (1, 1))
+"""The corners of an image: left or right, top or bottom."""
+
 
 @dataclass(frozen=True, slots=True)
 class Placement:
@@ -27,6 +30,8 @@ class Placement:
         fills: share of the width that the board would fill frontally.
         tilt_deg: across: positive if the board's left edge is away; down: positive if its top edge is.
         outline: the board's four outermost corners, shares; fewer where a part is seen.
+        nearest: the corner of the board that lies deepest in the image's top left, top right, bottom left, bottom right
+            quarter, shares.
     """
 
     low: tuple[float, float]
@@ -35,6 +40,17 @@ class Placement:
     fills: float
     tilt_deg: tuple[float, float]
     outline: tuple[tuple[float, float], ...]
+    nearest: tuple[tuple[float, float], ...]
+
+    def reach(self, x: int, y: int) -> float:
+        """Return how far the board reaches into a corner of the image: 0 the middle, 1 the corner.
+
+        Args:
+            x: -1 left, 1 right.
+            y: -1 top, 1 bottom.
+        """
+        across, down = self.nearest[CORNERS.index((x, y))]
+        return min(x * (2 * across - 1), y * (2 * down - 1))
 
 
 def usual_camera(size_px: tuple[int, int]) -> CameraModel:
@@ -66,7 +82,14 @@ def placement(corners: Corners, board: Board, model: CameraModel) -> Placement:
         fills=square_px * (board.columns - 1) / model.width_px,
         tilt_deg=_tilt_deg(corners, board, model),
         outline=tuple((float(x), float(y)) for x, y in ends if math.isfinite(x)),
+        nearest=tuple(_nearest(corners / size, x, y) for x, y in CORNERS),
     )
+
+
+def _nearest(shares: Corners, x: int, y: int) -> tuple[float, float]:
+    depths = np.minimum(x * (shares[:, 0] - 0.5), y * (shares[:, 1] - 0.5))
+    deepest = shares[int(np.nanargmax(depths))]
+    return float(deepest[0]), float(deepest[1])
 
 
 def _tilt_deg(corners: Corners, board: Board, model: CameraModel) -> tuple[float, float]:

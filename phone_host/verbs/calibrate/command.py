@@ -15,6 +15,7 @@ from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boa
 from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.guide.unseen import unseen_in, with_corners
 from phone_host.calibration.out_of_step import out_of_step
 from phone_host.calibration.session_snapshot import Taken
 from phone_host.calibration.target import Board
@@ -89,6 +90,10 @@ def run(options: argparse.Namespace) -> int:
         require_sizes(*beside, views.sizes_px)
     rejected = (*views.rejected, *found.rejected)
     judgement = assessed(found, rejected, finding, hint)
+    if live is not None and not options.pose_only:
+        used = {each.name for each in found.used}
+        seen = [pair for pair in every_pair(session, pairs) if pair.name in used]
+        judgement = with_corners(judgement, unseen_in(seen, session.board, found.rig.left, found.rig.right))
     rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
     rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict.value)
     report = report_of(files, views, rejected, found, judgement) | known.as_report() | cause_report(finding, hint)

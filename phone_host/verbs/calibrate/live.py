@@ -17,18 +17,21 @@ from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
+from common.program.terminal import say
 from common.stamp import HOST_CLOCK
 from common.words import counted
 from phone_host.boards.discovery import find_board_and_say
 from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.board_views import BoardViews, Size
-from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.looks import SeenLook
 from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.earlier_views import board_of, pairs_of
 from phone_host.calibration.guide.guide import View
 from phone_host.calibration.guide.progress import Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.guide.unseen import unseen_in
+from phone_host.calibration.guide.wants import CORNERS, Want
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
 from phone_host.camera.examples import EXAMPLE
@@ -41,7 +44,7 @@ from phone_host.run.host_settings import HostSettings
 from phone_host.settings import key_folder, most_pixels
 from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.cause import assessed
-from phone_host.verbs.calibrate.earlier import Asked
+from phone_host.verbs.calibrate.earlier import Asked, Session, calibrated
 from phone_host.verbs.calibrate.hints import arrangement_hint
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_folder, unwritable
@@ -88,6 +91,9 @@ class Live:
         """Return it for the summary: where the pictures are, and how they are calibrated again."""
         again = [f"--board {options.board}"] if options.board else []
         again += [f"--square {options.square}"] if options.square else []
+        again += [f"--from {options.earlier}"] if options.earlier else []
+        again += ["--pose-only"] if options.pose_only else []
+        again += [f"--board-side {options.board_side}"] if options.board_side else []
         command = " ".join(["phone-host calibrate", *self.folders, *again, f"--out {options.out}"])
         views = counted(self.last.views, "view")
         return [f"live     {views} in {self.last.seconds:.0f} s; to calibrate from them again:", f"         {command}"]
@@ -121,7 +127,14 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
     baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
 
     def grow(views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size]) -> Progress:
-        return grown(views, board, sizes_px, settings.host.board_side, baseline_m)
+        session = Session(
+            board=board,
+            side=settings.host.board_side,
+            path=options.earlier or Path(),
+            rig=asked.rig,
+            views=None if options.pose_only else asked.views,
+        )
+        return grown(views, session, sizes_px, baseline_m)
 
     try:
         live = LiveCalibration(settings, camera, open_links(uris, keys), grow)
@@ -129,24 +142,24 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
     except OSError as error:
         raise unwritable(settings.left, error, "LEFT or --snapshots") from error
     last = live.snapshot()
-    if last.views < _LEAST_VIEWS and signals.interrupted:
-        raise KeyboardInterrupt
     if last.views < _LEAST_VIEWS:
+        if last.views:
+            kept = f"{counted(last.views, 'view')} kept in {settings.left} and {settings.right}"
+            say(f"phone-host: {kept}; the next --live replaces them", sys.stderr, flush=True)
+        if signals.interrupted:
+            raise KeyboardInterrupt
         raise _too_few(last)
     stopped_with = None if not signals.stop else INTERRUPTED if signals.interrupted else 0
     return Live(last, settings.left, settings.right, stopped_with)
 
 
-def grown(
-    views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size], side: Side, baseline_m: float
-) -> Progress:
+def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:
     """Calibrate from the views so far and judge, as the command does at the end.
 
     Args:
         views: the views.
-        board: the board.
+        session: the board, and what an earlier calibration gives.
         sizes_px: of the left and of the right images.
-        side: which camera is the board's.
         baseline_m: as the user measured it, m; NaN: not told.
     """
     pairs = [view.pair for view in views]
@@ -155,14 +168,15 @@ def grown(
     )
     found: Calibration | DataError
     try:
-        found = calibrate(pairs, board, sizes_px, side)
+        found = calibrated(session, pairs, sizes_px)
     except DataError as error:
         found = error
-    session = BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
-    finding = name_mistake(session, found)
+    board = session.board
+    shown = BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
+    finding = name_mistake(shown, found)
     wrong = None if finding is None else finding.misplaced
-    shown = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=sizes_px, looks=looks)
-    hint = "" if wrong is None else arrangement_hint(shown, (UPRIGHT, UPRIGHT), wrong, is_live=True)
+    seen = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=sizes_px, looks=looks)
+    hint = "" if wrong is None else arrangement_hint(seen, (UPRIGHT, UPRIGHT), wrong, is_live=True)
     hopeless = wrong is not None or (finding is not None and finding.mistake in {Mistake.SWAPPED, Mistake.MIRRORED})
     if isinstance(found, DataError):
         remedy = hint or (f"{finding.sentence}: {finding.remedy}" if finding is not None else str(found))
@@ -214,7 +228,17 @@ def _settings(options: argparse.Namespace, asked: Asked) -> LiveSettings:
         most_views=options.views,
         left=left,
         right=right,
+        seen=_seen_before(asked, pose_only=options.pose_only),
     )
+
+
+def _seen_before(asked: Asked, *, pose_only: bool) -> frozenset[Want]:
+    """Return the image corners that the earlier calibration saw; all of them where its lenses are kept."""
+    if pose_only:
+        return CORNERS
+    if asked.rig is None or asked.views is None:
+        return frozenset()
+    return CORNERS - unseen_in(pairs_of(asked.views), board_of(asked.views), asked.rig.left, asked.rig.right)
 
 
 def _run(live: LiveCalibration, options: argparse.Namespace, signals: StopSignals, named: Sequence[str]) -> None:

@@ -1,4 +1,4 @@
-"""The camera `novice:FOLDER?side=left&seed=3[&fps=15][&phase=0.5]`: what one of two webcams sees of a board that somebody holds.
+"""The camera `novice:FOLDER?side=left&seed=3[&fps=15][&phase=0.5][&board=charuco][&steered=0]`: what one of two webcams sees of a board that somebody holds.
 
 It is another package's camera: registered as an entry point of `tandemscan.cameras` (see `registered`). Frame k is exposed around
 (k + phase) / fps of CLOCK_MONOTONIC and painted, by a thread of its own, as soon as that is over. FOLDER holds the plan of the hands; both
@@ -27,7 +27,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import Image, Side
 from tests.support.novice.hands import Plan, motion, read_plan
 from tests.support.novice.painter import Moment, Painter
-from tests.support.novice.scene import BOARD, novice_scene
+from tests.support.novice.scene import board_of, novice_scene
 
 PLAN: Final = "plan.npy"
 _FAR_FUTURE: Final = 2**63 - 1
@@ -45,7 +45,7 @@ class NoviceCamera:
     """One of the two cameras.
 
     Args:
-        request: path: the folder of the plan; options: side, seed, fps, phase.
+        request: path: the folder of the plan; options: side, seed, fps, phase, board, steered.
 
     Raises:
         SettingsError: an option is missing or unusable.
@@ -57,6 +57,7 @@ class NoviceCamera:
         try:
             self._side, seed = Side(options["side"]), int(options["seed"])
             fps, phase = float(options.get("fps", "15")), options.get("phase")
+            board, is_steered = board_of(options.get("board", "chessboard")), options.get("steered", "1") == "1"
         except (KeyError, ValueError) as error:
             raise SettingsError(f"camera {request.uri!r}: {error}", "give novice:FOLDER?side=left&seed=3") from None
         self._folder, self._clock = Path(request.path), request.clock
@@ -69,8 +70,8 @@ class NoviceCamera:
         )
         self._phase = self._eye.phase if phase is None else float(phase)
         self._period_ns = round(1e9 / fps)
-        self._painter = Painter(self._eye, BOARD, seed)
-        self._middle_m = BOARD.points_m().mean(axis=0)
+        self._painter = Painter(self._eye, board, seed)
+        self._middle_m = board.points_m().mean(axis=0)
         self._plan: tuple[int, Plan] = (-1, Plan(()))
         self._ready: deque[Grab] = deque()
         self._lock = threading.Lock()
@@ -83,7 +84,7 @@ class NoviceCamera:
             pixel_format=PixelFormat.MJPEG,
             period_ns=self._period_ns,
             pacing=Pacing.CLOCK,
-            steering=Steering.RESTART,
+            steering=Steering.RESTART if is_steered else Steering.NONE,
         )
         self.offers = Offers()
         self._restarts, self._rests_until_ns = np.random.default_rng([17, seed, self._eye.model.width_px]), 0

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.calibration.board_names import named_board
 from phone_host.calibration.target import Board
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Lens, Rig, Side
@@ -14,6 +15,19 @@ from tests.support.novice.hands import Unrest
 
 BOARD: Final = Board(9, 6, 0.025)
 """What `phone-host target chessboard` prints on A4."""
+
+BOARDS: Final = {
+    "chessboard": "9x6",
+    "charuco": "charuco:8x6:28mm:20mm:5x5",
+    "aprilgrid": "aprilgrid:4x3:48mm:12mm",
+}
+"""What a person may hold, as --board names it."""
+
+
+def board_of(kind: str) -> Board:
+    """Return the board of a kind."""
+    return named_board(BOARDS[kind], BOARD.square_m * 1e3 if kind == "chessboard" else None)
+
 
 SIZES: Final = ((640, 480), (800, 600))
 

@@ -10,25 +10,26 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phone_host.calibration.rig_sigma import baseline_sigma_m, depth_sigma_m
-from phone_host.geometry.lens import project, rays_through
-from phone_host.geometry.se3 import SE3, vectors_of
-from phone_host.geometry.triangulate import triangulate
+from phone_host.geometry.se3 import vectors_of
 from phone_host.model import Rig
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.novice.camera import PLAN, registered
+from tests.support.novice.depth_truth import depth_error_m, depths_in_places
 from tests.support.novice.hands import write_plan
 from tests.support.novice.head import Novice
-from tests.support.novice.scene import BOARD, between_m, novice_scene
+from tests.support.novice.scene import BOARD, BOARDS, between_m, novice_scene
 from tests.support.programs import Program, board, host, until
 
 _STEP_S: Final = 0.02
 _SAY, _TAKEN, _DONE = "say: ", "taken: ", "done"
 _PATIENCE_S: Final = 180.0
 _AWAY_M: Final = 1.0
+_LEAST_SIGMA_M: Final = 0.001
+"""Nobody is harmed by an error below this at 1 m, whatever is stated: a matcher's own is larger."""
+
 _TURN: Final = slice(24, 27)
 """Where a rig's covariance has the turn of the right camera."""
 
@@ -44,6 +45,7 @@ class Errors:
         turn_sigma_rad: stated.
         depth_m: error of depth at 1 m, root mean square over what both cameras see, m.
         depth_sigma_m: stated.
+        places: depth at 1 m in the middle and in the four corners of what both cameras see: error and what is stated, m.
     """
 
     baseline_m: float
@@ -52,6 +54,13 @@ class Errors:
     turn_sigma_rad: float
     depth_m: float
     depth_sigma_m: float
+    places: tuple[tuple[float, float], ...]
+
+    @property
+    def worst(self) -> float:
+        """The largest error of depth, in standard deviations as they are stated."""
+        pairs = [(self.depth_m, self.depth_sigma_m), *self.places]
+        return max(abs(error) / max(sigma, _LEAST_SIGMA_M) for error, sigma in pairs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,21 +92,40 @@ class Session:
     log: str
 
 
-def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session:
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a session is run with.
+
+    Attributes:
+        fps: of both cameras.
+        patience_s: longest time, s; then the session is ended as failed.
+        is_free: whether the cameras cannot be steered, so that their exposures stay apart.
+        kind: of board.
+        more: further options of phone-host.
+    """
+
+    fps: int = 15
+    patience_s: float = 300.0
+    is_free: bool = False
+    kind: str = "chessboard"
+    more: tuple[str, ...] = ()
+
+
+def run_session(seed: int, folder: Path, setting: Setting) -> Session:
     """Run one session in real time.
 
     Args:
         seed: of rig and person.
         folder: an empty one.
-        fps: of both cameras.
-        patience_s: longest time, s; then the session is ended as failed.
+        setting: what it is run with.
     """
     folder.mkdir(parents=True, exist_ok=True)
     truth = novice_scene(seed).rig
     novice = Novice(np.random.default_rng([16, seed]), between_m(truth), time.monotonic())
     write_plan(folder / PLAN, novice.plan)
     more = registered(folder / "site")
-    camera, link = f"novice:{folder}?seed={seed}&fps={fps}", f"ipc://{folder}/link"
+    camera = f"novice:{folder}?seed={seed}&fps={setting.fps}&board={setting.kind}&steered={0 if setting.is_free else 1}"
+    link = f"ipc://{folder}/link"
     live = [
         "calibrate",
         "--live",
@@ -110,12 +138,14 @@ def run_session(seed: int, folder: Path, fps: int, patience_s: float) -> Session
         "--snapshots",
         str(folder),
     ]
-    live += ["--square", f"{BOARD.square_m * 1e3:g}mm", "--out", str(folder / "rig.yaml")]
+    live += ["--board", BOARDS[setting.kind]] if setting.kind != "chessboard" else []
+    live += ["--square", f"{BOARD.square_m * 1e3:g}mm"] if setting.kind == "chessboard" else []
+    live += ["--out", str(folder / "rig.yaml"), *setting.more]
     with board(["run", "--camera", f"{camera}&side=left", "--link", link], folder, more=more) as agent:
         until(lambda: "serving" in agent.stderr or agent.process.poll() is not None, "board-agent serves")
         with host(live, folder, more=more) as guide:
             began_s = time.monotonic()
-            said = _talk(guide, novice, folder, began_s + patience_s)
+            said = _talk(guide, novice, folder, began_s + setting.patience_s)
             took_s = time.monotonic() - began_s
             is_done = bool(said) and said[-1][1].startswith(_DONE)
             if not is_done and guide.process.poll() is None:
@@ -181,34 +211,5 @@ def _errors(path: Path, truth: Rig) -> Errors | None:
         turn_sigma_rad=float(np.sqrt(np.trace(found.covariance[_TURN, _TURN]))),
         depth_m=depth_error_m(found, truth, _AWAY_M),
         depth_sigma_m=depth_sigma_m(found, rectify_rig(found), _AWAY_M),
+        places=depths_in_places(found, truth, _AWAY_M),
     )
-
-
-def depth_error_m(found: Rig, truth: Rig, depth_m: float) -> float:
-    """Return how wrong a rig measures what stands at a depth.
-
-    Args:
-        found: the rig that measures.
-        truth: the cameras as they are.
-        depth_m: of the points, m.
-
-    Returns:
-        Root mean square over all that both cameras see, m.
-    """
-    wide, high = truth.left.width_px - 1, truth.left.height_px - 1
-    grid = np.stack(np.meshgrid(np.linspace(0, wide, 17), np.linspace(0, high, 13)), axis=2).reshape(-1, 2)
-    rays = rays_through(grid, truth.left)
-    points_m = rays / rays[:, 2:] * depth_m
-    there = project(SE3(truth.R_right_left, truth.t_right_left_m).apply(points_m), truth.right)
-    limit = np.array([truth.right.width_px, truth.right.height_px]) - 1
-    both = ((there >= 0) & (there <= limit)).all(axis=1)
-    slopes = np.array([_slopes(grid[both], found.left), _slopes(there[both], found.right)])
-    covariances = np.broadcast_to(np.eye(2) * 1e-6, (*slopes.shape, 2))
-    poses = [SE3.identity(), SE3(found.R_right_left, found.t_right_left_m)]
-    measured_m = triangulate(slopes, covariances, poses).points_m[:, 2]
-    return float(np.sqrt(np.mean((measured_m - depth_m) ** 2)))
-
-
-def _slopes(pixels: NDArray[np.float64], model: Any) -> NDArray[np.float64]:
-    rays = rays_through(pixels, model)
-    return np.asarray(rays[:, :2] / rays[:, 2:])

@@ -1,0 +1,46 @@
+"""Corners of the images in which no board was seen: there a lens is guessed, and no figure of a fit tells how wrongly. Pure."""
+
+from collections.abc import Iterable
+
+from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.guide.placement import placement
+from phone_host.calibration.guide.wants import CORNERS, ORDER, Placed, Want, is_seen
+from phone_host.calibration.target import Board
+from phone_host.calibration.verdict import Assessment, Verdict
+from phone_host.model import CameraModel
+
+
+def unseen(places: Iterable[Placed]) -> frozenset[Want]:
+    """Return the image corners that no board reaches.
+
+    Args:
+        places: where the board was in each view.
+    """
+    left = set(CORNERS)
+    for placed in places:
+        left -= {want for want in left if is_seen(want, placed)}
+    return frozenset(left)
+
+
+def unseen_in(pairs: Iterable[BoardPair], board: Board, left: CameraModel, right: CameraModel) -> frozenset[Want]:
+    """Return the image corners that the board reaches in none of some pairs.
+
+    Args:
+        pairs: their corners.
+        board: the board.
+        left: the left camera; only its size counts.
+        right: the right one.
+    """
+    return unseen(
+        Placed(placement(pair.left_px, board, left), placement(pair.right_px, board, right)) for pair in pairs
+    )
+
+
+def with_corners(judgement: Assessment, missing: Iterable[Want]) -> Assessment:
+    """Return a verdict that promises nothing of what was not seen: good becomes usable where corners are missing."""
+    names = [want.value for want in ORDER if want in set(missing)]
+    if judgement.verdict is not Verdict.GOOD or not names:
+        return judgement
+    where = " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+    remedy = f"no board was seen in the {where} of the pictures, so the lens is guessed there: take views with it there"
+    return Assessment(Verdict.USABLE, (remedy,))
