@@ -313,16 +313,18 @@ def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | Non
 
 
 def _is_common(each: Weighed, loose: Loosened) -> bool:
-    """Return whether the median pair deviates much, too."""
+    """Return whether the median pair deviates much, too: beside the others, or beside the noise that the rule leaves."""
     off = each.found - each.found.mean(axis=0)
     size = off.shape[1]
-    own = np.array(
+    own_px2 = np.array(
         [
             deviation @ loose.information[i * size : (i + 1) * size, i * size : (i + 1) * size] @ deviation
             for i, deviation in enumerate(off)
         ]
     )
-    return bool(np.median(np.sqrt(own)) >= _COMMON * math.sqrt(float(own.mean())))
+    noise_px2 = each.squares_px2 / loose.numbers * each.columns / loose.count
+    usual_px2 = float(np.median(own_px2))
+    return usual_px2 >= _COMMON**2 * float(own_px2.mean()) or usual_px2 >= _SIGMAS**2 * noise_px2
 
 
 def _thinned(pairs: tuple[BoardPair, ...]) -> list[BoardPair]:

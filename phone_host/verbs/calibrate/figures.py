@@ -39,7 +39,7 @@ def report_of(
         **_figures(calibration),
         **_turned(views),
         "verdict": judgement.verdict.value,
-        "remedy": "; ".join(judgement.remedies),
+        "remedy": judgement.remedy,
     }
 
 
@@ -240,7 +240,7 @@ def summary(
     rows.append(f"verdict  {report['verdict']}")
     if not report["remedy"] and report["cause"] is not None:
         rows.append(f"note     {report['cause']['sentence']}")
-    rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
+    rows += [f"remedy   {report['remedy']}"] if report["remedy"] else []
     return [*rows, *_written(report, calibration, out)]
 
 

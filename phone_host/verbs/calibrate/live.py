@@ -172,7 +172,7 @@ def grown(
         views=len(views),
         calibration=found,
         verdict=judgement.verdict,
-        remedy="; ".join(judgement.remedies),
+        remedy=judgement.remedy,
         is_hopeless=hopeless,
         taught=lessons(found, board),
     )
