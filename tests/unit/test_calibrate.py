@@ -156,6 +156,15 @@ def test_few_pairs_are_never_good() -> None:
     assert judge(found, ()).verdict is not Verdict.GOOD
 
 
+def test_of_three_pairs_the_uncertainty_is_honest() -> None:
+    """Of eight sessions of three pairs, the baseline lies within 2.5 stated deviations in all; with k1 alone it is off by up to twenty."""
+    true_m = float(np.linalg.norm(_rig().t_right_left_m))
+    for seed in range(8):
+        found = calibrate(exact_pairs(_rig(), poses(3, seed=seed), noise_px=0.02, seed=seed), BOARD, _SIZES)
+        off_m = float(np.linalg.norm(found.rig.t_right_left_m)) - true_m
+        assert abs(off_m) < 2.5 * found.baseline_sigma_m, seed
+
+
 @pytest.mark.parametrize("count", [0, 2])
 def test_fewer_than_three_pairs_are_refused(count: int) -> None:
     """Nothing is invented from two views."""

@@ -5,7 +5,7 @@ other; how the pairs deviate from one stiff rig; and whether the squares can be 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
@@ -22,6 +22,7 @@ from phone_host.calibration.causes.lone import both_alone
 from phone_host.calibration.causes.looks import SeenLook
 from phone_host.calibration.causes.mistakes import Finding, Mistake
 from phone_host.calibration.causes.partners import wrong_partners
+from phone_host.calibration.causes.plain_lens import is_plain, with_plain_lenses
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import REFERENCE_PX, Verdict, size_factor
 from phone_host.model import Side
@@ -92,7 +93,7 @@ def name_mistake(session: BoardSession, found: Calibration | DataError) -> Findi
         or _placed(session, found)
         or _swapped(found)
         or _stretched(session)
-        or deviation(session.pairs, session.board, session.sizes_px)
+        or _deviating(session, found)
         or _other_square(session, found)
     )
 
@@ -187,6 +188,18 @@ def _swapped(found: Calibration | DataError) -> Finding | None:
     if x < 0 and abs(x) > max(abs(y), abs(z)):
         return Finding(mistake=Mistake.SWAPPED, sentence=found.obstacle.problem, remedy=found.obstacle.remedy)
     return None
+
+
+def _deviating(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+    """Name how the pairs deviate from one stiff rig; what only a bent lens makes them do is none."""
+    finding = deviation(session.pairs, session.board, session.sizes_px)
+    if finding is None or isinstance(found, DataError) or (is_plain(found.rig.left) and is_plain(found.rig.right)):
+        return finding
+    plain = with_plain_lenses(list(session.pairs), found.rig)
+    finding = deviation(tuple(plain), session.board, session.sizes_px)
+    if finding is None or finding.turned is None:
+        return finding
+    return replace(finding, turned=replace(finding.turned, lens=found.rig.right))
 
 
 def _absurd_square(session: BoardSession) -> Finding | None:

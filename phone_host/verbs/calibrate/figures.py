@@ -252,7 +252,7 @@ def _baseline_row(baseline_mm: float, sigma_m: float) -> str:
 
 def _lens_rows(calibration: Calibration) -> list[str]:
     """Return one line on the lenses, if one of them is not the usual one."""
-    if all(bend in {Bend.RADIAL, Bend.USUAL} for bend in calibration.bends):
+    if set(calibration.bends) <= {Bend.USUAL}:
         return []
     kinds = (
         f"{side} {bend.lens.value}, {bend.terms} coefficients"
