@@ -97,9 +97,10 @@ def deviation(pairs: tuple[BoardPair, ...], board: Board, sizes_px: Sizes) -> Fi
         if fitted is None:
             return None
         found = _named(fitted, sizes_px)
-        if found is not None and found.mistake in {Mistake.UNSTIFF, Mistake.FOCUS}:
-            return found
         together = _together(fitted)  # a few pairs that fit nothing are not the session's mistake
+        is_lone = together is not None and len(fitted.kept) - len(together) == 1
+        if found is not None and found.mistake in {Mistake.UNSTIFF, Mistake.FOCUS} and not is_lone:
+            return found  # many pairs lie apart for it; a single one may only look like it
         if together is None or len(together) == len(taken):
             return found
         again_fitted = _fitted(together, board, sizes_px)
