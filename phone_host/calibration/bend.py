@@ -14,14 +14,12 @@ class Bend(Enum):
     """Which coefficients are estimated, the simplest first.
 
     Attributes:
-        RADIAL: k1, for very few views.
         USUAL: k1 k2 p1 p2, as the lenses of webcams and phones need.
         WIDE: k3 as well. Without it, a wide lens's views of the image's corners look like wrong corners.
         RATIONAL: k4 k5 k6 as well.
         FISHEYE: k1 k2 k3 k4 of the angle.
     """
 
-    RADIAL = "radial"
     USUAL = "usual"
     WIDE = "wide"
     RATIONAL = "rational"
@@ -42,4 +40,4 @@ class Bend(Enum):
         return np.arange(PARAMETERS) < 4 + self.terms
 
 
-_TERMS: Final = {Bend.RADIAL: 1, Bend.USUAL: 4, Bend.WIDE: 5, Bend.RATIONAL: 8, Bend.FISHEYE: 4}
+_TERMS: Final = {Bend.USUAL: 4, Bend.WIDE: 5, Bend.RATIONAL: 8, Bend.FISHEYE: 4}

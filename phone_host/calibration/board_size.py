@@ -30,6 +30,10 @@ _SEARCHED_PX: Final = 800
 _SEED: Final = (3, 3)
 """The smallest lattice from which the detector may grow; what is no larger may be any pattern."""
 
+_USUAL_WAY: Final = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
+_OTHER_WAY: Final = _USUAL_WAY | cv2.CALIB_CB_EXHAUSTIVE
+"""Of 20 images of a board of 14x10 this way finds 17 whole, the usual one none; of 122 images of boards up to 9x6 it finds 70, the usual one 103."""
+
 _MARGIN, _LEAST_MARGIN = 1.25, 0.65
 """So many squares beside the outermost corners is the margin, be it half a square wide; so much of it must be seen. Fingers may lie on the rest; of a row of
 squares about half is white."""
@@ -126,11 +130,9 @@ def _searched(grey: Image) -> Image:
     return shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))[0]
 
 
-def _lattice(grey: Image) -> Corners:
+def _lattice(grey: Image, way: int = _USUAL_WAY) -> Corners:
     """Return the corners that hang together, (rows, columns, 2) px; empty: there are none."""
-    found, corners, meta = cv2.findChessboardCornersSBWithMeta(
-        grey, _SEED, flags=cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
-    )
+    found, corners, meta = cv2.findChessboardCornersSBWithMeta(grey, _SEED, flags=way)
     if not found or meta is None:
         return np.empty((0, 0, 2))
     return np.asarray(corners, np.float64).reshape(*meta.shape[:2], 2)
@@ -183,7 +185,7 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
     marks = marks_seen(side_by_side(lambda path: _small(path, most_pixels), list(_sample(files))[:_MARKED]))
     if marks:
         raise DataError(f"these images show no chessboard, but {marks}", "name that board with --board; see --help")
-    result = vote(_sample(files), lambda path: _size_in(path, most_pixels))
+    result = _vote_of(files, most_pixels)
     if result.leader is not None:
         return result.leader
     if not result.sizes:
@@ -211,7 +213,7 @@ def require_size(files: ViewFiles, given: Size, most_pixels: int = MOST_PIXELS) 
         SettingsError: the images show another board.
     """
     wanted = max(given), min(given)
-    result = vote(_sample(files), lambda path: _size_in(path, most_pixels))
+    result = _vote_of(files, most_pixels)
     seen = result.leader
     if seen is None or seen == wanted or result.sizes[wanted] * _CLEAR_VOTES >= result.sizes[seen]:
         return
@@ -228,9 +230,18 @@ def size_text(size: Size) -> str:
     return f"{size[0]}x{size[1]}"
 
 
-def _size_in(path: Path, most_pixels: int) -> Size | None:
+def _vote_of(files: ViewFiles, most_pixels: int) -> Vote:
+    """Ask the images; if they show boards and do not agree, ask them again another way."""
+    result = vote(_sample(files), lambda path: _size_in(path, most_pixels, _USUAL_WAY))
+    if result.leader is not None or result.sizes.total() < _LEAST_SHARE * result.asked:
+        return result
+    other = vote(_sample(files), lambda path: _size_in(path, most_pixels, _OTHER_WAY))
+    return result if other.leader is None else other
+
+
+def _size_in(path: Path, most_pixels: int, way: int) -> Size | None:
     image = _small(path, most_pixels)
-    return None if image is None else size_seen(image)
+    return None if image is None else _size_of(_lattice(_searched(image), way))
 
 
 def _small(path: Path, most_pixels: int) -> Image | None:

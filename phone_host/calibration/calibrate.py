@@ -31,7 +31,6 @@ from phone_host.calibration.bundle import (
     rms_px,
 )
 from phone_host.calibration.calibrate_alone import (
-    USUAL_PAIRS,
     LoneCamera,
     calibrate_alone,
     corners_of,
@@ -58,8 +57,8 @@ Sizes = tuple[tuple[int, int], tuple[int, int]]
 Bends = tuple[Bend, Bend]
 """How freely the left and the right lens may bend."""
 
-# With fewer pairs a richer lens explains noise. (From eight on, `lens_choice` asks views that were held out.)
-_FREER_PAIRS = 8
+# With fewer pairs a richer lens explains wrong pairs. (Of those that fit, `lens_choice` asks views that were held out.)
+_FREER_PAIRS = 5
 # Real rigs fit to 0.15 to 0.4 px. Above this, lenses that bend more freely are tried even if all pairs were used.
 _POOR_PX = 0.6
 # Above this share of the image's width no lens is worth choosing: left and right contradict each other.
@@ -285,8 +284,6 @@ def _adjust_robustly(
     """Adjust, reject the worst pair and adjust again until all fit. With `known`, only what it says is estimated."""
     rejected: list[Rejected] = []
     while True:
-        if len(pairs) < USUAL_PAIRS and known is None:
-            bends = (Bend.RADIAL, Bend.RADIAL)
         free = FreeParameters(bends[0].free(), bends[1].free()) if known is None else known
         result = adjust([BundleView(pair.left_px, pair.right_px) for pair in pairs], points_m, start, free)
         found = misfits(pairs, result, points_m)

@@ -20,8 +20,8 @@ from phone_host.model import CameraModel, Side
 LEAST_PAIRS = 3
 """Fewer pairs do not determine focal length and distortion (Zhang 2000: two views suffice only without distortion)."""
 
-USUAL_PAIRS = 5
-"""From this many pairs on, the usual four distortion coefficients are estimated; with fewer, only the first radial one."""
+_STEADY_VIEWS: Final = 5
+"""With fewer views OpenCV's search starts steadier with the first radial coefficient alone; the bundle adjustment adds the others."""
 
 # Nothing is certain yet, so only views that are plainly wrong are rejected.
 _GROSS_FACTOR, _GROSS_FLOOR_PX = 4.0, 1.0
@@ -144,7 +144,7 @@ def _opencv_camera(
 ) -> tuple[CameraModel, Vector]:
     """OpenCV's calibration of one camera: its model, and the poses (V, 6)."""
     flags = cv2.CALIB_ZERO_TANGENT_DIST | (0 if bend is Bend.WIDE else cv2.CALIB_FIX_K3)
-    if len(views) < USUAL_PAIRS:
+    if len(views) < _STEADY_VIEWS:
         flags |= cv2.CALIB_FIX_K2
     seen = [np.isfinite(corners).all(axis=1) for corners in views]
     _, matrix, distortion, turns, shifts = cv2.calibrateCamera(

@@ -34,8 +34,8 @@ from phone_host.geometry.lens import farthest_angle, parameters_of, rays_through
 from phone_host.model import CameraModel, Lens
 
 _PARTS: Final = 5
-_LEAST_VIEWS: Final = {Bend.USUAL: 5, Bend.WIDE: 8, Bend.FISHEYE: 8, Bend.RATIONAL: 10}
-"""Views from which on a formula is tried: fewer do not leave enough in each part to fit it."""
+_LEAST_VIEWS: Final = {Bend.USUAL: 5, Bend.WIDE: 5, Bend.FISHEYE: 5, Bend.RATIONAL: 7}
+"""Views from which on a formula is tried, the simplest first: fewer do not leave enough in each part to fit it."""
 
 _STANDARD_ERRORS: Final = 1.0
 _LEAST_GAIN: Final = 0.005
@@ -67,10 +67,8 @@ def choose_lens(
     Returns:
         The chosen formula, and all that were tried. Too few views for any choice: the formula that is needed, untried.
     """
-    order = [Bend.USUAL, Bend.WIDE, Bend.FISHEYE, Bend.RATIONAL]
-    wanted = [at_least] if at_least in {Bend.FISHEYE, Bend.RATIONAL} else order[order.index(Bend.USUAL) :]
-    if at_least is Bend.WIDE:
-        wanted = order[1:]
+    order = list(_LEAST_VIEWS)
+    wanted = [at_least] if at_least in {Bend.FISHEYE, Bend.RATIONAL} else order[order.index(at_least) :]
     trials = list[LensTrial]()
     for bend in wanted:
         if len(views) >= _LEAST_VIEWS[bend]:

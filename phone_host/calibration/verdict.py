@@ -53,11 +53,11 @@ class Assessment:
 
     Attributes:
         verdict: the verdict.
-        remedies: the one sentence that helps most; empty when the verdict is good.
+        remedy: the one sentence that helps most; empty when the verdict is good.
     """
 
     verdict: Verdict
-    remedies: tuple[str, ...]
+    remedy: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,17 +112,17 @@ def judge(calibration: Calibration, rejected: tuple[Rejected, ...]) -> Assessmen
             f"the views contradict each other by {calibration.rig.rms_stereo_px:.1f} px: check --board, that"
             " each LEFT image belongs to its RIGHT one, and that neither camera mirrors its image"
         )
-        return Assessment(Verdict.REJECT, (contradiction,))
+        return Assessment(Verdict.REJECT, contradiction)
     if calibration.obstacle is not None:
         obstacle = f"{calibration.obstacle.problem}: {calibration.obstacle.remedy}"
-        return Assessment(Verdict.REJECT, (obstacle,))
+        return Assessment(Verdict.REJECT, obstacle)
     measures = [_rows(calibration), _baseline(calibration), _depth(calibration), _squares(calibration)]
     worst = max(measures, key=lambda each: each.of_good)
     few = len(calibration.used) < _FEW_PAIRS
     if not few and worst.of_good <= 1:
-        return Assessment(Verdict.GOOD, ())
+        return Assessment(Verdict.GOOD, "")
     verdict = Verdict.REJECT if max(each.of_usable for each in measures) > 1 else Verdict.USABLE
-    return Assessment(verdict, (_remedy(calibration, rejected, worst),))
+    return Assessment(verdict, _remedy(calibration, rejected, worst))
 
 
 def _remedy(calibration: Calibration, rejected: tuple[Rejected, ...], worst: _Measure) -> str:

@@ -23,20 +23,15 @@ _NO_RIG: Final = 0.2
 """A calibrated rig whose corners are off by more was not calibrated with this board: its squares are of another size."""
 
 
-def quality_lines(report: QualityReport, out: str) -> list[str]:
+def quality_lines(report: QualityReport, out: str, width: int = 0) -> list[str]:
     """Say what was measured.
 
     Args:
         report: all pairs.
         out: the results folder, as the user named it.
+        width: of the terminal, characters; 0: no limit.
     """
-    rows = [COLUMNS, *(quality_row(pair) for pair in report.measured)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
-    lines = [quality_verdict(report)[1]]
-    if report.measured:
-        lines += [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-        ]
+    lines = [quality_verdict(report)[1], *_table([quality_row(pair) for pair in report.measured], width)]
     for pair in report.pairs:
         lines += _remarks(pair)
     lines += [remark.line for remark in report.remarks]
@@ -52,6 +47,19 @@ def quality_lines(report: QualityReport, out: str) -> list[str]:
     if len(report.measured) > MOST_MAPS:
         lines.append(f"note: {MAPS_LEFT_OUT}")
     return [*lines, f"written to {out}: report.json, index.html"]
+
+
+def _table(rows: list[tuple[str, ...]], width: int) -> list[str]:
+    """Return one line for each pair, or, where that is wider than the terminal, one for each value."""
+    if not rows:
+        return []
+    rows = [COLUMNS, *rows]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(cell.ljust(wide) for cell, wide in zip(row, widths, strict=True)).rstrip() for row in rows]
+    if not width or max(map(len, lines)) <= width:
+        return lines
+    label = max(map(len, COLUMNS)) + 2
+    return [f"{title:{label}}{cell}" for row in rows[1:] for title, cell in zip(COLUMNS, row, strict=True)]
 
 
 def quality_row(pair: MeasuredPair) -> tuple[str, ...]:

@@ -122,7 +122,7 @@ def test_what_the_boards_cannot_tell_is_named_together(both: Orientation) -> Non
     pairs, sizes = _with(_seen(BOARD), _SIZES, BOARD, dict.fromkeys(Side, both))
     found = calibrate(pairs, BOARD, sizes)
     assert misplaced(pairs, BOARD, sizes, found) is None
-    said = judge(found, ()).remedies[0]
+    said = judge(found, ()).remedy
     for cause in ("swap LEFT and RIGHT", "--flip-left h --flip-right h", "--rotate-left 180 --rotate-right 180"):
         assert cause in said
 

@@ -43,6 +43,14 @@ def test_the_size_is_that_which_the_images_show(tmp_path: Path) -> None:
         require_size(files, (6, 4))
 
 
+def test_a_board_of_many_squares_is_found_the_other_way(tmp_path: Path) -> None:
+    """The usual search ends early in a lattice of 14x10, in each picture elsewhere: then the pictures are asked again."""
+    files = _files(tmp_path, Board(14, 10, 0.0155))
+    assert size_in_files(files) == (14, 10)
+    with pytest.raises(SettingsError, match="have 14x10 inner corners, --board says 13x9"):
+        require_size(files, (13, 9))
+
+
 def test_images_without_a_board_name_no_size(tmp_path: Path) -> None:
     """Grey images and files that are no image: a size that was given passes, because nothing contradicts it."""
     for side in ("left", "right"):

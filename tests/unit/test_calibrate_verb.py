@@ -179,23 +179,23 @@ def test_marks_that_are_not_there_are_not_called_a_chessboard(
 
 
 @pytest.mark.parametrize(
-    ("verdict", "remedies"),
+    ("verdict", "remedy"),
     [
-        (Verdict.GOOD, ()),
-        (Verdict.USABLE, ("the board is blurred: hold it still",)),
-        (Verdict.REJECT, ("the board is blurred: hold it still",)),
+        (Verdict.GOOD, ""),
+        (Verdict.USABLE, "the board is blurred; the light is poor: hold it still"),
+        (Verdict.REJECT, "the board is blurred; the light is poor: hold it still"),
     ],
 )
-def test_a_good_rig_has_no_remedy_though_a_mistake_was_found(verdict: Verdict, remedies: tuple[str, ...]) -> None:
+def test_a_good_rig_has_no_remedy_though_a_mistake_was_found(verdict: Verdict, remedy: str) -> None:
     """The mistake is told all the same, as a note; a rig that is not good has its remedy in place of the other."""
-    finding = Finding(mistake=Mistake.BLUR, sentence="the board is blurred", remedy="hold it still")
-    before = Assessment(verdict, () if verdict is Verdict.GOOD else ("take more",))
+    finding = Finding(mistake=Mistake.BLUR, sentence="the board is blurred; the light is poor", remedy="hold it still")
+    before = Assessment(verdict, "" if verdict is Verdict.GOOD else "take more")
     judgement = with_cause(before, finding)
-    assert judgement == Assessment(verdict, remedies)
+    assert judgement == Assessment(verdict, remedy)
     found, views = calibration(), taken().views
     files = ViewFiles(pairs=(), by_number=True, by_name=False, left_alone=(), right_alone=())
     report = report_of(files, views, (), found, judgement) | cause_report(finding, "") | {"page": "index.html"}
     told = summary(report, views, found, (), Path("rig.yaml"))
-    assert ("note     the board is blurred" in told) == (verdict is Verdict.GOOD)
-    assert any(line.startswith("remedy") for line in told) == bool(remedies)
+    assert ("note     the board is blurred; the light is poor" in told) == (verdict is Verdict.GOOD)
+    assert [line for line in told if line.startswith("remedy")] == ([f"remedy   {remedy}"] if remedy else [])
     assert (report["remedy"] == "") == (verdict is Verdict.GOOD)

@@ -96,6 +96,23 @@ def test_a_loose_rig_is_told_from_a_board_that_moved() -> None:
     assert float(np.linalg.norm(found.turned.turn_rad)) == pytest.approx(truth * math.sqrt(3), rel=0.4)
 
 
+def test_a_stretched_print_is_told_though_it_makes_a_view_look_wrong() -> None:
+    """The lens of a view is judged with the wrong squares first: views rejected for it must not hide the stretch."""
+    made = MAKERS[Mistake.SQUARE](np.random.default_rng([10, 1 + list(Mistake).index(Mistake.SQUARE)]))
+    found = finding_of(made)
+    assert found is not None
+    assert found.mistake is Mistake.SQUARE, found.sentence
+    assert "wider" in found.sentence
+
+
+def test_few_views_with_much_motion_do_not_hide_a_rolling_shutter() -> None:
+    """Of 15 views two have most of the motion: the others, far above the noise, tell it is all of them."""
+    made = MAKERS[Mistake.ROWS](np.random.default_rng([12, 1 + list(Mistake).index(Mistake.ROWS)]))
+    found = deviation(tuple(made.pairs), made.board, made.sizes_px)
+    assert found is not None
+    assert found.mistake is Mistake.ROWS, found.sentence
+
+
 def test_the_true_partners_are_named() -> None:
     """Two right pictures are exchanged: each left one is told its own."""
     made = next(made for made in (partners(_random(seed)) for seed in range(30)) if made.truth == "two exchanged")
@@ -122,8 +139,8 @@ def test_a_blurred_edge_is_as_wide_as_its_blur() -> None:
 def test_a_mistake_is_the_first_remedy_and_caps_the_verdict() -> None:
     """A rig whose bar is loose is at most usable; what was rejected stays so."""
     finding = Finding(mistake=Mistake.UNSTIFF, sentence="they turned", remedy="tighten it", most=Verdict.USABLE)
-    assert with_cause(Assessment(Verdict.GOOD, ()), finding) == Assessment(Verdict.USABLE, ("they turned: tighten it",))
-    assert with_cause(Assessment(Verdict.REJECT, ("x",)), finding).verdict is Verdict.REJECT
+    assert with_cause(Assessment(Verdict.GOOD, ""), finding) == Assessment(Verdict.USABLE, "they turned: tighten it")
+    assert with_cause(Assessment(Verdict.REJECT, "x"), finding).verdict is Verdict.REJECT
     assert cause_report(None, "") == {"cause": None}
     told = cause_report(replace(finding, turned=_unstiff(Course.DRIFT)[1].turned), "")["cause"]
     assert told["name"] == "rig not stiff"

@@ -27,7 +27,9 @@ from phone_host.calibration.marked import MarkFamily
 from phone_host.calibration.pose_only import solve_pose
 from phone_host.calibration.target import Board, find_corners
 from phone_host.calibration.verdict import Verdict
-from phone_host.model import CameraModel, RectifiedPair, Rig, StereoGeometry
+from phone_host.geometry.lens import project
+from phone_host.geometry.se3 import SE3
+from phone_host.model import CameraModel, Lens, RectifiedPair, Rig, StereoGeometry
 from tests.support.boards import BOARD, exact_pairs, poses, render_board
 from tests.support.rigs import fisheye_rig, small_rig, unlike_rig
 
@@ -307,3 +309,42 @@ def _tags(count: int) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
         for row, y in zip(rows, (top, bottom), strict=True):
             row += [[x + gap - 0.5, y - 0.5], [x + gap + side - 0.5, y - 0.5]]
     return image, np.array([*rows[0], *rows[1]])
+
+
+_FISHEYE = CameraModel(
+    width_px=1280,
+    height_px=960,
+    matrix=np.array([[440.0, 0, 640], [0, 440, 480], [0, 0, 1]]),
+    distortion=np.array([0.02, -0.004, 0.001, -0.0002]),
+    lens=Lens.FISHEYE,
+)
+
+
+def _fisheye_views(turn_deg: float) -> tuple[BoardPair, ...]:
+    """Two fisheye cameras, 150 degrees wide, and twelve boards up to 60 degrees from the axis; half way the right one turns."""
+    random = np.random.default_rng(3)
+    points, pairs = BOARD.points_m() - BOARD.points_m().mean(axis=0), []
+    for index in range(12):
+        away, around = np.radians(random.uniform(0, 60)), random.uniform(0, 2 * np.pi)
+        face = SE3.of(np.array([-away * np.sin(around), away * np.cos(around), 0, 0, 0, 0])).R
+        tilt = SE3.of(np.array([*np.radians(random.uniform(-30, 30, 3)), 0, 0, 0])).R
+        seen = points @ (face @ tilt).T + face @ [0, 0, random.uniform(0.25, 0.45)]
+        rig = SE3.of(np.array([np.radians(turn_deg) * (index >= 6), 0, 0, -0.1, 0, 0]))
+        left, right = (
+            project(each, _FISHEYE) + random.normal(0, 0.1, (len(points), 2)) for each in (seen, rig.apply(seen))
+        )
+        pairs.append(BoardPair(str(index), left, right))
+    return tuple(pairs)
+
+
+@pytest.mark.parametrize(("turn_deg", "named"), [(0.0, None), (0.3, Mistake.UNSTIFF)])
+def test_a_fisheye_is_no_mistake_and_hides_none(turn_deg: float, named: Mistake | None) -> None:
+    """The search knows no fisheye: good views must not look like those of a rolling shutter, and a knock is told in the true lens's words."""
+    rig = Rig(left=_FISHEYE, right=_FISHEYE, R_right_left=np.eye(3), t_right_left_m=np.array([-0.1, 0, 0]))
+    session = BoardSession(pairs=_fisheye_views(turn_deg), board=BOARD, sizes_px=((1280, 960), (1280, 960)))
+    assert deviation(session.pairs, BOARD, session.sizes_px) is not None
+    finding = name_mistake(session, _calibration(rig))
+    assert (None if finding is None else finding.mistake) is named
+    if finding is not None and finding.turned is not None:
+        assert np.degrees(np.linalg.norm(finding.turned.turn_rad)) == pytest.approx(turn_deg, rel=0.1)
+        assert finding.turned.lens is _FISHEYE

@@ -103,6 +103,15 @@ def test_what_cannot_be_measured_is_told_in_one_line(
     assert error.count("\n") == 1
 
 
+def test_a_folder_is_no_image(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Other commands take folders: a line says what this one takes, and it is wrong use."""
+    rig = str(folder / "rig.yaml")
+    assert main(["measure", str(folder), str(folder), "--calibration", rig, "--points", "100,120"]) == 2
+    error = capsys.readouterr().err
+    assert f"{folder} is a folder, and distances are measured in one pair of images" in error
+    assert error.count("\n") == 1
+
+
 def test_one_bad_point_leaves_the_others(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The second of three points is outside of what both cameras see: it is named, the others are told as they are without it, and the exit code is 4."""
     assert _measure(folder, "--points", "100,120", "1,1", "150,180", "--json") == 4

@@ -26,6 +26,15 @@ def test_one_wall_is_told_in_one_sentence_and_one_row() -> None:
     assert quality_verdict(report())[0] is Headline.GOOD
 
 
+def test_a_narrow_terminal_gets_one_line_for_each_value() -> None:
+    """The table is wider than 48 columns: there each value stands behind its title, and no line is folded."""
+    lines = quality_lines(report(), "out", 48)
+    assert lines[1] == "pair               1.png"
+    assert lines[2] == "distance           1.000 m"
+    assert lines[6].startswith("bias (Z accuracy)  +10.0 mm")
+    assert quality_lines(report(), "out", 200) == quality_lines(report(), "out")
+
+
 def test_theory_takes_the_median_noise_and_grows_with_the_square() -> None:
     """Of walls at 0.5, 1 and 2 m, theory gives RMS in the ratio of their squares: z^2 sigma / (f b)."""
     told = report(*(pair(f"{z}.png", quality(z)) for z in (0.5, 1.0, 2.0)))

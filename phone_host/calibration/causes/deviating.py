@@ -13,13 +13,13 @@ import numpy as np
 
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.calibrate import Sizes
-from phone_host.calibration.causes.lone import Vector, apart_px, both_alone
+from phone_host.calibration.causes.lone import Vector, apart_px, both_alone, camera_arrays
 from phone_host.calibration.causes.loosened import FOCUS_LEFT, FOCUS_RIGHT, MOVE, TURN, Loosened, Stiff, loosen
 from phone_host.calibration.causes.mistakes import Course, Finding, Mistake, Turned
 from phone_host.calibration.causes.rules import Rule, Weighed, again, criterion, scatter, significance, weighed
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import REFERENCE_PX, Verdict
-from phone_host.model import Side
+from phone_host.model import CameraModel, Side
 
 _LEAST_PAIRS: Final = 6
 """With fewer, hardly a rule leaves anything to check it by."""
@@ -97,9 +97,10 @@ def deviation(pairs: tuple[BoardPair, ...], board: Board, sizes_px: Sizes) -> Fi
         if fitted is None:
             return None
         found = _named(fitted, sizes_px)
-        if found is not None and found.mistake in {Mistake.UNSTIFF, Mistake.FOCUS}:
-            return found
         together = _together(fitted)  # a few pairs that fit nothing are not the session's mistake
+        is_lone = together is not None and len(fitted.kept) - len(together) == 1
+        if found is not None and found.mistake in {Mistake.UNSTIFF, Mistake.FOCUS} and not is_lone:
+            return found  # many pairs lie apart for it; a single one may only look like it
         if together is None or len(together) == len(taken):
             return found
         again_fitted = _fitted(together, board, sizes_px)
@@ -188,7 +189,7 @@ def _believed(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None
     """Return what a rule other than STIFF says, if it says something that a good session would not."""
     match each.rule:
         case Rule.DRIFT | Rule.KNOCK:
-            return _turned(each, fitted)
+            return _turned(each, fitted, sizes_px[1])
         case Rule.FOCUS_LEFT | Rule.FOCUS_RIGHT:
             is_free = each.columns >= fitted.loose.count
             return _focus(each, fitted) if not is_free or _explains_much(each, fitted, sizes_px) else None
@@ -196,7 +197,7 @@ def _believed(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None
             return _scattered(each, fitted, sizes_px)
 
 
-def _turned(each: Weighed, fitted: _Fitted) -> Finding | None:
+def _turned(each: Weighed, fitted: _Fitted, size_px: tuple[int, int]) -> Finding | None:
     loose, kept = fitted.loose, fitted.kept
     free = fitted.free(Rule.LOOSE, 3 * loose.count)
     sigmas = significance(each, free, loose)[TURN]
@@ -213,11 +214,16 @@ def _turned(each: Weighed, fitted: _Fitted) -> Finding | None:
         begins=each.begins,
         names=tuple(pair.name for pair in kept),
         turns_rad=turns,
-        lens=loose.state.right,
+        lens=_model(loose.state.right, size_px),
         rows_px=float(effect_px[0]),
         depth_at_1_m_m=abs(float(change[1])) / float(np.linalg.norm(loose.state.translation_m)),
     )
     return _unstiff(turned, kept)
+
+
+def _model(lens: Vector, size_px: tuple[int, int]) -> CameraModel:
+    matrix, distortion = camera_arrays(lens)
+    return CameraModel(width_px=size_px[0], height_px=size_px[1], matrix=matrix, distortion=distortion)
 
 
 def _unstiff(turned: Turned, kept: list[BoardPair]) -> Finding:
@@ -286,7 +292,7 @@ def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | Non
             begins=-1,
             names=tuple(pair.name for pair in fitted.kept),
             turns_rad=angles,
-            lens=loose.state.right,
+            lens=_model(loose.state.right, sizes_px[1]),
             rows_px=float(angles[:, 0].std() * loose.state.right[1]),
             depth_at_1_m_m=float(angles[:, 1].std() / np.linalg.norm(loose.state.translation_m)),
         )
@@ -313,16 +319,21 @@ def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | Non
 
 
 def _is_common(each: Weighed, loose: Loosened) -> bool:
-    """Return whether the median pair deviates much, too."""
+    """Return whether the median pair deviates much, too: beside the others, or, by its rows, beside the noise that the rule leaves."""
     off = each.found - each.found.mean(axis=0)
     size = off.shape[1]
-    own = np.array(
+    own_px2 = np.array(
         [
             deviation @ loose.information[i * size : (i + 1) * size, i * size : (i + 1) * size] @ deviation
             for i, deviation in enumerate(off)
         ]
     )
-    return bool(np.median(np.sqrt(own)) >= _COMMON * math.sqrt(float(own.mean())))
+    noise_px2 = each.squares_px2 / loose.numbers * each.columns / loose.count
+    usual_px2 = float(np.median(own_px2))
+    if usual_px2 >= _COMMON**2 * float(own_px2.mean()):
+        return True
+    # One pair that moved drags the others' common pose along, and all seem to deviate; rows within a view it leaves straight.
+    return each.rule is Rule.ROWS and usual_px2 >= _SIGMAS**2 * noise_px2
 
 
 def _thinned(pairs: tuple[BoardPair, ...]) -> list[BoardPair]:

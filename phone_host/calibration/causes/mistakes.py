@@ -6,6 +6,7 @@ from enum import Enum
 from phone_host.calibration.arrangement import Misplaced
 from phone_host.calibration.causes.lone import Vector
 from phone_host.calibration.verdict import Verdict
+from phone_host.model import CameraModel
 
 
 class Mistake(Enum):
@@ -60,7 +61,7 @@ class Turned:
         begins: the first view after a knock, counted from 0; -1 otherwise.
         names: of the V views that tell it.
         turns_rad: (V, 3) of each of them.
-        lens: (9,) the right camera's parameters, in the order of `lone`.
+        lens: the right camera's, as far as it is known.
         rows_px: by how much rows of left and right differ for it, px of the right image.
         depth_at_1_m_m: by how much depth at 1 m is wrong for it, m.
     """
@@ -71,7 +72,7 @@ class Turned:
     begins: int
     names: tuple[str, ...]
     turns_rad: Vector
-    lens: Vector
+    lens: CameraModel
     rows_px: float
     depth_at_1_m_m: float
 

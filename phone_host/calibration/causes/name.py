@@ -5,7 +5,7 @@ other; how the pairs deviate from one stiff rig; and whether the squares can be 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
@@ -22,6 +22,7 @@ from phone_host.calibration.causes.lone import both_alone
 from phone_host.calibration.causes.looks import SeenLook
 from phone_host.calibration.causes.mistakes import Finding, Mistake
 from phone_host.calibration.causes.partners import wrong_partners
+from phone_host.calibration.causes.plain_lens import is_plain, with_plain_lenses
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import REFERENCE_PX, Verdict, size_factor
 from phone_host.model import Side
@@ -92,7 +93,7 @@ def name_mistake(session: BoardSession, found: Calibration | DataError) -> Findi
         or _placed(session, found)
         or _swapped(found)
         or _stretched(session)
-        or deviation(session.pairs, session.board, session.sizes_px)
+        or _deviating(session, found)
         or _other_square(session, found)
     )
 
@@ -189,6 +190,18 @@ def _swapped(found: Calibration | DataError) -> Finding | None:
     return None
 
 
+def _deviating(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+    """Name how the pairs deviate from one stiff rig; what only a bent lens makes them do is none."""
+    finding = deviation(session.pairs, session.board, session.sizes_px)
+    if finding is None or isinstance(found, DataError) or (is_plain(found.rig.left) and is_plain(found.rig.right)):
+        return finding
+    plain = with_plain_lenses(list(session.pairs), found.rig)
+    finding = deviation(tuple(plain), session.board, session.sizes_px)
+    if finding is None or finding.turned is None:
+        return finding
+    return replace(finding, turned=replace(finding.turned, lens=found.rig.right))
+
+
 def _absurd_square(session: BoardSession) -> Finding | None:
     """Name a square that no board has: it is told first, because nothing else depends on the scale."""
     board = session.board
@@ -231,24 +244,39 @@ def _other_square(session: BoardSession, found: Calibration | DataError) -> Find
 
 def _stretched(session: BoardSession) -> Finding | None:
     """Name squares that are no squares: a board that is longer explains more, however each is turned."""
-    board, sizes_px = session.board, session.sizes_px
     try:
-        fits = [
-            both_alone(list(session.pairs), board.points_m() * [1 + stretch, 1.0, 1.0], sizes_px)
-            for stretch in (-_STRETCHED, 0.0, _STRETCHED)
-        ]
+        squares = _squares_by_stretch(list(session.pairs), session)
     except cv2.error:
         return None
-    if any(fit is None for fit in fits):
+    if squares is None:
         return None
-    lenses = [(left, right) for _, left, right in (fit for fit in fits if fit is not None)]
-    less, as_said, more = (left.squares_px2 + right.squares_px2 for left, right in lenses)
+    less, as_said, more = squares
     bend = less - 2 * as_said + more
     stretch = _STRETCHED * (less - more) / (2 * bend) if bend > 0 else 0.0
     remaining = as_said - (less - more) ** 2 / (8 * bend) if bend > 0 else as_said
     if abs(stretch) < _STRETCHED or remaining > (1 - _EXPLAINED_SHARE) * as_said:
         return None
     return _no_squares(stretch)
+
+
+def _squares_by_stretch(pairs: list[BoardPair], session: BoardSession) -> tuple[float, float, float] | None:
+    """Return the squares that a board leaves which is shorter, as said, and longer, px^2, of the same pairs; None if they fit no lens.
+
+    Raises:
+        cv2.error: no lens explains the views.
+    """
+    points_m, squares, common = session.board.points_m(), list[float](), pairs
+    for stretch in (-_STRETCHED, 0.0, _STRETCHED):
+        found = both_alone(pairs, points_m * [1 + stretch, 1.0, 1.0], session.sizes_px)
+        if found is None:
+            return None
+        kept, left, right = found
+        common = [pair for pair in common if pair in kept]
+        squares.append(left.squares_px2 + right.squares_px2)
+    # A stretched board makes some views look wrong: what the others leave cannot be compared.
+    if len(common) < len(pairs):
+        return _squares_by_stretch(common, session)
+    return squares[0], squares[1], squares[2]
 
 
 def _no_squares(stretch: float) -> Finding:

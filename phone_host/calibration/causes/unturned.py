@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.causes.lone import camera_arrays
 from phone_host.calibration.causes.mistakes import Turned
+from phone_host.geometry.lens import project, rays_through
 
 
 def unturned(pairs: list[BoardPair], turned: Turned) -> list[BoardPair]:
@@ -23,17 +23,11 @@ def unturned(pairs: list[BoardPair], turned: Turned) -> list[BoardPair]:
         The pairs as the rig of the last view would see them.
     """
     by_name = dict(zip(turned.names, turned.turns_rad, strict=True))
-    matrix, distortion = camera_arrays(turned.lens)
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
     last, turn = np.asarray(cv2.Rodrigues(turned.turns_rad[-1])[0]), turned.turns_rad[0]
     result = []
     for pair in pairs:
         turn = by_name.get(pair.name, turn)
-        rays = cv2.undistortPointsIter(
-            pair.right_px.reshape(-1, 1, 2), matrix, distortion, np.eye(3), np.eye(3), criteria
-        )
-        points = np.column_stack([np.asarray(rays).reshape(-1, 2), np.ones(len(pair.right_px))])
         back = last @ np.asarray(cv2.Rodrigues(turn)[0]).T
-        seen = cv2.projectPoints(points @ back.T, np.zeros(3), np.zeros(3), matrix, distortion)[0]
-        result.append(BoardPair(pair.name, pair.left_px, np.asarray(seen, np.float64).reshape(-1, 2)))
+        seen = project(rays_through(pair.right_px, turned.lens) @ back.T, turned.lens)
+        result.append(BoardPair(pair.name, pair.left_px, seen))
     return result

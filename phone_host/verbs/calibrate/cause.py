@@ -61,8 +61,8 @@ def assessed(found: Calibration, rejected: tuple[Rejected, ...], finding: Findin
     if wrong is None:
         return judgement if found.obstacle is not None else with_cause(judgement, finding)
     if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
-        return Assessment(Verdict.REJECT, (hint,))  # all else follows from it
-    return judgement if judgement.verdict is Verdict.GOOD else Assessment(judgement.verdict, (hint,))
+        return Assessment(Verdict.REJECT, hint)  # all else follows from it
+    return judgement if judgement.verdict is Verdict.GOOD else Assessment(judgement.verdict, hint)
 
 
 def with_cause(judgement: Assessment, finding: Finding) -> Assessment:
@@ -73,7 +73,7 @@ def with_cause(judgement: Assessment, finding: Finding) -> Assessment:
     verdict = max(judgement.verdict, finding.most, key=_BEST_FIRST.index)
     if verdict is Verdict.GOOD:
         return judgement
-    return Assessment(verdict, (f"{finding.sentence}: {finding.remedy}",))
+    return Assessment(verdict, f"{finding.sentence}: {finding.remedy}")
 
 
 def cause_report(finding: Finding | None, hint: str) -> dict[str, Any]:

@@ -50,7 +50,6 @@ from phone_host.verbs.calibrate.figures import (
 )
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
 from phone_host.verbs.calibrate.importing import export_lines, import_calibration, require_pictures, write_exports
-from phone_host.verbs.calibrate.live import take_views
 from phone_host.verbs.calibrate.page import session_of_failure, session_of_rig, with_rectified, write_page
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
@@ -71,7 +70,11 @@ def run(options: argparse.Namespace) -> int:
     require_file(options.out)
     if kind_of(options.out) is not Kind.MISSING and not is_rig(options.out):
         raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
-    live = take_views(options, asked) if options.live else None
+    live = None
+    if options.live:
+        from phone_host.verbs.calibrate.live import take_views  # noqa: PLC0415 - cameras and links: 0.2 s that pictures need not wait for
+
+        live = take_views(options, asked)
     files = pair_files(*(live.folders if live is not None else two_lists(options.images)))
     require_first_sizes(files, asked, options, mounted)
     keep_other_report(options.out.parent, "calibrate")

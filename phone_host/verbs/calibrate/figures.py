@@ -39,7 +39,7 @@ def report_of(
         **_figures(calibration),
         **_turned(views),
         "verdict": judgement.verdict.value,
-        "remedy": "; ".join(judgement.remedies),
+        "remedy": judgement.remedy,
     }
 
 
@@ -240,7 +240,7 @@ def summary(
     rows.append(f"verdict  {report['verdict']}")
     if not report["remedy"] and report["cause"] is not None:
         rows.append(f"note     {report['cause']['sentence']}")
-    rows += [f"remedy   {remedy}" for remedy in report["remedy"].split("; ") if remedy]
+    rows += [f"remedy   {report['remedy']}"] if report["remedy"] else []
     return [*rows, *_written(report, calibration, out)]
 
 
@@ -252,7 +252,7 @@ def _baseline_row(baseline_mm: float, sigma_m: float) -> str:
 
 def _lens_rows(calibration: Calibration) -> list[str]:
     """Return one line on the lenses, if one of them is not the usual one."""
-    if all(bend in {Bend.RADIAL, Bend.USUAL} for bend in calibration.bends):
+    if set(calibration.bends) <= {Bend.USUAL}:
         return []
     kinds = (
         f"{side} {bend.lens.value}, {bend.terms} coefficients"

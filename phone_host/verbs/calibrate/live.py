@@ -186,7 +186,7 @@ def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size]
         views=len(views),
         calibration=found,
         verdict=judgement.verdict,
-        remedy="; ".join(judgement.remedies),
+        remedy=judgement.remedy,
         is_hopeless=hopeless,
         taught=lessons(found, board),
     )

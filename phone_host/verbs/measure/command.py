@@ -3,12 +3,15 @@
 import argparse
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from common.errors import SettingsError
+from common.places import Kind, kind_of
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_text
@@ -41,6 +44,8 @@ _EVEN: Final = 0.05
 
 def run(options: argparse.Namespace) -> int:
     """Match the pair, intersect the rays of each point, and print what came of it."""
+    for path in (options.left, options.right):
+        _require_image(path)
     points = tuple(point_px(text, "--points", "X,Y in px, for example 312,240") for text in options.points)
     job = PointJob(
         left=Path(options.left),
@@ -57,6 +62,20 @@ def run(options: argparse.Namespace) -> int:
     else:
         say(_lines(points, found))
     return _CHECK_FAILED if any(isinstance(each, MissedPoint) for each in found.points) else 0
+
+
+def _require_image(path: str) -> None:
+    """Refuse a folder, which other commands take.
+
+    Raises:
+        SettingsError: it is one.
+    """
+    with suppress(OSError):  # whoever reads it says what is wrong
+        if kind_of(path) is Kind.FOLDER:
+            raise SettingsError(
+                f"{path} is a folder, and distances are measured in one pair of images",
+                "name one left and one right image",
+            )
 
 
 def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:

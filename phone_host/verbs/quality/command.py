@@ -4,7 +4,7 @@ import argparse
 from typing import Final
 
 from common.errors import SettingsError
-from common.program.terminal import say
+from common.program.terminal import columns, say
 from phone_host.calibration.target import Board, parse_board
 from phone_host.output.json_text import json_text
 from phone_host.report.quality_json import quality_json
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json_text(quality_json(report)))
     else:
-        say(quality_lines(report, str(options.out)))
+        say(quality_lines(report, str(options.out), columns()))
     return 0 if report.is_sound else _CHECK_FAILED
 
 
