@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.running.fit import Fit, fit_rows, proven
+from phone_host.calibration.running.fit import Fit, fit_rows, is_better, proven
 from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, Vector, departure_of, values_of
 from phone_host.calibration.running.trend import Trends
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState
@@ -144,7 +144,7 @@ class DriftWatch:
         if len(self._window) < (_AT_FIRST if self._known is None else 2) or not self._is_sound(fit):
             return
         self._known = fit
-        self._estimate = _Estimate(fit, proven(fit, _SIGMAS))
+        self._estimate = _Estimate(fit, self._proven(fit))
         self._trends.add(at_s, fit.values[:PARAMETERS], self._rows_px(fit.values[:PARAMETERS]))
         self._follow(self._estimate, at_s)
 
@@ -197,6 +197,13 @@ class DriftWatch:
     def _rows_px(self, values: Vector) -> float:
         return float(np.percentile(np.abs(self._everywhere @ values), _P95))
 
+    def _proven(self, fit: Fit) -> Vector:
+        """Return what the window proves, and proves twice: by its uncertainty, and by what it does for sightings that it was not read from."""
+        assert self._model is not None
+        values = proven(fit, _SIGMAS)
+        is_real = not values.any() or is_better(self._model, tuple(self._window), _SIGMAS)
+        return values if is_real else np.zeros(PARAMETERS)
+
     def _departs(self, one: Fit, other: Fit) -> bool:
         off = (one.values - other.values)[:PARAMETERS]
         both = (one.covariance + other.covariance)[:PARAMETERS, :PARAMETERS]
@@ -226,7 +233,7 @@ class DriftWatch:
         self._trends.restart()
         now = fit_rows(model, tuple(self._window))
         off = (now.values - self._known.values)[:PARAMETERS]
-        departure = departure_of(proven(now, _SIGMAS))
+        departure = departure_of(self._proven(now))
         self._note(Change(kind=ChangeKind.KNOCKED, at_s=at_s, departure=departure, step=departure_of(off)))
 
     def _follow(self, found: _Estimate, at_s: float) -> None:
