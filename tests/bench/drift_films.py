@@ -15,6 +15,9 @@ from tests.bench.depth_scenes import Image
 
 JPEG_QUALITY: Final = 90
 
+_SWING_S: Final = 7.0
+"""An automatic exposure that hunts takes some seconds to and fro."""
+
 
 @dataclass(frozen=True, slots=True)
 class Act:
@@ -41,6 +44,9 @@ class Play:
         fps: pairs per second.
         late_s: by how much later than stated the left image is exposed.
         looks: the two sensors.
+        jpeg: quality of both cameras' images.
+        swing: by this share the right camera's automatic exposure swings about its mean.
+        shake_deg: the right camera trembles against the left one by this, standard deviation about each axis.
     """
 
     name: str
@@ -55,6 +61,10 @@ class Play:
             Look(gain_bgr=(1.05, 1.0, 0.97), vignetting=0.1, noise_sigma=2.0, seed=2),
         )
     )
+
+    jpeg: int = JPEG_QUALITY
+    swing: float = 0.0
+    shake_deg: float = 0.0
 
     def departure_at(self, t_s: float) -> Departure:
         """Return how the right camera departs at a moment."""
@@ -133,6 +143,48 @@ def dark(play: Play) -> Play:
     return replace(play, looks=(looks[0], looks[1]))
 
 
+def vibrating(scene: Scene) -> Scene:
+    """The whole scene trembles before the rig, some pixels ten times a second: a bar on a machine."""
+    tremble = Path(amplitude_m=(0.004, 0.004, 0.0), phase_rad=(0.0, 1.1, 0.0), period_s=0.093)
+    return replace(scene, bodies=tuple(replace(body, path=tremble) for body in scene.bodies))
+
+
+def steady_minutes(seed: int) -> list[Play]:
+    """Ten minutes of rigs that stand as they were calibrated, each with another nuisance and a room of its own.
+
+    Args:
+        seed: of the rooms.
+    """
+
+    def play(
+        number: int, name: str, *, contrast: float = 0.5, walker: bool = False, gain: float = 1.0, noise: float = 2.0
+    ) -> Play:
+        room = furnished_room(10 * seed + number, contrast=contrast)
+        scene = with_walker(room) if walker else room
+        looks = (
+            Look(gain_bgr=(gain,) * 3, offset=4.0, noise_sigma=noise, seed=1),
+            Look(gain_bgr=(gain,) * 3, noise_sigma=noise, seed=2),
+        )
+        return Play(name=f"{name}, room {10 * seed + number}", scene=scene, seconds=60, looks=looks)
+
+    trembles = play(7, "vibration")
+    return [
+        play(0, "quiet"),
+        play(1, "pale", contrast=0.25),
+        play(2, "walker", walker=True),
+        replace(play(3, "walker, 5 ms late", walker=True), late_s=0.005),
+        play(4, "dim", gain=0.1),
+        play(5, "noise", noise=12.0),
+        replace(play(6, "JPEG 50, exposure hunts"), jpeg=50, swing=0.4),
+        replace(trembles, scene=vibrating(trembles.scene), late_s=0.002),
+        replace(play(8, "trembling by 0.01 degrees"), shake_deg=0.01),
+        replace(
+            play(9, "repeats"),
+            scene=replace(checked_wall(), bodies=(*checked_wall().bodies, *furnished_room(10 * seed + 9).bodies[3:])),
+        ),
+    ]
+
+
 def turned(from_s: float, axis: int, degrees: float) -> Act:
     """The right camera turns at once.
 
@@ -170,21 +222,29 @@ def judged_pairs(play: Play, rig: Rig, period_s: float) -> Iterator[tuple[float,
     """
     left = Renderer(play.scene, rig.left, rig_poses(rig)[0], play.looks[0])
     rights: dict[Departure, Renderer] = {}
-    due_s = 0.0
+    random, due_s = np.random.default_rng(51), 0.0
     for number in range(1, round(play.seconds * play.fps)):
         t_s = number / play.fps
         if t_s < due_s - 1e-9:
             continue
         due_s = t_s + period_s
-        departure = play.departure_at(t_s)
+        departure = _trembling(play.departure_at(t_s), play.shake_deg, random)
         if departure not in rights:
             stands = corrected_rig(rig, departure)
             rights = {departure: Renderer(play.scene, stands.right, rig_poses(stands)[1], play.looks[1])}
-        seen = [_sent(left.frame(at_s + play.late_s)) for at_s in (t_s, t_s - 1 / play.fps)]
-        yield t_s, seen[0], _sent(rights[departure].frame(t_s)), seen[1]
+        seen = [_sent(left.frame(at_s + play.late_s), play.jpeg) for at_s in (t_s, t_s - 1 / play.fps)]
+        gain = 1 + play.swing * math.sin(math.tau * t_s / _SWING_S)
+        yield t_s, seen[0], _sent(cv2.convertScaleAbs(rights[departure].frame(t_s), alpha=gain), play.jpeg), seen[1]
 
 
-def _sent(image: Image) -> Image:
-    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+def _trembling(departure: Departure, shake_deg: float, random: np.random.Generator) -> Departure:
+    if not shake_deg:
+        return departure
+    x, y, z = (np.array(departure.turn_rad) + np.radians(random.normal(0, shake_deg, 3))).tolist()
+    return replace(departure, turn_rad=(x, y, z))
+
+
+def _sent(image: "cv2.typing.MatLike", jpeg: int) -> Image:
+    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, jpeg])
     assert done
     return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8)
