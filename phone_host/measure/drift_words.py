@@ -44,7 +44,7 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
     found = []
     departure, is_beyond = drift.departure, drift.state is DriftState.BEYOND
     angle = f"{math.degrees(departure.angle_rad):.2f} degrees"
-    if is_beyond:
+    if is_beyond and not _is_focus(departure):
         found.append(
             Concern(
                 Doubt.RIG_MOVED,
@@ -52,7 +52,7 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
                 _STIFFEN,
             )
         )
-    elif drift.rows_px >= TOLD_ROWS_PX and departure.angle_rad and (_was_knocked(drift) or _is_far(departure)):
+    elif not is_beyond and drift.rows_px >= TOLD_ROWS_PX and departure.angle_rad and (_was_knocked(drift) or _is_far(departure)):
         found.append(
             Concern(
                 Doubt.RIG_MOVED,
@@ -60,7 +60,7 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
                 _TIGHTEN,
             )
         )
-    if not is_beyond and abs(departure.focal - 1) >= TOLD_FOCUS:
+    if _is_focus(departure) or (not is_beyond and abs(departure.focal - 1) >= TOLD_FOCUS):
         found.append(
             Concern(
                 Doubt.FOCUS_CHANGED,
@@ -118,6 +118,11 @@ def _was_knocked(drift: Drift) -> bool:
     return any(change.kind is ChangeKind.KNOCKED for change in drift.changes)
 
 
+def _is_focus(departure: Departure) -> bool:
+    """Tell whether it is the focus that has changed: beyond a correction, a turn is read as some of it, too."""
+    return abs(departure.focal - 1) >= TOLD_FOCUS and not _is_far(departure)
+
+
 def _is_far(departure: Departure) -> bool:
     return departure.angle_rad >= TOLD_TURN_RAD
 
@@ -131,6 +136,8 @@ def _when(drift: Drift) -> str:
 
 def _mended(drift: Drift) -> str:
     """Say what a correction does for depth, and what it can't."""
+    if drift.state is DriftState.BEYOND:
+        return "too far to be corrected, depth is wrong"
     if drift.state is not DriftState.CORRECTED:
         return f"rows are off by {drift.rows_px:.1f} px, and depth suffers"
     return f"rows are corrected to {max(drift.left_px, 0.05):.1f} px, but disparities may all be off by {2 * drift.zero_sigma_px:.1f} px"

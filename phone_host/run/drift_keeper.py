@@ -161,12 +161,18 @@ def _say(change: Change, drift: Drift) -> None:
             _LOG.info(
                 event("rig_returned", at_s=values["at_s"], away_s=f"{change.away_s:.1f}", drift="measured afresh")
             )
+        case ChangeKind.KNOCKED if _is_focus(change):
+            step_percent = f"{100 * (change.step.focal - 1):+.2f}"
+            remedy = "switch autofocus off, then calibrate again"
+            _LOG.warning(event("focus_jumped", step_percent=step_percent, **values, remedy=remedy))
         case ChangeKind.KNOCKED:
             step_deg = f"{math.degrees(change.step.angle_rad):.2f}"
             remedy = "tighten the bar, then calibrate again, or calibrate --pose-only"
             _LOG.warning(event("rig_knocked", step_deg=step_deg, **values, remedy=remedy))
         case ChangeKind.BEYOND:
             remedy = "fix both cameras to one stiff bar, then calibrate again"
+            if _is_focus(change):
+                remedy = "switch autofocus off, then calibrate again"
             _LOG.warning(event("drift_beyond_correction", **values, remedy=remedy))
         case ChangeKind.CORRECTED:
             left_px, features = f"{drift.left_px:.2f}", drift.features
@@ -175,6 +181,11 @@ def _say(change: Change, drift: Drift) -> None:
             )
         case _:
             assert_never(change.kind)
+
+
+def _is_focus(change: Change) -> bool:
+    """Tell whether of the two, turn and focal length, only the latter is proven to have changed."""
+    return change.departure.focal != 1 and not change.departure.angle_rad
 
 
 def _turn_values(departure: Departure) -> dict[str, str]:

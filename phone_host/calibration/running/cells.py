@@ -15,9 +15,6 @@ CELLS: Final = (6, 4)
 _FEWEST: Final = 3
 """A cell's median speaks for it from so many features on."""
 
-_MOST_PX: Final = 1.0
-"""Farther from their rows are wrong matches; a turned camera's are, too, and end nearer."""
-
 Cells = NDArray[np.intp]
 """(N,) number of each feature's cell."""
 
@@ -56,5 +53,5 @@ def typical_px(cell: Cells, off_px: Vector) -> float:
         cell: number of each feature's.
         off_px: (N,) across the lines.
     """
-    found = [min(abs(median_px), _MOST_PX) for _, median_px in medians(cell, off_px)]
+    found = [abs(median_px) for _, median_px in medians(cell, off_px)]
     return float(np.mean(found)) if found else 0.0

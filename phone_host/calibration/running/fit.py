@@ -41,6 +41,9 @@ _SIGMA_OF_MEDIAN: Final = 1.48
 _MOST_OF_CELL: Final = 9.0
 """Beyond three sigmas one cell, of wrong matches perhaps, says no more."""
 
+_LINEAR: Final = 0.1
+"""The rows of a turn by 10 degrees differ by this share from the linear model's."""
+
 _BETTER: Final = 0.8
 """What is proven must take away a fifth of the distance from the rows. Turns read from the leftovers of given rigs' lenses, whose
 uncertainty called them proven (up to 5 sigmas), took away 0 to 9 %; turned cameras' take away nearly all."""
@@ -104,7 +107,8 @@ def fit_rows(model: RowModel, sightings: Sequence[Sighting]) -> Fit:
         matrix = np.diag(_PRIOR**-2.0) + design.T @ (weights[:, np.newaxis] * design)
         values = np.linalg.solve(matrix, design.T @ (weights * target))
     counts = trust > _COUNTS
-    covariance = np.linalg.inv(matrix) * _disagreement(cell, alike_px2, target - design @ values)
+    told_px = design @ values
+    covariance = np.linalg.inv(matrix) * _disagreement(cell, alike_px2 + (_LINEAR * told_px) ** 2, target - told_px)
     return Fit(
         values=values,
         covariance=np.asarray(covariance, np.float64),

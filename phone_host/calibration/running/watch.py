@@ -50,7 +50,9 @@ _AT_FIRST: Final = 3
 
 _STEP_PX: Final = 0.25
 _STEP_CHI2: Final = 35.0
-"""A sighting that departs from the estimate by so much is set aside: 5 sigmas in four dimensions."""
+_STEP_SHARE: Final = 0.1
+"""A sighting that departs from the estimate by so much is set aside: 5 sigmas in four dimensions. Of a rig that stands far away, the
+linear model itself knows the rows to a tenth."""
 
 MOST_TURN_RAD: Final = math.radians(1.0)
 MOST_FOCUS: Final = 0.02
@@ -207,7 +209,8 @@ class DriftWatch:
     def _departs(self, one: Fit, other: Fit) -> bool:
         off = (one.values - other.values)[:PARAMETERS]
         both = (one.covariance + other.covariance)[:PARAMETERS, :PARAMETERS]
-        return bool(off @ np.linalg.solve(both, off) > _STEP_CHI2) and self._rows_px(off) > _STEP_PX
+        least_px = max(_STEP_PX, _STEP_SHARE * self._rows_px(other.values[:PARAMETERS]))
+        return bool(off @ np.linalg.solve(both, off) > _STEP_CHI2) and self._rows_px(off) > least_px
 
     def _is_sound(self, fit: Fit) -> bool:
         return (
