@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from phone_host.measure.trust import Concern, Doubt
-from phone_host.model import ChangeKind, Departure, Drift, DriftState
+from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, Drift, DriftState
 
 TOLD_TURN_RAD: Final = math.radians(0.25)
 """A rig that has turned by more is no stiff rig, though its rows are corrected: its vergence is known from the corners alone."""
@@ -52,7 +52,12 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
                 _STIFFEN,
             )
         )
-    elif not is_beyond and drift.rows_px >= TOLD_ROWS_PX and departure.angle_rad and (_was_knocked(drift) or _is_far(departure)):
+    elif (
+        not is_beyond
+        and drift.rows_px >= TOLD_ROWS_PX
+        and departure.angle_rad
+        and (_was_knocked(drift) or _is_far(departure))
+    ):
         found.append(
             Concern(
                 Doubt.RIG_MOVED,
@@ -105,13 +110,52 @@ def drift_lines(drift: Drift | None) -> list[str]:
     return [f"drift: the right camera against its calibration: {turned}; {told}: {rows}{trend}"]
 
 
+def stills_words(drift: Drift) -> str:
+    """Say how a rig stood over the order of pairs, with pairs for seconds.
+
+    Args:
+        drift: of pairs of images from files.
+    """
+    if drift.state is DriftState.UNKNOWN:
+        return "drift: not measured: too few features, or too badly spread"
+    rows = f"rows are known to {drift.rows_sigma_px:.2f} px"
+    told = f"{turn_words(drift.departure)}; vertical error {drift.rows_px:.2f} px, {drift.left_px:.2f} px left; {rows}"
+    parts = [
+        f"the right camera against its calibration: {told}"
+        if drift.departure != AS_CALIBRATED
+        else f"none; the rig stands as it was calibrated, {rows}"
+    ]
+    knocks = [f"{change.at_s:.0f}" for change in drift.changes if change.kind is ChangeKind.KNOCKED]
+    if moving := _moving(drift, 1.0):
+        parts.append(f"it turns from pair to pair, {moving} degrees")
+    elif knocks:
+        parts.append(f"it changed at once at pair {', '.join(knocks)}")
+    return f"drift: {'; '.join(parts)}"
+
+
+def stills_remedy(drift: Drift) -> str:
+    """Say what to do about the rig of some stills; empty: it stands as it was calibrated, or nothing is known of it.
+
+    Args:
+        drift: of pairs of images from files.
+    """
+    if drift.state is DriftState.UNKNOWN or drift.left_px < TOLD_ROWS_PX:
+        return ""
+    return _HOLD if _is_focus(drift.departure) else _TIGHTEN
+
+
 def _trend_words(drift: Drift) -> str:
     """Say how fast it still turns, if that is proven."""
+    moving = _moving(drift, 60.0)
+    return f"it still turns, {moving} degrees a minute" if moving else ""
+
+
+def _moving(drift: Drift, times: float) -> str:
+    """Name the axes that are proven to turn, with their rates: "pitch by +0.020"; empty: none."""
     axes = zip(("pitch", "yaw", "roll"), drift.trend.turn_rad_s, drift.trend.sigma_rad_s, strict=True)
-    moving = [
-        f"{name} by {math.degrees(rate) * 60:+.3f}" for name, rate, sigma in axes if abs(rate) > _LATE_SIGMAS * sigma
-    ]
-    return f"it still turns, {', '.join(moving)} degrees a minute" if moving else ""
+    return ", ".join(
+        f"{name} by {math.degrees(rate) * times:+.3f}" for name, rate, sigma in axes if abs(rate) > _LATE_SIGMAS * sigma
+    )
 
 
 def _was_knocked(drift: Drift) -> bool:

@@ -49,6 +49,32 @@ def drift_values(drift: Drift | None) -> dict[str, object] | None:
     }
 
 
+def stills_drift_values(drift: Drift | None) -> dict[str, object] | None:
+    """Return the object `drift` of `stereo`'s report.json for several pairs; None without a rig.
+
+    Args:
+        drift: of the pairs, with their numbers, from 1 on, for seconds.
+    """
+    if drift is None:
+        return None
+    trend = drift.trend
+    return {
+        "state": drift.state.value,
+        "departure": _departure(drift.departure),
+        "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
+        "vertical_error_px": _rounded(drift.rows_px),
+        "vertical_error_sigma_px": _rounded(drift.rows_sigma_px),
+        "vertical_error_left_px": _rounded(drift.left_px),
+        "pairs_judged": drift.judged,
+        "trend": {
+            "turn_deg_per_pair": _degrees(trend.turn_rad_s),
+            "turn_sigma_deg_per_pair": _degrees(trend.sigma_rad_s),
+            "vertical_error_px_per_pair": _rounded(trend.rows_px_s),
+        },
+        "knocked_at_pair": [round(change.at_s) for change in drift.changes if change.kind is ChangeKind.KNOCKED],
+    }
+
+
 def drift_table(drift: Drift | None) -> tuple[Table, ...]:
     """Make a table of what happened to the rig; none if nothing did.
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
+from phone_host.report.drift_report import stills_drift_values
 from phone_host.report.match_words import corrected_values
 from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
 from phone_host.report.stereo_trust import trust_values
@@ -62,6 +63,7 @@ def set_json(report: SetReport) -> dict[str, Any]:
         "interrupted_of": report.interrupted_of or None,
         "computed": len(report.computed),
         "failed": len(report.failed),
+        "drift": stills_drift_values(report.drift),
         "warnings": [remark.text for remark in report.remarks],
         "pairs": [_entry(pair) for pair in report.pairs],
         "files": [*(pair.name for pair in report.computed), *ALWAYS],

@@ -11,7 +11,7 @@ from typing import Final, Self
 from common.errors import DataError, TandemError
 from common.words import counted
 from phone_host.measure.trust import Doubt
-from phone_host.model import CutCounts, DepthLimits, MatchReport, Search, StereoGeometry
+from phone_host.model import CutCounts, DepthLimits, Drift, MatchReport, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report.cut_words import searched_from_m
@@ -170,6 +170,7 @@ class SetReport:
         right_alone: right images without a partner.
         remarks: what the user must know about all of them.
         interrupted_of: how many pairs were to be computed when the command was interrupted; 0: it was not.
+        drift: how their rig departs from its calibration, with pairs for seconds; None without a rig.
     """
 
     pairs: tuple[PairReport | FailedPair, ...]
@@ -179,6 +180,7 @@ class SetReport:
     remarks: tuple[Remark, ...] = ()
     interrupted_of: int = 0
     by_name: bool = False
+    drift: Drift | None = None
 
     @property
     def computed(self) -> tuple[PairReport, ...]:

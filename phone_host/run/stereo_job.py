@@ -17,6 +17,8 @@ from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
+from phone_host.calibration.running.stills import StillsWatch
+from phone_host.model import Drift
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
@@ -36,11 +38,11 @@ from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
-from phone_host.run.stereo_remarks import pair_remarks, turned_remarks
+from phone_host.run.stereo_remarks import drift_remarks, pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import density
+from phone_host.stereo.evidence import density, look_at, maps_of
 from phone_host.stereo.images import decode_files, open_image, size_px
 from phone_host.stereo.view_files import ViewFiles
 
@@ -112,7 +114,7 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         pairs: list[PairReport | FailedPair] = []
 
         def write_so_far() -> None:
-            so_far = replace(_set(job, tuple(pairs)), interrupted_of=len(job.files.pairs))
+            so_far = replace(_set(job, tuple(pairs), work.drift), interrupted_of=len(job.files.pairs))
             if so_far.computed:
                 _write_set(job, results, work, so_far)
 
@@ -121,7 +123,7 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
                 folder = f"pair-{int(name) if job.files.by_number else number:06d}"
                 pairs.append(work.tried(folder, left, right))
                 watcher()
-        report = _set(job, tuple(pairs))
+        report = _set(job, tuple(pairs), work.drift)
         if not report.computed:
             raise report.failed[0].none_of(len(pairs))
         _write_set(job, results, work, report)
@@ -133,7 +135,7 @@ def _write_set(job: StereoJob, results: StereoResults, work: "_Work", report: Se
     results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
 
 
-def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetReport:
+def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...], drift: Drift | None = None) -> SetReport:
     left, right = (tuple(map(str, alone)) for alone in (job.files.left_alone, job.files.right_alone))
     return SetReport(
         pairs=pairs,
@@ -141,7 +143,8 @@ def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...]) -> SetRepor
         by_name=job.files.by_name,
         left_alone=left,
         right_alone=right,
-        remarks=() if len(pairs) == 1 else _of_the_job(job),
+        remarks=() if len(pairs) == 1 else (*_of_the_job(job), *drift_remarks(drift)),
+        drift=drift,
     )
 
 
@@ -197,7 +200,13 @@ class _Work:
     def __init__(self, job: StereoJob, results: StereoResults, watcher: Watcher) -> None:
         self._job, self._results, self._watcher = job, results, watcher
         self._cores = Cores(job.make_core)
+        self._rig = StillsWatch()
         self.thumbnails: dict[str, Picture] = {}
+
+    @property
+    def drift(self) -> Drift | None:
+        """How the rig has stood over the pairs so far; None without a rig."""
+        return self._rig.drift
 
     def tried(self, folder: str, left: Path, right: Path) -> PairReport | FailedPair:
         """Compute and write a pair, or say why not."""
@@ -223,7 +232,9 @@ class _Work:
         processed = core.compute(*images, _StageClock(self._watcher, about), whole_px=sizes_px)
         watch.take_over(processed.stages)
         self._watcher.say(f"checking{about}")
-        trust = judge_pair(core, processed, self._job.mounted)
+        look = look_at(processed, maps_of(core, processed))
+        trust = judge_pair(core, processed, self._job.mounted, look)
+        self._rig.add(core, processed, look)
         watch.lap("judge")
         self._watcher.say(f"writing{about}")
         planned = available(

@@ -2,8 +2,9 @@
 
 from common.orientation import UPRIGHT
 from common.words import distance_text
+from phone_host.measure.drift_words import stills_remedy, stills_words
 from phone_host.measure.trust import Doubt
-from phone_host.model import Processed
+from phone_host.model import Drift, Processed
 from phone_host.report.cut_words import searched_from_m
 from phone_host.report.match_words import corrected_words
 from phone_host.report.stereo_report import Remark
@@ -65,3 +66,15 @@ def turned_remarks(*files: EncodedFile) -> tuple[Remark, ...]:
         for file in files
         if file.head.orientation != UPRIGHT
     )
+
+
+def drift_remarks(drift: Drift | None) -> tuple[Remark, ...]:
+    """Return what is to be said of the rig of several pairs: a warning if it no longer stands as it was calibrated.
+
+    Args:
+        drift: with pairs for seconds; None without a rig.
+    """
+    if drift is None:
+        return ()
+    remedy = stills_remedy(drift)
+    return (Remark(stills_words(drift), remedy, is_note=not remedy),)

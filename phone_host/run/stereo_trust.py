@@ -15,14 +15,17 @@ from phone_host.model import Processed
 from phone_host.report.depth_data import density
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import has_depth, maps_of, measure_evidence
+from phone_host.stereo.evidence import Look, has_depth, look_at, maps_of
 
 _UNMATCHED: Final = no_depth(None, None)
 _OF_FILES: Final = "check that the scene has texture, and that --calibration or --rectified fits the images"
 
 
 def judge_pair(
-    core: StereoCore, processed: Processed, mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+    core: StereoCore,
+    processed: Processed,
+    mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT),
+    look: Look | None = None,
 ) -> PairTrust:
     """Judge one pair.
 
@@ -30,8 +33,9 @@ def judge_pair(
         core: the core that processed it.
         processed: its result.
         mounted: what the user gave to make the left and the right image upright.
+        look: what was seen in it; None: it is looked at.
     """
-    evidence = measure_evidence(processed, maps_of(core, processed))
+    evidence = (look or look_at(processed, maps_of(core, processed))).evidence
     seen = image_doubts(evidence, ImageSource.FILES)
     found = tuple(with_final_options(concern, mounted, ImageSource.FILES) for concern in seen)
     if not has_depth(processed) and not any(concern.is_certain for concern in found):

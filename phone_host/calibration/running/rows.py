@@ -35,6 +35,8 @@ YAW: Final = 1
 _WIDER: Final = 1e-3
 """Step of the numeric derivative by the focal length: a webcam's refocusing is a few of these."""
 
+_P95: Final = 95
+
 _OVER: Final = 9
 """The image's rows are judged at 9 x 9 places."""
 
@@ -102,6 +104,10 @@ class RowModel:
         x, y = (np.linspace(0, length - 1, _OVER) for length in (made.width_px, made.height_px))
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         return self.columns((places - np.array([geometry.cx_px, geometry.cy_px])) / geometry.focal_px)
+
+    def rows_px(self, values: Vector) -> float:
+        """Return the vertical error that the four parameters make, 95th percentile over the image, px."""
+        return float(np.percentile(np.abs(self.everywhere() @ values), _P95))
 
     def sighting(self, seen: Followed, now: PointMaps, calibrated: PointMaps, late_s: float = 0.0) -> Sighting:
         """Take followed features back to what the calibrated rig would have made of them.

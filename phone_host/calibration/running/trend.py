@@ -20,10 +20,11 @@ class Trends:
 
     Args:
         every: of so many estimates one is kept: those that share sightings would agree better than they know.
+        least: of time, s, or of whatever else counts; a shorter line follows the noise.
     """
 
-    def __init__(self, every: int = 1) -> None:
-        self._every, self._count = every, 0
+    def __init__(self, every: int = 1, least: float = _LEAST_S) -> None:
+        self._every, self._least, self._count = every, least, 0
         self._kept: list[tuple[float, Vector]] = []
         self._every_s = 0.0
 
@@ -53,7 +54,7 @@ class Trends:
         """The line; NaN where there are too few estimates, or over too short a time."""
         times = np.array([at_s for at_s, _ in self._kept])
         seconds = float(times[-1] - times[0]) if len(times) else 0.0
-        if len(times) < _FEWEST or seconds < _LEAST_S:
+        if len(times) < _FEWEST or seconds < self._least:
             return Trend(seconds=seconds)
         values = np.array([each for _, each in self._kept])
         from_middle = times - times.mean()
