@@ -8,8 +8,8 @@ import pytest
 
 from common import now
 from phone_host.calibration.running.see import Timed
-from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, DriftState, Processed, Result, Side
-from phone_host.run.drift_keeper import DriftKeeper, Moment
+from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Processed, Result, Side
+from phone_host.run.drift_keeper import DriftKeeper, Moment, _say
 from phone_host.scene.scene import demo_scene, render, rig_poses
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.departure import corrected_rig
@@ -121,3 +121,15 @@ def test_images_that_came_rectified_are_not_watched(turned: tuple[StereoCore, Pr
         Moment(replace(result(0), processed=processed), Timed()), look_at(processed, maps_of(core, processed)), 0.0
     )
     assert (keeper.drift.judged, keeper.overlay) == (0, "")
+
+
+@pytest.mark.parametrize("kind", [ChangeKind.KNOCKED, ChangeKind.BEYOND])
+def test_a_jump_of_the_focus_is_logged_as_one(kind: ChangeKind, caplog: pytest.LogCaptureFixture) -> None:
+    """Where only the focal length is proven to have changed, the remedy is the focus and not the bar."""
+    zoomed, turned_too = Departure(focal=1.03), Departure(turn_rad=(0.05, 0.0, 0.0), focal=1.03)
+    for departure in (zoomed, turned_too):
+        _say(Change(kind=kind, at_s=3.0, departure=departure, step=departure), Drift())
+    focus, bar = (record.getMessage() for record in caplog.records)
+    assert "autofocus" in focus
+    assert "bar" in bar
+    assert "autofocus" not in bar

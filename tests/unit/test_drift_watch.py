@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.running.rows import RowModel
+from phone_host.calibration.running.rows import RowModel, Sighting
 from phone_host.calibration.running.trend import Trends
 from phone_host.calibration.running.watch import DriftWatch
+from phone_host.measure.drift_words import drift_concerns
+from phone_host.measure.trust import Doubt
 from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, DriftState
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.scaled_rig import scaled_rig
@@ -223,3 +225,54 @@ def test_a_trend_over_hours_keeps_few_estimates() -> None:
     assert trends.trend.turn_rad_s[0] == pytest.approx(2e-6, rel=1e-6)
     trends.restart()
     assert trends.trend.seconds == 0.0
+
+
+LEFTOVERS = (
+    (0, 29, -0.36), (3, 23, -1.02), (4, 42, -0.35), (5, 20, 0.23), (10, 391, 0.0), (11, 260, 0.06), (12, 8, 0.36), (13, 75, -0.02),
+    (14, 109, -0.07), (15, 133, -0.04), (16, 494, -0.01), (17, 156, -0.02), (18, 73, -0.03), (21, 112, 0.0), (23, 56, 0.24),
+)  # fmt: skip
+"""Cells of the image, their features in twelve pairs, and how far these lie beside their rows, px: EuRoC V1_01 at rest, its own calibration."""
+
+
+def test_corners_that_contradict_each_other_are_no_turn(made: Sight) -> None:
+    """What a good rig's lenses leave in two corners looks like a yaw that two others deny: nothing is told or corrected."""
+    random, watch = np.random.default_rng(3), DriftWatch()
+    geometry = made.model.rectification.geometry
+    cells = np.concatenate([np.full(count // 6 + 1, cell) for cell, count, _ in LEFTOVERS])
+    leftover_px = {cell: off_px for cell, _, off_px in LEFTOVERS}
+    for number in range(12):
+        places = (
+            (np.column_stack([cells % 6, cells // 6]) + random.uniform(0, 1, (len(cells), 2))) / (6, 4) * (640, 480)
+        )
+        slopes = (places - (geometry.cx_px, geometry.cy_px)) / geometry.focal_px
+        off_px = np.array([leftover_px[cell] for cell in cells.tolist()]) + random.normal(0, 0.05, len(cells))
+        seen = Sighting(slopes, made.model.columns(slopes), off_px, np.zeros(len(cells)))
+        watch.add(made.model, seen, number / 2)
+    assert (kinds(watch), watch.overlay, watch.drift.departure) == ([], AS_CALIBRATED, AS_CALIBRATED)
+    assert watch.drift.state is not DriftState.UNKNOWN
+
+
+@pytest.mark.parametrize("degrees", [3.0, -10.0])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_rig_that_stands_far_away_is_told_once_as_a_turn(made: Sight, axis: int, degrees: float) -> None:
+    """By 3 and by 10 degrees about any axis: one knock, too far to be corrected, and a turn rather than a focus."""
+    turn = [0.0, 0.0, 0.0]
+    turn[axis] = math.radians(degrees)
+    stands, watch = Departure(turn_rad=(turn[0], turn[1], turn[2])), DriftWatch()
+    shown(watch, made, AS_CALIBRATED, range(6))
+    shown(watch, made, stands, range(6, 14))
+    assert kinds(watch) == [KNOCKED, BEYOND]
+    drift = watch.drift
+    assert (drift.state, watch.overlay) == (DriftState.BEYOND, AS_CALIBRATED)
+    assert drift.departure.turn_rad[axis] == pytest.approx(turn[axis], rel=0.05)
+    assert [concern.doubt for concern in drift_concerns(drift)] == [Doubt.RIG_MOVED]
+
+
+def test_a_focus_beyond_bounds_is_told_as_a_focus(made: Sight) -> None:
+    """A focal length 4 % longer is no turn, though nothing of it is corrected."""
+    watch = DriftWatch()
+    shown(watch, made, AS_CALIBRATED, range(6))
+    shown(watch, made, Departure(focal=1.04), range(6, 10))
+    [concern] = drift_concerns(watch.drift)
+    assert (watch.drift.state, concern.doubt) == (DriftState.BEYOND, Doubt.FOCUS_CHANGED)
+    assert "too far to be corrected" in concern.sentence

@@ -9,11 +9,11 @@ import cv2
 import pytest
 
 from common.errors import DataError
-from phone_host.measure.drift_words import drift_concerns, drift_lines
+from phone_host.measure.drift_words import drift_concerns, drift_lines, stills_remedy, stills_words
 from phone_host.measure.trust import Doubt
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Trend
 from phone_host.output.overlay_yaml import fingerprint, overlay_text, read_overlay
-from phone_host.report.drift_report import drift_table, drift_values
+from phone_host.report.drift_report import drift_table, drift_values, stills_drift_values
 from tests.support.drift_sightings import two_webcams
 
 PITCHED = Departure(turn_rad=(math.radians(0.1), 0.0, 0.0))
@@ -172,3 +172,32 @@ def test_what_is_no_overlay_is_refused(tmp_path: Path, content: bytes | None) ->
         read_overlay(path, two_webcams())
     assert str(path) in error.value.problem
     assert "--overlay" in error.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("drift", "words", "remedy"),
+    [
+        (Drift(judged=2), "too few features", ""),
+        (replace(KNOWN, state=DriftState.STEADY, rows_px=0.0), "drift: none; the rig stands as it was calibrated", ""),
+        (replace(corrected(FAR, KNOCK), left_px=1.0), "px left; rows are known to 0.05 px; it changed at once at pair 12", "bar"),
+        (replace(corrected(ZOOMED), left_px=2.5), "focal length +1.00 %", "autofocus"),
+        (
+            replace(corrected(FAR, KNOCK), trend=Trend(turn_rad_s=(4e-4, 0.0, 0.0), sigma_rad_s=(1e-6, 1e-6, 1e-6))),
+            "it turns from pair to pair, pitch by +0.023 degrees",
+            "",
+        ),
+    ],
+)  # fmt: skip
+def test_a_rig_of_stills_is_told_over_the_order_of_pairs(drift: Drift, words: str, remedy: str) -> None:
+    """The line names the departure, what is left and the trend, or the pair at which it changed; a remedy only if rows are off."""
+    assert words in stills_words(drift)
+    assert (remedy in stills_remedy(drift)) if remedy else not stills_remedy(drift)
+
+
+def test_the_report_of_stills_counts_pairs() -> None:
+    """Rates are per pair, and a knock has the number of its pair; without a rig there is nothing."""
+    assert stills_drift_values(None) is None
+    values = stills_drift_values(replace(corrected(FAR, KNOCK), trend=Trend(turn_rad_s=(math.radians(0.02), 0.0, 0.0))))
+    assert values is not None
+    assert values["knocked_at_pair"] == [12]
+    assert values["trend"]["turn_deg_per_pair"] == [0.02, 0.0, 0.0]  # type: ignore[index]

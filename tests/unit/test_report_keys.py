@@ -15,7 +15,7 @@ from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
-from phone_host.model import CutCounts, DepthAccount, DepthLimits, MatchReport, Search, TemporalAccount
+from phone_host.model import CutCounts, DepthAccount, DepthLimits, Drift, MatchReport, Search, TemporalAccount
 from phone_host.report.quality_json import quality_json
 from phone_host.report.run_json import build
 from phone_host.report.stereo_json import pair_json, set_json
@@ -94,7 +94,7 @@ def test_every_key_of_a_report_of_stereo_is_described() -> None:
     """That of one pair, and that of several of which one failed."""
     pair = replace(test_stereo_report._PAIR, trust=test_stereo_report._BAD)
     failed = FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")
-    keys = _keys(pair_json(pair)) | _keys(set_json(SetReport(pairs=(pair, failed), by_number=True)))
+    keys = _keys(pair_json(pair)) | _keys(set_json(SetReport(pairs=(pair, failed), by_number=True, drift=Drift())))
     assert len(keys - {"total"}) >= 55
     assert keys <= _described("What `--json` prints", "report.json of `stereo`")
 
