@@ -25,6 +25,8 @@ _STIFFEN: Final = "fix both cameras to one stiff bar, then calibrate again"
 _HOLD: Final = "switch autofocus off, hold the focus that you scan with, and calibrate again"
 _TIME: Final = "measure the cameras' time offset: phone-host calibrate-time"
 
+_EXPLAINED: Final = frozenset({Doubt.MIRRORED, Doubt.TURNED, Doubt.TURNED_BY_QUARTER, Doubt.OTHER_SCENE})
+
 
 def turn_words(departure: Departure) -> str:
     """Name the departure's parts that are not 0: "pitch +0.300 degrees, focal length +1.00 %"."""
@@ -83,6 +85,21 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
             )
         )
     return tuple(found)
+
+
+def told_as_a_turn(images: tuple[Concern, ...], moved: tuple[Concern, ...]) -> tuple[Concern, ...]:
+    """Return the doubts about images without those that a knocked rig explains.
+
+    Features that agree on one turn of a camera are those of one scene, upright and not mirrored; single pairs of a rig
+    that was knocked by some degrees may look so.
+
+    Args:
+        images: what single pairs made doubtful.
+        moved: what the rig's departure did.
+    """
+    if all(concern.doubt is not Doubt.RIG_MOVED for concern in moved):
+        return images
+    return tuple(concern for concern in images if concern.doubt not in _EXPLAINED)
 
 
 def is_late(drift: Drift) -> bool:

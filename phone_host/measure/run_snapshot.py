@@ -15,7 +15,7 @@ from phone_host.measure.budget_words import with_budget
 from phone_host.measure.camera_match import LockMiss, settings_concerns
 from phone_host.measure.delays import DelayStatistics
 from phone_host.measure.doubt_history import Episode
-from phone_host.measure.drift_words import drift_concerns
+from phone_host.measure.drift_words import drift_concerns, told_as_a_turn
 from phone_host.measure.gone import gone_concerns
 from phone_host.measure.image_trust import ImageTrust
 from phone_host.measure.no_depth import no_depth
@@ -257,6 +257,7 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     gone = gone_concerns(run.ended, run.away, run.camera, run.last_s, run.refused) if run.processed else ()
     told = (*spoiled_concerns(run.spoiled_counts), *settings_concerns(run.missed_locks))
     moved = () if run.drift is None else drift_concerns(run.drift)
+    images = told_as_a_turn(images, moved)
     timing = unbelieved_concerns(unbelieved) + timing_concerns(time_and_motion(run))
     return gravest_first((*rejected, *numbers, *images, *moved, *told, *gone, *timing))
 

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from typing import Final
 
 from common import now
+from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.image_trust import ImageTrust
+from phone_host.measure.trust import Doubt
 from phone_host.model import DepthLimits, Result, StereoGeometry
 from phone_host.run.drift_keeper import DriftKeeper, Moment
 from phone_host.run.sinks import OneQueueSink, SinkQueue
@@ -90,7 +92,10 @@ class TrustSink(OneQueueSink):
         processed, at_s = result.processed, (done_ns - self._started_ns) / 1e9
         maps = None if self._core is None else maps_of(self._core, processed)
         look = look_at(processed, maps)
-        if self._keeper is not None and moment is not None:
+        is_swapped = any(concern.doubt is Doubt.SWAPPED for concern in image_doubts(look.evidence))
+        if (
+            self._keeper is not None and moment is not None and not is_swapped
+        ):  # exchanged cameras look like turned ones
             self._keeper.judge(moment, look, at_s)
             if self._keeper.is_unsure:
                 self._due_ns = 0  # was the rig knocked? The next pair tells

@@ -9,8 +9,8 @@ import cv2
 import pytest
 
 from common.errors import DataError
-from phone_host.measure.drift_words import drift_concerns, drift_lines, stills_remedy, stills_words
-from phone_host.measure.trust import Doubt
+from phone_host.measure.drift_words import drift_concerns, drift_lines, stills_remedy, stills_words, told_as_a_turn
+from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Trend
 from phone_host.output.overlay_yaml import fingerprint, overlay_text, read_overlay
 from phone_host.report.drift_report import drift_table, drift_values, stills_drift_values
@@ -201,3 +201,11 @@ def test_the_report_of_stills_counts_pairs() -> None:
     assert values is not None
     assert values["knocked_at_pair"] == [12]
     assert values["trend"]["turn_deg_per_pair"] == [0.02, 0.0, 0.0]  # type: ignore[index]
+
+
+def test_a_knocked_rig_explains_what_single_pairs_look_like() -> None:
+    """With a proven turn neither `mirrored` nor `other scene` is told; a swap, and everything without a turn, is."""
+    images = tuple(Concern(doubt, "s", "r") for doubt in (Doubt.SWAPPED, Doubt.MIRRORED, Doubt.OTHER_SCENE))
+    moved = drift_concerns(corrected(FAR))
+    assert told_as_a_turn(images, ()) == images
+    assert told_as_a_turn(images, moved) == images[:1]
