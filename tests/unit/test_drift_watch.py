@@ -229,9 +229,10 @@ def test_a_trend_over_hours_keeps_few_estimates() -> None:
 
 LEFTOVERS = (
     (0, 29, -0.36), (3, 23, -1.02), (4, 42, -0.35), (5, 20, 0.23), (10, 391, 0.0), (11, 260, 0.06), (12, 8, 0.36), (13, 75, -0.02),
-    (14, 109, -0.07), (15, 133, -0.04), (16, 494, -0.01), (17, 156, -0.02), (18, 73, -0.03), (21, 112, 0.0), (23, 56, 0.24),
+    (14, 109, -0.07), (15, 133, -0.04), (16, 494, -0.01), (17, 156, -0.02), (18, 73, -1.0), (21, 112, 0.0), (23, 56, 1.0),
 )  # fmt: skip
-"""Cells of the image, their features in twelve pairs, and how far these lie beside their rows, px: EuRoC V1_01 at rest, its own calibration."""
+"""Cells of the image, their features in twelve pairs, and how far these lie beside their rows, px: as EuRoC V1_01 at rest has them with
+its own calibration, but that the lower corners deny a yaw more loudly."""
 
 
 def test_corners_that_contradict_each_other_are_no_turn(made: Sight) -> None:
