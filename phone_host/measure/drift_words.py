@@ -44,6 +44,9 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
         drift: of the run.
     """
     found = []
+    if drift.state is DriftState.UNKNOWN and _was_knocked(drift):
+        problem = f"the cameras turned against each other{_when(drift)}; by how much is not known, because too few features were seen since"
+        found.append(Concern(Doubt.RIG_MOVED, problem, _TIGHTEN))
     departure, is_beyond = drift.departure, drift.state is DriftState.BEYOND
     angle = f"{math.degrees(departure.angle_rad):.2f} degrees"
     if is_beyond and not _is_focus(departure):
@@ -109,13 +112,25 @@ def is_late(drift: Drift) -> bool:
 
 
 def drift_lines(drift: Drift | None) -> list[str]:
-    """Say in one line how the rig departs from its calibration; nothing without a rig, or if no pair was judged."""
+    """Say how the rig departs from its calibration, and how often it may have been touched; nothing without a rig, or if no pair was judged."""
     if drift is None or not drift.judged:
         return []
+    away = [change for change in drift.changes if change.kind is ChangeKind.RETURNED]
+    if not away:
+        return [_drift_line(drift)]
+    times = "once" if len(away) == 1 else f"{len(away)} times"
+    return [
+        _drift_line(drift),
+        f"a camera or the board was away {times}, last for {away[-1].away_s:.1f} s: drift was measured afresh",
+    ]
+
+
+def _drift_line(drift: Drift) -> str:
     if drift.state is DriftState.UNKNOWN:
-        return ["drift: not measured: too few features, or too badly spread; nothing was corrected"]
+        used = "nothing was corrected" if drift.overlay == AS_CALIBRATED else "the correction of before is kept"
+        return f"drift: not measured: too few features, or too badly spread; {used}"
     if drift.state is DriftState.STEADY:
-        return [f"drift: none; the rig stands as it was calibrated, rows are known to {drift.rows_sigma_px:.2f} px"]
+        return f"drift: none; the rig stands as it was calibrated, rows are known to {drift.rows_sigma_px:.2f} px"
     told = {
         DriftState.CORRECTED: "corrected",
         DriftState.DEPARTED: "not corrected",
@@ -124,7 +139,7 @@ def drift_lines(drift: Drift | None) -> list[str]:
     trend = f"; {trended}" if (trended := _trend_words(drift)) else ""
     turned = turn_words(drift.departure) or "as calibrated"
     rows = f"vertical error {drift.rows_px:.2f} px, {drift.left_px:.2f} px left"
-    return [f"drift: the right camera against its calibration: {turned}; {told}: {rows}{trend}"]
+    return f"drift: the right camera against its calibration: {turned}; {told}: {rows}{trend}"
 
 
 def stills_words(drift: Drift) -> str:

@@ -158,7 +158,7 @@ def _say(change: Change, drift: Drift) -> None:
     values = {"at_s": f"{change.at_s:.1f}"} | _turn_values(change.departure)
     match change.kind:
         case ChangeKind.RETURNED:
-            _LOG.info(
+            _LOG.warning(
                 event("rig_returned", at_s=values["at_s"], away_s=f"{change.away_s:.1f}", drift="measured afresh")
             )
         case ChangeKind.KNOCKED if _is_focus(change):

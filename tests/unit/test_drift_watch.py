@@ -155,6 +155,21 @@ def test_too_few_features_never_correct(made: Sight, count: int) -> None:
     assert (watch.drift.state, watch.overlay, kinds(watch)) == (DriftState.UNKNOWN, AS_CALIBRATED, [])
 
 
+@pytest.mark.parametrize("count", [20, 25, 29])
+def test_a_knock_with_few_features_is_told_once_and_taken_in(made: Sight, count: int) -> None:
+    """Two sightings do not know the rows: what was known before is over at once, and six of them make a new estimate."""
+    watch = DriftWatch()
+    shown(watch, made, AS_CALIBRATED, range(6))
+    number, states = 6, list[DriftState]()
+    while CORRECTED not in kinds(watch) and number < 30:
+        shown(watch, made, pitched(0.3), range(number, number + 1), count=count)
+        states.append(watch.drift.state)
+        number += 1
+    assert kinds(watch) == [KNOCKED, CORRECTED]
+    assert list(dict.fromkeys(states)) == [DriftState.STEADY, DriftState.UNKNOWN, DriftState.CORRECTED]
+    assert watch.drift.left_px < 0.1
+
+
 def test_after_a_camera_was_away_the_rig_is_measured_afresh(made: Sight) -> None:
     """It is told at once; that it stands otherwise by the second sighting; that it stands as before by no change."""
     watch = DriftWatch()

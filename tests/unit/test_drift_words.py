@@ -50,6 +50,24 @@ def test_a_small_slow_departure_is_told_in_a_line_and_worries_nobody() -> None:
     assert "pitch +0.10 degrees; corrected: vertical error 1.00 px, 0.02 px left" in line
 
 
+def test_what_is_unknown_since_a_knock_is_said_so() -> None:
+    """Too few features since: a concern, and a line that does not deny the correction in use."""
+    drift = Drift(state=DriftState.UNKNOWN, judged=9, changes=(KNOCK,))
+    [concern] = drift_concerns(drift)
+    assert concern.doubt is Doubt.RIG_MOVED
+    assert "at once 12 s after the start; by how much is not known" in concern.sentence
+    assert drift_lines(drift)[0].endswith("nothing was corrected")
+    assert drift_lines(replace(drift, overlay=PITCHED))[0].endswith("the correction of before is kept")
+
+
+def test_a_camera_that_was_away_is_told() -> None:
+    """Once, and several times."""
+    away = Change(kind=ChangeKind.RETURNED, at_s=30.0, departure=AS_CALIBRATED, away_s=1.5)
+    once, twice = (drift_lines(replace(KNOWN, changes=(away,) * count))[1] for count in (1, 2))
+    assert once == "a camera or the board was away once, last for 1.5 s: drift was measured afresh"
+    assert "away 2 times" in twice
+
+
 @pytest.mark.parametrize(
     ("drift", "doubt", "words", "remedy"),
     [

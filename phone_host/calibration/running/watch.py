@@ -1,7 +1,7 @@
 """Watches over a rig while it runs: how far it has turned, whether at once or little by little, and what corrects it. Pure.
 
 The latest few sightings together give the estimate. One that does not fit them is set aside. If the next one agrees with
-it, the rig was knocked: the estimate starts afresh from those two. Whatever the estimate says, it counts only if it rests
+it, the rig was knocked: the estimate starts afresh from those two, and is unknown until it rests on enough. Whatever the estimate says, it counts only if it rests
 on enough features that are well spread, and only what they prove is corrected.
 """
 
@@ -238,6 +238,8 @@ class DriftWatch:
         off = (now.values - self._known.values)[:PARAMETERS]
         departure = departure_of(self._proven(now))
         self._note(Change(kind=ChangeKind.KNOCKED, at_s=at_s, departure=departure, step=departure_of(off)))
+        # The next sightings belong here even where these two are not enough for an estimate: what was known before is over.
+        self._known, self._estimate = now, None
 
     def _follow(self, found: _Estimate, at_s: float) -> None:
         """Let the correction follow the estimate, within bounds, and note what changes."""
