@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.bundle_problem import (
     GLOBALS,
-    LEFT,
-    RIGHT,
     BundleState,
     BundleView,
     RigProblem,
@@ -25,6 +23,7 @@ from phone_host.calibration.bundle_problem import (
     errors_of,
     project_view,
 )
+from phone_host.geometry.rig_pixels import LEFT, RIGHT
 from phone_host.geometry.schur import inverse_of, minimise
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Lens, Rig

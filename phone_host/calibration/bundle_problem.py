@@ -1,8 +1,7 @@
 """The least-squares problem of a rig: what is estimated, how it predicts the corners, and the derivatives. Pure.
 
-Shared parameters, in this order: the left camera's twelve (`geometry.lens`), the right camera's twelve, a small turn of the
-relative rotation about the right camera's axes (rad), the translation (m). Blocks: one board pose each, moved by a small turn
-about the left camera's axes and a translation.
+Shared parameters: the thirty of a rig (`geometry.rig_pixels`). Blocks: one board pose each, moved by a small turn about the left
+camera's axes and a translation.
 """
 
 from dataclasses import dataclass, replace
@@ -13,16 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.lens import PARAMETERS, parameters_of, project, project_linearised, with_parameters
+from phone_host.geometry.rig_pixels import LEFT, RIG, RIGHT
 from phone_host.geometry.schur import NormalEquations
 from phone_host.geometry.se3 import cross_matrices, rotations_of, vectors_of
-from phone_host.model import CameraModel
+from phone_host.model import RIG_PARAMETERS, CameraModel
 
 Vector = NDArray[np.float64]
 
-LEFT: Final = slice(0, PARAMETERS)
-RIGHT: Final = slice(PARAMETERS, 2 * PARAMETERS)
-RIG: Final = slice(2 * PARAMETERS, 2 * PARAMETERS + 6)
-GLOBALS: Final = 2 * PARAMETERS + 6
+GLOBALS: Final = RIG_PARAMETERS
 
 HUBER_SIGMAS: Final = 2.5
 """Huber's threshold in standard deviations: Gaussian noise loses 1 % of its information."""

@@ -11,9 +11,10 @@ import numpy as np
 from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.bundle import BundleResult, Vector
-from phone_host.calibration.bundle_problem import GLOBALS, RIG, BundleView, RigProblem
+from phone_host.calibration.bundle_problem import GLOBALS, BundleView, RigProblem
 from phone_host.calibration.calibrate import fit_of_known_lenses, summed_up
 from phone_host.calibration.target import Board
+from phone_host.geometry.rig_pixels import RIG
 from phone_host.model import CameraModel, Lens, Rig
 
 

@@ -4,8 +4,7 @@ The covariance of the parameters is carried through to first order:
 
     variance of a disparity = J C J^T,  J = its derivative by the parameters.
 
-J is exact: how a point's pixels move with the true cameras (`geometry.lens`), and how the rectification that was computed from
-the estimated ones carries that to the rectified images. A point at infinity has D = d + doffs = 0 in an exact rig; in a
+J is exact (`geometry.rig_pixels`). A point at infinity has D = d + doffs = 0 in an exact rig; in a
 calibrated one its sigma, the noise of zero, decides how far the rig can see, because depth is f b / D.
 """
 
@@ -14,10 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.bundle_problem import GLOBALS, LEFT, RIG, RIGHT
-from phone_host.geometry.lens import project_linearised
-from phone_host.geometry.se3 import cross_matrices
-from phone_host.model import CameraModel, Epipolar, Rectification, Rig
+from phone_host.geometry.rig_pixels import pixel_derivatives
+from phone_host.model import Epipolar, Rectification, Rig
 
 Floats = NDArray[np.float64]
 
@@ -81,39 +78,15 @@ def disparity_derivatives(rig: Rig, rectification: Rectification, depth_m: float
         depth_m: of the points, m; may be infinite.
     """
     slopes = _slopes(rectification)
-    is_far = not np.isfinite(depth_m)
-    if not is_far:  # what the right camera does not see has no disparity
-        axis, geometry = (1 if rectification.epipolar.is_vertical else 0), rectification.geometry
+    axis = 1 if rectification.epipolar.is_vertical else 0
+    if np.isfinite(depth_m):  # what the right camera does not see has no disparity
+        geometry = rectification.geometry
         pixels = slopes[:, axis] * geometry.focal_px + (geometry.cy_px if axis else geometry.cx_px)
         towards = -1.0 if rectification.epipolar is Epipolar.DOWN else 1.0
         matched = pixels - towards * geometry.focal_px * geometry.baseline_m / depth_m
         slopes = slopes[(matched >= 0) & (matched < (rectification.height_px if axis else rectification.width_px))]
-    points = np.column_stack([slopes, np.ones(len(slopes))]) * (1.0 if is_far else depth_m)
-    left = points @ rectification.R_left  # rows: R_left^T p, from the rectified axes to the left camera's
-    turned = left @ rig.R_right_left.T
-    right = turned + (0.0 if is_far else rig.t_right_left_m)
-    axis = 1 if rectification.epipolar.is_vertical else 0
-    result = np.zeros((len(points), GLOBALS))
-    by_values, _ = _rectified_derivatives(left, rig.left, rectification.R_left, rectification)
-    result[:, LEFT] = by_values[:, axis]
-    by_values, by_point = _rectified_derivatives(right, rig.right, rectification.R_right, rectification)
-    result[:, RIGHT] = -by_values[:, axis]
-    by_turn = by_point @ -cross_matrices(turned)
-    result[:, RIG.start : RIG.start + 3] = -by_turn[:, axis]
-    if not is_far:
-        result[:, RIG.start + 3 :] = -by_point[:, axis]
-    return result
-
-
-def _rectified_derivatives(
-    points: Floats, model: CameraModel, rotation: Floats, rectification: Rectification
-) -> tuple[Floats, Floats]:
-    """Return the derivatives of rectified pixels by the true camera's parameters (N, 2, 12) and by the true point (N, 2, 3)."""
-    _, by_point, by_values = project_linearised(points, model)
-    depths = points @ rotation[2]  # along the rectified axis
-    by_slope = by_point @ rotation.T[:, :2] * depths[:, np.newaxis, np.newaxis]
-    back = np.linalg.inv(by_slope) * rectification.geometry.focal_px
-    return back @ by_values, back @ by_point
+    both = pixel_derivatives(slopes, np.full(len(slopes), 1 / depth_m), rig, rectification)[:, :, axis]
+    return np.asarray(both[:, 0] - both[:, 1], np.float64)
 
 
 def _slopes(rectification: Rectification) -> Floats:

@@ -1,6 +1,5 @@
 """Measures points of one pair of image files. The root of `measure`."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from phone_host.stereo.measured_point import MeasuredPoint, measured_point
 from phone_host.stereo.point_match import PointMatch, match_point
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_points
+from phone_host.stereo.rig_errors import Known, RigErrors, ZeroError, rig_errors
 from phone_host.stereo.wide_limits import Wide, why_wide
 
 Point = tuple[float, float]
@@ -76,12 +76,12 @@ class Measured:
 
     Attributes:
         points: one for each point asked for, in their order; one at least was found.
-        zero_sigma_px: the rig's uncertainty of the disparity of infinitely far points that was reckoned with, px; NaN: not known.
+        known: what of the rig's own uncertainty was reckoned with.
         doubts: reasons not to trust it that do not rule it out.
     """
 
     points: tuple[Outcome, ...]
-    zero_sigma_px: float
+    known: Known
     doubts: tuple[Concern, ...]
 
 
@@ -124,13 +124,12 @@ def measure_points(job: PointJob, watcher: Watcher) -> Measured:
         why = f"these images cannot be measured, because {blocking.sentence} ({blocking.remedy})"
         raise DataError(why, "mend that, then measure again")
     watcher.say("measuring")
-    seen = _Seen(
-        processed.pair, disparity, geometry, 1 / search.scale, core.rectifier_for(size_px(processed.pair.left))
-    )
-    zero_sigma_px = math.nan if seen.rectifier is None else seen.rectifier.rig.zero_sigma_px
-    points = tuple(_measured(point, seen, zero_sigma_px) for point in job.points_px)
+    rectifier = core.rectifier_for(size_px(processed.pair.left))
+    errors = ZeroError() if rectifier is None else rig_errors(rectifier.rig, rectifier.rectification)
+    seen = _Seen(processed.pair, disparity, geometry, 1 / search.scale, rectifier, errors)
+    points = tuple(_measured(point, seen) for point in job.points_px)
     _require_one(job.points_px, points)
-    return Measured(points, zero_sigma_px, concerns)
+    return Measured(points, errors.known, concerns)
 
 
 def _require_one(asked_px: tuple[Point, ...], points: tuple[Outcome, ...]) -> None:
@@ -148,16 +147,17 @@ def point_text(point_px: Point) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """A matched pair, and how many of its px one px of the matched images is."""
+    """A matched pair, how many of its px one px of the matched images is, and what is known of its rig."""
 
     pair: RectifiedPair
     disparity: Disparity
     geometry: StereoGeometry
     step_px: float
     rectifier: Rectifier | None
+    errors: RigErrors
 
 
-def _measured(asked_px: Point, seen: _Seen, zero_sigma_px: float) -> Outcome:
+def _measured(asked_px: Point, seen: _Seen) -> Outcome:
     at_px, rectifier = asked_px, seen.rectifier
     if rectifier is not None:
         turn = rectifier.rectification.R_left
@@ -167,7 +167,7 @@ def _measured(asked_px: Point, seen: _Seen, zero_sigma_px: float) -> Outcome:
     if not isinstance(match, PointMatch):
         return MissedPoint(match.value)
     epipolar = seen.pair.epipolar
-    point = measured_point(at_px, match, seen.geometry, epipolar, zero_sigma_px)
+    point = measured_point(at_px, match, seen.geometry, epipolar, seen.errors)
     if not np.isfinite(point.point_m).all():
         return MissedPoint("cannot be told from infinity")
     return FoundPoint(point, why_wide(point, match, epipolar))

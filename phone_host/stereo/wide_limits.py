@@ -4,6 +4,8 @@ import math
 from enum import Enum
 from typing import Final
 
+import numpy as np
+
 from phone_host.model import Epipolar
 from phone_host.stereo.measured_point import MeasuredPoint
 from phone_host.stereo.point_match import PointMatch
@@ -24,7 +26,7 @@ _FEW_SHARE: Final = 0.5
 class Wide(Enum):
     """Why limits lie far apart; the value says it to the user."""
 
-    ZERO = "the rig's zero is uncertain: calibrate with more pictures"
+    RIG = "the rig's calibration is uncertain: calibrate with more pictures"
     MISSED = "its two rays miss each other: the rig or the object moved, or this is another point"
     NEIGHBOURS = "few pixels around it lie on the same surface"
     TEXTURE = "there is little texture around it"
@@ -42,8 +44,8 @@ def why_wide(point: MeasuredPoint, match: PointMatch, epipolar: Epipolar = Epipo
     length = point.distance
     if length.high_m - length.low_m <= 2 * _WIDE * length.value_m:
         return None
-    if point.zero_m[2] ** 2 > point.covariance_m2[2, 2]:
-        return Wide.ZERO
+    if float(np.square(point.rig_m[:, 2]).sum()) > point.covariance_m2[2, 2]:
+        return Wide.RIG
     if point.noise_factor > _MISSED:
         return Wide.MISSED
     along = int(epipolar.is_vertical)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from phone_host.cli import main
-from phone_host.model import Rig
+from phone_host.model import RIG_PARAMETERS, Rig
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.cast import cast, rays_through
 from phone_host.scene.scene import Look, plane_scene, render, rig_poses
@@ -34,6 +34,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     _write(made / "rig.yaml", rig)
     _write(made / "rejected.yaml", replace(rig, verdict="reject"))
     _write(made / "plain.yaml", replace(rig, zero_sigma_px=float("nan")))
+    covariance = np.zeros((RIG_PARAMETERS, RIG_PARAMETERS))
+    covariance[-3:, -3:] = 1e-4 * np.outer(rig.t_right_left_m, rig.t_right_left_m)
+    _write(made / "whole.yaml", replace(rig, covariance=covariance))
     return made
 
 
@@ -71,14 +74,31 @@ def test_distances_hold_the_truth(folder: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_the_text_says_what_is_included(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One line for a point, one for a distance, and which parts the uncertainty has: without zero_sigma in rig.yaml it is named as missing."""
+    """One line for a point, one for a distance, and which parts the uncertainty has: what rig.yaml does not hold of its own is named as missing."""
     assert _measure(folder, "--points", "100,120", "150,180", rig="plain.yaml") == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("point 1  at 100,120 px: ")
     assert " mm away; x " in lines[0]
     assert lines[2].startswith("1 to 2   ")
     assert lines[-2].endswith("they include noise of both images")
-    assert lines[-1].startswith("not included: the rig's zero (zero_sigma), the baseline")
+    assert lines[-1].startswith("not included: the rig's own uncertainty, how exactly")
+    assert _measure(folder, "--points", "100,120", "150,180") == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("not included: the baseline's own uncertainty, how")
+    assert _measure(folder, "--points", "100,120", "150,180", rig="whole.yaml") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-2].endswith("they include noise of both images and the rig's calibration (covariance)")
+    assert lines[-1] == "not included: the size of the board's squares, how exactly the points were picked"
+
+
+def test_a_baseline_known_to_a_per_cent_widens_every_length(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A covariance of 1 % of the baseline: limits lie 1.96 % on either side, of a distance from the camera and of one between two points; noise adds less."""
+    assert _measure(folder, "--points", "100,120", "150,180", "--json", rig="whole.yaml") == 0
+    told: dict[str, Any] = json.loads(capsys.readouterr().out)
+    lengths = [*(point["distance_mm"] for point in told["points"]), told["between"][0]["length_mm"]]
+    for length in lengths:
+        assert 0.0195 < (length["high"] - length["low"]) / 2 / length["value"] < 0.03
+    assert told["points"][0]["sigma_mm"][2] > 0.0099 * told["points"][0]["point_mm"][2]
+    assert told["points"][0]["wide_because"] == "the rig's calibration is uncertain: calibrate with more pictures"
 
 
 @pytest.mark.parametrize(
@@ -134,7 +154,7 @@ def test_a_far_from_certain_rig_is_named_as_the_reason(folder: Path, capsys: pyt
     """zero_sigma of 2 px makes the limits wide, and the line says so."""
     _write(folder / "vague.yaml", replace(small_rig(), zero_sigma_px=2.0))
     assert _measure(folder, "--points", "100,120", rig="vague.yaml") == 0
-    assert "; uncertain, because the rig's zero is uncertain" in capsys.readouterr().out
+    assert "; uncertain, because the rig's calibration is uncertain" in capsys.readouterr().out
 
 
 def test_exchanged_images_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

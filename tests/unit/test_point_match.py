@@ -11,6 +11,7 @@ from phone_host.model import Disparity, Epipolar, Image, RectifiedPair, StereoGe
 from phone_host.stereo.between_pixels import cubic
 from phone_host.stereo.measured_point import MeasuredPoint, Within, distance_between, measured_point
 from phone_host.stereo.point_match import PointMatch, Unmatched, match_point
+from phone_host.stereo.rig_errors import ZeroError
 from phone_host.stereo.wide_limits import Wide, why_wide
 from tests.support.planes import Plane, noise, plane
 
@@ -150,10 +151,10 @@ def test_wide_limits_have_a_reason() -> None:
     """Each part of the uncertainty in turn is the largest; narrow limits have none."""
 
     def reason(match: PointMatch, zero_sigma_px: float = math.nan) -> Wide | None:
-        return why_wide(measured_point((159.5, 79.5), match, GEOMETRY, zero_sigma_px=zero_sigma_px), match)
+        return why_wide(measured_point((159.5, 79.5), match, GEOMETRY, rig=ZeroError(zero_sigma_px)), match)
 
     assert reason(_match((109.5, 79.5))) is None
-    assert reason(_match((109.5, 79.5)), 5.0) is Wide.ZERO
+    assert reason(_match((109.5, 79.5)), 5.0) is Wide.RIG
     assert reason(_match((109.5, 84.5), 0.2, across_px=5.0)) is Wide.MISSED
     assert reason(_match((155.5, 79.5), 0.05)) is Wide.FAR
     assert reason(_match((149.5, 79.5), 0.3)) is Wide.TEXTURE
@@ -173,7 +174,7 @@ def test_a_measured_point_has_the_textbooks_depth_and_error() -> None:
     assert point.noise_factor == 1.0
     assert point.distance.low_m == pytest.approx(50 / (50 + 1.959964 * 0.1), rel=1e-5)
     assert point.distance.high_m == pytest.approx(50 / (50 - 1.959964 * 0.1), rel=1e-5)
-    assert not point.zero_m.any()
+    assert point.rig_m.shape == (0, 3)
 
 
 def test_doffs_and_both_ways_of_columns_give_the_same_point() -> None:
@@ -196,14 +197,14 @@ def test_rays_that_miss_each_other_make_everything_less_sure() -> None:
 
 def test_the_rigs_zero_moves_all_points_together() -> None:
     """0.5 px of zero at d = 50 px moves the depth by 1 %; two points at one depth keep their distance, two depths do not."""
-    middle = measured_point((159.5, 79.5), _match((109.5, 79.5), 0.01), GEOMETRY, zero_sigma_px=0.5)
-    assert abs(middle.zero_m[2]) == pytest.approx(0.01, rel=0.02)
+    middle = measured_point((159.5, 79.5), _match((109.5, 79.5), 0.01), GEOMETRY, rig=ZeroError(0.5))
+    assert abs(middle.rig_m[0, 2]) == pytest.approx(0.01, rel=0.02)
     assert middle.distance.high_m - 1 == pytest.approx(1.96 * 0.01, rel=0.05)
-    beside = measured_point((209.5, 79.5), _match((159.5, 79.5), 0.01), GEOMETRY, zero_sigma_px=0.5)
+    beside = measured_point((209.5, 79.5), _match((159.5, 79.5), 0.01), GEOMETRY, rig=ZeroError(0.5))
     across = distance_between(middle, beside)
     assert across.value_m == pytest.approx(0.1)
     assert across.high_m - across.value_m == pytest.approx(1.96 * 0.1 * 0.01, rel=0.1)  # the scale: 1 % of it
-    far = measured_point((159.5, 79.5), _match((134.5, 79.5), 0.01), GEOMETRY, zero_sigma_px=0.5)
+    far = measured_point((159.5, 79.5), _match((134.5, 79.5), 0.01), GEOMETRY, rig=ZeroError(0.5))
     along = distance_between(middle, far)
     assert along.value_m == pytest.approx(1.0)
     # At 2 m the zero moves a point by 40 mm, at 1 m by 10 mm, both the same way.

@@ -30,14 +30,24 @@ from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.measured_point import Within, distance_between
+from phone_host.stereo.rig_errors import Known
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.stereo_numbers import point_px
 from phone_host.verbs.stereo_options import build_core
 
 _CHECK_FAILED: Final = 4
 _NOISE: Final = "noise of both images"
+_RIG: Final = "the rig's calibration (covariance)"
 _ZERO: Final = "the rig's zero (zero_sigma)"
-_LEFT_OUT: Final = ("the baseline's own uncertainty", "how exactly the points were picked")
+_SQUARES: Final = "the size of the board's squares"
+_PICKED: Final = "how exactly the points were picked"
+_PARTS: Final = {
+    Known.ALL: ([_NOISE, _RIG], [_SQUARES, _PICKED]),
+    Known.ZERO: ([_NOISE, _ZERO], ["the baseline's own uncertainty", _PICKED]),
+    Known.NOTHING: ([_NOISE], ["the rig's own uncertainty", _PICKED]),
+}
+"""What the stated uncertainty includes and what it leaves out, by what is known of the rig."""
+
 _EVEN: Final = 0.05
 """Limits that differ by less than this share of themselves are written as one number."""
 
@@ -85,14 +95,8 @@ def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:
     return core
 
 
-def _included(found: Measured) -> tuple[list[str], list[str]]:
-    """Return which parts of the uncertainty are included, and which are not."""
-    known = not math.isnan(found.zero_sigma_px)
-    return [_NOISE, *([_ZERO] if known else [])], [*([] if known else [_ZERO]), *_LEFT_OUT]
-
-
 def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> dict[str, Any]:
-    included, left_out = _included(found)
+    included, left_out = _PARTS[found.known]
     return {
         "format_version": REPORT_FORMAT,
         "command": "measure",
@@ -117,7 +121,7 @@ def _point(at_px: tuple[float, float], outcome: Outcome) -> dict[str, Any]:
     if isinstance(outcome, MissedPoint):
         return {"at_px": list(at_px), "problem": outcome.problem}
     point = outcome.point
-    sigma_m = np.sqrt(np.diag(point.covariance_m2) + point.zero_m**2)
+    sigma_m = np.sqrt(np.diag(point.covariance_m2) + np.square(point.rig_m).sum(axis=0))
     return {
         "at_px": list(at_px),
         "distance_mm": _values(point.distance),
@@ -145,7 +149,7 @@ def _values(length: Within) -> dict[str, float | None]:
 
 
 def _lines(points_px: tuple[tuple[float, float], ...], found: Measured) -> list[str]:
-    included, left_out = _included(found)
+    included, left_out = _PARTS[found.known]
     lines = [_line(*each) for each in enumerate(zip(points_px, found.points, strict=True), start=1)]
     lines += [
         f"{number} to {number + 1}   {'not measured' if length is None else _text(length)}"
