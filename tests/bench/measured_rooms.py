@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from phone_host.stereo.point_match import PointMatch, match_point
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_points
 from phone_host.stereo.reproject import disparities_for_near
+from phone_host.stereo.rig_errors import rig_errors
+from tests.bench.drawn_rigs import drawn_rig, with_covariance
 from tests.bench.trust_rooms import Room, room
 
 NEAR_M = 0.5
@@ -24,6 +27,17 @@ NEAR_M = 0.5
 
 _FAR_OFF = 3.0
 """Three times the stated reach is six standard deviations: what no noise does."""
+
+
+ZERO_SIGMA_PX = 0.15
+
+
+class Off(Enum):
+    """How the rig that is measured with differs from the true one, and what it states of that."""
+
+    EXACT = "it is exact, and states nothing"
+    ZERO = "turned about its vertical axis: its zero is off by a standard deviation of 0.15 px, which it states"
+    DRAWN = "drawn from the covariance of a calibration, which it states"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,27 +63,32 @@ class Row:
     far_off: bool = False
 
 
-def room_rows(seed: int, points: int, zero_sigma_px: float = 0.0) -> list[Row]:
+def room_rows(seed: int, points: int, off: Off = Off.EXACT) -> list[Row]:
     """Measure random points of a room.
 
     Args:
         seed: of the room and the points.
         points: how many are tried.
-        zero_sigma_px: the rig that is measured with is turned about its vertical axis by chance, so that its zero is off by
-            this standard deviation, which it states; 0: it is exact and states nothing.
+        off: how the rig that is measured with differs from the true one.
     """
     made = replace(room(seed), lower_px=0.0)  # an exact rig has no rows that are off
     random = np.random.default_rng([seed, 31])
-    rig = _off(made.rig, float(random.normal()) * zero_sigma_px, zero_sigma_px) if zero_sigma_px else made.rig
+    match off:
+        case Off.EXACT:
+            rig = made.rig
+        case Off.ZERO:
+            rig = _turned(made.rig, float(random.normal()) * ZERO_SIGMA_PX)
+        case Off.DRAWN:
+            rig = drawn_rig(with_covariance(made.rig, seed), random)
     return list(_rows(made, rig, random, points))
 
 
-def _off(rig: Rig, zero_px: float, zero_sigma_px: float) -> Rig:
+def _turned(rig: Rig, zero_px: float) -> Rig:
     """Return a rig whose right camera is turned so that disparities are off by some px."""
     focal_px = float(min(rig.left.matrix[0, 0], rig.right.matrix[0, 0]))
     turn = rotation((0.0, 1.0, 0.0), zero_px / focal_px)
     return replace(
-        rig, R_right_left=turn @ rig.R_right_left, t_right_left_m=turn @ rig.t_right_left_m, zero_sigma_px=zero_sigma_px
+        rig, R_right_left=turn @ rig.R_right_left, t_right_left_m=turn @ rig.t_right_left_m, zero_sigma_px=ZERO_SIGMA_PX
     )
 
 
@@ -86,26 +105,28 @@ def _rows(made: Room, rig: Rig, random: np.random.Generator, points: int) -> Ite
     rays = rays_through(rig.left, at[:, 0], at[:, 1])
     true_m = (cast(made.scene.bodies, np.zeros(3), rays).depth * rays).T
     rectified = rectify_points(at, rig.left, rectifier.rectification.R_left, done.geometry)
+    errors = rig_errors(rig, rectifier.rectification)
     before: tuple[MeasuredPoint, np.ndarray[tuple[int], np.dtype[np.float64]]] | None = None
     for (x, y), point_m in zip(rectified.tolist(), true_m, strict=True):
         match = match_point(done.pair, done.disparity, (x, y), 1 / done.search.scale)
         if not isinstance(match, PointMatch):
             yield Row(made.seed, match.name.lower())
             continue
-        found = measured_point((x, y), match, done.geometry, done.pair.epipolar, rig.zero_sigma_px)
+        found = measured_point((x, y), match, done.geometry, done.pair.epipolar, errors)
         if not np.isfinite(found.point_m).all():
             yield Row(made.seed, "infinite")
             continue
-        yield _row(made.seed, "distance", found.distance, float(np.linalg.norm(point_m)))
+        yield row_of(made.seed, "distance", found.distance, float(np.linalg.norm(point_m)))
         if before is not None:
             apart_m = float(np.linalg.norm(point_m - before[1]))
-            yield _row(made.seed, "length", distance_between(before[0], found), apart_m)
+            yield row_of(made.seed, "length", distance_between(before[0], found), apart_m)
             before = None
         else:
             before = found, point_m
 
 
-def _row(seed: int, what: str, found: Within, true_m: float) -> Row:
+def row_of(seed: int, what: str, found: Within, true_m: float) -> Row:
+    """Compare a measured length with the truth."""
     low, high = found.low_m, found.high_m
     reach = (found.value_m - low) if true_m < found.value_m else (high - found.value_m)
     return Row(

@@ -35,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     _write(made / "rejected.yaml", replace(rig, verdict="reject"))
     _write(made / "plain.yaml", replace(rig, zero_sigma_px=float("nan")))
     covariance = np.zeros((RIG_PARAMETERS, RIG_PARAMETERS))
-    covariance[-3:, -3:] = 1e-4 * np.outer(rig.t_right_left_m, rig.t_right_left_m)
+    covariance[-3:, -3:] = 4e-4 * np.outer(rig.t_right_left_m, rig.t_right_left_m)
     _write(made / "whole.yaml", replace(rig, covariance=covariance))
     return made
 
@@ -90,14 +90,14 @@ def test_the_text_says_what_is_included(folder: Path, capsys: pytest.CaptureFixt
     assert lines[-1] == "not included: the size of the board's squares, how exactly the points were picked"
 
 
-def test_a_baseline_known_to_a_per_cent_widens_every_length(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A covariance of 1 % of the baseline: limits lie 1.96 % on either side, of a distance from the camera and of one between two points; noise adds less."""
+def test_a_baseline_known_to_two_per_cent_widens_every_length(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A covariance of 2 % of the baseline: limits lie 3.9 % on either side, of a distance from the camera and of one between two points; noise adds less."""
     assert _measure(folder, "--points", "100,120", "150,180", "--json", rig="whole.yaml") == 0
     told: dict[str, Any] = json.loads(capsys.readouterr().out)
     lengths = [*(point["distance_mm"] for point in told["points"]), told["between"][0]["length_mm"]]
     for length in lengths:
-        assert 0.0195 < (length["high"] - length["low"]) / 2 / length["value"] < 0.03
-    assert told["points"][0]["sigma_mm"][2] > 0.0099 * told["points"][0]["point_mm"][2]
+        assert 0.039 < (length["high"] - length["low"]) / 2 / length["value"] < 0.05
+    assert told["points"][0]["sigma_mm"][2] > 0.0199 * told["points"][0]["point_mm"][2]
     assert told["points"][0]["wide_because"] == "the rig's calibration is uncertain: calibrate with more pictures"
 
 
