@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.looks import look_at
@@ -18,7 +19,7 @@ from phone_host.calibration.causes.unturned import unturned
 from phone_host.calibration.target import find_corners
 from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.verbs.calibrate.cause import cause_report, with_cause
-from tests.support.boards import BOARD, poses, render_pair
+from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.cause_judge import finding_of
 from tests.support.cause_real import judged as judged_real
 from tests.support.cause_real import real_pairs, variants
@@ -85,6 +86,21 @@ def test_a_turn_is_measured_and_undone(course: Course) -> None:
         for each in (stiff, loose)
     ]
     assert off[0] < 0.5 * off[1] or off[0] < 0.02
+
+
+def test_a_roll_costs_rows_at_the_edges() -> None:
+    """A right camera that rolls by 0.395 degrees moves no row in the middle, but those at the edges by angle times half the width: that is what is told."""
+    rig, pairs = small_rig(), list[BoardPair]()
+    roll = math.radians(0.395)
+    for index, pose in enumerate(poses(12, seed=3)):
+        turn = np.asarray(cv2.Rodrigues(np.array([0, 0, roll * index / 11]))[0], np.float64)
+        turned = replace(rig, R_right_left=turn @ rig.R_right_left, t_right_left_m=turn @ rig.t_right_left_m)
+        pairs += exact_pairs(turned, pose[np.newaxis], noise_px=0.03, seed=index)
+    found = deviation(tuple(pairs), BOARD, ((320, 240), (400, 300)))
+    assert found is not None
+    assert found.turned is not None
+    assert found.turned.rows_px == pytest.approx(roll * 200, rel=0.1)
+    assert "rows differ by up to 1." in found.sentence
 
 
 def test_a_loose_rig_is_told_from_a_board_that_moved() -> None:

@@ -207,6 +207,7 @@ def _turned(each: Weighed, fitted: _Fitted, size_px: tuple[int, int]) -> Finding
     effect_px = np.abs(change * [focal_px, focal_px, half_px])
     if not ((np.abs(sigmas) >= _SIGMAS) & (effect_px >= _LEAST_TURN_PX)).any():
         return None
+    lens = _model(loose.state.right, size_px)
     turned = Turned(
         course=Course.DRIFT if each.rule is Rule.DRIFT else Course.KNOCK,
         turn_rad=change,
@@ -214,8 +215,8 @@ def _turned(each: Weighed, fitted: _Fitted, size_px: tuple[int, int]) -> Finding
         begins=each.begins,
         names=tuple(pair.name for pair in kept),
         turns_rad=turns,
-        lens=_model(loose.state.right, size_px),
-        rows_px=float(effect_px[0]),
+        lens=lens,
+        rows_px=_rows_px(change[np.newaxis], lens),
         depth_at_1_m_m=abs(float(change[1])) / float(np.linalg.norm(loose.state.translation_m)),
     )
     return _unstiff(turned, kept)
@@ -224,6 +225,19 @@ def _turned(each: Weighed, fitted: _Fitted, size_px: tuple[int, int]) -> Finding
 def _model(lens: Vector, size_px: tuple[int, int]) -> CameraModel:
     matrix, distortion = camera_arrays(lens)
     return CameraModel(width_px=size_px[0], height_px=size_px[1], matrix=matrix, distortion=distortion)
+
+
+def _rows_px(turns: Vector, model: CameraModel) -> float:
+    """Return by how much turns (M, 3), rad, of a camera move its rows where they do so most: root mean square of the turns, px.
+
+    A roll leaves the middle where it is and moves the edges by pixels.
+    """
+    sides = ([0.0, (side - 1) / 2, side - 1.0] for side in (model.width_px, model.height_px))
+    x, y = (axis.ravel() for axis in np.meshgrid(*sides))
+    (fx, _, cx), (_, fy, cy) = model.matrix[:2]
+    a, b = (x - cx) / fx, (y - cy) / fy
+    moved = fy * (turns @ np.stack([-(1 + b * b), a * b, a]))
+    return float(np.sqrt(np.square(moved).mean(axis=0)).max())
 
 
 def _unstiff(turned: Turned, kept: list[BoardPair]) -> Finding:
@@ -235,7 +249,7 @@ def _unstiff(turned: Turned, kept: list[BoardPair]) -> Finding:
         if turned.course is Course.DRIFT
         else f"at once before pair {kept[turned.begins].name}"
     )
-    cost = f"rows differ by {turned.rows_px:.2f} px and depth at 1 m by {turned.depth_at_1_m_m * 1e3:.1f} mm for it"
+    cost = f"rows differ by up to {turned.rows_px:.2f} px and depth at 1 m by {turned.depth_at_1_m_m * 1e3:.1f} mm for it"
     return Finding(
         mistake=Mistake.UNSTIFF,
         sentence=f"the cameras turned against each other by {degrees:.3f} +- {sigma:.3f} degrees {how}: {cost}",
@@ -285,6 +299,7 @@ def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | Non
         return None
     if each.rule is Rule.LOOSE:
         angles = each.found[:, TURN] - each.found[:, TURN].mean(axis=0)
+        lens = _model(loose.state.right, sizes_px[1])
         turned = Turned(
             course=Course.LOOSE,
             turn_rad=angles.std(axis=0),
@@ -292,8 +307,8 @@ def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | Non
             begins=-1,
             names=tuple(pair.name for pair in fitted.kept),
             turns_rad=angles,
-            lens=_model(loose.state.right, sizes_px[1]),
-            rows_px=float(angles[:, 0].std() * loose.state.right[1]),
+            lens=lens,
+            rows_px=_rows_px(angles, lens),
             depth_at_1_m_m=float(angles[:, 1].std() / np.linalg.norm(loose.state.translation_m)),
         )
         degrees = math.degrees(float(np.linalg.norm(turned.turn_rad)))

@@ -62,7 +62,7 @@ class Turned:
         names: of the V views that tell it.
         turns_rad: (V, 3) of each of them.
         lens: the right camera's, as far as it is known.
-        rows_px: by how much rows of left and right differ for it, px of the right image.
+        rows_px: by how much rows of left and right differ for it where they do most in the image, px of the right image.
         depth_at_1_m_m: by how much depth at 1 m is wrong for it, m.
     """
 
