@@ -36,7 +36,9 @@ def pixel_derivatives(slopes: Floats, nearness: Floats, rig: Rig, rectification:
     Returns:
         (N, 2, 2, 30): of the left and of the right image, x and y, px per unit.
     """
-    left = np.column_stack([slopes, np.ones(len(slopes))]) @ rectification.R_left  # rows: R_left^T p; p is scaled by 1 / z
+    left = (
+        np.column_stack([slopes, np.ones(len(slopes))]) @ rectification.R_left
+    )  # rows: R_left^T p; p is scaled by 1 / z
     turned = left @ rig.R_right_left.T
     right = turned + nearness[:, np.newaxis] * rig.t_right_left_m
     result = np.zeros((len(left), 2, 2, RIG_PARAMETERS))

@@ -31,6 +31,7 @@ SIGMAS_95: Final = 1.959964
 _EXACT_PX: Final = 1e-4
 """Standard deviation of the left ray, which is exact: small beside any match, large beside rounding."""
 
+
 @dataclass(frozen=True, slots=True)
 class Within:
     """A length and the limits between which it lies in 95 % of cases, m.

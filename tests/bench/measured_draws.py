@@ -35,6 +35,9 @@ def draw_rows(seed: int, cases: int) -> list[Row]:
         rig = drawn_rig(true, random)
         points_m = [_seen_by_both(true, random) for _ in range(2)]
         found = [_measured(point_m, true, rig, random) for point_m in points_m]
+        if not all(np.isfinite(one.point_m).all() for one in found):
+            rows.append(Row(seed, "infinite"))
+            continue
         lengths_m = [float(np.linalg.norm(point_m)) for point_m in points_m]
         rows += [row_of(seed, "distance", one.distance, exact) for one, exact in zip(found, lengths_m, strict=True)]
         apart_m = float(np.linalg.norm(points_m[0] - points_m[1]))

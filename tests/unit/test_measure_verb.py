@@ -16,6 +16,7 @@ from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.cast import cast, rays_through
 from phone_host.scene.scene import Look, plane_scene, render, rig_poses
 from phone_host.stereo.rectify import rectify_rig
+from tests.support.overlays import write_turned
 from tests.support.rigs import small_rig
 from tests.unit.test_report_keys import _described, _keys
 
@@ -99,6 +100,18 @@ def test_a_baseline_known_to_two_per_cent_widens_every_length(folder: Path, caps
         assert 0.039 < (length["high"] - length["low"]) / 2 / length["value"] < 0.05
     assert told["points"][0]["sigma_mm"][2] > 0.0199 * told["points"][0]["point_mm"][2]
     assert told["points"][0]["wide_because"] == "the rig's calibration is uncertain: calibrate with more pictures"
+
+
+def test_an_overlay_makes_up_for_a_turn(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The right camera has turned by 0.4 degrees since: with the run's overlay.yaml the limits hold the truth, and say what they leave out."""
+    words = write_turned(tmp_path, replace(small_rig(), zero_sigma_px=0.05))
+    sides = (str(folder / "left.png"), str(folder / "right.png"))
+    assert main(["measure", *sides, *words, "--points", "100,120", "--json"]) == 0
+    told: dict[str, Any] = json.loads(capsys.readouterr().out)
+    length_mm = float(np.linalg.norm(_true_m((100.0, 120.0)))) * 1e3
+    distance = told["points"][0]["distance_mm"]
+    assert distance["low"] < length_mm < distance["high"] < 1.03 * length_mm
+    assert told["uncertainty"]["leaves_out"][-1] == "how well the overlay is known"
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import argparse
 
 from phone_host.stereo.matcher_names import default_words
 from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.stereo_arguments import DEFAULT_NEAR_MM
+from phone_host.verbs.stereo_arguments import DEFAULT_NEAR_MM, add_overlay_argument
 
 SUMMARY = "measure points of a pair of images in millimetres, with their uncertainty"
 
@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="rig.yaml of the two cameras; or, for rectified images, the calib.txt of Middlebury, ETH3D or KITTI",
     )
+    add_overlay_argument(parser)
     parser.add_argument(
         "--points",
         nargs="+",

@@ -33,7 +33,7 @@ from phone_host.stereo.measured_point import Within, distance_between
 from phone_host.stereo.rig_errors import Known
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.stereo_numbers import point_px
-from phone_host.verbs.stereo_options import build_core
+from phone_host.verbs.stereo_options import build_core, overlay_of
 
 _CHECK_FAILED: Final = 4
 _NOISE: Final = "noise of both images"
@@ -41,6 +41,7 @@ _RIG: Final = "the rig's calibration (covariance)"
 _ZERO: Final = "the rig's zero (zero_sigma)"
 _SQUARES: Final = "the size of the board's squares"
 _PICKED: Final = "how exactly the points were picked"
+_OVERLAY: Final = "how well the overlay is known"
 _PARTS: Final = {
     Known.ALL: ([_NOISE, _RIG], [_SQUARES, _PICKED]),
     Known.ZERO: ([_NOISE, _ZERO], ["the baseline's own uncertainty", _PICKED]),
@@ -70,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json_text(_report(options, points, found)))
     else:
-        say(_lines(points, found))
+        say(_lines(options, points, found))
     return _CHECK_FAILED if any(isinstance(each, MissedPoint) for each in found.points) else 0
 
 
@@ -92,11 +93,18 @@ def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:
     matcher = options.matcher or default_matcher().value
     core, _ = build_core(options, options.calibration, matcher, size_px, Path(options.left))
     assert core is not None, "a calibration always makes one"
+    core.correct(overlay_of(options, core))
     return core
 
 
-def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> dict[str, Any]:
+def _parts(options: argparse.Namespace, found: Measured) -> tuple[list[str], list[str]]:
+    """Return which parts of the uncertainty are included, and which are not."""
     included, left_out = _PARTS[found.known]
+    return included, left_out if options.overlay is None else [*left_out, _OVERLAY]
+
+
+def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> dict[str, Any]:
+    included, left_out = _parts(options, found)
     return {
         "format_version": REPORT_FORMAT,
         "command": "measure",
@@ -148,8 +156,8 @@ def _values(length: Within) -> dict[str, float | None]:
     return {name: round(value * 1e3, 3) if math.isfinite(value) else None for name, value in limits.items()}
 
 
-def _lines(points_px: tuple[tuple[float, float], ...], found: Measured) -> list[str]:
-    included, left_out = _PARTS[found.known]
+def _lines(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> list[str]:
+    included, left_out = _parts(options, found)
     lines = [_line(*each) for each in enumerate(zip(points_px, found.points, strict=True), start=1)]
     lines += [
         f"{number} to {number + 1}   {'not measured' if length is None else _text(length)}"

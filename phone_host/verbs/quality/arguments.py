@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.stereo_arguments import PAIRED, add_core_arguments
+from phone_host.verbs.stereo_arguments import PAIRED, add_core_arguments, add_overlay_argument
 
 SUMMARY = "measure how good a rig's depth is, on a flat wall or board"
 
@@ -44,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " outermost inner corners)",
     )
     add_core_arguments(parser)
+    add_overlay_argument(parser)
     add_image_arguments(parser)
     parser.add_argument(
         "--out",

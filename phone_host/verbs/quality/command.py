@@ -21,7 +21,7 @@ from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
 from phone_host.verbs.stereo_numbers import crop_of
-from phone_host.verbs.stereo_options import build_core
+from phone_host.verbs.stereo_options import build_core, overlay_of
 from phone_host.verbs.units import limit_mm, square_mm
 
 _CHECK_FAILED: Final = 4
@@ -111,4 +111,5 @@ def _core(options: argparse.Namespace, matcher: str, size_px: Size, files: ViewF
             "the images have neither a focal length nor a baseline, so there are no distances",
             "add --focal PX and --baseline MM, or give --calibration",
         )
+    core.correct(overlay_of(options, core))
     return core
