@@ -132,11 +132,25 @@ def _camera(
         model, poses = fisheye_camera(views, points_m, size_px)
     else:
         model, poses = _opencv_camera(views, points_m, size_px, bend)
-    errors = [
-        corners - project(SE3.of(pose).apply(points_m), model) for corners, pose in zip(views, poses, strict=True)
-    ]
-    rms = np.array([np.sqrt(np.nanmean((each**2).sum(axis=1))) for each in errors])
-    return LoneCamera(side, model, poses), np.where(np.isfinite(rms), rms, np.inf)
+    camera = LoneCamera(side, model, poses)
+    rms = np.array([np.sqrt(np.nanmean((each**2).sum(axis=1))) for each in errors_px(camera, pairs, points_m)])
+    return camera, np.where(np.isfinite(rms), rms, np.inf)
+
+
+def errors_px(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> Vector:
+    """Return measured minus projected corners of a camera's views, (V, N, 2) px; NaN where a corner was not seen.
+
+    Args:
+        camera: with one pose for each pair.
+        pairs: V pairs.
+        points_m: (N, 3) corners in the board's axes.
+    """
+    return np.array(
+        [
+            corners_of(pair, camera.side) - project(SE3.of(pose).apply(points_m), camera.parameters)
+            for pair, pose in zip(pairs, camera.poses, strict=True)
+        ]
+    )
 
 
 def _opencv_camera(

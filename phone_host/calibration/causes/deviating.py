@@ -118,7 +118,13 @@ def _fitted(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> _Fitted | 
         return None
     kept, left, right = alone
     apart, rig = apart_px(kept, left, right, points_m)
-    start = Stiff(left=left.lens, right=right.lens, rotation=rig[:3], translation_m=rig[3:], poses=left.poses)
+    start = Stiff(
+        left=left.lens,
+        right=right.lens,
+        rotation=rig.rotation,
+        translation_m=rig.translation_m,
+        poses=left.camera.poses,
+    )
     free = np.array([1, 1, 1, 1, 1, *[len(kept) >= _USUAL_PAIRS] * 3, len(kept) >= 2 * _USUAL_PAIRS], bool)
 
     def at(state: Stiff, given: Vector | None = None) -> Loosened:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.causes.lone import LENS, Vector, camera_arrays
+from phone_host.calibration.causes.lone import LENS, Vector
 
 TURN, MOVE, FOCUS_LEFT, FOCUS_RIGHT, ROWS_LEFT, ROWS_RIGHT = (
     slice(0, 3),
@@ -235,6 +235,11 @@ class _Problem:
         places = np.arange(lenses, size)
         matrix[places, places] += noise_px2 * np.tile(_PRIOR**-2.0, count)
         return _Reduced(matrix, right)
+
+
+def camera_arrays(lens: Vector) -> tuple[Vector, Vector]:
+    """Return a lens as OpenCV's camera matrix (3, 3) and distortion (5,)."""
+    return np.array([[lens[0], 0.0, lens[2]], [0.0, lens[1], lens[3]], [0.0, 0.0, 1.0]]), lens[4:]
 
 
 def _linearised(

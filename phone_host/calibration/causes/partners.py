@@ -12,9 +12,12 @@ import cv2
 import numpy as np
 
 from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.causes.lone import Vector, fit_pose, lone_lens, relative_pose, seen_right
+from phone_host.calibration.board_pose import fit_pose
+from phone_host.calibration.causes.lone import Vector, lone_camera
 from phone_host.calibration.target import Board, agree
-from phone_host.model import Side
+from phone_host.geometry.lens import project
+from phone_host.geometry.se3 import SE3
+from phone_host.model import CameraModel, Side
 
 _FITS_SHARE: Final = 1 / 250
 """How well a rig from one pair predicts the other views' places, as a share of the image's width: 2.5 px of 640."""
@@ -45,29 +48,29 @@ def wrong_partners(
     """
     points_m = board.points_m()
     try:
-        lenses = [lone_lens(list(pairs), side, points_m, size) for side, size in zip(Side, sizes_px, strict=True)]
+        found = [lone_camera(list(pairs), side, points_m, size) for side, size in zip(Side, sizes_px, strict=True)]
     except cv2.error:
         return []
-    left, right = lenses
-    if left is None or right is None:
+    models = [each[1].parameters for each in found if each is not None]
+    if len(models) < len(found):
         return []
-    errors = _best_errors(pairs, board, [left, right], _FITS_SHARE * sizes_px[1][0])
     limit_px = _FITS_SHARE * sizes_px[1][0]
-    found = []
+    errors = _best_errors(pairs, board, models, limit_px)
+    wrong = []
     for index, row in enumerate(errors):
         best = int(row.argmin())
         if best != index and row[best] <= limit_px and row[index] > max(limit_px, _CLEARLY * row[best]):
-            found.append((pairs[index].name, pairs[best].name))
-    return found
+            wrong.append((pairs[index].name, pairs[best].name))
+    return wrong
 
 
-def _best_errors(pairs: list[BoardPair], board: Board, lenses: list[Vector], limit_px: float) -> Vector:
+def _best_errors(pairs: list[BoardPair], board: Board, models: list[CameraModel], limit_px: float) -> Vector:
     """Return (V, V): how far each left picture's prediction is from each right picture, px, by the rig that places most.
 
     All infinite if no rig places enough of them.
     """
     points_m, count = board.points_m(), len(pairs)
-    left = [fit_pose(points_m, pair.left_px, lenses[0]) for pair in pairs]
+    left = [fit_pose(points_m, pair.left_px, models[0]) for pair in pairs]
     right = np.array([_orders(pair.right_px, board) for pair in pairs])
     right_poses: dict[tuple[int, int], Vector] = {}
     tried = np.unique(np.linspace(0, count - 1, min(_TRIED, count)).astype(int)).tolist()
@@ -77,9 +80,9 @@ def _best_errors(pairs: list[BoardPair], board: Board, lenses: list[Vector], lim
     for i, j in candidates:
         order = _same_way(pairs[i].left_px, right[j], board)
         if (j, order) not in right_poses:
-            right_poses[j, order] = fit_pose(points_m, right[j, order], lenses[1])
-        rig = relative_pose(left[i], right_poses[j, order])
-        predicted = np.array([seen_right(rig, pose, points_m, lenses[1]) for pose in left])
+            right_poses[j, order] = fit_pose(points_m, right[j, order], models[1])
+        rig = SE3.of(right_poses[j, order]) @ SE3.of(left[i]).inverse()
+        predicted = np.array([project((rig @ SE3.of(pose)).apply(points_m), models[1]) for pose in left])
         squares = np.nanmean(((predicted[:, np.newaxis, np.newaxis] - right) ** 2).sum(axis=4), axis=3)
         errors = np.sqrt(squares.min(axis=2))
         nearest = errors.min(axis=1)
