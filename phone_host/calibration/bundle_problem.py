@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.lens import PARAMETERS, parameters_of, project, project_linearised, with_parameters
 from phone_host.geometry.rig_pixels import LEFT, RIG, RIGHT
-from phone_host.geometry.schur import NormalEquations
+from phone_host.geometry.schur import NormalEquations, eliminated
 from phone_host.geometry.se3 import cross_matrices, rotations_of, vectors_of
 from phone_host.model import RIG_PARAMETERS, CameraModel
 
@@ -192,7 +192,7 @@ class RigProblem:
             known[np.ix_(np.arange(count), at, at)] += turned @ by_shared
             coupling[:, at] += turned @ by_pose
             blocks += np.swapaxes(by_pose, 1, 2) @ by_pose
-        return pulls, known - coupling @ np.linalg.inv(blocks) @ np.swapaxes(coupling, 1, 2)
+        return pulls, known - eliminated(coupling, blocks, np.zeros((count, 6)))[0]
 
     def _measured(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         left = np.isfinite(np.array([view.left_px for view in self.views])).all(axis=2)

@@ -10,12 +10,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.bundle import BundleState, BundleView, FreeParameters, Vector, adjust_roughly, rig_of
 from phone_host.calibration.fit_quality import Squares
-from phone_host.model import Rectification, Rig
-from phone_host.stereo.rectify import rectify_points, rectify_rig
+from phone_host.geometry.lens import rays_through
+from phone_host.geometry.se3 import SE3
+from phone_host.geometry.triangulate import triangulate
+from phone_host.model import CameraModel, Rig
 
 _PARTS: Final = 5
 _LEAST_PAIRS: Final = 6
@@ -39,43 +40,42 @@ def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleStat
         out = np.arange(len(pairs)) % parts == part
         kept = [BundleView(pair.left_px, pair.right_px) for pair, held in zip(pairs, out, strict=True) if not held]
         rig = rig_of(adjust_roughly(kept, points_m, replace(state, poses=state.poses[~out]), free))
-        try:
-            rectification = rectify_rig(rig)
-        except DataError:
-            continue
         held = [pair for pair, is_held in zip(pairs, out, strict=True) if is_held]
-        sides += [square_sides_m(pair, points_m, rig, rectification) for pair in held]
+        sides.append(square_sides_m(held, points_m, rig))
     found = np.concatenate(sides) if sides else np.empty(0)
     if not found.size:
         return Squares(true_m=true_m, mean_m=float("nan"), sigma_m=float("nan"), count=0)
     return Squares(true_m=true_m, mean_m=float(found.mean()), sigma_m=float(found.std()), count=found.size)
 
 
-def square_sides_m(pair: BoardPair, points_m: Vector, rig: Rig, rectification: Rectification) -> Vector:
-    """Return the sides of the squares between neighbouring corners, (M,) m, as a rig measures them.
+def square_sides_m(pairs: list[BoardPair], points_m: Vector, rig: Rig) -> Vector:
+    """Return the sides of the squares between neighbouring corners, (M,) m, as a rig measures them: where its rays meet best.
 
     Args:
-        pair: the corners; NaN where one is not seen.
+        pairs: the corners; NaN where one is not seen.
         points_m: (N, 3) corners in the board's axes.
         rig: the rig.
-        rectification: of the rig.
     """
-    geometry = rectification.geometry
-    at = np.full((2, len(points_m), 2), np.nan)
-    for index, (corners, model, turn) in enumerate(
-        ((pair.left_px, rig.left, rectification.R_left), (pair.right_px, rig.right, rectification.R_right))
-    ):
-        seen = np.isfinite(corners).all(axis=1)
-        at[index, seen] = rectify_points(corners[seen], model, turn, geometry)
-    axis = 1 if rectification.epipolar.is_vertical else 0
-    depth = geometry.focal_px * geometry.baseline_m / (at[0, :, axis] - at[1, :, axis])
-    middle = at[0].copy()
-    middle[:, 1 - axis] = at[:, :, 1 - axis].mean(axis=0)  # rows that do not quite meet: between the two
-    slopes = (middle - np.array([geometry.cx_px, geometry.cy_px])) / geometry.focal_px
-    points = np.column_stack([slopes, np.ones(len(slopes))]) * depth[:, np.newaxis]
+    left, right = (np.concatenate([pair.left_px for pair in pairs]), np.concatenate([pair.right_px for pair in pairs]))
+    slopes = np.stack([_slopes(left, rig.left), _slopes(right, rig.right)])
+    # Both images' corners are as noisy in pixels; the finer camera's rays are surer.
+    noise = np.array([np.eye(2) / (model.matrix[0, 0] * model.matrix[1, 1]) for model in (rig.left, rig.right)])
+    noises = np.broadcast_to(noise[:, np.newaxis], (*slopes.shape, 2))
+    found = triangulate(slopes, noises, (SE3.identity(), SE3(rig.R_right_left, rig.t_right_left_m.reshape(3))))
+    points = found.points_m.reshape(len(pairs), -1, 3)
     first, second = _neighbours(points_m)
-    sides = np.linalg.norm(points[first] - points[second], axis=1)
+    sides = np.linalg.norm(points[:, first] - points[:, second], axis=2)
     return np.asarray(sides[np.isfinite(sides)], np.float64)
+
+
+def _slopes(corners: Vector, model: CameraModel) -> Vector:
+    """Return (N, 2) x / z and y / z of the rays of corners; NaN where one is not seen, or lies aside of the image plane."""
+    slopes = np.full(corners.shape, np.nan)
+    seen = np.flatnonzero(np.isfinite(corners).all(axis=1))
+    rays = rays_through(corners[seen], model)
+    ahead = rays[:, 2] > 0
+    slopes[seen[ahead]] = rays[ahead, :2] / rays[ahead, 2:]
+    return slopes
 
 
 def _neighbours(points_m: Vector) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -61,14 +61,10 @@ class NormalEquations:
         Raises:
             np.linalg.LinAlgError: a block is singular.
         """
-        inverse = np.linalg.inv(self.blocks + damping * self.blocks * np.eye(self.blocks.shape[1]))
-        coupling = self.coupling[:, free]
+        blocks = self.blocks + damping * self.blocks * np.eye(self.blocks.shape[1])
+        taken, taken_right, inverse = eliminated(self.coupling[:, free], blocks, self.blocks_right)
         matrix = self.shared[np.ix_(free, free)] + damping * np.diag(np.diag(self.shared)[free])
-        right = self.shared_right[free]
-        eliminated = coupling @ inverse
-        matrix = matrix - (eliminated @ np.swapaxes(coupling, 1, 2)).sum(axis=0)
-        right = right - (eliminated @ self.blocks_right[..., np.newaxis]).sum(axis=0)[:, 0]
-        return np.asarray(matrix, np.float64), np.asarray(right, np.float64), np.asarray(inverse, np.float64)
+        return matrix - taken.sum(axis=0), self.shared_right[free] - taken_right.sum(axis=0), inverse
 
     def step(self, damping: float, free: Flags) -> tuple[Floats, Floats]:
         """Return the damped step: shared parameters (G,), 0 for those that are not free, and blocks (V, B).
@@ -86,6 +82,25 @@ class NormalEquations:
         result = np.zeros(self.shared.shape)
         result[np.ix_(free, free)] = inverse_of(self.reduced(0.0, free)[0])
         return result
+
+
+def eliminated(coupling: Floats, blocks: Floats, right: Floats) -> tuple[Floats, Floats, Floats]:
+    """Eliminate blocks, each on its own.
+
+    Args:
+        coupling: (V, F, B) between the shared parameters and each block.
+        blocks: (V, B, B).
+        right: (V, B) right side of each block.
+
+    Returns:
+        What each takes from the shared equations: (V, F, F) of their matrix, (V, F) of their right side; the inverse blocks (V, B, B).
+
+    Raises:
+        np.linalg.LinAlgError: a block is singular.
+    """
+    inverse = np.asarray(np.linalg.inv(blocks), np.float64)
+    through = coupling @ inverse
+    return through @ np.swapaxes(coupling, 1, 2), (through @ right[..., np.newaxis])[..., 0], inverse
 
 
 def inverse_of(matrix: Floats) -> Floats:

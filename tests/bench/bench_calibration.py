@@ -102,13 +102,8 @@ def real_rows(rig: RealRig) -> list[Row]:
 def _row(
     rig: RealRig, corners: Corners, found: Calibration, seconds: float, common: frozenset[str], *, is_unlike: bool
 ) -> Row:
-    assert found.rectification is not None
     points, true_m = rig.board.points_m(), rig.board.square_m
-    sides = [
-        square_sides_m(pair, points, found.rig, found.rectification) / true_m
-        for pair in corners.ours
-        if pair.name in common
-    ]
+    sides = [square_sides_m([pair], points, found.rig) / true_m for pair in corners.ours if pair.name in common]
     fair = [pair for pair in corners.ours if int(pair.name) not in rig.spoiled]
     return Row(
         rig=rig.name,

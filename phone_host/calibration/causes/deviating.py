@@ -255,7 +255,9 @@ def _unstiff(turned: Turned, kept: list[BoardPair]) -> Finding:
         if turned.course is Course.DRIFT
         else f"at once before pair {kept[turned.begins].name}"
     )
-    cost = f"rows differ by up to {turned.rows_px:.2f} px and depth at 1 m by {turned.depth_at_1_m_m * 1e3:.1f} mm for it"
+    cost = (
+        f"rows differ by up to {turned.rows_px:.2f} px and depth at 1 m by {turned.depth_at_1_m_m * 1e3:.1f} mm for it"
+    )
     return Finding(
         mistake=Mistake.UNSTIFF,
         sentence=f"the cameras turned against each other by {degrees:.3f} +- {sigma:.3f} degrees {how}: {cost}",

@@ -11,7 +11,7 @@ pair") is weighed in closed form:
 with g the gradient of the deviations, L their information, and A the rule (Gauss-Newton; the rule's numbers are small).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import cv2
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.causes.lone import LENS, Vector
+from phone_host.geometry.schur import NormalEquations, eliminated, minimise
 
 TURN, MOVE, FOCUS_LEFT, FOCUS_RIGHT, ROWS_LEFT, ROWS_RIGHT = (
     slice(0, 3),
@@ -36,13 +37,16 @@ DEVIATIONS: Final = 12
 _LENSES: Final = 2 * LENS
 _POSE: Final = slice(_LENSES, _LENSES + 6)
 _OWN: Final = slice(_LENSES + 6, _LENSES + 6 + DEVIATIONS)
-"""Places of a pair's parameters: lenses, pose, deviations."""
+_SHARED: Final = np.concatenate([np.arange(_LENSES), np.arange(_OWN.start, _OWN.start + 6)])
+"""Places of a pair's parameters: lenses, pose, deviations; and of those that all pairs of a stiff rig share."""
 
 _PRIOR: Final = np.array([0.03] * 3 + [0.03] * 3 + [0.05] * 2 + [10.0] * 4)
 """Mistakes are no larger: 2 degrees, 30 mm, 5 %, 10 px. It keeps what the views do not tell apart finite."""
 
 _PRINCIPAL_POINT_SHARE: Final = 0.1
-_MOST_STEPS: Final = 40
+_ROUNDS: Final = 2
+"""The noise that the prior is weighed by is known after the first."""
+
 _CONVERGED: Final = 1e-5
 _LEAST_SIGMA_PX: Final = 0.02
 
@@ -109,132 +113,142 @@ def loosen(
     Raises:
         numpy.linalg.LinAlgError: the views leave something undetermined.
     """
-    problem = _Problem(
-        pairs,
-        np.zeros((len(pairs), DEVIATIONS)) if given is None else given,
-        points_m,
-        np.flatnonzero(np.concatenate([free_camera, free_camera])),
-        _lens_prior(sizes_px),
-        np.array([size[1] for size in sizes_px], float),
-    )
-    state, damping, system = start, 1e-6, problem.at(start)
-    for _ in range(_MOST_STEPS):
-        tried = problem.stepped(system, state, damping)
-        after = problem.at(tried)
-        if not np.isfinite(after.squares) or after.squares > system.squares:
-            damping *= 100
-            if damping > 1:
-                break
-            continue
-        gain = (system.squares - after.squares) / max(after.squares, 1e-12)
-        state, system, damping = tried, after, max(damping / 10, 1e-9)
-        if gain < _CONVERGED:
-            break
-    return problem.loosened(system, state)
+    free = np.concatenate([free_camera, free_camera])
+    own = np.zeros((len(pairs), DEVIATIONS)) if given is None else given
+    views = _Views(pairs, own, points_m, np.array([size[1] for size in sizes_px], float))
+    found = views.at(start)
+    for _ in range(_ROUNDS):
+        problem = _Problem(views, _lens_prior(sizes_px), found.noise_px2)
+        found = minimise(problem, found, np.concatenate([free, np.full(6, True)]), _CONVERGED)
+    return _loosened(found, np.flatnonzero(free), _lens_prior(sizes_px))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _System:
-    """Normal equations of each pair, (V, 36, 36) and (V, 36): parameters are lenses (18), pose (6), deviations (12)."""
-
-    matrices: Vector
-    gradients: Vector
-    squares: float
-    numbers: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Reduced:
-    """The same over all pairs, with the poses eliminated: parameters are free lenses (n) and all deviations (12 V)."""
-
-    matrix: Vector
-    right: Vector
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
-    """What stays fixed. The prior is (expected lenses, weights); `free` lists the lenses' parameters that are estimated."""
+class _Views:
+    """What was seen; `given` are the deviations (V, 12) that the pairs are known to have."""
 
     pairs: list[BoardPair]
     given: Vector
     points_m: Vector
-    free: NDArray[np.intp]
-    prior: tuple[Vector, Vector]
     heights: Vector
 
-    def at(self, state: Stiff) -> _System:
+    def at(self, state: Stiff) -> "_Linearised":
         """Linearise at a stiff rig."""
         both = [
             _linearised(pair, self.points_m, state, np.concatenate([pose, given]), self.heights)
             for pair, pose, given in zip(self.pairs, state.poses, self.given, strict=True)
         ]
-        return _System(
-            np.array([jacobian.T @ jacobian for _, jacobian in both]),
-            np.array([jacobian.T @ error for error, jacobian in both]),
-            float(sum(error @ error for error, _ in both)),
-            sum(int(np.isfinite(view).sum()) for pair in self.pairs for view in (pair.left_px, pair.right_px)),
+        return _Linearised(
+            state=state,
+            matrices=np.array([jacobian.T @ jacobian for _, jacobian in both]),
+            right=np.array([jacobian.T @ error for error, jacobian in both]),
+            squares_px2=float(sum(error @ error for error, _ in both)),
+            numbers=sum(int(np.isfinite(view).sum()) for pair in self.pairs for view in (pair.left_px, pair.right_px)),
         )
 
-    def stepped(self, system: _System, state: Stiff, damping: float) -> Stiff:
-        """Return the stiff rig after one damped step: all pairs deviate alike."""
-        reduced, lenses = self._reduced(system, state, damping), len(self.free)
-        alike = np.zeros((len(reduced.right), lenses + 6))
-        alike[:lenses, :lenses] = np.eye(lenses)
-        alike[lenses:, lenses:] = np.tile(np.eye(DEVIATIONS)[:, :6], (len(self.pairs), 1))
-        matrix = alike.T @ reduced.matrix @ alike
-        step = alike @ np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), alike.T @ reduced.right)
-        lens = np.zeros(_LENSES)
-        lens[self.free] = step[:lenses]
-        same = step[lenses : lenses + DEVIATIONS]
-        poses = []
-        for index, (block, gradient) in enumerate(zip(system.matrices, system.gradients, strict=True)):
-            rest = block[_POSE, :_LENSES] @ lens + block[_POSE, _OWN] @ same
-            damped = block[_POSE, _POSE] + damping * np.diag(np.diag(block[_POSE, _POSE]))
-            poses.append(state.poses[index] + np.linalg.solve(damped, gradient[_POSE] - rest))
-        at = _right_pose(np.zeros(6), same, state)
-        return replace(
-            state,
-            left=state.left + lens[:LENS],
-            right=state.right + lens[LENS:],
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Linearised:
+    """A stiff rig and the normal equations of each pair there, (V, 36, 36) and (V, 36): of lenses (18), pose (6), deviations (12)."""
+
+    state: Stiff
+    matrices: Vector
+    right: Vector
+    squares_px2: float
+    numbers: int
+
+    @property
+    def lenses(self) -> Vector:
+        """Both lenses, (18,)."""
+        return np.concatenate([self.state.left, self.state.right])
+
+    @property
+    def noise_px2(self) -> float:
+        """Variance of a coordinate, within what is sensible."""
+        return min(max(self.squares_px2 / self.numbers, _LEAST_SIGMA_PX**2), 1.0)
+
+    def parts(self, shared: NDArray[np.intp]) -> tuple[Vector, Vector, Vector, Vector, Vector]:
+        """Return matrices and right sides of some parameters, their coupling with the poses, the poses' matrices and right sides."""
+        of_shared = self.matrices[:, shared]
+        return (
+            of_shared[:, :, shared],
+            self.right[:, shared],
+            of_shared[:, :, _POSE],
+            self.matrices[:, _POSE, _POSE],
+            self.right[:, _POSE],
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Problem:
+    """The stiff rig, see `geometry.schur.Problem`: shared are both lenses and one turn and move, alike for all pairs.
+
+    Attributes:
+        views: what was seen.
+        prior: expected lenses and their weights.
+        noise_px2: by which the prior is weighed against squares, px^2.
+    """
+
+    views: _Views
+    prior: tuple[Vector, Vector]
+    noise_px2: float
+
+    def cost(self, state: _Linearised) -> float:
+        """Return the squares and the prior's."""
+        expected, weight = self.prior
+        cost = state.squares_px2 + self.noise_px2 * float(weight @ (expected - state.lenses) ** 2)
+        return cost if np.isfinite(cost) else float("inf")
+
+    def linearised(self, state: _Linearised) -> NormalEquations:
+        """Return the normal equations at a state."""
+        matrices, right, coupling, blocks, blocks_right = state.parts(_SHARED)
+        expected, weight = self.prior
+        known = self.noise_px2 * np.concatenate([weight, np.zeros(6)])
+        off = np.concatenate([expected - state.lenses, np.zeros(6)])
+        return NormalEquations(
+            shared=matrices.sum(axis=0) + np.diag(known),
+            coupling=coupling,
+            blocks=blocks,
+            shared_right=right.sum(axis=0) + known * off,
+            blocks_right=blocks_right,
+        )
+
+    def moved(self, state: _Linearised, shared: Vector, blocks: Vector) -> _Linearised:
+        """Return a state after a step."""
+        before = state.state
+        at = _right_pose(np.zeros(6), shared[_LENSES:], before)
+        after = Stiff(
+            left=before.left + shared[:LENS],
+            right=before.right + shared[LENS:_LENSES],
             rotation=at[:3],
             translation_m=at[3:],
-            poses=np.array(poses),
+            poses=before.poses + blocks,
         )
+        return self.views.at(after)
 
-    def loosened(self, system: _System, state: Stiff) -> Loosened:
-        """Eliminate lenses and poses."""
-        reduced, lenses = self._reduced(system, state, 0.0), len(self.free)
-        across = reduced.matrix[lenses:, :lenses]
-        through = np.linalg.solve(reduced.matrix[:lenses, :lenses], across.T).T
-        return Loosened(
-            count=len(self.pairs),
-            gradient=np.asarray(reduced.right[lenses:] - through @ reduced.right[:lenses], np.float64),
-            information=np.asarray(reduced.matrix[lenses:, lenses:] - through @ across.T, np.float64),
-            squares_px2=system.squares,
-            numbers=system.numbers,
-            state=state,
-        )
 
-    def _reduced(self, system: _System, state: Stiff, damping: float) -> _Reduced:
-        count, lenses = len(self.pairs), len(self.free)
-        rest = np.concatenate([self.free, np.arange(_OWN.start, _OWN.stop)])
-        size = lenses + DEVIATIONS * count
-        matrix, right = np.zeros((size, size)), np.zeros(size)
-        for index, (block, gradient) in enumerate(zip(system.matrices, system.gradients, strict=True)):
-            poses = block[_POSE, _POSE] + damping * np.diag(np.diag(block[_POSE, _POSE]))
-            through = np.linalg.solve(poses, block[_POSE][:, rest]).T
-            places = np.concatenate([np.arange(lenses), lenses + DEVIATIONS * index + np.arange(DEVIATIONS)])
-            matrix[np.ix_(places, places)] += block[np.ix_(rest, rest)] - through @ block[_POSE][:, rest]
-            right[places] += gradient[rest] - through @ gradient[_POSE]
-        noise_px2 = min(max(system.squares / system.numbers, _LEAST_SIGMA_PX**2), 1.0)
-        expected, weight = self.prior
-        off = expected - np.concatenate([state.left, state.right])
-        places = np.arange(lenses)
-        matrix[places, places] += noise_px2 * weight[self.free]
-        right[:lenses] += noise_px2 * (weight * off)[self.free]
-        places = np.arange(lenses, size)
-        matrix[places, places] += noise_px2 * np.tile(_PRIOR**-2.0, count)
-        return _Reduced(matrix, right)
+def _loosened(found: _Linearised, free: NDArray[np.intp], prior: tuple[Vector, Vector]) -> Loosened:
+    """Let each pair deviate on its own; eliminate the poses and the lenses that are free."""
+    own, right, coupling, blocks, blocks_right = found.parts(np.concatenate([free, np.arange(_OWN.start, _OWN.stop)]))
+    taken, taken_right, _ = eliminated(coupling, blocks, blocks_right)
+    own, right, lenses, count = own - taken, right - taken_right, len(free), len(own)
+    expected, weight = prior
+    known = found.noise_px2 * weight
+    of_lenses = own[:, :lenses, :lenses].sum(axis=0) + np.diag(known[free])
+    lenses_right = right[:, :lenses].sum(axis=0) + (known * (expected - found.lenses))[free]
+    across = own[:, lenses:, :lenses].reshape(-1, lenses)
+    through = np.linalg.solve(of_lenses, across.T).T
+    information = np.zeros((count, DEVIATIONS, count, DEVIATIONS))
+    each = np.arange(count)
+    information[each, :, each] = own[:, lenses:, lenses:] + found.noise_px2 * np.diag(_PRIOR**-2.0)
+    return Loosened(
+        count=count,
+        gradient=np.asarray(right[:, lenses:].ravel() - through @ lenses_right, np.float64),
+        information=np.asarray(information.reshape(len(across), -1) - through @ across.T, np.float64),
+        squares_px2=found.squares_px2,
+        numbers=found.numbers,
+        state=found.state,
+    )
 
 
 def camera_arrays(lens: Vector) -> tuple[Vector, Vector]:
