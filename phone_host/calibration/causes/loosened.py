@@ -119,7 +119,7 @@ def loosen(
     found = views.at(start)
     for _ in range(_ROUNDS):
         problem = _Problem(views, _lens_prior(sizes_px), found.noise_px2)
-        found = minimise(problem, found, np.concatenate([free, np.full(6, True)]), _CONVERGED)
+        found = minimise(problem, found, np.concatenate([free, np.ones(6, bool)]), _CONVERGED)
     return _loosened(found, np.flatnonzero(free), _lens_prior(sizes_px))
 
 
