@@ -27,11 +27,11 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.plane_quality import StatedDistance, measure_plane, middle_of
-from phone_host.stereo.rectify import Rectifier
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
+from tests.bench.drawn_rigs import Floats
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
-from tests.bench.measured_draws import Floats
 
 _DISTANCES_M: Final = (0.5, 1.0, 2.0)
 _TILTS_DEG: Final = (0.0, 20.0)

@@ -73,13 +73,11 @@ def room_rows(seed: int, points: int, off: Off = Off.EXACT) -> list[Row]:
     """
     made = replace(room(seed), lower_px=0.0)  # an exact rig has no rows that are off
     random = np.random.default_rng([seed, 31])
-    match off:
-        case Off.EXACT:
-            rig = made.rig
-        case Off.ZERO:
-            rig = _turned(made.rig, float(random.normal()) * ZERO_SIGMA_PX)
-        case Off.DRAWN:
-            rig = drawn_rig(with_covariance(made.rig, seed), random)
+    rig = made.rig
+    if off is Off.ZERO:
+        rig = _turned(rig, float(random.normal()) * ZERO_SIGMA_PX)
+    elif off is Off.DRAWN:
+        rig = drawn_rig(with_covariance(rig, seed), random)
     return list(_rows(made, rig, random, points))
 
 

@@ -27,7 +27,9 @@ def test_exact_corners_give_exact_squares(rig: Rig) -> None:
 def test_rows_that_miss_each_other_are_shared_by_their_noise() -> None:
     """A right image 0.5 px too low, of a camera twice as fine as the left one: the squares stay, and so does their scatter."""
     rig = unlike_rig()
-    pairs = [replace(pair, right_px=pair.right_px + np.array([0.0, 0.5])) for pair in exact_pairs(rig, poses(4, seed=2))]
+    pairs = [
+        replace(pair, right_px=pair.right_px + np.array([0.0, 0.5])) for pair in exact_pairs(rig, poses(4, seed=2))
+    ]
     sides = square_sides_m(pairs, BOARD.points_m(), rig)
     assert sides.mean() == pytest.approx(0.025, rel=1e-3)
     assert sides.std() < 0.025 * 2e-3

@@ -147,7 +147,7 @@ def test_one_wall_without_a_distance(room: Path, tmp_path: Path, capsys: pytest.
 def test_an_overlay_makes_up_for_a_turn(room: Path, tmp_path: Path) -> None:
     """The right camera has turned by 0.4 degrees since the calibration: with the run's overlay.yaml the wall is where it stands to 0.2 %."""
     images = [str(room / side / "2.png") for side in ("left", "right")]
-    words = [*write_turned(tmp_path, unlike_rig()), "--matcher", "sgbm", "--distance", "1.2m", "--out"]
+    words = [*write_turned(tmp_path, narrow_rig()), "--matcher", "sgbm", "--distance", "1.2m", "--out"]
     assert main(["quality", *images, *words, str(tmp_path / "o")]) == 0
     [pair] = report_of(tmp_path / "o")["pairs"]
     assert pair["bias_share"] == pytest.approx(0, abs=0.002)

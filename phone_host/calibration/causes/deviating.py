@@ -13,8 +13,17 @@ import numpy as np
 
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.calibrate import Sizes
-from phone_host.calibration.causes.lone import Vector, apart_px, both_alone, camera_arrays
-from phone_host.calibration.causes.loosened import FOCUS_LEFT, FOCUS_RIGHT, MOVE, TURN, Loosened, Stiff, loosen
+from phone_host.calibration.causes.lone import Vector, apart_px, both_alone
+from phone_host.calibration.causes.loosened import (
+    FOCUS_LEFT,
+    FOCUS_RIGHT,
+    MOVE,
+    TURN,
+    Loosened,
+    Stiff,
+    camera_arrays,
+    loosen,
+)
 from phone_host.calibration.causes.mistakes import Course, Finding, Mistake, Turned
 from phone_host.calibration.causes.rules import Rule, Weighed, again, criterion, scatter, significance, weighed
 from phone_host.calibration.target import Board
