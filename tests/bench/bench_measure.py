@@ -93,7 +93,7 @@ def _verdict(what: str, share: float) -> Verdict:
     return Verdict(f"truth inside the stated 95 %, {what}", reached, f"{share:.1%}", limit)
 
 
-def _print(title: str, rows: Sequence[Row]) -> None:
+def _print(title: str, rows: Sequence[Row], looked_at: int = _LOOKED_AT) -> None:
     table = Table(title=title, title_justify="left")
     for head in (
         "rooms",
@@ -106,8 +106,8 @@ def _print(title: str, rows: Sequence[Row]) -> None:
     ):
         table.add_column(head, justify="left" if head in {"rooms", "what"} else "right")
     for name, some in (
-        ("looked at", [row for row in rows if row.seed < _LOOKED_AT]),
-        ("held out", [row for row in rows if row.seed >= _LOOKED_AT]),
+        ("looked at", [row for row in rows if row.seed < looked_at]),
+        ("held out", [row for row in rows if row.seed >= looked_at]),
     ):
         for what in ("distance", "length"):
             found = [row for row in some if row.what == what]
@@ -124,7 +124,7 @@ def _print(title: str, rows: Sequence[Row]) -> None:
             )
     Console(width=130).print(table)
     refused = Counter(row.what for row in rows if row.what not in {"distance", "length"})
-    print("refused:", ", ".join(f"{count} {name}" for name, count in refused.most_common()))
+    print("refused:", "none" if not refused else ", ".join(f"{count} {name}" for name, count in refused.most_common()))
 
 
 def main() -> int:
@@ -160,7 +160,7 @@ def main() -> int:
         print(machine())
         for off, found in rooms.items():
             _print(f"rooms; the rig: {off.value}", found)
-        _print("no images; each case's rig: " + Off.DRAWN.value, cases)
+        _print("no images; each case's rig: " + Off.DRAWN.value, cases, looked_at=0)
         print(*verdicts, sep="\n")
     return exit_code(verdicts)
 
