@@ -161,12 +161,12 @@ def test_a_verdict_promises_nothing_of_corners_that_were_not_seen() -> None:
 
 def test_only_good_is_lowered_by_unseen_corners() -> None:
     """Several corners are told in one sentence; any other verdict keeps its own remedy."""
-    good, poor = Assessment(Verdict.GOOD, ()), Assessment(Verdict.REJECT, ("fix it",))
+    good, poor = Assessment(Verdict.GOOD, ""), Assessment(Verdict.REJECT, "fix it")
     assert with_corners(good, ()) is good
     assert with_corners(poor, CORNERS) is poor
     lowered = with_corners(good, {Want.BOTTOM_LEFT, Want.TOP_RIGHT})
     assert lowered.verdict is Verdict.USABLE
-    assert "in the top right corner or bottom left corner of the pictures" in lowered.remedies[0]
+    assert "in the top right corner or bottom left corner of the pictures" in lowered.remedy
     one = BoardPair("1", corners(0.34, 0.36), corners(0.34, 0.36, size=SIZES[1]))
     rig = unlike_rig()
     left, right = (

@@ -250,7 +250,7 @@ class Guide:
             depth_error_m=math.nan if progress is None else progress.depth_error_m,
             next_error_m=math.nan if progress is None else progress.after_m(self._asked),
             verdict="" if progress is None else self._verdict(progress).verdict.value,
-            remedy="" if progress is None else "; ".join(self._verdict(progress).remedies),
+            remedy="" if progress is None else self._verdict(progress).remedy,
             refused=tuple((gate, self._refused[gate]) for gate in Gate if self._refused[gate]),
         )
 
@@ -312,7 +312,7 @@ class Guide:
         return unseen(used) - self._seen
 
     def _verdict(self, progress: Progress) -> Assessment:
-        return with_corners(Assessment(progress.verdict, tuple(filter(None, (progress.remedy,)))), self._unseen)
+        return with_corners(Assessment(progress.verdict, progress.remedy), self._unseen)
 
     def _ask(self, now_ns: int) -> None:
         """Choose the view that is wanted next: the one that would lower the depth error most, of those asked for least often in vain."""

@@ -43,4 +43,4 @@ def with_corners(judgement: Assessment, missing: Iterable[Want]) -> Assessment:
         return judgement
     where = " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
     remedy = f"no board was seen in the {where} of the pictures, so the lens is guessed there: take views with it there"
-    return Assessment(Verdict.USABLE, (remedy,))
+    return Assessment(Verdict.USABLE, remedy)
