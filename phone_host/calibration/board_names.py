@@ -1,5 +1,6 @@
 """Boards as people write them: inner corners of a chessboard, a ChArUco board, an AprilGrid. Pure."""
 
+import math
 import re
 from typing import Final, assert_never
 
@@ -12,6 +13,12 @@ _LENGTH: Final = r"(\d+(?:\.\d+)?)\s*mm"
 _CHARUCO: Final = re.compile(rf"charuco:(\d{{1,3}})x(\d{{1,3}}):{_LENGTH}:{_LENGTH}:([456]x[456])", re.IGNORECASE)
 _GRID: Final = re.compile(rf"aprilgrid:(\d{{1,2}})x(\d{{1,2}}):{_LENGTH}:{_LENGTH}", re.IGNORECASE)
 _LEAST_TAGS: Final = 2
+_TAGS: Final = 587
+"""In the family 36h11."""
+
+MOST_MARKS: Final = 1000
+"""In each ArUco family that is used here."""
+
 _MOST_STRETCH: Final = 0.1
 """Printed "fit to page" a board is up to 7 % smaller."""
 
@@ -65,16 +72,36 @@ def no_square() -> SettingsError:
     )
 
 
+def require_marks(columns: int, rows: int, family: str) -> None:
+    """Check that a family has a mark for each white square of a chessboard.
+
+    Args:
+        columns: squares in a row.
+        rows: squares in a column.
+        family: of the marks, in words.
+
+    Raises:
+        SettingsError: it has fewer.
+    """
+    marks = columns * rows // 2
+    if marks > MOST_MARKS:
+        raise SettingsError(
+            f"{columns}x{rows} squares hold {marks} marks, and the family {family} has {MOST_MARKS}",
+            "give fewer squares",
+        )
+
+
 def _charuco(name: str, square_mm: float | None) -> Board:
     found = _CHARUCO.fullmatch(name)
-    if found is None or found[5] not in _FAMILIES or not 0.3 <= float(found[4]) / float(found[3]) <= 0.9:
+    if found is None or found[5] not in _FAMILIES or not 0.3 <= _share(found) <= 0.9:
         raise SettingsError(
             f"--board {name!r} is no ChArUco board",
             "give squares, side of a square, side of a mark and family, as in charuco:10x8:25mm:18mm:5x5",
         )
-    side, mark = float(found[3]), float(found[4])
-    marks = Charuco(_FAMILIES[found[5]], mark / side)
-    return Board(int(found[1]) - 1, int(found[2]) - 1, _side_mm(side, square_mm) / 1000, marks)
+    columns, rows = int(found[1]), int(found[2])
+    require_marks(columns, rows, found[5])
+    marks = Charuco(_FAMILIES[found[5]], _share(found))
+    return Board(columns - 1, rows - 1, _side_mm(float(found[3]), square_mm) / 1000, marks)
 
 
 def _april_grid(name: str, square_mm: float | None) -> Board:
@@ -82,13 +109,21 @@ def _april_grid(name: str, square_mm: float | None) -> Board:
     if (
         found is None
         or min(int(found[1]), int(found[2])) < _LEAST_TAGS
-        or not 0.1 <= float(found[4]) / float(found[3]) <= 1
+        or not 0.1 <= _share(found) <= 1
     ):
         raise SettingsError(
             f"--board {name!r} is no AprilGrid", "give tags, side of a tag and gap, as in aprilgrid:6x6:30mm:9mm"
         )
-    side, gap = float(found[3]), float(found[4])
-    return Board(2 * int(found[1]), 2 * int(found[2]), _side_mm(side, square_mm) / 1000, AprilGrid(gap / side))
+    across, down = int(found[1]), int(found[2])
+    if across * down > _TAGS:
+        raise SettingsError(f"{across}x{down} tags are {across * down}, the family has {_TAGS}", "give fewer")
+    return Board(2 * across, 2 * down, _side_mm(float(found[3]), square_mm) / 1000, AprilGrid(_share(found)))
+
+
+def _share(found: re.Match[str]) -> float:
+    """Return the second length of a name as a share of the first; NaN where there is none."""
+    side, other = float(found[3]), float(found[4])
+    return other / side if side > 0 else math.nan
 
 
 def _side_mm(named_mm: float, square_mm: float | None) -> float:

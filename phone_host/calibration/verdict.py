@@ -42,6 +42,14 @@ _CONTRADICTION_PX = 1.0
 SHARE_GOOD, _SHARE_USABLE = 0.01, 0.05
 """Limits of the uncertainty of baseline and depth, and of what squares are off, as shares."""
 
+_JUST_BEYOND = math.nextafter(1.0, 2.0)
+"""What is not known is never good, and what is known to be worse gives the remedy."""
+
+_UNKNOWN = (
+    "how exactly baseline and depth are known cannot be told, because the earlier calibration does not say how exact its"
+    " lenses are: calibrate from pictures of a board without --pose-only"
+)
+
 _FEW_PAIRS = 6
 _WANTED_PAIRS = 15
 _MANY_REJECTED = 1 / 3
@@ -154,6 +162,8 @@ def _rows(calibration: Calibration) -> _Measure:
 def _baseline(calibration: Calibration) -> _Measure:
     baseline_m = float(np.linalg.norm(calibration.rig.t_right_left_m))
     share = calibration.baseline_sigma_m / baseline_m
+    if not math.isfinite(share):
+        return _Measure(_JUST_BEYOND, 0.0, _UNKNOWN)
     remedy = (
         f"these views leave the baseline open by {calibration.baseline_sigma_m * 1e3:.2f} of {baseline_m * 1e3:.1f} mm:"
         f" {_what_to_show(calibration)}"
@@ -162,7 +172,7 @@ def _baseline(calibration: Calibration) -> _Measure:
 
 
 def _depth(calibration: Calibration) -> _Measure:
-    """Judge the depth error at 1 m; a rig that sees nothing there is judged by its baseline and rows alone."""
+    """Judge the depth error at 1 m; a rig that sees nothing there, or knows nothing of it, is judged by its baseline and rows alone."""
     sigma_m = dict(calibration.depths).get(DEPTH_M, math.nan)
     share = sigma_m / DEPTH_M if math.isfinite(sigma_m) else 0.0
     remedy = f"these views leave depth open by {share * 1e3:.0f} mm at {DEPTH_M:g} m: {_what_to_show(calibration)}"

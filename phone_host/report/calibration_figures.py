@@ -78,6 +78,8 @@ def _rms(found: SessionRig) -> list[_Row]:
 
 def _baseline(found: SessionRig) -> list[_Row]:
     baseline_m, sigma_m = float(np.linalg.norm(found.rig.t_right_left_m)), found.baseline_sigma_m
+    if not math.isfinite(sigma_m):
+        return [("baseline", f"{baseline_m * 1e3:.2f} mm", _DASH, _DASH)]
     words = f"{baseline_m * 1e3:.2f} ± {sigma_m * 1e3:.2g} mm ({sigma_m / baseline_m:.2%})"
     return [("baseline", words, *_shares(found))]
 

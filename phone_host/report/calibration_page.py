@@ -100,14 +100,9 @@ def _figures(session: CalibrationSession, found: SessionRig) -> tuple[Figure, ..
         note = f"good up to {found.limits.good_px:.2f} px"
         figures.append(Figure(label="vertical error, 95 %", value=f"{p95_px:.3f}", unit="px", note=note))
     figures.append(Figure(label="RMS of all corners", value=f"{found.rig.rms_stereo_px:.3f}", unit="px"))
-    figures.append(
-        Figure(
-            label="baseline",
-            value=f"{baseline_mm:.2f}",
-            unit="mm",
-            note=f"± {found.baseline_sigma_m * 1e3:.2g} mm; compare it with a ruler",
-        )
-    )
+    sigma = f"± {found.baseline_sigma_m * 1e3:.2g} mm; " if math.isfinite(found.baseline_sigma_m) else ""
+    note = f"{sigma}compare it with a ruler"
+    figures.append(Figure(label="baseline", value=f"{baseline_mm:.2f}", unit="mm", note=note))
     sigma_m = depths.get(_DEPTH_M, math.nan)
     if math.isfinite(sigma_m):
         figures.append(

@@ -1,5 +1,6 @@
 """The page of `calibrate`: what it says and shows of a session, and that nothing in it comes from elsewhere."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -145,6 +146,20 @@ def test_a_session_without_any_board_has_only_its_reasons() -> None:
     assert "What the views cover" not in page.words
     assert "Not used: 2 pairs" in page.words
     assert "Over the order" not in page.words
+
+
+def test_what_is_not_known_of_a_rig_is_left_out() -> None:
+    """A rig whose lenses' uncertainty nobody stated has a baseline, but neither a sigma of it nor one of depth; no figure reads nan."""
+    shown = session()
+    assert shown.found is not None
+    rig = replace(shown.found.rig, covariance=np.full((30, 30), np.nan), zero_sigma_px=math.nan)
+    depths = tuple((depth_m, math.nan) for depth_m, _ in shown.found.depths)
+    unknown = replace(shown.found, rig=rig, baseline_sigma_m=math.nan, depths=depths, far_m=math.nan)
+    words = _page(replace(shown, found=unknown)).words
+    assert f"{np.linalg.norm(rig.t_right_left_m) * 1e3:.2f} mm" in words
+    assert "nan" not in words.lower().split()
+    assert "± nan" not in words
+    assert "nan%" not in words
 
 
 def test_a_rig_that_cannot_be_rectified_has_no_rows() -> None:

@@ -164,6 +164,10 @@ def test_boards_are_named(text: str, square_mm: float | None, corners: tuple[int
         ("charuco:10x8", "is no ChArUco board: give squares"),
         ("charuco:10x8:25mm:25mm:5x5", "is no ChArUco board"),
         ("aprilgrid:1x6:30mm:9mm", "is no AprilGrid: give tags"),
+        ("charuco:8x6:0mm:0mm:5x5", "is no ChArUco board"),
+        ("aprilgrid:6x6:0mm:0mm", "is no AprilGrid"),
+        ("charuco:100x100:25mm:18mm:5x5", "100x100 squares hold 5000 marks, and the family 5x5 has 1000: give fewer"),
+        ("aprilgrid:30x30:30mm:9mm", "30x30 tags are 900, the family has 587: give fewer"),
     ],
 )
 def test_what_names_no_board_is_refused(text: str, said: str) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from phone_host.calibration.sheets.screen import screen_board
 from phone_host.calibration.sheets.sheet import Ink, Paper, Sheet
 from phone_host.calibration.sheets.svg import svg
 from phone_host.calibration.target import Board, find_corners
+from phone_host.cli import main
 from phone_host.model import Image
 
 _DPI = 200
@@ -122,6 +124,13 @@ def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(SettingsError, match="do not fit on A4: give fewer squares"):
         largest_square_mm(Paper.A4, 500, 500, 0.5)
     assert largest_square_mm(Paper.A4, 10, 7, 0.5) == 25
+
+
+def test_more_marks_than_a_family_has_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """100x60 squares want 3000 marks: one line says how many there are; nothing is written."""
+    assert main(["target", "charuco", "--size", "100x60", "--square", "2mm", "--out", str(tmp_path)]) == 2
+    assert "hold 3000 marks, and the family 5x5 has 1000: give fewer squares" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_screen_shows_whole_pixels() -> None:

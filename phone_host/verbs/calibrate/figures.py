@@ -151,8 +151,9 @@ def _sigmas(rig: Rig) -> dict[str, Any]:
         }
         for side, at in (("left", 0), ("right", 12))
     }
-    turn_deg = [float(f"{math.degrees(sigma):.4g}") for sigma in sigmas[24:27]]
-    return {**cameras, "rotation_deg": turn_deg, "translation_mm": [float(f"{s * 1e3:.4g}") for s in sigmas[27:]]}
+    pose = {"rotation_deg": np.degrees(sigmas[24:27]), "translation_mm": sigmas[27:] * 1e3}
+    rounded = {key: [float(f"{each:.4g}") if math.isfinite(each) else None for each in row] for key, row in pose.items()}
+    return cameras | rounded
 
 
 def _rounded(value: float, digits: int) -> float | None:
@@ -221,12 +222,10 @@ def summary(
     rows.append(_baseline_row(report["baseline_mm"], calibration.baseline_sigma_m))
     rows.append("         compare it with a ruler: it shows a wrong --square")
     rows += _lens_rows(calibration)
-    if calibration.depths:
-        errors = ", ".join(
-            f"{_sigma_mm(sigma_m)} mm at {depth_m:g} m"
-            for depth_m, sigma_m in calibration.depths
-            if math.isfinite(sigma_m)
-        )
+    errors = ", ".join(
+        f"{_sigma_mm(sigma_m)} mm at {depth_m:g} m" for depth_m, sigma_m in calibration.depths if math.isfinite(sigma_m)
+    )
+    if errors:
         rows.append(f"depth    +- {errors} by the calibration alone")
     squares = calibration.squares
     if squares.count:
@@ -245,6 +244,8 @@ def summary(
 
 
 def _baseline_row(baseline_mm: float, sigma_m: float) -> str:
+    if not math.isfinite(sigma_m):
+        return f"baseline {baseline_mm:.2f} mm"
     share = sigma_m * 1e3 / baseline_mm
     vague = f": uncertain by {share:.0%}, and so is every depth" if share > SHARE_GOOD else ""
     return f"baseline {baseline_mm:.2f} +- {_sigma_mm(sigma_m)} mm{vague}"

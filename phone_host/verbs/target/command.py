@@ -13,6 +13,7 @@ import numpy as np
 from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
 from common.program.terminal import say
+from phone_host.calibration.board_names import require_marks
 from phone_host.calibration.sheets.layout import chessboard_sheet, largest_square_mm, marked_sheet
 from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard
 from phone_host.calibration.sheets.pdf import pdf
@@ -109,6 +110,7 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
             raise SettingsError(
                 f"--mark {mark:g}mm does not fit a square of {side:g} mm", "give 0.3 to 0.9 of its side"
             )
+        require_marks(columns, rows, options.family)
         size = f"{columns}x{rows}"
         name = f"{size}:{side:g}mm:{mark:g}mm:{options.family}"
         board = f"--board charuco:{name} "
