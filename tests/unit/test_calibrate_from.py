@@ -26,6 +26,7 @@ from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.board import Known, Named, Origin
 from phone_host.verbs.calibrate.command import run
 from phone_host.verbs.calibrate.earlier import Session, asked_of, calibrated, notes, session_of
+from phone_host.verbs.calibrate.rig_file import replace_rig
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.pictures import encoded
 from tests.support.rigs import small_rig, unlike_rig
@@ -232,12 +233,30 @@ def test_the_command_adds_to_a_rig_and_solves_the_pose(tmp_path: Path, capsys: p
     assert views is not None
     assert views.board == "9x6"
     assert len(set(views.names)) == len(views.names) == len(pairs_of(views)) > 5
-    run(_options(first, "--from", str(second / "new.yaml"), "--pose-only", "--board", "9x6", "--square", "25mm"))
-    assert read_rig_views(first / "new.yaml") is None
+    both = (second / "new.yaml").read_bytes()
+    run(_options(second, "--from", str(second / "new.yaml"), "--pose-only"))
+    assert read_rig_views(second / "new.yaml") is None
+    assert (second / "new.yaml.old").read_bytes() == both
     np.testing.assert_allclose(
-        read_rig(first / "new.yaml").left.matrix, read_rig(second / "new.yaml").left.matrix, rtol=1e-12
+        read_rig(second / "new.yaml").left.matrix, read_rig(second / "new.yaml.old").left.matrix, rtol=1e-12
     )
-    assert "its lenses are kept, the relative pose is new" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "its lenses are kept, the relative pose is new" in told
+    assert "the earlier one is now new.yaml.old" in told
+
+
+def test_no_views_are_lost(tmp_path: Path) -> None:
+    """A file whose views the new one does not hold is moved aside, and kept there from one without views; one whose views are all in the new one is replaced."""
+    rig, out = unlike_rig(), _filed(tmp_path, BOARD)
+    made, views = rectify_rig(rig), read_rig_views(out)
+    assert replace_rig(out, rig, made, views) == {}
+    assert replace_rig(out, rig, made) == {"earlier_rig": "rig.yaml.old"}
+    assert replace_rig(out, rig, made) == {}
+    assert replace_rig(out, None, None) == {"earlier_rig": "rig.yaml.old2"}
+    kept = read_rig_views(tmp_path / "rig.yaml.old")
+    assert kept is not None
+    assert kept.names == ("1", "2", "3")
+    assert not out.exists()
 
 
 def test_unlike_lenses_are_chosen_by_views_that_were_held_out() -> None:

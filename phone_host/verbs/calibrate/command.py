@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import DataError, UnavailableError
-from common.places import Kind, kind_of, make_folder
+from common.places import Kind, kind_of
 from common.program.terminal import say
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
@@ -22,8 +22,7 @@ from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.rig_views import RigViews
-from phone_host.output.rig_yaml import REJECTED, is_rig, read_rig, write_rig
+from phone_host.output.rig_yaml import is_rig
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files
@@ -51,6 +50,7 @@ from phone_host.verbs.calibrate.figures import (
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
 from phone_host.verbs.calibrate.importing import export_lines, import_calibration, require_pictures, write_exports
 from phone_host.verbs.calibrate.page import session_of_failure, session_of_rig, with_rectified, write_page
+from phone_host.verbs.calibrate.rig_file import replace_rig
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import PAGE, claim_names, keep_other_report, require_file, unwritable
@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
     rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
     rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict.value)
     report = report_of(files, views, rejected, found, judgement) | known.as_report() | cause_report(finding, hint)
-    report |= _write_rig(options.out, replace(found, rig=rig), saved_views(session, found, pairs))
+    report |= replace_rig(options.out, rig, found.rectification, saved_views(session, found, pairs))
     report |= {} if live is None else live.as_report()
     exported: list[str] = []
     if found.rectification is not None:
@@ -164,7 +164,7 @@ def _report_failure(
     if 2 * unseen > len(files.pairs):
         limit = most_pixels(None, options.max_megapixels)
         error = DataError(failure.problem, unseen_remedy(files, known.board, limit))
-    report = report_of_failure(files, views, error) | known.as_report() | _write_rig(options.out, None)
+    report = report_of_failure(files, views, error) | known.as_report() | replace_rig(options.out, None, None)
     report |= write_page(options.out, session_of_failure(_taken(files, views, list(views.pairs), known.board), report))
     _write_report(options.out, report)
     _tell(
@@ -184,37 +184,6 @@ def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[s
         print(json_text(report))
     else:
         say(lines)
-
-
-def _write_rig(out: Path, calibration: Calibration | None, views: RigViews | None = None) -> dict[str, str]:
-    """Write rig.yaml. Unless the new rig is of use, move that of an earlier run aside, so that nobody takes the one for the other.
-
-    Returns:
-        For the report: where the earlier rig is now, if it was moved.
-    """
-    rig = None if calibration is None else calibration.rig
-    moved: dict[str, str] = {}
-    try:
-        make_folder(out.parent)
-        if (rig is None or rig.verdict == REJECTED) and kind_of(out) is not Kind.MISSING and not _is_rejected(out):
-            aside = out.with_name(f"{out.name}.old")
-            out.replace(aside)
-            moved = {"earlier_rig": aside.name}
-        if calibration is not None and calibration.rectification is not None:
-            write_rig(out, calibration.rig, calibration.rectification, views)
-        else:
-            out.unlink(missing_ok=True)
-    except OSError as error:
-        raise unwritable(out, error) from error
-    return moved
-
-
-def _is_rejected(path: Path) -> bool:
-    """Return whether an earlier rig was rejected itself: it may be replaced, and does not take the place of a good one in rig.yaml.old."""
-    try:
-        return read_rig(path).verdict == REJECTED
-    except DataError:
-        return False
 
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:

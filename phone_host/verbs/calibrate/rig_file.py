@@ -1,0 +1,72 @@
+"""rig.yaml as phone-host calibrate writes it: what an earlier one holds, and the new one does not, is moved aside."""
+
+from pathlib import Path
+
+from common.errors import DataError
+from common.places import Kind, kind_of, make_folder
+from phone_host.calibration.earlier_views import new_ones, pairs_of
+from phone_host.model import Rectification, Rig
+from phone_host.output.rig_views import RigViews
+from phone_host.output.rig_yaml import REJECTED, read_rig, read_rig_views, write_rig
+from phone_host.verbs.output_folders import unwritable
+
+
+def replace_rig(
+    out: Path, rig: Rig | None, rectification: Rectification | None, views: RigViews | None = None
+) -> dict[str, str]:
+    """Write rig.yaml. Keep an earlier one that the new one does not replace: because it is of use and the new one is not, or because its views would be lost.
+
+    Args:
+        out: the file.
+        rig: the new rig; None: there is none.
+        rectification: of the rig; None: it cannot be rectified, and is not written.
+        views: what it was computed from; None: not known.
+
+    Returns:
+        For the report: where the earlier rig is now, if it was moved.
+
+    Raises:
+        UnavailableError: a file cannot be written or moved.
+    """
+    is_of_use = rig is not None and rig.verdict != REJECTED
+    moved: dict[str, str] = {}
+    try:
+        make_folder(out.parent)
+        if kind_of(out) is not Kind.MISSING and not _is_rejected(out) and not (is_of_use and _holds(views, out)):
+            aside = _aside(out)
+            out.replace(aside)
+            moved = {"earlier_rig": aside.name}
+        if rig is not None and rectification is not None:
+            write_rig(out, rig, rectification, views)
+        else:
+            out.unlink(missing_ok=True)
+    except OSError as error:
+        raise unwritable(out, error) from error
+    return moved
+
+
+def _is_rejected(path: Path) -> bool:
+    """Return whether an earlier rig was rejected itself: it may be replaced, and does not take the place of a good one in rig.yaml.old."""
+    try:
+        return read_rig(path).verdict == REJECTED
+    except DataError:
+        return False
+
+
+def _holds(views: RigViews | None, path: Path) -> bool:
+    """Return whether a file has no views but these."""
+    earlier = _views_in(path)
+    return earlier is None or not new_ones([] if views is None else pairs_of(views), pairs_of(earlier))
+
+
+def _aside(out: Path) -> Path:
+    """Return the name for an earlier rig. One without views takes the place of none that has some."""
+    aside = out.with_name(f"{out.name}.old")
+    return aside if _views_in(out) is not None or _views_in(aside) is None else out.with_name(f"{out.name}.old2")
+
+
+def _views_in(path: Path) -> RigViews | None:
+    try:
+        return read_rig_views(path)
+    except DataError:  # it is missing, or no rig
+        return None
