@@ -106,11 +106,7 @@ def _charuco(name: str, square_mm: float | None) -> Board:
 
 def _april_grid(name: str, square_mm: float | None) -> Board:
     found = _GRID.fullmatch(name)
-    if (
-        found is None
-        or min(int(found[1]), int(found[2])) < _LEAST_TAGS
-        or not 0.1 <= _share(found) <= 1
-    ):
+    if found is None or min(int(found[1]), int(found[2])) < _LEAST_TAGS or not 0.1 <= _share(found) <= 1:
         raise SettingsError(
             f"--board {name!r} is no AprilGrid", "give tags, side of a tag and gap, as in aprilgrid:6x6:30mm:9mm"
         )

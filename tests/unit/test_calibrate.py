@@ -202,11 +202,13 @@ def test_the_one_remedy_is_that_of_the_worst_measure() -> None:
 def test_an_unknown_uncertainty_is_not_good() -> None:
     """After --pose-only with an imported rig nothing is known of baseline and depth: usable at most, and that is said; what is known to be worse is said first."""
     found = _fine()
-    unknown = replace(found, baseline_sigma_m=math.nan, depths=tuple((depth_m, math.nan) for depth_m, _ in found.depths))
+    unknown = replace(
+        found, baseline_sigma_m=math.nan, depths=tuple((depth_m, math.nan) for depth_m, _ in found.depths)
+    )
     judgement = judge(unknown, ())
     assert judgement.verdict is Verdict.USABLE
-    assert "how exactly baseline and depth are known cannot be told" in judgement.remedies[0]
-    (remedy,) = judge(replace(unknown, vertical_px=np.full(100, 0.3)), ()).remedies
+    assert "how exactly baseline and depth are known cannot be told" in judgement.remedy
+    remedy = judge(replace(unknown, vertical_px=np.full(100, 0.3)), ()).remedy
     assert "rows of the two views differ by 0.30 px" in remedy
     assert judge(replace(unknown, vertical_px=np.full(100, 3.0)), ()).verdict is Verdict.REJECT
 

@@ -1,6 +1,7 @@
 """phone-host calibrate --import and --export in this process: what is written, and what is refused before anything is."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import pytest
 
 from common.errors import DataError
 from phone_host.cli import main
+from phone_host.model import Side, TimeOffset
 from phone_host.output.rig_files.imported import import_rig, read_own_rig
-from phone_host.output.rig_yaml import read_rig
+from phone_host.output.rig_views import RigViews
+from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
+from phone_host.stereo.rectify import rectify_rig
 from tests.unit.test_report_keys import _described, _keys
 from tests.unit.test_rig_files_kalibr import KALIBR
 
@@ -72,6 +76,11 @@ def test_a_rig_is_exported_into_folders_beside_it(
         (["l", "r", "--board", "9x6", "--square", "25mm", "--unit", "1mm"], 2, "--unit without --import"),
         (["l", "r", "--import", "C"], 2, "--import and pictures contradict"),
         (["--board", "9x6", "--import", "C"], 2, "--import and --board contradict"),
+        (["--rotate-right", "90", "--import", "C"], 2, "--import and --rotate-right contradict"),
+        (["--camera", "browser:", "--import", "C"], 2, "--import and --camera contradict"),
+        (["--snapshots", "d", "--import", "C"], 2, "--import and --snapshots contradict"),
+        (["--no-sound", "--import", "C"], 2, "--import and --no-sound contradict"),
+        (["--baseline", "500mm", "--import", "C"], 4, "are 120.0 mm apart, and you measured 500.0 mm: say with --unit"),
         (["--import", "C", "--unit", "squares"], 2, "--unit is 'squares'"),
         (["--import", "C", "--size", "640"], 2, "--size is '640'"),
         (["--import", "C", "--size", "640x480,1x1,2x2"], 2, "--size is"),
@@ -157,3 +166,24 @@ def test_an_import_says_what_looks_wrong(chain: Path, tmp_path: Path, capsys: py
     out.write_text(out.read_text() + "verdict: reject\n")
     assert main(["calibrate", "--import", str(out), "--out", str(tmp_path / "again.yaml")]) == 0
     assert "verdict  reject\nrun and stereo refuse this calibration" in capsys.readouterr().out
+
+
+def test_an_import_is_on_the_side_that_is_named_and_keeps_what_it_holds(
+    chain: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """--board-side goes into rig.yaml and turns the time offset round; the imported file is not changed by it. A rig.yaml keeps its views, and takes the place of none that has others."""
+    out, other = tmp_path / "rig.yaml", tmp_path / "other.yaml"
+    assert _told(capsys, "calibrate", "--import", chain, "--baseline", "121mm", "--board-side", "right", "--out", out)
+    assert read_rig(out).board_side is Side.RIGHT
+    corners = np.zeros((1, 54, 2))
+    views = RigViews(columns=9, rows=6, square_m=0.02, names=("a",), left_px=corners, right_px=corners)
+    rig = replace(read_rig(out), time_offset=TimeOffset(7, 3))
+    write_rig(out, rig, rectify_rig(rig), views)
+    assert main(["calibrate", "--import", str(out), "--board-side", "left", "--out", str(out)]) == 2
+    assert "--board-side left would change" in capsys.readouterr().err
+    assert _told(capsys, "calibrate", "--import", out, "--board-side", "left", "--out", other)["board_side"] == "left"
+    assert (read_rig(other).board_side, read_rig(other).time_offset) == (Side.LEFT, TimeOffset(-7, 3))
+    kept = read_rig_views(other)
+    assert kept is not None
+    assert kept.names == ("a",)
+    assert _told(capsys, "calibrate", "--import", chain, "--out", other)["earlier_rig"] == "other.yaml.old"

@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import shlex
 import threading
 from pathlib import Path
 
@@ -14,12 +15,14 @@ from common.errors import DataError, SettingsError, UnavailableError
 from phone_host.calibration.guide.snapshot import before_board
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target import Board, find_corners
+from phone_host.calibration.verdict import Verdict
 from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken
 from phone_host.live.newest import Newest
 from phone_host.live.view_folders import Pictures, ViewFolders
 from phone_host.live.voice import Voice, speech_program
 from phone_host.verbs.calibrate.arguments import add_arguments
-from phone_host.verbs.calibrate.command import run
+from phone_host.verbs.calibrate.command import exit_code, run
+from phone_host.verbs.calibrate.given import command_again
 from tests.support.boards import BOARD, poses, render_pair
 from tests.support.programs import until
 from tests.support.rigs import small_rig
@@ -148,6 +151,11 @@ def test_the_picture_and_the_files_show_the_words(tmp_path: Path) -> None:
         (["--live", "--camera", "replay:x", "left"], "--live with 1 folder"),
         (["--live", "--camera", "replay:x", "--rotate-left", "90"], "--live does not take"),
         (["left", "right", "--camera", "replay:x"], "--camera without --live"),
+        (["left", "right", "--views", "9"], "--views without --live"),
+        (["left", "right", "--wait", "5s"], "--wait without --live"),
+        (["left", "right", "--tolerance", "5ms"], "--tolerance without --live"),
+        (["left", "right", "--keys", "folder"], "--keys without --live"),
+        (["left", "right", "--no-sound"], "--no-sound without --live"),
         ([], "neither pictures nor --live nor --import"),
     ],
 )
@@ -158,3 +166,38 @@ def test_options_that_do_not_fit_are_refused(tmp_path: Path, options: list[str],
     parser.add_argument("--json", action="store_true")
     with pytest.raises(SettingsError, match=problem):
         run(parser.parse_args([*options, "--square", "25mm", "--out", str(tmp_path / "rig.yaml")]))
+
+
+def test_a_rejected_rig_counts_more_than_a_signal() -> None:
+    """SIGTERM is exit 0 and Ctrl-C 130, but a check that failed is exit 4 in any case."""
+    assert [exit_code(Verdict.GOOD, is_interrupted=each) for each in (False, True)] == [0, 130]
+    assert [exit_code(Verdict.REJECT, is_interrupted=each) for each in (False, True)] == [4, 4]
+
+
+def _parsed(*words: str | Path) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    parser.add_argument("--json", action="store_true")
+    return parser.parse_args([*map(str, words)])
+
+
+def test_a_live_session_is_repeated_with_all_its_options() -> None:
+    """What a shell would take apart is quoted; what only cameras need is left out. Where the earlier calibration is replaced, it holds the pictures: no command."""
+    words = ["--live", "--camera", "browser:", "--no-sound", "--views", "9", "--link", "ipc://x", "--link", "ipc://y"]
+    kept = [
+        "--board",
+        "9x6",
+        "--square",
+        "120px*0.1794mm",
+        "--baseline",
+        "80mm",
+        "--from",
+        "old rig.yaml",
+        "--pose-only",
+    ]
+    kept += ["--export", "ros", "--export", "kalibr", "--board-side", "right", "--max-megapixels", "20"]
+    options = _parsed(*words, *kept, "--out", "new rig.yaml")
+    told = shlex.split(command_again(options, "my views/left", "right"))
+    assert told[:4] == ["phone-host", "calibrate", "my views/left", "right"]
+    assert vars(_parsed(*told[2:])) == vars(_parsed("my views/left", "right", *kept, "--out", "new rig.yaml"))
+    assert command_again(_parsed("--live", "--from", "rig.yaml", "--out", "rig.yaml"), "l", "r") == ""

@@ -89,11 +89,43 @@ def test_a_ruler_of_100_mm_lies_beside_the_board() -> None:
     assert bottom < sheet.height_mm - 4.8
 
 
+@pytest.mark.parametrize("paper", list(Paper))
+@pytest.mark.parametrize("shape", [(10, 8), (8, 10)])
+def test_a_mat_says_what_it_is_though_it_fills_the_paper(paper: Paper, shape: tuple[int, int]) -> None:
+    """Name, ruler and "print at 100 %" stand where there is room, run to no edge that printers leave blank, and cover no square. What has no ruler is measured itself."""
+    sheet = marked_sheet(
+        MarkedBoard(Chessboard(*shape, 25.0), 18.0, Family.ARUCO_5X5), paper, "mat, named", "calibrate it"
+    )
+    left, upper = (sheet.width_mm - shape[0] * 25) / 2, (sheet.height_mm - shape[1] * 25) / 2
+    rulers = [each for each in sheet.rectangles if max(each.width_mm, each.height_mm) == 100]
+    assert len(rulers) == (2 if paper is Paper.A3 else 1)
+    side = "wide" if shape[0] > shape[1] else "high"
+    assert sheet.check == (
+        "both rulers: 100 mm" if paper is Paper.A3 else f"the ruler, 100 mm, and the board, 250 mm {side}"
+    )
+    page = pypdfium2.PdfDocument(pdf(sheet))[0]
+    text = page.get_textpage()
+    said = "".join(text.get_text_bounded().split())
+    for words in (f"measure {sheet.check}", "mat, named", "print at 100 %, not fitted to the page; then: calibrate it"):
+        assert "".join(words.split()) in said
+    for index in range(text.count_chars()):
+        x0, y0, x1, y1 = (each * 25.4 / 72 for each in text.get_charbox(index))
+        assert 4.6 < x0 <= x1 < sheet.width_mm - 4.6
+        assert 4.6 < y0 <= y1 < sheet.height_mm - 4.6
+        assert x1 < left or x0 > sheet.width_mm - left or y1 < upper or y0 > sheet.height_mm - upper
+
+
+def test_a_board_without_room_beside_it_is_measured_itself() -> None:
+    """10x7 squares of 28 mm on A4 leave 8.5 and 7 mm."""
+    sheet = chessboard_sheet(Chessboard(10, 7, 28.0), Paper.A4)
+    assert (sheet.check, sheet.words) == ("the board: 280 x 196 mm", ())
+
+
 def test_the_pdf_says_in_words_what_it_is() -> None:
     """A reader gets the text: the ruler's length, the board, and the command; and is asked not to fit the page."""
     file = pdf(chessboard_sheet(Chessboard(10, 7, 25.0), Paper.A4))
     text = pypdfium2.PdfDocument(file)[0].get_textpage().get_text_bounded()
-    assert "100 mm: measure it" in text
+    assert "measure both rulers: 100 mm" in text
     assert "9x6 inner corners, squares of 25 mm" in text
     assert "phone-host calibrate left right --square 25mm" in text
     assert b"/PrintScaling /None" in file

@@ -43,7 +43,7 @@ _CONTRADICTION_PX: Final = 1.0
 """As in the verdict: real rigs fit to 0.15 to 0.4 px."""
 
 _LARGEST_BOARD_M, _SMALLEST_BOARD_M = 2.0, 0.03
-_BASELINE_OFF: Final = 0.03
+BASELINE_OFF: Final = 0.03
 """A ruler between two lenses is off by less."""
 
 _STRETCHED: Final = 0.01
@@ -223,8 +223,8 @@ def _other_square(session: BoardSession, found: Calibration | DataError) -> Find
         return None
     baseline_m = float(np.linalg.norm(found.rig.t_right_left_m))
     factor = session.baseline_m / baseline_m
-    sigma = 3 * found.baseline_sigma_m / baseline_m
-    if math.isfinite(factor) and abs(factor - 1) > _BASELINE_OFF + sigma:
+    sigma = 3 * found.baseline_sigma_m / baseline_m if math.isfinite(found.baseline_sigma_m) else 0.0
+    if math.isfinite(factor) and abs(factor - 1) > BASELINE_OFF + sigma:
         return Finding(
             mistake=Mistake.SQUARE,
             sentence=(

@@ -16,7 +16,9 @@ _TICK_MM, _LINE_MM = 2.5, 0.2
 _RULER_NEEDS_MM: Final = 10.0
 """Between the pattern and the paper's edge: 4.2 mm that printers leave blank, and the ruler."""
 
-_WORDS_MM: Final = 2.2
+_WORDS_MM, _GAP_MM = 2.2, 0.9
+_LETTER: Final = 0.8
+"""Width of a letter, and a little more than that, in heights of capitals: Helvetica's are 0.55 of the font's size on average."""
 
 
 def largest_square_mm(paper: Paper, columns: int, rows: int, margin_squares: float) -> float:
@@ -80,27 +82,78 @@ def _sheet(board: Chessboard, pattern: list[Rectangle], paper: Paper, what: str,
             "give a smaller --square, fewer squares or a larger --paper",
         )
     rectangles = [replace(each, x_mm=each.x_mm + x, y_mm=each.y_mm + y) for each in pattern]
+    rulers = [
+        edge >= _RULER_NEEDS_MM and from_mm + _RULER_MM <= whole_mm - _MARGIN_MM
+        for edge, from_mm, whole_mm in ((y, x, page_width), (x, y, page_height))
+    ]
+    check = _check(rulers, width, height)
+    told = (f"measure {check}", what, f"print at 100 %, not fitted to the page; then: {then}")
     words = list[Words]()
-    if y >= _RULER_NEEDS_MM:
-        top = page_height - y / 2 - _TICK_MM / 2
-        rectangles += _ruler(x, top, along=True)
-        # Beside the ruler: below it a printer may leave the paper blank.
-        words.append(Words(x + _RULER_MM + 3, top + _TICK_MM, f"{_RULER_MM} mm: measure it. {what}", _WORDS_MM))
-        words.append(
-            Words(x, y / 2 + _WORDS_MM / 2, f"print at 100 %, not fitted to the page; then: {then}", _WORDS_MM)
-        )
-    if x >= _RULER_NEEDS_MM and height >= _RULER_MM:
-        rectangles += _ruler(x / 2 - _TICK_MM / 2, y, along=False)
-    return Sheet(what, page_width, page_height, tuple(rectangles), tuple(words))
+    if rulers[0]:
+        ruler, words = _ruler_and_words((page_width, page_height), (x, y), told)
+        rectangles += ruler
+        if rulers[1]:
+            rectangles += [
+                _turned(each, page_height) for each in _ruler(page_height - y - _RULER_MM, (x - _TICK_MM) / 2)
+            ]
+    elif rulers[1]:
+        # As on a page that lies on its side: words run upwards.
+        ruler, words = _ruler_and_words((page_height, page_width), (y, x), told)
+        rectangles += [_turned(each, page_height) for each in ruler]
+        words = [replace(each, x_mm=each.y_mm, y_mm=page_height - each.x_mm, is_upward=True) for each in words]
+    return Sheet(what, page_width, page_height, check, tuple(rectangles), tuple(words))
 
 
-def _ruler(x_mm: float, y_mm: float, *, along: bool) -> list[Rectangle]:
+def _check(rulers: list[bool], width_mm: float, height_mm: float) -> str:
+    """Say what to measure on the print, both ways: the board itself where it leaves no room for a ruler."""
+    match rulers:
+        case [True, True]:
+            return f"both rulers: {_RULER_MM} mm"
+        case [True, False]:
+            return f"the ruler, {_RULER_MM} mm, and the board, {height_mm:g} mm high"
+        case [False, True]:
+            return f"the ruler, {_RULER_MM} mm, and the board, {width_mm:g} mm wide"
+        case _:
+            return f"the board: {width_mm:g} x {height_mm:g} mm"
+
+
+def _ruler_and_words(
+    page_mm: tuple[float, float], edge_mm: tuple[float, float], told: tuple[str, str, str]
+) -> tuple[list[Rectangle], list[Words]]:
+    """Return a ruler below the board with the first words beside it, where printers leave no paper blank, and the others above the board.
+
+    Args:
+        page_mm: width and height of the page.
+        edge_mm: between the board and the page's edge, beside it and above it.
+        told: the words.
+    """
+    x, y = edge_mm
+    top = page_mm[1] - y / 2 - _TICK_MM / 2
+    height = min(_WORDS_MM, (y - _MARGIN_MM - 2 * _GAP_MM) / 2)
+    lines = [(x + _RULER_MM + 3, top + _TICK_MM, told[0])]
+    lines += [(x, _MARGIN_MM + index * (height + _GAP_MM) + height, text) for index, text in enumerate(told[1:])]
+    return _ruler(x, top), [
+        Words(at, base, text, min(height, (page_mm[0] - _MARGIN_MM - at) / (_LETTER * len(text))))
+        for at, base, text in lines
+    ]
+
+
+def _turned(each: Rectangle, page_mm: float) -> Rectangle:
+    """Turn a rectangle with its page, a quarter clockwise back; `page_mm` is the page's height after it."""
+    return replace(
+        each,
+        x_mm=each.y_mm,
+        y_mm=page_mm - each.x_mm - each.width_mm,
+        width_mm=each.height_mm,
+        height_mm=each.width_mm,
+    )
+
+
+def _ruler(x_mm: float, y_mm: float) -> list[Rectangle]:
     """Return a ruler with a tick every 10 mm; the outer edges of the first and the last tick are exactly its length apart."""
-    found = [Rectangle(0, _TICK_MM - _LINE_MM, _RULER_MM, _LINE_MM)]
+    found = [Rectangle(x_mm, y_mm + _TICK_MM - _LINE_MM, _RULER_MM, _LINE_MM)]
     for at in range(0, _RULER_MM + 1, 10):
         left = min(max(at - _LINE_MM / 2, 0), _RULER_MM - _LINE_MM)
         tick = _TICK_MM if at % 50 == 0 else _TICK_MM * 0.6
-        found.append(Rectangle(left, _TICK_MM - tick, _LINE_MM, tick))
-    if not along:
-        found = [Rectangle(each.y_mm, each.x_mm, each.height_mm, each.width_mm) for each in found]
-    return [replace(each, x_mm=each.x_mm + x_mm, y_mm=each.y_mm + y_mm) for each in found]
+        found.append(Rectangle(x_mm + left, y_mm + _TICK_MM - tick, _LINE_MM, tick))
+    return found

@@ -56,7 +56,8 @@ def _content(sheet: Sheet) -> str:
 
 def _words(words: Words) -> str:
     # The page runs downwards, letters do not: their matrix turns them back.
-    at = f"1 0 0 -1 {words.x_mm:.4f} {words.y_mm:.4f} Tm"
+    turn = "0 -1 -1 0" if words.is_upward else "1 0 0 -1"
+    at = f"{turn} {words.x_mm:.4f} {words.y_mm:.4f} Tm"
     return f"BT /F {words.height_mm / 0.7:.3f} Tf {at} ({_escaped(words.text)}) Tj ET"  # capitals are 0.7 of the size
 
 

@@ -32,12 +32,13 @@ class Rectangle:
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """A line of text: where its base line begins, mm, and how high its letters are, mm."""
+    """A line of text: where its base line begins, mm, how high its letters are, mm, and whether it runs upwards."""
 
     x_mm: float
     y_mm: float
     text: str
     height_mm: float = 3.0
+    is_upward: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +49,7 @@ class Sheet:
         title: what it is, for the file's own title.
         width_mm: of the paper.
         height_mm: of the paper.
+        check: what to measure on the print, in words.
         rectangles: in the order in which they are painted.
         words: over them; ASCII only.
     """
@@ -55,5 +57,6 @@ class Sheet:
     title: str
     width_mm: float
     height_mm: float
+    check: str
     rectangles: tuple[Rectangle, ...]
     words: tuple[Words, ...] = field(default=())

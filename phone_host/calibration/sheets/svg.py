@@ -2,7 +2,7 @@
 
 from html import escape
 
-from phone_host.calibration.sheets.sheet import Sheet
+from phone_host.calibration.sheets.sheet import Sheet, Words
 
 
 def svg(sheet: Sheet) -> str:
@@ -23,8 +23,12 @@ def svg(sheet: Sheet) -> str:
         for each in sheet.rectangles
     ]
     lines += [
-        f'<text x="{each.x_mm:.4f}" y="{each.y_mm:.4f}" font-family="Helvetica, Arial, sans-serif"'
+        f'<text x="{each.x_mm:.4f}" y="{each.y_mm:.4f}"{_turn(each)} font-family="Helvetica, Arial, sans-serif"'
         f' font-size="{each.height_mm / 0.7:.3f}">{escape(each.text)}</text>'
         for each in sheet.words
     ]
     return "\n".join([*lines, "</svg>"]) + "\n"
+
+
+def _turn(words: Words) -> str:
+    return f' transform="rotate(-90 {words.x_mm:.4f} {words.y_mm:.4f})"' if words.is_upward else ""

@@ -9,6 +9,7 @@ from typing import Any
 
 from common.errors import DataError, UnavailableError
 from common.places import Kind, kind_of
+from common.program.commandline import INTERRUPTED
 from common.program.terminal import say
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
@@ -47,8 +48,9 @@ from phone_host.verbs.calibrate.figures import (
     summary,
     unwritten,
 )
+from phone_host.verbs.calibrate.given import require_pictures
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
-from phone_host.verbs.calibrate.importing import export_lines, import_calibration, require_pictures, write_exports
+from phone_host.verbs.calibrate.importing import export_lines, import_calibration, write_exports
 from phone_host.verbs.calibrate.page import session_of_failure, session_of_rig, with_rectified, write_page
 from phone_host.verbs.calibrate.rig_file import replace_rig
 from phone_host.verbs.globs import two_lists
@@ -114,9 +116,15 @@ def run(options: argparse.Namespace) -> int:
     said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
     again = [] if live is None else live.as_lines(options)
     _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported, *again])
-    if live is not None and live.stopped_with is not None:
-        return live.stopped_with
-    return _CHECK_FAILED if judgement.verdict is Verdict.REJECT else 0
+    # Asked only now: Ctrl-C may have come while the rig was computed.
+    return exit_code(judgement.verdict, is_interrupted=live is not None and live.signals.interrupted)
+
+
+def exit_code(verdict: Verdict, *, is_interrupted: bool) -> int:
+    """Return with what the command ends: a check that failed counts more than a signal."""
+    if verdict is Verdict.REJECT:
+        return _CHECK_FAILED
+    return INTERRUPTED if is_interrupted else 0
 
 
 def _calibrated(

@@ -23,6 +23,7 @@ from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.stereo.working import chosen_scale
 from phone_host.verbs.calibrate.importing import REFUSED
+from phone_host.verbs.calibrate.rig_file import earlier_words
 
 _WHOLE_METRES = 10.0
 """From here on a limit in tenths of a metre says nothing."""
@@ -152,7 +153,9 @@ def _sigmas(rig: Rig) -> dict[str, Any]:
         for side, at in (("left", 0), ("right", 12))
     }
     pose = {"rotation_deg": np.degrees(sigmas[24:27]), "translation_mm": sigmas[27:] * 1e3}
-    rounded = {key: [float(f"{each:.4g}") if math.isfinite(each) else None for each in row] for key, row in pose.items()}
+    rounded = {
+        key: [float(f"{each:.4g}") if math.isfinite(each) else None for each in row] for key, row in pose.items()
+    }
     return cameras | rounded
 
 
@@ -187,11 +190,7 @@ def pairing_notes(files: ViewFiles) -> list[str]:
 
 def unwritten(report: dict[str, Any], out: Path) -> list[str]:
     """Say that there is no new rig, and where the earlier one is."""
-    return [f"{out} was not written{_earlier(report)}", f"look at {report['page']}"]
-
-
-def _earlier(report: dict[str, Any]) -> str:
-    return f"; the earlier one is now {report['earlier_rig']}" if "earlier_rig" in report else ""
+    return [f"{out} was not written{earlier_words(report)}", f"look at {report['page']}"]
 
 
 def _sigma_mm(sigma_m: float) -> str:
@@ -265,7 +264,7 @@ def _lens_rows(calibration: Calibration) -> list[str]:
 def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> list[str]:
     if calibration.rectification is None:
         return unwritten(report, out)
-    rows = [f"written to {out} and {out.with_name('report.json')}{_earlier(report)}", f"look at {report['page']}"]
+    rows = [f"written to {out} and {out.with_name('report.json')}{earlier_words(report)}", f"look at {report['page']}"]
     if report["verdict"] == REJECTED:
         rows.append(REFUSED)
     return rows

@@ -2,26 +2,30 @@
 
 import argparse
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from common.errors import SettingsError, UnavailableError
+from common.errors import DataError, SettingsError, UnavailableError
 from common.imagesize.head import size_text
-from common.places import Kind, kind_of, make_folder, resolved
+from common.places import Kind, kind_of, resolved
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
+from phone_host.calibration.causes.name import BASELINE_OFF
 from phone_host.declared_settings import NEAR_M
-from phone_host.model import Rectification, Rig
+from phone_host.model import Rectification, Rig, Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import Imported, RigKind, export_texts, import_rig
-from phone_host.output.rig_yaml import REJECTED, is_rig, write_rig
+from phone_host.output.rig_yaml import REJECTED, is_rig, read_rig_views
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
+from phone_host.verbs.calibrate.given import require_import_alone
+from phone_host.verbs.calibrate.rig_file import earlier_words, replace_rig
 from phone_host.verbs.output_folders import claim_names, drop_page, keep_other_report, require_file, unwritable
-from phone_host.verbs.units import length_mm
+from phone_host.verbs.units import baseline_mm, length_mm
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 
@@ -32,44 +36,20 @@ _OF_RECTIFIED: Final = frozenset({RigKind.MIDDLEBURY.value, RigKind.KITTI.value}
 REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
 
 
-def require_pictures(options: argparse.Namespace) -> None:
-    """Check that a calibration from pictures has some or takes them, and nothing that belongs to --import or to --live alone.
-
-    Raises:
-        SettingsError: they are missing, or an option has no meaning.
-    """
-    if not options.images and not options.live:
-        raise SettingsError(
-            "neither pictures nor --live nor --import is given",
-            "give LEFT RIGHT --square 25mm, --live --camera URI --square 25mm, or --import FILE",
-        )
-    for name in () if options.live else ("link", "camera", "snapshots"):
-        if getattr(options, name) is not None:
-            raise SettingsError(f"--{name} without --live", "add --live to take the pictures now, or leave it out")
-    for name in ("unit", "size"):
-        if getattr(options, name) is not None:
-            raise SettingsError(f"--{name} without --import", "leave it out")
-
-
 def import_calibration(options: argparse.Namespace) -> int:
     """Read, check and write a calibration of another program."""
-    given = {
-        "board": options.board,
-        "square": options.square,
-        "from": options.earlier,
-        "pose-only": options.pose_only or None,
-        "live": options.live or None,
-    }
-    idle = [name for name, value in given.items() if value is not None]
-    if options.images or idle:
-        what = f"--{idle[0]}" if idle else "pictures"
-        raise SettingsError(f"--import and {what} contradict each other", "give pictures of a board, or --import")
+    require_import_alone(options)
     require_file(options.out)
     found = import_rig(tuple(options.imported), _unit_m(options.unit), _sizes_px(options.size))
+    _require_baseline(found.rig, options.baseline)
+    side = Side(options.board_side or found.rig.board_side.value)
     rectification = rectify_rig(found.rig)
     same = resolved(options.out) in {resolved(path) for path in found.files}
     if same and found.kind is not RigKind.RIG:
         raise SettingsError(f"--out {options.out} is the file that is imported", "name another --out")
+    if same and side is not found.rig.board_side:
+        raise SettingsError(f"--board-side {side.value} would change {options.out}", "name another --out")
+    found = replace(found, rig=_on_side(found.rig, side))
     report = _report(found)
     if not same:
         _require_own(options.out)
@@ -79,22 +59,41 @@ def import_calibration(options: argparse.Namespace) -> int:
     report |= write_exports(options, found.rig, rectification, found.files)
     if not same:
         try:
-            make_folder(options.out.parent)
-            write_rig(options.out, found.rig, rectification)
+            views = read_rig_views(found.files[0]) if found.kind is RigKind.RIG else None
+            report |= replace_rig(options.out, found.rig, rectification, views)
             write_text(options.out.with_name(_REPORT), json_text(report, indent=2) + "\n")
         except OSError as error:
             raise unwritable(options.out, error) from error
     if options.json:
         print(json_text(report))
     else:
-        say(
-            [
-                *_lines(found, report),
-                *export_lines(report, rectification),
-                *([] if same else [f"written to {options.out}"]),
-            ]
-        )
+        written = [] if same else [f"written to {options.out}{earlier_words(report)}"]
+        say([*_lines(found, report), *export_lines(report, rectification), *written])
     return 0
+
+
+def _require_baseline(rig: Rig, measured: str | None) -> None:
+    """Compare the imported baseline with what a ruler says.
+
+    Raises:
+        DataError: they differ by more than a ruler is off.
+    """
+    if measured is None:
+        return
+    measured_mm, imported_mm = baseline_mm(measured), float(np.linalg.norm(rig.t_right_left_m)) * 1e3
+    if abs(measured_mm / imported_mm - 1) > BASELINE_OFF:
+        raise DataError(
+            f"the imported cameras are {imported_mm:.1f} mm apart, and you measured {measured_mm:.1f} mm",
+            "say with --unit what 1 in the file's lengths is, or measure again",
+        )
+
+
+def _on_side(rig: Rig, side: Side) -> Rig:
+    """Return the rig with the board's camera on a side; its time offset is of the host's camera against the board's."""
+    if side is rig.board_side:
+        return rig
+    offset = replace(rig.time_offset, offset_ns=-rig.time_offset.offset_ns)
+    return replace(rig, board_side=side, time_offset=offset)
 
 
 def _require_own(out: Path) -> None:
@@ -134,6 +133,7 @@ def _report(found: Imported) -> dict[str, Any]:
         "baseline_mm": round(float(np.linalg.norm(rig.t_right_left_m)) * 1e3, 4),
         "focal_px": {side: [round(float(model.matrix[i, i]), 3) for i in (0, 1)] for side, model in cameras.items()},
         "sizes": {side: f"{model.width_px}x{model.height_px}" for side, model in cameras.items()},
+        "board_side": rig.board_side.value,
         "verdict": rig.verdict or None,
     }
 

@@ -14,7 +14,6 @@ from common.errors import DataError, SettingsError
 from common.link.factory import open_links, parse_link, tell_insecure
 from common.orientation import UPRIGHT
 from common.program import logs
-from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import say
@@ -45,6 +44,7 @@ from phone_host.settings import key_folder, most_pixels
 from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.cause import assessed
 from phone_host.verbs.calibrate.earlier import Asked, Session, calibrated
+from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.hints import arrangement_hint
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_folder, unwritable
@@ -63,13 +63,13 @@ class Live:
         last: its last snapshot.
         left: folder of the left pictures.
         right: folder of the right ones.
-        stopped_with: exit code if a signal ended it; None: it ended by itself.
+        signals: what asked the process to stop, until now.
     """
 
     last: GuideSnapshot
     left: Path
     right: Path
-    stopped_with: int | None
+    signals: StopSignals
 
     @property
     def folders(self) -> tuple[str, str]:
@@ -89,14 +89,9 @@ class Live:
 
     def as_lines(self, options: argparse.Namespace) -> list[str]:
         """Return it for the summary: where the pictures are, and how they are calibrated again."""
-        again = [f"--board {options.board}"] if options.board else []
-        again += [f"--square {options.square}"] if options.square else []
-        again += [f"--from {options.earlier}"] if options.earlier else []
-        again += ["--pose-only"] if options.pose_only else []
-        again += [f"--board-side {options.board_side}"] if options.board_side else []
-        command = " ".join(["phone-host calibrate", *self.folders, *again, f"--out {options.out}"])
-        views = counted(self.last.views, "view")
-        return [f"live     {views} in {self.last.seconds:.0f} s; to calibrate from them again:", f"         {command}"]
+        taken = f"live     {counted(self.last.views, 'view')} in {self.last.seconds:.0f} s"
+        command = command_again(options, *self.folders)
+        return [f"{taken}; to calibrate from them again:", f"         {command}"] if command else [taken]
 
 
 def take_views(options: argparse.Namespace, asked: Asked) -> Live:
@@ -149,8 +144,7 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
         if signals.interrupted:
             raise KeyboardInterrupt
         raise _too_few(last)
-    stopped_with = None if not signals.stop else INTERRUPTED if signals.interrupted else 0
-    return Live(last, settings.left, settings.right, stopped_with)
+    return Live(last, settings.left, settings.right, signals)
 
 
 def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:

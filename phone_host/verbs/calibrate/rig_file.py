@@ -1,6 +1,7 @@
 """rig.yaml as phone-host calibrate writes it: what an earlier one holds, and the new one does not, is moved aside."""
 
 from pathlib import Path
+from typing import Any
 
 from common.errors import DataError
 from common.places import Kind, kind_of, make_folder
@@ -43,6 +44,11 @@ def replace_rig(
     except OSError as error:
         raise unwritable(out, error) from error
     return moved
+
+
+def earlier_words(report: dict[str, Any]) -> str:
+    """Say where the earlier rig is now, behind a sentence on the new one; empty: it was not moved."""
+    return f"; the earlier one is now {report['earlier_rig']}" if "earlier_rig" in report else ""
 
 
 def _is_rejected(path: Path) -> bool:

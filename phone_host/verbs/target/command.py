@@ -121,7 +121,7 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
         )
     marks = "" if options.kind == "chessboard" else f"-{mark:g}mm-{options.family}"
     stem = f"{options.kind}-{size}-{side:g}mm{marks}-{paper.name.lower()}"
-    return _Made(_files(stem, sheet), side, _paper_lines(board, side))
+    return _Made(_files(stem, sheet), side, _paper_lines(board, side, sheet.check))
 
 
 def _usual_mark_mm(side: float) -> float:
@@ -133,10 +133,10 @@ def _files(stem: str, sheet: Sheet) -> dict[str, bytes]:
     return {f"{stem}.pdf": pdf(sheet), f"{stem}.svg": svg(sheet).encode("ascii")}
 
 
-def _paper_lines(board: str, side: float) -> tuple[str, ...]:
+def _paper_lines(board: str, side: float, check: str) -> tuple[str, ...]:
     square = "" if board else f"--square {side:g}mm "
     return (
-        "print it at 100 %, not fitted to the page, and measure the rulers: 100 mm",
+        f"print it at 100 %, not fitted to the page, and measure {check}",
         "glue it to something flat and stiff: glass, acrylic, a picture frame",
         f"then    phone-host calibrate left/ right/ {board}{square}--out rig.yaml",
     )
