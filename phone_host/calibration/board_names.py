@@ -63,6 +63,11 @@ def board_name(board: Board) -> str:
             assert_never(board.marks)
 
 
+def family_name(family: MarkFamily) -> str:
+    """Write a family of marks in words."""
+    return next((f"ArUco {word}" for word, each in _FAMILIES.items() if each is family), "AprilTag 36h11")
+
+
 def no_square() -> SettingsError:
     """Make the error for a chessboard whose square is not known: how to measure it, on paper and on a screen."""
     return SettingsError(

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, TandemError
 from common.imagesize.head import MOST_PIXELS
-from phone_host.calibration.marks_seen import marks_seen
-from phone_host.calibration.target import Corners, shrunk
+from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
+from phone_host.calibration.target import Board, Corners, shrunk
 from phone_host.calibration.threads import side_by_side
 from phone_host.model import Image
 from phone_host.stereo.images import decode_file, open_image, to_grey
@@ -182,9 +182,11 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
         DataError: the images show none, do not agree, or none of them is an image.
     """
     # First: the corners of a ChArUco board look like those of a chessboard, until a hand hides some.
-    marks = marks_seen(side_by_side(lambda path: _small(path, most_pixels), list(_sample(files))[:_MARKED]))
-    if marks:
-        raise DataError(f"these images show no chessboard, but {marks}", "name that board with --board; see --help")
+    marks = _marks_in(files, most_pixels)
+    if marks is not None:
+        raise DataError(
+            f"these images show no chessboard, but {marks.words}", "name that board with --board; see --help"
+        )
     result = _vote_of(files, most_pixels)
     if result.leader is not None:
         return result.leader
@@ -202,7 +204,7 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
 
 
 def require_size(files: ViewFiles, given: Size, most_pixels: int = MOST_PIXELS) -> None:
-    """Check in some images that a board has the size that was given; what cannot be told passes.
+    """Check in some images that a chessboard has the size that was given; what cannot be told passes.
 
     Args:
         files: the pairs of files.
@@ -223,6 +225,24 @@ def require_size(files: ViewFiles, given: Size, most_pixels: int = MOST_PIXELS) 
         f"these boards have {size_text(seen)} inner corners, --board says {size_text(given)}",
         f"give --board {size_text(seen)}, or leave --board out",
     )
+
+
+def require_marks_of(files: ViewFiles, board: Board, most_pixels: int = MOST_PIXELS) -> None:
+    """Check in some images that the marks are those of the board that was given; what cannot be told passes.
+
+    Args:
+        files: the pairs of files.
+        board: the board, with marks.
+        most_pixels: an image that claims more is passed over.
+
+    Raises:
+        SettingsError: the images show another board of marks.
+    """
+    require_marks(_marks_in(files, most_pixels), board)
+
+
+def _marks_in(files: ViewFiles, most_pixels: int) -> SeenMarks | None:
+    return find_marks(side_by_side(lambda path: _small(path, most_pixels), list(_sample(files))[:_MARKED]))
 
 
 def size_text(size: Size) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from common.errors import DataError, SettingsError
 from phone_host.calibration.board_size import Size, Vote, size_text, whole_size_seen
-from phone_host.calibration.marks_seen import marks_seen
+from phone_host.calibration.marks_seen import find_marks, require_marks
 from phone_host.calibration.target import Board, Corners, agree, find_corners, order_by_colour, shrunk
 from phone_host.calibration.threads import side_by_side
 from phone_host.model import Image
@@ -24,6 +24,9 @@ _AROUND: Final = 0.35
 """A board is looked for in its former place, widened by this share of its size."""
 
 _NONE: Final = np.empty((0, 2))
+
+_MARKS_PX: Final = 1280
+"""Longer side of what is searched for marks of any family."""
 
 _PATIENT_LOOKS: Final = 12
 """A board of the given size that is not found so often may have another size."""
@@ -112,13 +115,13 @@ class SizeFinder:
         size = self._vote.leader if self._vote.is_over else None
         if size is None:
             return None
-        if marks := marks_seen([left, right]):
-            raise DataError(f"this is no chessboard: it has {marks}", "name that board with --board; see --help")
+        if marks := find_marks([left, right]):
+            raise DataError(f"this is no chessboard: it has {marks.words}", "name that board with --board; see --help")
         return Board(*size, self._square_m)
 
 
 class SizeCheck:
-    """Notices that a person shows a chessboard of another size than was given.
+    """Notices that a person shows a chessboard of another size than was given, or other marks.
 
     Args:
         board: the board that was given.
@@ -133,10 +136,17 @@ class SizeCheck:
         """Take note of a pair in which the board was not found.
 
         Raises:
-            SettingsError: several pairs show a board of another size.
+            SettingsError: several pairs show a board of another size, or one shows other marks.
         """
         self._looks += 1
-        if self._board.marks is not None or self._looks < _PATIENT_LOOKS:
+        if self._looks < _PATIENT_LOOKS:
+            return
+        if self._board.marks is not None:
+            if self._looks % _PATIENT_LOOKS == 0:  # all families take 0.2 s
+                require_marks(
+                    find_marks([shrunk(grey, min(1.0, _MARKS_PX / max(grey.shape)))[0] for grey in (left, right)]),
+                    self._board,
+                )
             return
         shown = self._finder.find(left, right)
         given: Size = (self._board.columns, self._board.rows)

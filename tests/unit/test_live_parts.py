@@ -12,6 +12,7 @@ import pytest
 from rich.console import Console
 
 from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.calibration.board_names import named_board
 from phone_host.calibration.guide.snapshot import before_board
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target import Board, find_corners
@@ -64,6 +65,17 @@ def test_a_board_of_marks_is_not_taken_for_a_chessboard() -> None:
     assert finder.find(image, image) is None
     with pytest.raises(DataError, match="ArUco 5x5"):
         finder.find(image, image)
+
+
+def test_marks_of_another_board_are_told_while_it_is_shown() -> None:
+    """After twelve looks without a corner the person is not asked for more light: the marks are another family's."""
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_1000)
+    shown = cv2.aruco.CharucoBoard((8, 6), 0.03, 0.022, family).generateImage((640, 480), marginSize=20)
+    check = SizeCheck(named_board("charuco:8x6:30mm:22mm:4x4", None))
+    for _ in range(11):
+        check.missed(shown, shown)
+    with pytest.raises(SettingsError, match="marks of the family ArUco 5x5 and 8x6 squares, --board says charuco:8x6"):
+        check.missed(shown, shown)
 
 
 def test_pictures_replace_those_of_an_earlier_session_only(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Boards with coded marks: corners are found to a tenth of a pixel, a part of the board is enough, and what is hidden is NaN."""
 
+from contextlib import nullcontext
+
 import cv2
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from phone_host.calibration.causes.looks import SeenLook, look_at
 from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSession, name_mistake
 from phone_host.calibration.marked import MarkFamily
+from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
 from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard, marked_rectangles
 from phone_host.calibration.sheets.sheet import Ink
 from phone_host.calibration.target import Board, agree, find_corners
@@ -216,3 +219,66 @@ def test_marks_are_no_glare(board: Board, sheet: tuple[Image, NDArray[np.float64
     look = look_at(image, find_corners(image, board), board)
     assert look.washed < 0.03
     assert 1 < look.edge_px < 3.5
+
+
+@pytest.mark.parametrize(
+    ("sheet", "given", "said"),
+    [
+        (_charuco_sheet(), "charuco:8x6:28mm:20mm:5x5", ""),
+        (_charuco_sheet(), "charuco:8x9:28mm:20mm:5x5", ""),  # the last rows may be hidden
+        (
+            _charuco_sheet(),
+            "charuco:8x5:28mm:20mm:5x5",
+            "ArUco 5x5 and 8x6 squares, .*: give --board charuco:8x6:28mm:20mm:5x5",
+        ),
+        (_charuco_sheet(), "charuco:10x6:28mm:20mm:5x5", "and 8x6 squares, --board says charuco:10x6:28mm:20mm:5x5"),
+        (_charuco_sheet(), "charuco:6x8:28mm:20mm:5x5", "and 8x6 squares"),
+        (
+            _charuco_sheet(),
+            "charuco:8x6:28mm:20mm:4x4",
+            "ArUco 5x5 and 8x6 squares, .*: give --board charuco:8x6:28mm:20mm:5x5",
+        ),
+        (_charuco_sheet(), "aprilgrid:6x6:30mm:9mm", "5x5 and 8x6 squares, .*: give --board charuco:8x6:25mm:18mm:5x5"),
+        (_grid_sheet(2, upward=True), "aprilgrid:5x4:30mm:9mm", ""),
+        (
+            _grid_sheet(1, upward=False),
+            "aprilgrid:4x5:30mm:9mm",
+            "AprilTag 36h11 and 5x4 tags, .*: give --board aprilgrid:5x4",
+        ),
+        (_grid_sheet(2, upward=True), "charuco:8x6:28mm:20mm:4x4", "marks of the family AprilTag 36h11 and 5x4 tags"),
+    ],
+)
+def test_other_marks_than_the_named_board_has_are_told(
+    sheet: tuple[Image, NDArray[np.float64]], given: str, said: str
+) -> None:
+    """Family and size are read from the marks; a board that fits, or of which the last rows are not seen, passes."""
+    seen = find_marks([None, _seen(*sheet)[0]])
+    with pytest.raises(SettingsError, match=said) if said else nullcontext():
+        require_marks(seen, named_board(given, None))
+
+
+def test_few_marks_tell_the_family_alone() -> None:
+    """Four marks of the upper left corner do not tell where rows end; without marks, or for a chessboard, nothing is said."""
+    image = _seen(*_charuco_sheet())[0]
+    part = np.full_like(image, 128)
+    part[:360, :450] = image[:360, :450]
+    seen = find_marks([part])
+    assert seen is not None
+    assert 3 <= len(seen.middles_px[0]) < 6
+    require_marks(seen, named_board("charuco:12x6:28mm:20mm:5x5", None))
+    with pytest.raises(
+        SettingsError, match=r"family ArUco 5x5, --board says .*: give --board charuco:COLUMNSxROWS:28mm"
+    ):
+        require_marks(seen, named_board("charuco:8x6:28mm:20mm:6x6", None))
+    require_marks(None, _CHARUCO)
+    require_marks(seen, Board(9, 6, 0.025))
+    assert find_marks([None, np.full((48, 64), 99, np.uint8)]) is None
+
+
+def test_marks_in_no_order_tell_no_size() -> None:
+    """Marks in one row, or strewn at random, fit no board: nothing is said of their size."""
+    random = np.random.default_rng(3)
+    strewn = {number: random.uniform(0, 640, 2) for number in range(20)}
+    row = {number: np.array([50.0 * number, 10.0]) for number in range(8)}
+    for middles in (strewn, row):
+        require_marks(SeenMarks(MarkFamily.ARUCO_5X5, (middles,)), named_board("charuco:10x8:25mm:18mm:5x5", None))

@@ -16,9 +16,9 @@ _TICK_MM, _LINE_MM = 2.5, 0.2
 _RULER_NEEDS_MM: Final = 10.0
 """Between the pattern and the paper's edge: 4.2 mm that printers leave blank, and the ruler."""
 
-_WORDS_MM, _GAP_MM = 2.2, 0.9
-_LETTER: Final = 0.8
-"""Width of a letter, and a little more than that, in heights of capitals: Helvetica's are 0.55 of the font's size on average."""
+_WORDS_MM, _GAP_MM = 2.2, 1.2
+_LETTER: Final = 0.72
+"""Width of a letter, and a little more than that, in heights of capitals: those of the longest line are 0.63 of it on average."""
 
 
 def largest_square_mm(paper: Paper, columns: int, rows: int, margin_squares: float) -> float:

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from common.errors import DataError
 from phone_host.calibration.board_names import named_board, no_square
-from phone_host.calibration.board_size import require_size, size_in_files, size_text
+from phone_host.calibration.board_size import require_marks_of, require_size, size_in_files, size_text
 from phone_host.calibration.marked import Charuco
 from phone_host.calibration.target import Board
 from phone_host.run.progress_bar import busy_bar
@@ -114,6 +114,7 @@ def board_in(files: ViewFiles, named: Named, most_pixels: int) -> Known:
     with busy_bar("looking at the board"):
         if named.board is not None:
             if named.board.marks is not None:
+                require_marks_of(files, named.board, most_pixels)
                 return Known(named.board, Origin.OPTION)
             require_size(files, (named.board.columns, named.board.rows), most_pixels)
             return Known(named.board, Origin.OPTION)
