@@ -100,13 +100,6 @@ class BundleResult:
     right_errors_px: Vector
     covariance: Vector = field(default_factory=lambda: np.full((GLOBALS, GLOBALS), np.nan))
 
-    @property
-    def baseline_sigma_m(self) -> float:
-        """Standard deviation of the baseline that the corners' noise leaves, m."""
-        direction = self.state.translation_m / np.linalg.norm(self.state.translation_m)
-        variance = float(direction @ self.covariance[-3:, -3:] @ direction)
-        return float(np.sqrt(max(variance, 0.0)))
-
     def rms_px(self) -> float:
         """Return the root mean square distance of all corners of both cameras, px (counted like OpenCV's stereoCalibrate)."""
         return rms_px(self.left_errors_px, self.right_errors_px)

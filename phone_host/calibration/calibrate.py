@@ -364,7 +364,7 @@ def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibrat
         used=used,
         rejected=tuple(fitted.rejected),
         vertical_px=np.abs(np.concatenate(vertical)),
-        baseline_sigma_m=result.baseline_sigma_m,
+        baseline_sigma_m=rig.baseline_sigma_m,
         tilts_deg=np.array([_tilt_deg(pose) for pose in state.poses]),
         spread=min(
             _spread([corners_of(pair, side) for pair in pairs], (model.width_px, model.height_px))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.calibration.corner_fit import fit_corners
+from phone_host.calibration.small_picture import shrunk
 from phone_host.model import Image
 
 Corners = NDArray[np.float64]
@@ -79,12 +80,7 @@ def find_marked(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
     Returns:
         (columns * rows, 2) px, row by row, NaN where one is not seen; (0, 2) if fewer than eight are.
     """
-    scale = min(1.0, _SEARCHED_PX / max(grey.shape))
-    small = grey
-    if scale < 1:
-        size = (round(grey.shape[1] * scale), round(grey.shape[0] * scale))
-        small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.uint8)
-    factors = np.array([small.shape[1] / grey.shape[1], small.shape[0] / grey.shape[0]])
+    small, factors = shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))
     rough, share = (
         (_charuco(small, columns, rows, marks), 1 - marks.mark_share)
         if isinstance(marks, Charuco)

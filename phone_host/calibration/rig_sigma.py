@@ -54,13 +54,6 @@ def depth_sigma_m(rig: Rig, rectification: Rectification, depth_m: float) -> flo
     return depth_m**2 / (geometry.focal_px * geometry.baseline_m) * sigma_px
 
 
-def baseline_sigma_m(rig: Rig) -> float:
-    """Return the standard uncertainty of the baseline, m; NaN if the covariance is not known."""
-    direction = rig.t_right_left_m / np.linalg.norm(rig.t_right_left_m)
-    variance = float(direction @ rig.covariance[-3:, -3:] @ direction)
-    return float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else float("nan")
-
-
 def _disparity_sigma_px(rig: Rig, rectification: Rectification, depth_m: float) -> float:
     if not np.isfinite(rig.covariance).all():
         return float("nan")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from common.errors import SettingsError
 from phone_host.calibration.corner_fit import FittedCorners, fit_corners, steps_between
 from phone_host.calibration.marked import AprilGrid, Marks, find_marked, plan_of
+from phone_host.calibration.small_picture import shrunk
 from phone_host.model import Image
 from phone_host.stereo.images import to_grey
 
@@ -223,20 +224,6 @@ def _is_chessboard(fitted: FittedCorners, board: Board) -> bool:
     turns = (-1.0) ** np.add.outer(np.arange(board.rows), np.arange(board.columns)).ravel()
     is_light = fitted.contrast * turns > 0
     return bool(fitted.are_sure().all() and (is_light.all() or not is_light.any()))
-
-
-def shrunk(grey: Image, scale: float) -> tuple[Image, NDArray[np.float64]]:
-    """Return an image at a smaller size, and by what its columns and rows were really multiplied.
-
-    Args:
-        grey: (H, W) uint8.
-        scale: 0 to 1; 1 gives the image itself.
-    """
-    if scale == 1.0:
-        return grey, np.ones(2)
-    size = (max(1, round(grey.shape[1] * scale)), max(1, round(grey.shape[0] * scale)))
-    small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    return small, np.array([size[0] / grey.shape[1], size[1] / grey.shape[0]])
 
 
 def _brightness(grid: Corners, column: int, grey: Image) -> float:

@@ -141,10 +141,3 @@ class SE3:
     def apply(self, points_m: Floats) -> Floats:
         """Return moved points, (..., 3), m."""
         return np.asarray(points_m @ self.R.T + self.t_m, np.float64)
-
-    def adjoint(self) -> Floats:
-        """Return the (6, 6) matrix that takes twists in the axes of b to those of a, for T_a_b; covariances go as A C A^T."""
-        result = np.zeros((6, 6))
-        result[:3, :3] = result[3:, 3:] = self.R
-        result[3:, :3] = cross_matrices(self.t_m) @ self.R
-        return result

@@ -70,7 +70,7 @@ class Picture(Redrawn):
 
     def __init__(self, console: Console | None = None, *, rings: bool = False) -> None:
         super().__init__(console)
-        self._rings = rings
+        self.rings = rings
         self._views = 0
         self._shown_ns = 0
 
@@ -85,7 +85,7 @@ class Picture(Redrawn):
         parts += [Part(2, Text(line)) for line in figure_lines(snapshot)]
         parts += [Part(4, Text(snapshot.remedy, style="dim"))] if snapshot.remedy else []
         parts += [Part(3, Text(line, no_wrap=True)) for line in picture_lines(snapshot)]
-        self.draw(parts, rings=self._rings and len(views) > self._views)
+        self.draw(parts, rings=self.rings and len(views) > self._views)
         self._views = len(views)
 
 

@@ -19,7 +19,7 @@ class Newest(Generic[T]):
         self._work = work
         self._changed = threading.Condition()
         self._waiting: list[T] = []
-        self._is_busy = self._is_ending = False
+        self._is_ending = False
         self.failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -29,12 +29,6 @@ class Newest(Generic[T]):
         with self._changed:
             self._waiting = [thing]
             self._changed.notify_all()
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether something is worked on, or waits to be."""
-        with self._changed:
-            return self._is_busy or bool(self._waiting)
 
     def finish(self, patience_s: float | None = None) -> None:
         """Finish what was handed over, then end.
@@ -50,15 +44,12 @@ class Newest(Generic[T]):
     def _run(self) -> None:
         while True:
             with self._changed:
-                self._is_busy = False
                 self._changed.wait_for(lambda: bool(self._waiting) or self._is_ending)
                 if not self._waiting or self.failure is not None:
                     return
-                self._is_busy, thing = True, self._waiting.pop()
+                thing = self._waiting.pop()
             try:
                 self._work(thing)
             except Exception as error:  # noqa: BLE001 - a thread's root: the live root reports it once
                 self.failure = error
-                with self._changed:
-                    self._is_busy = False
                 return

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from typing import Final
 
 from phone_host.live.newest import Newest
@@ -21,10 +22,11 @@ class Voice:
 
     Args:
         command: of the speech program.
+        failed: called once, in another thread, with the reason, if the program cannot be started. Then nothing is spoken any more.
     """
 
-    def __init__(self, command: tuple[str, ...]) -> None:
-        self._command = command
+    def __init__(self, command: tuple[str, ...], failed: Callable[[OSError], None]) -> None:
+        self._command, self._failed = command, failed
         self._words = Newest[str]("voice", self._speak)
 
     def say(self, words: str) -> None:
@@ -37,7 +39,11 @@ class Voice:
 
     def _speak(self, words: str) -> None:
         quiet = subprocess.DEVNULL
-        process = subprocess.Popen([*self._command, words], stdin=quiet, stdout=quiet, stderr=quiet)
+        try:
+            process = subprocess.Popen([*self._command, words], stdin=quiet, stdout=quiet, stderr=quiet)
+        except OSError as error:
+            self._failed(error)
+            raise
         try:
             process.wait(_LONGEST_S)
         except subprocess.TimeoutExpired:

@@ -131,6 +131,12 @@ class Rig:
         """Whether its own calibration found it unfit."""
         return self.verdict == REJECTED
 
+    @property
+    def baseline_sigma_m(self) -> float:
+        """Standard uncertainty of the baseline, m; NaN = not measured."""
+        direction = self.t_right_left_m / np.linalg.norm(self.t_right_left_m)
+        return float(np.sqrt(np.maximum(direction @ self.covariance[-3:, -3:] @ direction, 0.0)))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rectification:

@@ -34,15 +34,13 @@ def write_sigmas(storage: cv2.FileStorage, rig: Rig) -> None:
     if not np.isfinite(rig.covariance).all():
         return
     sigmas = np.sqrt(np.diag(rig.covariance).clip(min=0))
-    direction = rig.t_right_left_m / np.linalg.norm(rig.t_right_left_m)
     storage.writeComment("standard uncertainties: px, coefficients, rad, m; 0: not estimated")
     for key, at, count in (("1", 0, rig.left.distortion.size), ("2", 12, rig.right.distortion.size)):
         storage.write(f"sigma_M{key}", sigmas[at : at + 4].reshape(1, -1))
         storage.write(f"sigma_D{key}", sigmas[at + 4 : at + 4 + min(count, 8)].reshape(1, -1))
     storage.write("sigma_R", sigmas[24:27].reshape(3, 1))
     storage.write("sigma_T", sigmas[27:].reshape(3, 1))
-    variance = float(direction @ rig.covariance[-3:, -3:] @ direction)
-    storage.write("sigma_baseline", float(np.sqrt(max(variance, 0.0))))
+    storage.write("sigma_baseline", rig.baseline_sigma_m)
     storage.write("covariance", rig.covariance)
 
 

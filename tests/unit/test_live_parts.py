@@ -24,6 +24,7 @@ from phone_host.live.voice import Voice, speech_program
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.command import exit_code, run
 from phone_host.verbs.calibrate.given import command_again
+from phone_host.verbs.calibrate.live import ring_instead
 from tests.support.boards import BOARD, poses, render_pair
 from tests.support.programs import until
 from tests.support.rigs import small_rig
@@ -109,9 +110,8 @@ def test_only_the_newest_thing_is_worked_on() -> None:
     begun.wait(60)
     for number in (2, 3):
         newest.offer(number)
-    assert newest.is_busy
     go.set()
-    until(lambda: not newest.is_busy, "the third")
+    until(lambda: seen == [1, 3], "the third")
     newest.offer(4)
     newest.finish()
     assert seen == [1, 3, 4]
@@ -126,12 +126,30 @@ def test_words_are_spoken_by_the_systems_program(tmp_path: Path, monkeypatch: py
     script.write_text(f'#!/bin/sh\necho "$1" >> {tmp_path}/said\n')
     script.chmod(0o755)
     assert speech_program() == ("espeak-ng",)
-    voice = Voice(speech_program())
+    failed = list[OSError]()
+    voice = Voice(speech_program(), failed.append)
     spoken = Spoken(voice.say)
     for _ in range(2):
         spoken.show(before_board("hold still", 25, 1.0), (), "")
     voice.finish()
     assert (tmp_path / "said").read_text() == "hold still\n"
+    assert not failed
+
+
+def test_the_bell_rings_where_the_speech_program_does_not_start(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A program for another machine: that is told once, whatever else is to be said, and the bell takes its place."""
+    (tmp_path / "espeak-ng").write_bytes(b"\x7fELF")
+    (tmp_path / "espeak-ng").chmod(0o755)
+    picture = Picture(Console(file=io.StringIO()))
+    voice = Voice((str(tmp_path / "espeak-ng"),), lambda reason: ring_instead(picture, "espeak-ng", reason))
+    voice.say("hold still")
+    until(lambda: picture.rings, "the bell")
+    voice.say("closer")
+    voice.finish()
+    assert caplog.text.count("voice_off program=espeak-ng") == 1
+    assert "the terminal's bell rings instead" in caplog.text
 
 
 def test_lines_are_written_when_they_are_new(capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,15 +43,6 @@ def test_motions_are_a_group(one: np.ndarray, other: np.ndarray, point: np.ndarr
         np.testing.assert_allclose(SE3.exp(first.log()).apply(point), first.apply(point), atol=1e-8)
 
 
-@given(twists, twists)
-def test_the_adjoint_moves_twists(one: np.ndarray, twist: np.ndarray) -> None:
-    """T exp(x) = exp(Ad x) T."""
-    motion, small = SE3.exp(one), twist * 0.1
-    left, right = motion @ SE3.exp(small), SE3.exp(motion.adjoint() @ small) @ motion
-    np.testing.assert_allclose(left.R, right.R, atol=1e-10)
-    np.testing.assert_allclose(left.t_m, right.t_m, atol=1e-10)
-
-
 def test_cross_matrices_multiply_like_cross_products() -> None:
     """For stacks of vectors."""
     random = np.random.default_rng(0)

@@ -1,6 +1,7 @@
 """phone-host calibrate --live: takes the views with both cameras, guides the person, then leaves the pictures to `calibrate`."""
 
 import argparse
+import logging
 import math
 import sys
 from collections.abc import Sequence
@@ -49,6 +50,8 @@ from phone_host.verbs.calibrate.hints import arrangement_hint
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_folder, unwritable
 from phone_host.verbs.units import baseline_mm
+
+_LOG = logging.getLogger(__name__)
 
 _LEAST_VIEWS, _MOST_VIEWS = 3, 99
 _WAITED_NS: Final = 1_000_000_000
@@ -241,15 +244,16 @@ def _run(live: LiveCalibration, options: argparse.Namespace, signals: StopSignal
     is_terminal = sys.stderr.isatty()
     with ExitStack() as ending:
         shows: list[Shows] = []
+        picture = Picture(rings=options.sound and not command)
         if command:
-            voice = Voice(command)
+            voice = Voice(command, lambda reason: ring_instead(picture, command[0], reason))
             ending.callback(voice.finish)
             shows.append(Spoken(voice.say))
         if options.snapshots is not None:
             shows.append(SnapshotFiles(options.snapshots))
         if is_terminal:
             tell_sides()
-            shows.append(ending.enter_context(Picture(rings=options.sound and not command)))
+            shows.append(ending.enter_context(picture))
         else:
             shows.append(Lines())
 
@@ -260,6 +264,13 @@ def _run(live: LiveCalibration, options: argparse.Namespace, signals: StopSignal
 
         live.run(lambda: signals.stop, show)
         show()
+
+
+def ring_instead(picture: Picture, program: str, reason: OSError) -> None:
+    """Let the bell tell of views where the speech program does not start, and say so."""
+    picture.rings = True
+    remedy = "the terminal's bell rings instead; install espeak-ng, or give --no-sound"
+    _LOG.error(logs.event("voice_off", program=program, reason=reason.strerror, remedy=remedy))
 
 
 def _note(live: LiveCalibration, named: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from phone_host.calibration.rig_sigma import baseline_sigma_m, depth_sigma_m
+from phone_host.calibration.rig_sigma import depth_sigma_m
 from phone_host.geometry.se3 import vectors_of
 from phone_host.model import Rig
 from phone_host.output.rig_yaml import read_rig
@@ -206,7 +206,7 @@ def _errors(path: Path, truth: Rig) -> Errors | None:
     baselines = [float(np.linalg.norm(each.t_right_left_m)) for each in (found, truth)]
     return Errors(
         baseline_m=baselines[0] - baselines[1],
-        baseline_sigma_m=baseline_sigma_m(found),
+        baseline_sigma_m=found.baseline_sigma_m,
         turn_rad=float(np.linalg.norm(vectors_of(found.R_right_left @ truth.R_right_left.T))),
         turn_sigma_rad=float(np.sqrt(np.trace(found.covariance[_TURN, _TURN]))),
         depth_m=depth_error_m(found, truth, _AWAY_M),
