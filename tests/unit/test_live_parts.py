@@ -71,7 +71,8 @@ def test_a_board_of_marks_is_not_taken_for_a_chessboard() -> None:
 def test_marks_of_another_board_are_told_while_it_is_shown() -> None:
     """After twelve looks without a corner the person is not asked for more light: the marks are another family's."""
     family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_1000)
-    shown = cv2.aruco.CharucoBoard((8, 6), 0.03, 0.022, family).generateImage((640, 480), marginSize=20)
+    board = cv2.aruco.CharucoBoard((8, 6), 0.03, 0.022, family)
+    shown = np.asarray(board.generateImage((640, 480), marginSize=20), np.uint8)
     check = SizeCheck(named_board("charuco:8x6:30mm:22mm:4x4", None))
     for _ in range(11):
         check.missed(shown, shown)

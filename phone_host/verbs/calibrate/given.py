@@ -20,7 +20,7 @@ class _Given:
     """An option as it was given: where argparse keeps it, its name, and all its words."""
 
     dest: str
-    name: str
+    option: str
     words: tuple[str, ...]
 
 
@@ -50,9 +50,9 @@ def require_pictures(options: argparse.Namespace) -> None:
         )
     for each in _given(options):
         if each.dest in _OF_LIVE and not options.live:
-            raise SettingsError(f"{each.name} without --live", "add --live to take the pictures now, or leave it out")
+            raise SettingsError(f"{each.option} without --live", "add --live to take the pictures now, or leave it out")
         if each.dest in _OF_IMPORT:
-            raise SettingsError(f"{each.name} without --import", "leave it out")
+            raise SettingsError(f"{each.option} without --import", "leave it out")
 
 
 def require_import_alone(options: argparse.Namespace) -> None:
@@ -61,10 +61,10 @@ def require_import_alone(options: argparse.Namespace) -> None:
     Raises:
         SettingsError: an option, or a folder of pictures.
     """
-    idle = ["pictures"] if options.images else []
-    idle += [each.name for each in _given(options) if each.dest not in _WITH_IMPORT]
-    if idle:
-        raise SettingsError(f"--import and {idle[0]} contradict each other", "give pictures of a board, or --import")
+    given = ["pictures"] if options.images else []
+    given += [each.option for each in _given(options) if each.dest not in _WITH_IMPORT]
+    for option in given:
+        raise SettingsError(f"--import and {option} contradict each other", "give pictures of a board, or --import")
 
 
 def command_again(options: argparse.Namespace, left: str, right: str) -> str:
