@@ -106,7 +106,7 @@ def _squares(found: SessionRig) -> list[_Row]:
 
 
 def _far(found: SessionRig) -> list[_Row]:
-    if not math.isfinite(found.far_m):
+    if not (math.isfinite(found.far_m) and math.isfinite(found.rig.zero_sigma_px)):
         return []
     words = f"{found.far_m:.3g} m (infinity ± {found.rig.zero_sigma_px:.2f} px)"
     return [("far limit", words, _DASH, _DASH)]

@@ -154,7 +154,7 @@ def test_what_is_not_known_of_a_rig_is_left_out() -> None:
     assert shown.found is not None
     rig = replace(shown.found.rig, covariance=np.full((30, 30), np.nan), zero_sigma_px=math.nan)
     depths = tuple((depth_m, math.nan) for depth_m, _ in shown.found.depths)
-    unknown = replace(shown.found, rig=rig, baseline_sigma_m=math.nan, depths=depths, far_m=math.nan)
+    unknown = replace(shown.found, rig=rig, baseline_sigma_m=math.nan, depths=depths)
     words = _page(replace(shown, found=unknown)).words
     assert f"{np.linalg.norm(rig.t_right_left_m) * 1e3:.2f} mm" in words
     assert "nan" not in words.lower().split()
