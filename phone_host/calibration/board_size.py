@@ -35,6 +35,9 @@ _USUAL_WAY: Final = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
 _OTHER_WAY: Final = _USUAL_WAY | cv2.CALIB_CB_EXHAUSTIVE
 """Of 20 images of a board of 14x10 this way finds 17 whole, the usual one none; of 122 images of boards up to 9x6 it finds 70, the usual one 103."""
 
+_ALL_WHITE: Final = 0.8
+"""Share of white among the squares beyond the outermost corners: half of them are black beside inner corners."""
+
 _MARGIN, _LEAST_MARGIN = 1.25, 0.65
 """So many squares beside the outermost corners is the margin, be it half a square wide; so much of it must be seen. Fingers may lie on the rest; of a row of
 squares about half is white."""
@@ -120,8 +123,7 @@ def whole_size_seen(grey: Image) -> Size | None:
     size = _size_of(grid)
     if size is None:
         return None
-    squares = _levels(small, (grid[:-1, :-1] + grid[1:, 1:]) / 2)
-    limit = (np.percentile(squares, 10) + np.percentile(squares, 90)) / 2
+    limit = _grey_between(small, grid)
     sides = (grid, grid[::-1], grid.transpose(1, 0, 2), grid[:, ::-1].transpose(1, 0, 2))
     margins = (_levels(small, side[0] + _MARGIN * (side[0] - side[1])) for side in sides)
     return size if all((levels > limit).mean() >= _LEAST_MARGIN for levels in margins) else None
@@ -136,7 +138,32 @@ def _lattice(grey: Image, way: int = _USUAL_WAY) -> Corners:
     found, corners, meta = cv2.findChessboardCornersSBWithMeta(grey, _SEED, flags=way)
     if not found or meta is None:
         return np.empty((0, 0, 2))
-    return np.asarray(corners, np.float64).reshape(*meta.shape[:2], 2)
+    return inner_lattice(grey, np.asarray(corners, np.float64).reshape(*meta.shape[:2], 2))
+
+
+def inner_lattice(grey: Image, grid: Corners) -> Corners:
+    """Return a lattice without outer rows that are no inner corners: the detector may take the outermost squares' own corners for some.
+
+    Beyond inner corners lie black and white squares in turns, beyond those the white margin alone.
+
+    Args:
+        grey: (H, W) uint8.
+        grid: (R, C, 2) corners of squares in it, px.
+    """
+    limit = _grey_between(grey, grid)
+    for _ in range(4):  # each side comes first in turn
+        grid = np.rot90(grid)
+        if len(grid) > 2:
+            middles = (grid[:2, :-1] + grid[:2, 1:]) / 2
+            beyond = _levels(grey, middles[0] + 0.5 * (middles[0] - middles[1]))
+            grid = grid[1:] if (beyond > limit).mean() > _ALL_WHITE else grid
+    return grid
+
+
+def _grey_between(grey: Image, grid: Corners) -> float:
+    """Return the grey level between black and white squares."""
+    squares = _levels(grey, (grid[:-1, :-1] + grid[1:, 1:]) / 2)
+    return float(np.percentile(squares, 10) + np.percentile(squares, 90)) / 2
 
 
 def _size_of(grid: Corners) -> Size | None:

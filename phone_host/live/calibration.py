@@ -46,6 +46,9 @@ _SILENT_NS: Final = 3_000_000_000
 _LEAST_VIEWS: Final = 3
 """Fewer give no calibration."""
 
+_MISSES: Final = 60
+"""So many looks in turn without a board of the size that was counted: it may have been counted wrongly."""
+
 _HELP_NS: Final = 20_000_000_000
 
 Grow = Callable[[tuple[View, ...], Board, tuple[Size, Size]], Progress]
@@ -101,6 +104,7 @@ class LiveCalibration:
         self._finder: BoardFinder | None = None
         self._size_finder = SizeFinder(settings.square_m)
         self._check: SizeCheck | None = None
+        self._misses = 0
         if settings.board is not None:
             self._know(settings.board)
         self._solver = Newest[tuple[View, ...]]("calibrating", self._solve)
@@ -230,10 +234,22 @@ class LiveCalibration:
         seen = glance(finder.find(left, right))
         with self._lock:
             gate = guide.see(seen, now.monotonic_ns())
-        if gate is Gate.NOT_FOUND and self._check is not None and not guide.views:
-            self._check.missed(left, right)
+        if gate is Gate.NOT_FOUND and not guide.views:
+            self._missed(left, right)
+        else:
+            self._misses = 0
         if gate is Gate.READY:
             self._examine(guide, glance(finder.find_exactly(left, right)), (left, right), (pair.left, pair.right))
+
+    def _missed(self, left: Image, right: Image) -> None:
+        """Check a board that is never found: one that was named, against what is shown; one that was counted is counted anew."""
+        self._misses += 1
+        if self._check is not None:
+            self._check.missed(left, right)
+        elif self._misses >= _MISSES:
+            self._misses, self._finder, self._size_finder = 0, None, SizeFinder(self._settings.square_m)
+            with self._lock:
+                self._guide = None
 
     def _examine(self, guide: Guide, exact: Glance, greys: tuple[Image, Image], images: tuple[Image, Image]) -> None:
         looks = [

@@ -1,25 +1,29 @@
 """Real sessions of $SCAN_DATA, as they are and with a mistake made on their corners: what is named."""
 
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Final
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from common.errors import DataError
 from common.orientation import Flip, Orientation
 from phone_host.calibration.arrangement import turned_corners
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.board_views import look_for_boards
 from phone_host.calibration.calibrate import Sizes, calibrate
-from phone_host.calibration.causes.mistakes import Finding
-from phone_host.calibration.causes.name import BoardSession, name_mistake
-from phone_host.calibration.target import Board, agree
+from phone_host.calibration.causes.mistakes import Finding, Mistake
+from phone_host.calibration.target import Board, agree, find_corners
+from phone_host.model import Image
 from phone_host.stereo.view_files import pair_files
+from tests.support.cause_judge import finding_of
+from tests.support.cause_sessions import Made, blurring, lit
+
+Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,55 +53,127 @@ def real_pairs(name: str) -> tuple[tuple[BoardPair, ...], Board, Sizes]:
     return views.pairs, real.board, views.sizes_px
 
 
-def judged(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> Finding | None:
-    """Return what is named for a session."""
-    try:
-        found = calibrate(pairs, board, sizes_px)
-    except DataError as failure:
-        return name_mistake(BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes_px), failure)
-    return name_mistake(BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes_px), found)
+def _pictures(name: str, count: int = 6) -> list[tuple[Image, Image]]:
+    """Return the grey images of some pairs, at most 1280 px wide."""
+    real, data = REAL[name], Path(os.environ["SCAN_DATA"])
+    found = []
+    for _, *paths in pair_files(str(data / real.left), str(data / real.right)).pairs[:count]:
+        left, right = (np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.uint8) for path in paths)
+        found.append((left, right))
+    return found
 
 
-def variants(name: str) -> Iterator[tuple[str, list[BoardPair], Board, Sizes]]:
-    """Give a real session as it is, and with mistakes: the right camera knocked, zoomed, mirrored, on its head; sides swapped; pictures exchanged."""
-    pairs, board, sizes_px = real_pairs(name)
-    yield "as it is", list(pairs), board, sizes_px
-    width, height = sizes_px[1]
-    middle, half = np.array([width / 2, height / 2]), len(pairs) // 2
-
-    def changed(what: np.ndarray, first: int) -> list[BoardPair]:
-        return [
-            pair
-            if index < first
-            else BoardPair(pair.name, pair.left_px, np.asarray(cv2.perspectiveTransform(pair.right_px[None], what)[0]))
-            for index, pair in enumerate(pairs)
-        ]
-
-    focal = 0.9 * width
-    inner = np.array([[focal, 0, middle[0]], [0, focal, middle[1]], [0, 0, 1]])
-    knock = inner @ np.asarray(cv2.Rodrigues(np.radians([0.15, 0.1, 0.0]))[0]) @ np.linalg.inv(inner)
-    yield "knocked by 0.18 degrees", changed(knock, half), board, sizes_px
-    zoom = np.array([[1.02, 0, -0.02 * middle[0]], [0, 1.02, -0.02 * middle[1]], [0, 0, 1]])
-    yield "zoomed by 2 %", changed(zoom, half), board, sizes_px
-    for word, turn in (("mirrored", Orientation(0, Flip.H)), ("on its head", Orientation(180))):
-        placed = [(pair, turned_corners(pair.right_px, sizes_px[1], turn, board)) for pair in pairs]
-        views = [BoardPair(pair.name, pair.left_px, agree(pair.left_px, right, board)) for pair, right in placed]
-        yield word, views, board, sizes_px
-    swapped = [BoardPair(pair.name, pair.right_px, agree(pair.right_px, pair.left_px, board)) for pair in pairs]
-    yield "sides swapped", swapped, board, (sizes_px[1], sizes_px[0])
-    order = [1, 0, *range(2, len(pairs))]
-    exchanged = [
-        BoardPair(pair.name, pair.left_px, agree(pair.left_px, pairs[index].right_px, board))
-        for pair, index in zip(pairs, order, strict=True)
+def _with_right(made: Made, what: Callable[[int, Points], Points], first: int = 0) -> Made:
+    """Change the right corners of the views from one on."""
+    pairs = [
+        pair if index < first else BoardPair(pair.name, pair.left_px, what(index, pair.right_px))
+        for index, pair in enumerate(made.pairs)
     ]
-    yield "two exchanged", exchanged, board, sizes_px
+    return replace(made, pairs=pairs)
 
 
-def real_sessions() -> Iterator[tuple[str, str]]:
-    """Give each real session's name and what is said of it; nothing without $SCAN_DATA."""
+def _hung(made: Made, turn: Orientation) -> Made:
+    """The right camera hangs otherwise."""
+    width, height = turn.turned_size(made.sizes_px[1])
+    pairs = [
+        BoardPair(
+            pair.name,
+            pair.left_px,
+            agree(pair.left_px, turned_corners(pair.right_px, made.sizes_px[1], turn, made.board), made.board),
+        )
+        for pair in made.pairs
+    ]
+    return replace(made, pairs=pairs, sizes_px=(made.sizes_px[0], (width, height)))
+
+
+def _placed(made: Made) -> Iterator[tuple[str, Mistake, Made]]:
+    """Mistakes of how cameras hang and of which pictures belong together."""
+    yield "mirrored", Mistake.MIRRORED, _hung(made, Orientation(0, Flip.H))
+    yield "on its head", Mistake.UPSIDE_DOWN, _hung(made, Orientation(180))
+    yield "on its side", Mistake.TURNED, _hung(made, Orientation(90))
+    swapped = [
+        BoardPair(pair.name, pair.right_px, agree(pair.right_px, pair.left_px, made.board)) for pair in made.pairs
+    ]
+    yield "sides swapped", Mistake.SWAPPED, replace(made, pairs=swapped, sizes_px=(made.sizes_px[1], made.sizes_px[0]))
+    order = [1, 0, *range(2, len(made.pairs))]
+    exchanged = [
+        BoardPair(pair.name, pair.left_px, agree(pair.left_px, made.pairs[index].right_px, made.board))
+        for pair, index in zip(made.pairs, order, strict=True)
+    ]
+    yield "two exchanged", Mistake.PARTNERS, replace(made, pairs=exchanged)
+
+
+def _moved(made: Made) -> Iterator[tuple[str, Mistake, Made]]:
+    """Mistakes of what changed or moved while the views were taken."""
+    width, height = made.sizes_px[1]
+    middle, random = np.array([width / 2, height / 2]), np.random.default_rng(0)
+    inner = np.array([[0.9 * width, 0, middle[0]], [0, 0.9 * width, middle[1]], [0, 0, 1]])
+
+    def turned(degrees: Points) -> Points:
+        return np.asarray(inner @ cv2.Rodrigues(np.radians(degrees))[0] @ np.linalg.inv(inner), np.float64)
+
+    def mapped(corners: Points, what: Points) -> Points:
+        return np.asarray(cv2.perspectiveTransform(corners[None], what)[0], np.float64)
+
+    half = len(made.pairs) // 2
+    knock, zoom = turned(np.array([0.15, 0.1, 0.0])), np.diag([1.02, 1.02, 1.0])
+    zoom[:2, 2] = -0.02 * middle
+    yield "knocked by 0.18 degrees", Mistake.UNSTIFF, _with_right(made, lambda _, seen: mapped(seen, knock), half)
+    yield "zoomed by 2 %", Mistake.FOCUS, _with_right(made, lambda _, seen: mapped(seen, zoom), half)
+    # A board that moves by about 6 px between or during the exposures, each view in its own direction, as hands do.
+    ways = random.normal(0, 0.006 * width, (len(made.pairs), 2))
+    yield "moved between the exposures", Mistake.SKEW, _with_right(made, lambda index, seen: seen + ways[index])
+
+    def rolled(seen: Points, way: Points, lines: int) -> Points:
+        return np.asarray(seen + way * (seen[:, 1:] / lines - 0.5) * 3, np.float64)
+
+    pairs = [
+        BoardPair(
+            pair.name, rolled(pair.left_px, way * made.sizes_px[0][0] / width, made.sizes_px[0][1]),
+            rolled(pair.right_px, way, height),
+        )
+        for pair, way in zip(made.pairs, ways, strict=True)
+    ]  # fmt: skip
+    yield "moved while rows were exposed", Mistake.ROWS, replace(made, pairs=pairs)
+
+
+def variants(name: str) -> Iterator[tuple[str, Mistake | None, Made]]:
+    """Give a real session as it is, and with a mistake of each class: made on its corners, blur and glare on its images.
+
+    Args:
+        name: of `REAL`.
+    """
+    pairs, board, sizes_px = real_pairs(name)
+    rig = calibrate(list(pairs), board, sizes_px).rig
+    made = Made(pairs=list(pairs), board=board, sizes_px=sizes_px, rig=rig)
+    yield "as it is", None, made
+    yield from _placed(made)
+    yield from _moved(made)
+    larger, measured_m = replace(board, square_m=board.square_m * 1.15), float(np.linalg.norm(rig.t_right_left_m))
+    yield "square 15 % too large", Mistake.SQUARE, replace(made, board=larger, baseline_m=measured_m)
+    random = np.random.default_rng(0)
+    smears = {"out of focus": blurring(random, moving=False), "smeared": blurring(random, moving=True)}
+    images = _pictures(name)
+    for what, spoil in smears.items():
+        spoiled = tuple((spoil(left), spoil(right)) for left, right in images)
+        yield what, Mistake.BLUR, replace(made, pairs=[], images=spoiled)
+    shining = tuple((_lit(left, board), _lit(right, board)) for left, right in images)
+    yield "glare", Mistake.GLARE, replace(made, pairs=[], images=shining)
+
+
+def _lit(image: Image, board: Board) -> Image:
+    """A lamp's reflection on the board."""
+    corners = find_corners(image, board)
+    if not len(corners):
+        return image
+    x, y = corners[len(corners) // 3]
+    return lit(image, (float(x), float(y)), 0.2 * float(np.ptp(corners, axis=0).max()))
+
+
+def real_sessions() -> Iterator[tuple[str, Mistake | None, Finding | None]]:
+    """Give each real session's name, the mistake made and what is named; nothing without $SCAN_DATA."""
     if not os.environ.get("SCAN_DATA"):
         return
     for name in REAL:
-        for what, pairs, board, sizes_px in variants(name):
-            found = judged(pairs, board, sizes_px)
-            yield f"{name}, {what}", "nothing" if found is None else f"{found.mistake.value}: {found.sentence}"
+        for what, mistake, made in variants(name):
+            yield f"{name}, {what}", mistake, finding_of(made)

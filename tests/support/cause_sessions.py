@@ -37,7 +37,7 @@ class Made:
         pairs: the corners.
         board: the board as the user names it.
         sizes_px: of the images.
-        rig: the true cameras, the right one as it stands in the last view.
+        rig: the true cameras, the right one as it stands in the last view; of a real session: as it is calibrated.
         baseline_m: what the user measured; NaN: nothing.
         images: of sessions whose mistake shows in pixels only; otherwise none.
         truth: what the session was made with, in words.
@@ -367,9 +367,8 @@ def good_pictures(random: np.random.Generator) -> Made:
     return _pictured(random, lambda image: image, 0.0)
 
 
-def blur(random: np.random.Generator) -> Made:
-    """Half or more of the images are out of focus, or were taken while the board moved."""
-    moving = bool(random.random() < 0.5)
+def blurring(random: np.random.Generator, *, moving: bool) -> Callable[[Image], Image]:
+    """Return what puts an image out of focus, or smears it along a random direction."""
 
     def spoil(image: Image) -> Image:
         if not moving:
@@ -382,21 +381,38 @@ def blur(random: np.random.Generator) -> Made:
         kernel = np.asarray(cv2.warpAffine(kernel, turn, (length, length)), np.float32)
         return np.asarray(cv2.filter2D(image, -1, kernel / kernel.sum()), np.uint8)
 
+    return spoil
+
+
+def blur(random: np.random.Generator) -> Made:
+    """Half or more of the images are out of focus, or were taken while the board moved."""
+    moving = bool(random.random() < 0.5)
+    spoil = blurring(random, moving=moving)
     return replace(_pictured(random, spoil, random.uniform(0.5, 1.0)), truth="moving" if moving else "out of focus")
 
 
-def glare(random: np.random.Generator) -> Made:
-    """A lamp's reflection washes out a part of the board in half of the images or more."""
+def glaring(random: np.random.Generator) -> Callable[[Image], Image]:
+    """Return what shines a lamp on an image, where it is dark: on a square, if the board fills it."""
 
     def spoil(image: Image) -> Image:
         dark = np.argwhere(cv2.erode(image, np.ones((5, 5), np.uint8)) < 60)
         y, x = dark[random.integers(len(dark))] if len(dark) else (image.shape[0] / 2, image.shape[1] / 2)
-        rows_at, columns_at = np.mgrid[0 : image.shape[0], 0 : image.shape[1]]
         spread = float(np.ptp(dark, axis=0).max()) * random.uniform(0.15, 0.3) if len(dark) else 60.0
-        light = 450 * np.exp(-((rows_at - y) ** 2 + (columns_at - x) ** 2) / (2 * spread**2))
-        return np.asarray(np.clip(image + light, 0, 255), np.uint8)
+        return lit(image, (float(x), float(y)), spread)
 
-    return _pictured(random, spoil, random.uniform(0.5, 1.0))
+    return spoil
+
+
+def lit(image: Image, at_px: tuple[float, float], spread_px: float) -> Image:
+    """Return an image with the reflection of a lamp at a place."""
+    rows_at, columns_at = np.mgrid[0 : image.shape[0], 0 : image.shape[1]]
+    light = 450 * np.exp(-((rows_at - at_px[1]) ** 2 + (columns_at - at_px[0]) ** 2) / (2 * spread_px**2))
+    return np.asarray(np.clip(image + light, 0, 255), np.uint8)
+
+
+def glare(random: np.random.Generator) -> Made:
+    """A lamp's reflection washes out a part of the board in half of the images or more."""
+    return _pictured(random, glaring(random), random.uniform(0.5, 1.0))
 
 
 MAKERS: Final[dict[Mistake, Callable[[np.random.Generator], Made]]] = {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.board_size import Vote, require_size, size_in_files, size_seen
+from phone_host.calibration.board_size import Vote, inner_lattice, require_size, size_in_files, size_seen
 from phone_host.calibration.target import Board
 from phone_host.calibration.threads import side_by_side
 from phone_host.stereo.view_files import ViewFiles, pair_files
@@ -117,3 +117,17 @@ def test_several_at_a_time_keep_their_order_and_the_first_error_ends_them() -> N
     assert len(counted) == 9
     with pytest.raises(ZeroDivisionError):
         side_by_side(lambda each: 1 // each, [1, 0, 2])
+
+
+@pytest.mark.parametrize("side", range(4))
+def test_corners_of_the_outermost_squares_are_no_inner_corners(side: int) -> None:
+    """A detector may take one column too many on any side; what beyond inner corners is cut off by the image's edge stays."""
+    squares = np.kron((np.indices((7, 10)).sum(axis=0) % 2) * 255, np.ones((30, 30))).astype(np.uint8)
+    image = np.pad(squares, 60, constant_values=255)
+    inner = np.stack(np.meshgrid(np.arange(1, 10), np.arange(1, 7)), axis=2) * 30.0 + 59.5
+    wide = np.rot90(np.concatenate([inner[:, :1] - [30, 0], inner], axis=1), side)
+    found = inner_lattice(image, wide)
+    assert found.shape[:2] in {(6, 9), (9, 6)}
+    assert inner_lattice(image, inner).shape[:2] == (6, 9)
+    cut = image[:, :320]  # in the middle of the last column but one
+    assert inner_lattice(cut, inner[:, :8]).shape[:2] == (6, 8)

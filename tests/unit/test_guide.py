@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.looks import Look
@@ -19,7 +20,7 @@ from phone_host.calibration.guide.picture import guide_svg
 from phone_host.calibration.guide.progress import Progress, Taught, lessons
 from phone_host.calibration.guide.snapshot import Ended, before_board
 from phone_host.calibration.guide.text_picture import figure_lines, picture_lines
-from phone_host.calibration.guide.unseen import unseen_in, with_corners
+from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corners
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Want
 from phone_host.calibration.guide.words import Speech, Words
 from phone_host.calibration.next_view import Spot, after_one_m
@@ -365,3 +366,9 @@ def _calibration() -> Calibration:
     rig = unlike_rig()
     sizes = ((rig.left.width_px, rig.left.height_px), (rig.right.width_px, rig.right.height_px))
     return calibrate(exact_pairs(rig, poses(6, 3), 0.1), BOARD, sizes, Side.LEFT)
+
+
+def test_only_lenses_of_many_coefficients_are_guessed_where_nothing_was_seen() -> None:
+    """Four coefficients stay near the truth; five, eight or a fisheye's may not."""
+    assert not is_guessed((Bend.USUAL, Bend.USUAL))
+    assert all(is_guessed((Bend.USUAL, bend)) for bend in (Bend.WIDE, Bend.RATIONAL, Bend.FISHEYE))

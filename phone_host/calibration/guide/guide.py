@@ -33,7 +33,7 @@ from phone_host.calibration.guide.gates import (
 from phone_host.calibration.guide.placement import placement, usual_camera
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
-from phone_host.calibration.guide.unseen import unseen, with_corners
+from phone_host.calibration.guide.unseen import is_guessed, unseen, with_corners
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Speech, Words, done, taken
 from phone_host.calibration.target import Board
@@ -305,8 +305,10 @@ class Guide:
 
     @property
     def _unseen(self) -> frozenset[Want]:
-        """The image corners that no view shows of those that the calibration uses."""
+        """The image corners that no view shows of those that the calibration uses, if its lens is guessed there."""
         found = None if self._progress is None else self._progress.calibration
+        if found is not None and not is_guessed(found.bends):
+            return frozenset()
         rejected = set() if found is None else {each.name for each in found.rejected}
         used = (where for view, where in zip(self.views, self._places, strict=True) if view.name not in rejected)
         return unseen(used) - self._seen

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.guide.placement import placement
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Placed, Want, is_seen
@@ -34,6 +35,17 @@ def unseen_in(pairs: Iterable[BoardPair], board: Board, left: CameraModel, right
     return unseen(
         Placed(placement(pair.left_px, board, left), placement(pair.right_px, board, right)) for pair in pairs
     )
+
+
+def is_guessed(bends: Iterable[Bend]) -> bool:
+    """Return whether a lens may bend freely where nothing was seen: one of more than four coefficients.
+
+    Beyond what was seen the powers of the fifth coefficient and more run away; four stay near the truth, because webcams' lenses follow them.
+
+    Args:
+        bends: the formulas of both lenses.
+    """
+    return any(bend is not Bend.USUAL for bend in bends)
 
 
 def with_corners(judgement: Assessment, missing: Iterable[Want]) -> Assessment:

@@ -16,7 +16,7 @@ from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boa
 from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.causes.name import BoardSession, name_mistake
-from phone_host.calibration.guide.unseen import unseen_in, with_corners
+from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corners
 from phone_host.calibration.out_of_step import out_of_step
 from phone_host.calibration.session_snapshot import Taken
 from phone_host.calibration.target import Board
@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
         require_sizes(*beside, views.sizes_px)
     rejected = (*views.rejected, *found.rejected)
     judgement = assessed(found, rejected, finding, hint)
-    if live is not None and not options.pose_only:
+    if live is not None and not options.pose_only and is_guessed(found.bends):
         used = {each.name for each in found.used}
         seen = [pair for pair in every_pair(session, pairs) if pair.name in used]
         judgement = with_corners(judgement, unseen_in(seen, session.board, found.rig.left, found.rig.right))
