@@ -124,7 +124,7 @@ def test_corners_of_the_outermost_squares_are_no_inner_corners(side: int) -> Non
     """A detector may take one column too many on any side; what beyond inner corners is cut off by the image's edge stays."""
     squares = np.kron((np.indices((7, 10)).sum(axis=0) % 2) * 255, np.ones((30, 30))).astype(np.uint8)
     image = np.pad(squares, 60, constant_values=255)
-    inner = np.stack(np.meshgrid(np.arange(1, 10), np.arange(1, 7)), axis=2) * 30.0 + 59.5
+    inner = np.asarray(np.stack(np.meshgrid(np.arange(1, 10), np.arange(1, 7)), axis=2) * 30.0 + 59.5, np.float64)
     wide = np.rot90(np.concatenate([inner[:, :1] - [30, 0], inner], axis=1), side)
     found = inner_lattice(image, wide)
     assert found.shape[:2] in {(6, 9), (9, 6)}
