@@ -168,7 +168,7 @@ def _grey_between(grey: Image, grid: Corners) -> float:
 
 def _size_of(grid: Corners) -> Size | None:
     size = max(grid.shape[:2]), min(grid.shape[:2])
-    return None if size in {_SEED, (0, 0)} else size
+    return None if size[1] < _SEED[1] or size == _SEED else size
 
 
 def _levels(grey: Image, points: Corners) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from phone_host.calibration.target import Board
 from phone_host.calibration.threads import side_by_side
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from tests.support.boards import poses, render_pair
+from tests.support.numbered import draw
 from tests.support.pictures import encoded
 from tests.support.rigs import small_rig
 
@@ -131,3 +132,9 @@ def test_corners_of_the_outermost_squares_are_no_inner_corners(side: int) -> Non
     assert inner_lattice(image, inner).shape[:2] == (6, 9)
     cut = image[:, :320]  # in the middle of the last column but one
     assert inner_lattice(cut, inner[:, :8]).shape[:2] == (6, 8)
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_what_is_left_of_a_pattern_may_be_too_little_to_be_a_board(number: int) -> None:
+    """Numbers written in black and white blocks make lattices of 3x2 and 2x2 corners at most: that is no board."""
+    assert size_seen(draw(number)) is None
