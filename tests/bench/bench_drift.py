@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Final
@@ -322,7 +322,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=int, default=_MINUTES, help="rendered minutes of a steady rig (figure: 10)")
     parser.add_argument("--seed", type=int, default=_SEED, help="of the steady rigs' rooms (default: %(default)s)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the rows")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     data = os.environ.get("SCAN_DATA", "")
     if not data:
@@ -338,16 +338,19 @@ def main() -> int:
         steady = [*minutes, *given.result()]
         mean_px = euroc.result()
     run_s = seconds_until_told()
+    verdicts = _verdicts(rows, walked, steady, run_s)
+    verdicts.append(Verdict("euroc, imported: |y| mean", mean_px <= 0.13, f"{mean_px:.3f} px", "0.13 px"))
+    if options.json:
+        parts = {"turning": rows, "steady": steady, "verdicts": verdicts}
+        shown = {name: [asdict(row) for row in some] for name, some in parts.items()}
+        print(json.dumps({"machine": str(machine()), **shown}))
+        return exit_code(verdicts)
     console = Console(width=150)
     console.print(machine())
     console.print(_table("a rig that turns", rows))
     console.print(_table("a steady rig", steady))
-    verdicts = _verdicts(rows, walked, steady, run_s)
-    verdicts.append(Verdict("euroc, imported: |y| mean", mean_px <= 0.13, f"{mean_px:.3f} px", "0.13 px"))
     for verdict in verdicts:
         console.print(str(verdict))
-    if options.json:
-        options.json.write_text(json.dumps([str(row) for row in (*rows, *steady)], indent=1))
     return exit_code(verdicts)
 
 
