@@ -341,7 +341,7 @@ def main() -> int:
     verdicts = _verdicts(rows, walked, steady, run_s)
     verdicts.append(Verdict("euroc, imported: |y| mean", mean_px <= 0.13, f"{mean_px:.3f} px", "0.13 px"))
     if options.json:
-        parts = {"turning": rows, "steady": steady, "verdicts": verdicts}
+        parts: dict[str, Sequence[Row | Verdict]] = {"turning": rows, "steady": steady, "verdicts": verdicts}
         shown = {name: [asdict(row) for row in some] for name, some in parts.items()}
         print(json.dumps({"machine": str(machine()), **shown}))
         return exit_code(verdicts)
