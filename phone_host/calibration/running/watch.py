@@ -48,10 +48,10 @@ _START_SIGMAS: Final = 5.0
 _AT_FIRST: Final = 3
 """Sightings before anything is said: one that is wrong must not be half of them."""
 
-_STEP_PX: Final = 0.25
+_STEP_PX: Final = 0.4
 _STEP_CHI2: Final = 35.0
 _STEP_SHARE: Final = 0.1
-"""A sighting that departs from the estimate by so much is set aside: 5 sigmas in four dimensions. Of a rig that stands far away, the
+"""A sighting that departs from the estimate by so much is set aside: 5 sigmas in four dimensions, and more than a bar that trembles by 0.01 degrees. Of a rig that stands far away, the
 linear model itself knows the rows to a tenth."""
 
 MOST_TURN_RAD: Final = math.radians(1.0)
