@@ -122,7 +122,17 @@ def _moved(made: Made) -> Iterator[tuple[str, Mistake, Made]]:
     yield "zoomed by 2 %", Mistake.FOCUS, _with_right(made, lambda _, seen: mapped(seen, zoom), half)
     # A board that moves by about 6 px between or during the exposures, each view in its own direction, as hands do.
     ways = random.normal(0, 0.006 * width, (len(made.pairs), 2))
-    yield "moved between the exposures", Mistake.SKEW, _with_right(made, lambda index, seen: seen + ways[index])
+    # It turns and comes nearer as well: a shift alone is what a turned camera shows.
+    turns, scales = random.normal(0, np.radians(0.8), len(ways)), 1 + random.normal(0, 0.012, len(ways))
+
+    def jolted(index: int, seen: Points) -> Points:
+        cos, sin = np.cos(turns[index]) * scales[index], np.sin(turns[index]) * scales[index]
+        middle_px = seen.mean(axis=0)
+        return np.asarray(
+            (seen - middle_px) @ np.array([[cos, sin], [-sin, cos]]) + middle_px + ways[index], np.float64
+        )
+
+    yield "moved between the exposures", Mistake.SKEW, _with_right(made, jolted)
 
     def rolled(seen: Points, way: Points, lines: int) -> Points:
         return np.asarray(seen + way * (seen[:, 1:] / lines - 0.5) * 3, np.float64)
