@@ -21,7 +21,8 @@ from phone_host.calibration.target import Board, agree, find_corners
 from phone_host.model import Image
 from phone_host.stereo.view_files import pair_files
 from tests.support.cause_judge import finding_of
-from tests.support.cause_sessions import Made, blurring, lit
+from tests.support.cause_sessions import Made
+from tests.support.cause_spoils import blurring, lit
 
 Points = NDArray[np.float64]
 

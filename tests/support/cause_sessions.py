@@ -20,6 +20,7 @@ from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.target import Board, agree
 from phone_host.model import CameraModel, Image, Rig
 from tests.support.boards import render_pair
+from tests.support.cause_spoils import blurring, glaring
 from tests.support.rigs import project_points
 
 Vector = NDArray[np.float64]
@@ -367,47 +368,11 @@ def good_pictures(random: np.random.Generator) -> Made:
     return _pictured(random, lambda image: image, 0.0)
 
 
-def blurring(random: np.random.Generator, *, moving: bool) -> Callable[[Image], Image]:
-    """Return what puts an image out of focus, or smears it along a random direction."""
-
-    def spoil(image: Image) -> Image:
-        if not moving:
-            sigma = random.uniform(3.0, 5.0)
-            return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma), np.uint8)
-        length = int(random.uniform(11, 19))
-        kernel = np.zeros((length, length), np.float32)
-        kernel[length // 2] = 1 / length
-        turn = cv2.getRotationMatrix2D((length // 2, length // 2), random.uniform(0, 180), 1)
-        kernel = np.asarray(cv2.warpAffine(kernel, turn, (length, length)), np.float32)
-        return np.asarray(cv2.filter2D(image, -1, kernel / kernel.sum()), np.uint8)
-
-    return spoil
-
-
 def blur(random: np.random.Generator) -> Made:
     """Half or more of the images are out of focus, or were taken while the board moved."""
     moving = bool(random.random() < 0.5)
     spoil = blurring(random, moving=moving)
     return replace(_pictured(random, spoil, random.uniform(0.5, 1.0)), truth="moving" if moving else "out of focus")
-
-
-def glaring(random: np.random.Generator) -> Callable[[Image], Image]:
-    """Return what shines a lamp on an image, where it is dark: on a square, if the board fills it."""
-
-    def spoil(image: Image) -> Image:
-        dark = np.argwhere(cv2.erode(image, np.ones((5, 5), np.uint8)) < 60)
-        y, x = dark[random.integers(len(dark))] if len(dark) else (image.shape[0] / 2, image.shape[1] / 2)
-        spread = float(np.ptp(dark, axis=0).max()) * random.uniform(0.15, 0.3) if len(dark) else 60.0
-        return lit(image, (float(x), float(y)), spread)
-
-    return spoil
-
-
-def lit(image: Image, at_px: tuple[float, float], spread_px: float) -> Image:
-    """Return an image with the reflection of a lamp at a place."""
-    rows_at, columns_at = np.mgrid[0 : image.shape[0], 0 : image.shape[1]]
-    light = 450 * np.exp(-((rows_at - at_px[1]) ** 2 + (columns_at - at_px[0]) ** 2) / (2 * spread_px**2))
-    return np.asarray(np.clip(image + light, 0, 255), np.uint8)
 
 
 def glare(random: np.random.Generator) -> Made:
