@@ -24,14 +24,9 @@ def drift_values(drift: Drift | None) -> dict[str, object] | None:
         return None
     trend = drift.trend
     return {
-        "state": drift.state.value,
-        "departure": _departure(drift.departure),
-        "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
+        **_standing(drift),
         "focal_sigma_percent": _rounded(100 * drift.focal_sigma),
         "overlay": _departure(drift.overlay),
-        "vertical_error_px": _rounded(drift.rows_px),
-        "vertical_error_sigma_px": _rounded(drift.rows_sigma_px),
-        "vertical_error_left_px": _rounded(drift.left_px),
         "zero_sigma_px": _rounded(drift.zero_sigma_px),
         "features": drift.features,
         "pairs_used": drift.measurements,
@@ -59,12 +54,7 @@ def stills_drift_values(drift: Drift | None) -> dict[str, object] | None:
         return None
     trend = drift.trend
     return {
-        "state": drift.state.value,
-        "departure": _departure(drift.departure),
-        "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
-        "vertical_error_px": _rounded(drift.rows_px),
-        "vertical_error_sigma_px": _rounded(drift.rows_sigma_px),
-        "vertical_error_left_px": _rounded(drift.left_px),
+        **_standing(drift),
         "pairs_judged": drift.judged,
         "trend": {
             "turn_deg_per_pair": _degrees(trend.turn_rad_s),
@@ -72,6 +62,18 @@ def stills_drift_values(drift: Drift | None) -> dict[str, object] | None:
             "vertical_error_px_per_pair": _rounded(trend.rows_px_s),
         },
         "knocked_at_pair": [round(change.at_s) for change in drift.changes if change.kind is ChangeKind.KNOCKED],
+    }
+
+
+def _standing(drift: Drift) -> dict[str, object]:
+    """What is said of the rig in every report: how it stands, and what that does to its rows."""
+    return {
+        "state": drift.state.value,
+        "departure": _departure(drift.departure),
+        "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
+        "vertical_error_px": _rounded(drift.rows_px),
+        "vertical_error_sigma_px": _rounded(drift.rows_sigma_px),
+        "vertical_error_left_px": _rounded(drift.left_px),
     }
 
 
