@@ -25,10 +25,12 @@ class Presence:
             now_ns: the clock now, ns.
 
         Returns:
-            Nanoseconds, each reported once; 0 if it was called in time or nearly so.
+            Nanoseconds, each reported once; 0 if it was called in time or nearly so; negative if the clock went back by so much.
         """
         looked_ns, self._looked_ns = self._looked_ns, now_ns
-        if looked_ns is None or now_ns - looked_ns <= LATE_NS:
+        if looked_ns is None or abs(now_ns - looked_ns) <= LATE_NS:
             return 0
+        if now_ns < looked_ns:
+            return now_ns - looked_ns
         late_ns = now_ns - max(due_ns(), looked_ns)
         return late_ns if late_ns > LATE_NS else 0

@@ -81,7 +81,8 @@ class _Host:
         return beside if beside is not None else next(iter(self.controls.values()), None)
 
     def excuse(self, absent_ns: int, now_ns: int) -> None:
-        """Do not count the time in which this process did not run as this host's silence."""
+        """Do not count the time in which this process did not run as this host's silence. Negative: the clock went back."""
+        self.status_due_ns += min(0, absent_ns)
         self.heard_ns = min(now_ns, self.heard_ns + absent_ns)
         self.heard_by = {link: min(now_ns, heard_ns + absent_ns) for link, heard_ns in self.heard_by.items()}
         self.silence_due_ns = min(self.heard_by.values(), default=now_ns) + SILENCE_NS
@@ -141,6 +142,7 @@ class BoardSession:
         self._asked: Locks | None = None
         self._is_asked = False
         self._locked_ns = -LOCK_REST_NS
+        self._leaving = False
         self._presence = Presence()
 
     @property
@@ -212,6 +214,10 @@ class BoardSession:
             What to send.
         """
         self._notice_absence(now_ns)
+        if self._leaving:  # a hello or a knock now would begin the session anew, only for it to vanish
+            if isinstance(message, Bye):
+                self._host = None
+            return []
         if isinstance(message, HostHello):
             return self._greet(connection, message, now_ns, counts)
         host = self._host
@@ -329,14 +335,22 @@ class BoardSession:
         return [] if host is None or host.frames is None else [Outgoing(host.frames, End(self.session, counts))]
 
     def leave(self, counts: BoardCounts) -> list[Outgoing]:
-        """Say goodbye to the host with the final account: behind the last frame if there is a frames lane."""
+        """Say goodbye to the host with the final account: behind the last frame if there is a frames lane.
+
+        From now on only the host's answer is taken; it takes the host away.
+        """
+        self._leaving = True
         host = self._host
         connection = None if host is None else host.frames if host.frames is not None else host.account_lane
         return [] if connection is None else [Outgoing(connection, Bye(counts))]
 
     def _notice_absence(self, now_ns: int) -> None:
-        """Time in which this process did not run does not count as the host's silence."""
+        """Time in which this process did not run does not count as the host's silence. What was due is due as soon by a clock that went back."""
         absent_ns = self._presence.absent_ns(lambda: self.due_ns, now_ns)
+        back_ns = min(0, absent_ns)
+        self._knock_due_ns += back_ns
+        self._steered_ns += back_ns
+        self._locked_ns += back_ns
         if self._host is not None and absent_ns:
             self._host.excuse(absent_ns, now_ns)
 

@@ -245,7 +245,7 @@ class HostSession:
     def _notice_absence(self, now_ns: int) -> None:
         """Do not count the time in which this process did not run as anyone's silence."""
         absent_ns = self._presence.absent_ns(lambda: self.due_ns, now_ns)
-        if not absent_ns:
+        if absent_ns <= 0:
             return
         for path in self._paths:
             path.heard_ns = min(now_ns, path.heard_ns + absent_ns)

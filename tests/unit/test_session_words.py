@@ -249,7 +249,33 @@ def test_a_boards_goodbye_gives_its_last_account() -> None:
     assert outputs == [Outgoing(frames, Bye()), Counted(counts, ended=False, lost=3, last=True), Vanished(orderly=True)]
     assert not host.session.is_open
     world.settle(1000 * MS)
+    assert not host.session.is_open
+    world.restart_board()
+    world.settle(1000 * MS)
     assert host.session.is_open
+
+
+def test_a_board_that_has_said_goodbye_takes_only_the_answer() -> None:
+    """Hellos and echoes that cross its goodbye bring no new contact, which would only break; the host's goodbye takes the host away."""
+    world = World()
+    world.settle(300 * MS)
+    host = world.hosts[0]
+    frames = host.names[0, Lane.FRAMES]
+    world.board.leave(world.counts)
+    for message in (HostHello(host_id="h", lane=Lane.CONTROL), Ping(1, 0), Credit(99)):
+        assert world.board.receive(frames, message, world.now_ns, world.counts) == []
+    assert world.board.has_host
+    assert world.board.receive(frames, Bye(), world.now_ns, world.counts) == []
+    assert not world.board.has_host
+
+
+def test_a_boards_clock_that_goes_back_delays_nothing() -> None:
+    """What the board does now and then, it does as soon by a clock that was set back by an hour."""
+    world = World()
+    world.settle(300 * MS)
+    back_ns = world.now_ns - 3600_000 * MS
+    world.board.tick(back_ns, world.counts)
+    assert back_ns < world.board.due_ns <= back_ns + STATUS_NS
 
 
 def test_a_goodbye_counts_also_when_the_other_lane_broke_first() -> None:
