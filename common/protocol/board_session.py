@@ -214,16 +214,14 @@ class BoardSession:
             What to send.
         """
         self._notice_absence(now_ns)
-        if self._leaving:  # a hello or a knock now would begin the session anew, only for it to vanish
-            if isinstance(message, Bye):
-                self._host = None
-            return []
         if isinstance(message, HostHello):
-            return self._greet(connection, message, now_ns, counts)
+            # An answer after the goodbye would begin the session anew, only for it to vanish.
+            return [] if self._leaving else self._greet(connection, message, now_ns, counts)
         host = self._host
         if host is None or not host.knows(connection):
             # Someone from before a restart, or a stranger. Clock echoes run on the control lane, so knock for that one.
-            return [] if isinstance(message, Bye) else [Outgoing(connection, Knock(Lane.CONTROL, self.session))]
+            is_mute = self._leaving or isinstance(message, Bye)
+            return [] if is_mute else [Outgoing(connection, Knock(Lane.CONTROL, self.session))]
         host.heard(connection, now_ns)
         match message:
             case Ping(wave, t0_ns):
@@ -337,7 +335,7 @@ class BoardSession:
     def leave(self, counts: BoardCounts) -> list[Outgoing]:
         """Say goodbye to the host with the final account: behind the last frame if there is a frames lane.
 
-        From now on only the host's answer is taken; it takes the host away.
+        From now on nobody is greeted.
         """
         self._leaving = True
         host = self._host

@@ -255,18 +255,18 @@ def test_a_boards_goodbye_gives_its_last_account() -> None:
     assert host.session.is_open
 
 
-def test_a_board_that_has_said_goodbye_takes_only_the_answer() -> None:
-    """Hellos and echoes that cross its goodbye bring no new contact, which would only break; the host's goodbye takes the host away."""
+def test_a_board_that_has_said_goodbye_begins_no_new_contact() -> None:
+    """A hello that crosses its goodbye is not answered, nor is anything once the host has gone: that contact would only break."""
     world = World()
     world.settle(300 * MS)
-    host = world.hosts[0]
-    frames = host.names[0, Lane.FRAMES]
+    control = world._board_name(world.hosts[0], (0, Lane.CONTROL))
     world.board.leave(world.counts)
-    for message in (HostHello(host_id="h", lane=Lane.CONTROL), Ping(1, 0), Credit(99)):
-        assert world.board.receive(frames, message, world.now_ns, world.counts) == []
-    assert world.board.has_host
-    assert world.board.receive(frames, Bye(), world.now_ns, world.counts) == []
+    hello = HostHello(host_id="h", lane=Lane.CONTROL)
+    assert world.board.receive(control, hello, world.now_ns, world.counts) == []
+    world.board.receive(control, Bye(), world.now_ns, world.counts)
     assert not world.board.has_host
+    for message in (hello, Ping(1, 0), Credit(99)):
+        assert world.board.receive(control, message, world.now_ns, world.counts) == []
 
 
 def test_a_boards_clock_that_goes_back_delays_nothing() -> None:
