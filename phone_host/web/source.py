@@ -1,0 +1,196 @@
+"""The border between the page's server and the program behind it: what the page is told, and what it may ask. Pure.
+
+The server holds a `Source` and nothing else of the program. Everything that a source returns is a copy.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble
+from phone_host.model import Result
+
+
+class Activity(Enum):
+    """What the program does now."""
+
+    IDLE = "idle"
+    ENROLLING = "enrolling"
+    CHECKING = "checking"
+    CALIBRATING = "calibrating"
+    RUNNING = "running"
+    ENDING = "ending"
+
+
+class StepName(Enum):
+    """The steps from nothing to a run, in their order."""
+
+    BOARD = "board"
+    CAMERA = "camera"
+    CHECK = "check"
+    CALIBRATION = "calibration"
+    RUN = "run"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One step on the way to a run.
+
+    Attributes:
+        name: which one.
+        done: whether it needs no more care.
+        words: what it has come to, or what to do now; one sentence.
+    """
+
+    name: StepName
+    done: bool
+    words: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """Something that may be chosen: a board or a camera.
+
+    Attributes:
+        uri: as the command line takes it.
+        name: for people.
+        note: what is to be known of it, such as "needs its code"; may be empty.
+        needs_code: whether the board wants its enrolment code first.
+    """
+
+    uri: str
+    name: str
+    note: str = ""
+    needs_code: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageState:
+    """Everything that the page shows beside images.
+
+    Attributes:
+        activity: what the program does now.
+        steps: the way to a run.
+        command: the command line that does what the page's choices do; empty: not enough is chosen.
+        settings: the choices, by the option's name without dashes, as the command line takes them.
+        boards: boards that were found.
+        cameras: cameras of this machine.
+        matchers: names that `--matcher` takes.
+        run: the run, live or the last one; None: there was none.
+        guide: the live calibration, as its guide.json has it; None: there was none.
+        trouble: what went wrong last; None: nothing.
+        changed: grows with each change of anything but `run` and `guide`.
+    """
+
+    activity: Activity
+    steps: tuple[Step, ...] = ()
+    command: str = ""
+    settings: Mapping[str, str] = field(default_factory=dict)
+    boards: tuple[Choice, ...] = ()
+    cameras: tuple[Choice, ...] = ()
+    matchers: tuple[str, ...] = ()
+    run: RunSnapshot | None = None
+    guide: Mapping[str, object] | None = None
+    trouble: Trouble | None = None
+    changed: int = 0
+
+
+class Do(Enum):
+    """What the page may ask for. Each needs the token."""
+
+    FIND = "find"
+    ENROL = "enrol"
+    SET = "set"
+    CHECK = "check"
+    CALIBRATE = "calibrate"
+    RUN = "run"
+    STOP = "stop"
+    SNAPSHOT = "snapshot"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """A command of the page.
+
+    Attributes:
+        do: what.
+        values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
+            `board` and `square`. Empty for the others.
+    """
+
+    do: Do
+    values: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What became of a command.
+
+    Attributes:
+        words: what happened, one sentence.
+        trouble: why it did not; None: it did.
+    """
+
+    words: str = ""
+    trouble: Trouble | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """Places and their distances, from the newest pair or the one that was named.
+
+    Attributes:
+        places_m: X, Y, Z of each point, m; None: no depth there.
+        place_sigmas_m: standard uncertainty of each point's distance from the left camera, m; None likewise.
+        distances_m: of each point from the left camera, m.
+        length_m: between the first two points, m; None: not two points with depth.
+        length_sigma_m: its standard uncertainty, m.
+        words: why something could not be measured; empty: everything was.
+    """
+
+    places_m: tuple[tuple[float, float, float] | None, ...]
+    distances_m: tuple[float | None, ...]
+    place_sigmas_m: tuple[float | None, ...]
+    length_m: float | None = None
+    length_sigma_m: float | None = None
+    words: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Newest:
+    """A result with its number. Numbers grow by one with each result, over all runs of this program."""
+
+    number: int
+    result: Result
+
+
+class Source(Protocol):
+    """The program behind the page. Its methods may be called from any thread."""
+
+    def state(self) -> PageState:
+        """Return the state now. Takes a few milliseconds at most."""
+
+    def newest(self) -> Newest | None:
+        """Return the newest result; None: there is none."""
+
+    def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
+        """Have a function called whenever there is a newer result or the activity changes.
+
+        It is called from threads of the run and must return at once. Return a function that ends this.
+        """
+
+    def command(self, command: Command) -> Answer:
+        """Do what the page asks. May take seconds; never raises for what the page got wrong."""
+
+    def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
+        """Measure points of the rectified left image.
+
+        Args:
+            points_px: x, y of one or two points, px of the full image.
+            number: of the result; None: the newest. One that is gone is answered in `words`.
+        """
+
+    def saved(self) -> str:
+        """Return the path of the folder with the saved pairs (pair-NNNNNN); empty: nothing is saved."""
