@@ -117,6 +117,17 @@ class Epipolar(Enum):
         """Whether the epipolar lines are columns: the cameras stand one above the other."""
         return self is not Epipolar.LEFT
 
+    @property
+    def way(self) -> tuple[int, int]:
+        """Where a point lies in the right image: this many disparities right and down of its place in the left one."""
+        match self:
+            case Epipolar.LEFT:
+                return -1, 0
+            case Epipolar.UP:
+                return 0, -1
+            case Epipolar.DOWN:
+                return 0, 1
+
 
 @dataclass(frozen=True, slots=True)
 class RectifiedPair:

@@ -75,12 +75,30 @@ def write_ply(path: Path, cloud: CloudImage, colours: Image, axes: Axes = Axes.C
             packed_points(cloud[rows], colours[rows], axes, library).view(np.uint8).data
             for rows in strips(cloud.shape[0], cloud.shape[1])
         )
-    header = (
+    write_parts(path, chain([_header(count, axes)], parts))
+    return count
+
+
+def cloud_ply(cloud: CloudImage, colours: Image, axes: Axes = Axes.CAMERA) -> bytes:
+    """Return what `write_ply` writes, in memory.
+
+    Args:
+        cloud: (H, W, 3) float32, m, in the left camera's axes, NaN = none.
+        colours: (H, W) grey or (H, W, 3) BGR, uint8: the rectified left image.
+        axes: axes of the points.
+
+    Raises:
+        ValueError: the two sizes differ.
+    """
+    points = packed_points(cloud, colours, axes)
+    return _header(points.size, axes) + points.tobytes()
+
+
+def _header(count: int, axes: Axes) -> bytes:
+    return (
         f"ply\nformat binary_little_endian 1.0\ncomment unit metre; {axes.text}\n"
         f"element vertex {count}\n{_PROPERTIES}end_header\n"
-    )
-    write_parts(path, chain([header.encode()], parts))
-    return count
+    ).encode()
 
 
 def packed_points(

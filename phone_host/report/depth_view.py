@@ -50,9 +50,6 @@ button{font:inherit;font-size:.85rem;color:var(--ink);background:var(--bg);borde
 THIN: Final = "\u202f"
 """The space between groups of three digits."""
 
-_WAY: Final = {Epipolar.LEFT: (-1, 0), Epipolar.UP: (0, -1), Epipolar.DOWN: (0, 1)}
-"""Where a point lies in the right picture, in disparities right and down of its place in the left one."""
-
 _RAMP_STEPS: Final = 12
 _MOST_TICKS: Final = 6
 
@@ -137,7 +134,7 @@ def _view(processed: Processed, small: Grid) -> dict[str, object]:
         "low": small.low,
         "high": small.high,
         "metric": small.metric,
-        "way": _WAY[processed.pair.epipolar],
+        "way": processed.pair.epipolar.way,
     }
     if geometry is not None:
         values |= {

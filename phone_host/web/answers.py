@@ -1,0 +1,287 @@
+"""The HTTP API: what each address answers. `openapi` describes it for programs."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import BinaryIO, Final, TypeVar
+
+from aiohttp import web
+
+from phone_host.measure.trouble import Trouble
+from phone_host.output.json_text import json_text
+from phone_host.report import run_json
+from phone_host.web.door import KNOWN, problem
+from phone_host.web.encoder import FILES, has_data
+from phone_host.web.gate import Gate, is_loopback
+from phone_host.web.hub import Hub
+from phone_host.web.openapi import description
+from phone_host.web.saved_pairs import open_saved, saved_pairs
+from phone_host.web.settings import Limits
+from phone_host.web.source import Answer
+from phone_host.web.state_json import answer_values, measured_values, whole_text
+from phone_host.web.static_files import INDEX, StaticFile, chosen_encoding
+from phone_host.web.viewers import Viewers
+from phone_host.web.wishes import read_command, read_measure
+
+T = TypeVar("T")
+
+_BLOCK_BYTES: Final = 1 << 18
+_LEAST_BYTES_PER_S: Final = 20_000
+"""A reader that is slower than a Bluetooth line is cut off; it holds a place and memory."""
+_BODY_S: Final = 10.0
+
+_KINDS: Final = {
+    ".ply": "application/octet-stream",
+    ".pfm": "application/octet-stream",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+}
+_NOT_YET: Final = Trouble("there is no such thing yet", "start a run and wait for its first pair")
+_NO_DEPTH: Final = Trouble("this run has no depth", "give it a calibration")
+_NOT_SAVED: Final = Trouble("this file was not saved", "see /api/pairs; save pairs with --save-every")
+_BUSY: Final = Trouble("too much is asked for at once", "try again in a moment")
+_NO_COMMAND: Final = Trouble("this is no command", "send JSON as /api/openapi.json describes it")
+_NO_POINTS: Final = Trouble("these are no points", "send JSON as /api/openapi.json describes it")
+_NO_AUTHORITY: Final = Trouble("this page has no certificate", "start it with --lan")
+
+
+class Answers:
+    """Answers requests that the door has let in.
+
+    Args:
+        hub: what there is to tell.
+        viewers: those who look all the time.
+        gate: makes the cookie.
+        files: the page's files.
+        limits: how much at once.
+        authority: certificate of the page's own authority, PEM; empty without https.
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        viewers: Viewers,
+        gate: Gate,
+        files: dict[str, StaticFile],
+        limits: Limits,
+        authority: bytes,
+    ) -> None:
+        self._hub, self._viewers, self._gate, self._files, self._limits = hub, viewers, gate, files, limits
+        self._authority = authority
+        self._commander = ThreadPoolExecutor(1, "page command")
+        self._commands = self._downloads = 0
+
+    def routes(self) -> list[web.RouteDef]:
+        """Return all addresses."""
+        newest = [web.get(f"/api/{name}", self._newest_file) for name in FILES]
+        return [
+            web.get("/", self._index),
+            web.get("/static/{path:.+}", self._static),
+            web.get("/ws", self._socket),
+            web.get("/api/events", self._events),
+            web.get("/api/state", self._state),
+            web.get("/api/report.json", self._report),
+            web.get("/api/openapi.json", self._openapi),
+            web.get("/api/authority.pem", self._authority_file),
+            web.get("/api/pairs", self._pairs),
+            web.get(r"/api/pairs/{number:[0-9]{1,9}}/{name}", self._saved_file),
+            web.post("/api/command", self._command),
+            web.post("/api/measure", self._measure),
+            *newest,
+        ]
+
+    def close(self) -> None:
+        """Take no more commands."""
+        self._commander.shutdown(wait=False, cancel_futures=True)
+
+    async def _index(self, request: web.Request) -> web.StreamResponse:
+        token = request.query.get("token")
+        if token is None or not self._gate.is_token(token):
+            return await self._file(request, INDEX)
+        # The fragment stays in the browser: the page keeps the token where only its own origin reaches it.
+        target = f"/#token={token}"
+        headers = {"Set-Cookie": self._gate.set_cookie, "Cache-Control": "no-store"}
+        if request.headers.get("Sec-Fetch-Site", "none") in {"none", "same-origin"}:
+            return web.Response(status=303, headers={**headers, "Location": target})
+        # Coming from another site, the browser would not send a strict cookie along a redirect.
+        text = f'<!doctype html><meta http-equiv="refresh" content="0;url={target}"><title>tandemscan</title>'
+        return web.Response(text=text, content_type="text/html", headers=headers)
+
+    async def _static(self, request: web.Request) -> web.StreamResponse:
+        return await self._file(request, request.match_info["path"])
+
+    async def _file(self, request: web.Request, path: str) -> web.StreamResponse:
+        file = self._files.get(path)
+        if file is None:
+            raise web.HTTPNotFound
+        encoding = chosen_encoding(request.headers.get("Accept-Encoding", ""), file)
+        headers = {
+            "Content-Type": file.kind,
+            "ETag": f'W/"{file.tag}"',
+            "Cache-Control": "no-cache",
+            "Vary": "Accept-Encoding",
+        }
+        if any(tag.value == file.tag for tag in request.if_none_match or ()):
+            return web.Response(status=304, headers=headers)
+        if encoding != "identity":
+            headers["Content-Encoding"] = encoding
+        return await _send(request, len(file.content[encoding]), _blocks(file.content[encoding]), headers)
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        if not self._viewers.has_room(is_known=request[KNOWN]):
+            return problem(503, _BUSY, {"Retry-After": "5"})
+        if request.headers.get("Upgrade", "").lower() != "websocket":
+            raise web.HTTPBadRequest
+        is_near = is_loopback(request.remote or "")
+        return await self._viewers.sockets(request, is_known=request[KNOWN], is_near=is_near)
+
+    async def _events(self, request: web.Request) -> web.StreamResponse:
+        if not self._viewers.has_room(is_known=request[KNOWN]):
+            return problem(503, _BUSY, {"Retry-After": "5"})
+        return await self._viewers.events(request, is_known=request[KNOWN])
+
+    async def _state(self, _request: web.Request) -> web.StreamResponse:
+        await self._hub.refresh()
+        return _json(whole_text(self._hub.state, self._hub.samples_since(-1)))
+
+    async def _report(self, _request: web.Request) -> web.StreamResponse:
+        def built() -> str:
+            run = self._hub.source.state().run
+            return "" if run is None else json_text(run_json.build(run))
+
+        text = await self._hub.encoder.run(built)
+        return _json(text) if text else problem(404, _NOT_YET)
+
+    async def _openapi(self, _request: web.Request) -> web.StreamResponse:
+        return _json(json_text(description()))
+
+    async def _authority_file(self, _request: web.Request) -> web.StreamResponse:
+        if not self._authority:
+            return problem(404, _NO_AUTHORITY)
+        return web.Response(body=self._authority, content_type="application/x-x509-ca-cert")
+
+    async def _newest_file(self, request: web.Request) -> web.StreamResponse:
+        name, newest = request.path.rpartition("/")[2], self._hub.newest()
+        if newest is None:
+            return problem(404, _NOT_YET)
+        if not has_data(name, newest.result.processed):
+            return problem(404, _NO_DEPTH)
+        if self._downloads >= self._limits.downloads:
+            return problem(503, _BUSY, {"Retry-After": "1"})
+        self._downloads += 1
+        try:
+            data = await self._hub.encoder.file(newest, name)
+            headers = _file_headers(name) | {"X-Pair-Number": str(newest.number)}
+            return await _send(request, len(data), _blocks(data), headers)
+        finally:
+            self._downloads -= 1
+
+    async def _pairs(self, _request: web.Request) -> web.StreamResponse:
+        found = await self._hub.encoder.run(lambda: saved_pairs(self._hub.source.saved()))
+        pairs = [{"number": pair.number, "files": list(pair.files)} for pair in found]
+        return _json(json_text({"pairs": pairs}))
+
+    async def _saved_file(self, request: web.Request) -> web.StreamResponse:
+        number, name = int(request.match_info["number"]), request.match_info["name"]
+        if self._downloads >= self._limits.downloads:
+            return problem(503, _BUSY, {"Retry-After": "1"})
+        self._downloads += 1
+        try:
+            file = await _aside(lambda: open_saved(self._hub.source.saved(), number, name))
+            with file:
+                size = await _aside(lambda: file.seek(0, 2))
+                return await _send(request, size, _read(file, size), _file_headers(name))
+        except FileNotFoundError:
+            return problem(404, _NOT_SAVED)
+        finally:
+            self._downloads -= 1
+
+    async def _command(self, request: web.Request) -> web.StreamResponse:
+        command = read_command(await _body(request))
+        if command is None:
+            return problem(400, _NO_COMMAND)
+        answer = await self._in_turn(lambda: self._hub.source.command(command))
+        if answer is None:
+            return problem(503, _BUSY, {"Retry-After": "1"})
+        self._hub.wake()
+        return _json(json_text(answer_values(answer)), 200 if answer.trouble is None else 409)
+
+    async def _measure(self, request: web.Request) -> web.StreamResponse:
+        asked = read_measure(await _body(request))
+        if asked is None:
+            return problem(400, _NO_POINTS)
+        measured = await self._hub.encoder.run(lambda: self._hub.source.measure(asked.points_px, asked.number))
+        return _json(json_text(measured_values(measured)))
+
+    async def _in_turn(self, do: Callable[[], Answer]) -> Answer | None:
+        """Run a command in its thread, one after another; None: too many wait."""
+        if self._commands >= self._limits.commands:
+            return None
+        self._commands += 1
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._commander, do)
+        finally:
+            self._commands -= 1
+
+
+def _json(text: str, status: int = 200) -> web.Response:
+    headers = {"Cache-Control": "no-store"}
+    return web.Response(status=status, text=text, content_type="application/json", headers=headers)
+
+
+def _file_headers(name: str) -> dict[str, str]:
+    kind = _KINDS[f".{name.rpartition('.')[2]}"]
+    shown = "attachment" if kind == "application/octet-stream" else "inline"
+    disposition = f'{shown}; filename="{name}"'
+    return {"Content-Type": kind, "Content-Disposition": disposition, "Cache-Control": "no-store"}
+
+
+async def _body(request: web.Request) -> bytes:
+    """Return a request's body.
+
+    Raises:
+        HTTPRequestTimeout: it takes too long.
+        HTTPRequestEntityTooLarge: it is too long.
+    """
+    try:
+        return await asyncio.wait_for(request.read(), _BODY_S)
+    except TimeoutError:
+        raise web.HTTPRequestTimeout from None
+
+
+async def _aside(do: Callable[[], T]) -> T:
+    """Run something that waits for a disk in another thread."""
+    return await asyncio.get_running_loop().run_in_executor(None, do)
+
+
+async def _blocks(data: bytes) -> AsyncIterator[bytes | memoryview]:
+    whole = memoryview(data)
+    for at in range(0, len(data), _BLOCK_BYTES):
+        yield whole[at : at + _BLOCK_BYTES]
+
+
+async def _read(file: BinaryIO, size: int) -> AsyncIterator[bytes]:
+    file.seek(0)
+    while size > 0 and (block := await _aside(lambda: file.read(min(size, _BLOCK_BYTES)))):
+        size -= len(block)
+        yield block
+
+
+async def _send(
+    request: web.Request, size: int, blocks: AsyncIterator[bytes | memoryview], headers: dict[str, str]
+) -> web.StreamResponse:
+    """Send an answer block by block, and cut off a peer that reads too slowly."""
+    answer = web.StreamResponse(headers=headers)
+    answer.content_length = size
+    await answer.prepare(request)
+    if request.method == "HEAD":
+        return answer
+    transport = request.transport
+    try:
+        async for block in blocks:
+            await asyncio.wait_for(answer.write(block), 10.0 + len(block) / _LEAST_BYTES_PER_S)
+        await answer.write_eof()
+    except TimeoutError:
+        if transport is not None:
+            transport.abort()
+    return answer

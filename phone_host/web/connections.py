@@ -1,0 +1,115 @@
+"""Keeps the page's connections few and busy. A shell around the HTTP protocol of each.
+
+aiohttp limits neither how many there are nor how long a peer takes for its first request. Beyond the limit, the one that
+has been idle longest makes room: strangers who hold connections open do not keep the user out.
+"""
+
+import asyncio
+from collections.abc import Callable
+from typing import Final, cast
+
+from phone_host.web.settings import Limits
+
+_SWEEP_S: Final = 1.0
+
+
+class Connection(asyncio.Protocol):
+    """Passes everything on to the HTTP protocol, and knows since when nothing is being answered.
+
+    Args:
+        inner: the HTTP protocol.
+        all_of_them: told when it begins and ends.
+    """
+
+    def __init__(self, inner: asyncio.Protocol, all_of_them: "Connections") -> None:
+        self._inner, self._all = inner, all_of_them
+        self.transport: asyncio.Transport | None = None
+        self.answering = 0
+        self.idle_since_s = asyncio.get_running_loop().time()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin, if there is room."""
+        self.transport = cast("asyncio.Transport", transport)
+        self._inner.connection_made(transport)
+        self._all.begun(self)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End."""
+        self._all.ended(self)
+        self._inner.connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Pass bytes on."""
+        self._inner.data_received(data)
+
+    def eof_received(self) -> bool | None:
+        """Pass the end of the peer's bytes on."""
+        return self._inner.eof_received()
+
+    def pause_writing(self) -> None:
+        """Pass on that the peer reads slowly."""
+        self._inner.pause_writing()
+
+    def resume_writing(self) -> None:
+        """Pass on that the peer has caught up."""
+        self._inner.resume_writing()
+
+    def abort(self) -> None:
+        """Cut the connection; what was not sent is lost."""
+        if self.transport is not None:
+            self.transport.abort()
+
+
+class Connections:
+    """All connections of the server.
+
+    Args:
+        limits: how many, and how long they may be idle.
+        serve: makes the HTTP protocol of a new one.
+    """
+
+    def __init__(self, limits: Limits, serve: Callable[[], asyncio.Protocol]) -> None:
+        self._limits, self._serve = limits, serve
+        self._open: dict[asyncio.Transport, Connection] = {}
+
+    def __call__(self) -> asyncio.Protocol:
+        """Make the protocol of a new connection."""
+        return Connection(self._serve(), self)
+
+    def __len__(self) -> int:
+        """Return how many are open."""
+        return len(self._open)
+
+    def begun(self, connection: Connection) -> None:
+        """Take a new connection in, at the cost of the one that is idle longest, or of itself."""
+        assert connection.transport is not None
+        self._open[connection.transport] = connection
+        if len(self._open) > self._limits.connections:
+            idle = [each for each in self._open.values() if not each.answering]
+            min(idle, key=lambda each: each.idle_since_s).abort()
+
+    def ended(self, connection: Connection) -> None:
+        """Forget a connection."""
+        assert connection.transport is not None
+        self._open.pop(connection.transport, None)
+
+    def answering(self, transport: asyncio.BaseTransport | None, change: int) -> None:
+        """Note that an answer begins (1) or ends (-1)."""
+        found = self._open.get(cast("asyncio.Transport", transport))
+        if found is not None:
+            found.answering += change
+            found.idle_since_s = asyncio.get_running_loop().time()
+
+    async def sweep(self) -> None:
+        """Close what has been idle for too long, for ever."""
+        while True:
+            await asyncio.sleep(_SWEEP_S)
+            now_s = asyncio.get_running_loop().time()
+            for each in list(self._open.values()):
+                if not each.answering and now_s - each.idle_since_s > self._limits.idle_s:
+                    each.abort()
+
+    def close(self) -> None:
+        """Cut all that are left."""
+        for each in list(self._open.values()):
+            each.abort()

@@ -1,0 +1,100 @@
+"""Puts the page's server together within its event loop: the only place where its parts meet."""
+
+import asyncio
+import logging
+import socket
+import ssl
+from typing import Final
+
+from aiohttp import web
+
+from phone_host.web.answers import Answers
+from phone_host.web.connections import Connections
+from phone_host.web.door import Door
+from phone_host.web.gate import Gate
+from phone_host.web.hub import Hub
+from phone_host.web.settings import Limits, PageSettings, content_policy
+from phone_host.web.source import Source
+from phone_host.web.static_files import INDEX, PACKAGE_PAGE, read_files, script_hashes
+from phone_host.web.viewers import Viewers
+
+_HANDSHAKE_S: Final = 10.0
+_LINE_BYTES: Final = 4096
+_FIELD_BYTES: Final = 8192
+_FAREWELL_S: Final = 1.0
+
+
+class Serving:
+    """The server's parts, alive between `start` and `stop`.
+
+    Args:
+        source: the program behind the page.
+        settings: where, and for whom.
+        limits: what strangers may use up.
+        gate: judges requests.
+    """
+
+    def __init__(self, source: Source, settings: PageSettings, limits: Limits, gate: Gate) -> None:
+        files = read_files(settings.page or PACKAGE_PAGE)
+        page = files[INDEX].content["identity"] if INDEX in files else b""
+        self._hub = Hub(source)
+        self._viewers = Viewers(self._hub, limits)
+        self._connections = Connections(limits, lambda: self._http()())
+        door = Door(gate, limits, self._connections, content_policy(script_hashes(page)))
+        authority = b"" if settings.credentials is None else settings.credentials.authority
+        self._answers = Answers(self._hub, self._viewers, gate, files, limits, authority)
+        app = web.Application(middlewares=[door.middleware()], client_max_size=limits.body_bytes)
+        app.add_routes(self._answers.routes())
+        app.on_response_prepare.append(door.dress)
+        self._runner = web.AppRunner(
+            app,
+            access_log=None,
+            handle_signals=False,
+            keepalive_timeout=limits.idle_s,
+            max_line_size=_LINE_BYTES,
+            max_field_size=_FIELD_BYTES,
+            auto_decompress=False,  # a body of ours is never compressed; a bomb would be
+            logger=_quiet(),
+        )
+        self._tasks: list[asyncio.Task[None]] = []
+        self._server: asyncio.Server | None = None
+
+    async def start(self, listener: socket.socket, tls: ssl.SSLContext | None) -> None:
+        """Begin to serve.
+
+        Args:
+            listener: a listening socket.
+            tls: for https; None: http.
+        """
+        await self._runner.setup()
+        loop = asyncio.get_running_loop()
+        patience = {} if tls is None else {"ssl_handshake_timeout": _HANDSHAKE_S, "ssl_shutdown_timeout": 1.0}
+        self._server = await loop.create_server(self._connections, sock=listener, ssl=tls, **patience)
+        self._tasks = [asyncio.ensure_future(each) for each in (self._connections.sweep(), self._hub.watch())]
+
+    async def stop(self) -> None:
+        """Tell viewers goodbye, and end."""
+        assert self._server is not None
+        self._server.close()
+        self._hub.close()
+        self._answers.close()
+        self._viewers.close()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        deadline_s = asyncio.get_running_loop().time() + _FAREWELL_S
+        while len(self._viewers) and asyncio.get_running_loop().time() < deadline_s:
+            await asyncio.sleep(0.01)
+        self._connections.close()
+        await self._runner.cleanup()
+
+    def _http(self) -> web.Server:
+        assert self._runner.server is not None
+        return self._runner.server
+
+
+def _quiet() -> logging.Logger:
+    """Return a logger that drops what aiohttp says of strangers' broken requests; the door logs what is ours."""
+    logger = logging.getLogger("phone_host.web.aiohttp")
+    logger.setLevel(logging.CRITICAL + 1)
+    return logger

@@ -1,0 +1,198 @@
+"""The program's state as the JSON that the page gets. Pure.
+
+`live` ends with its samples, because those differ from viewer to viewer and all else is made once for all of them.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from common.ledger import PairLedger
+from phone_host.measure.headline import headline
+from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.trouble import Trouble
+from phone_host.measure.unused import unused
+from phone_host.output.json_text import json_text
+from phone_host.report.run_json import concern_values
+from phone_host.web.source import Answer, Choice, Measured, PageState
+
+MOST_SAMPLES: Final = 120
+"""Samples in one message: 4 s of them at 30/s; a chart shows no more of a moment."""
+
+_RECENT: Final = 60
+"""Pairs over which rate and time skew are told while a run goes on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The delays of one pair, for the charts.
+
+    Attributes:
+        number: of the result.
+        done_ns: when it was done, host's monotonic clock.
+        text: its row, JSON.
+    """
+
+    number: int
+    done_ns: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class StateText:
+    """A state, but for the samples.
+
+    Attributes:
+        before: the text up to the samples; they stand last in `live`.
+        after: the text behind them; empty if there is no `live`, and so no place for samples.
+    """
+
+    before: str
+    after: str
+
+
+def sample(number: int, ledger: PairLedger) -> Sample:
+    """Return the row of a pair: done, s; then the delays and the time skew, ms.
+
+    Args:
+        number: of the result.
+        ledger: its marks and delays.
+    """
+    delays_ns = (
+        ledger.capture_ns,
+        ledger.outbox_ns,
+        ledger.propagation_ns,
+        ledger.pairing_ns,
+        ledger.queuing_ns,
+        ledger.processing_ns,
+        ledger.end_to_end_ns,
+        ledger.time_skew_ns,
+    )
+    row = [round(ledger.done_ns / 1e9, 4), *(round(value / 1e6, 3) for value in delays_ns)]
+    return Sample(number, ledger.done_ns, json_text(row))
+
+
+def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
+    """Write a state.
+
+    Args:
+        state: the state.
+        samples: the newest ones, oldest first; they tell the rate.
+    """
+    values: dict[str, object] = {
+        "kind": "state",
+        "activity": state.activity.value,
+        "steps": [{"name": step.name.value, "done": step.done, "words": step.words} for step in state.steps],
+        "command": state.command,
+        "settings": dict(state.settings),
+        "boards": [_choice(item) for item in state.boards],
+        "cameras": [_choice(item) for item in state.cameras],
+        "matchers": list(state.matchers),
+        "guide": None if state.guide is None else dict(state.guide),
+        "trouble": None if state.trouble is None else trouble_values(state.trouble),
+        "changed": state.changed,
+    }
+    if state.run is None:
+        return StateText(json_text(values | {"live": None})[:-1], "")
+    live = json_text(_live(state.run, samples))
+    return StateText(f'{json_text(values)[:-1]}, "live": {live[:-1]}, "samples": [', "]}")
+
+
+def whole_text(state: StateText, samples: Sequence[Sample], report: str = "null") -> str:
+    """Write a state with samples and report.
+
+    Args:
+        state: the state.
+        samples: those that the viewer does not have yet; at most the newest `MOST_SAMPLES` are told.
+        report: report.json's object, or null.
+    """
+    rows = ", ".join(item.text for item in samples[-MOST_SAMPLES:]) if state.after else ""
+    return f'{state.before}{rows}{state.after}, "report": {report}}}'
+
+
+def trouble_values(trouble: Trouble) -> dict[str, object]:
+    """Return problem and remedy."""
+    return {"problem": trouble.problem, "remedy": trouble.remedy}
+
+
+def answer_values(answer: Answer) -> dict[str, object]:
+    """Return what became of a command."""
+    return {"words": answer.words} if answer.trouble is None else trouble_values(answer.trouble)
+
+
+def measured_values(measured: Measured) -> dict[str, object]:
+    """Return places and distances, m."""
+    return {
+        "places_m": [None if place is None else list(place) for place in measured.places_m],
+        "place_sigmas_m": list(measured.place_sigmas_m),
+        "distances_m": list(measured.distances_m),
+        "length_m": measured.length_m,
+        "length_sigma_m": measured.length_sigma_m,
+        "words": measured.words,
+    }
+
+
+def _choice(choice: Choice) -> dict[str, object]:
+    return {"uri": choice.uri, "name": choice.name, "note": choice.note, "needs_code": choice.needs_code}
+
+
+def _live(run: RunSnapshot, samples: Sequence[Sample]) -> dict[str, object]:
+    """Return what changes all the time, but for the samples."""
+    skew_ns = run.delays.spread("time_skew", _RECENT).p50_ns
+    return {
+        "trust": _trust(run),
+        "ended": run.ended,
+        "pairs": run.processed,
+        "pairs_per_s": _number(_rate(run, samples)),
+        "time_skew_ms": None if run.timeless else _number(skew_ns / 1e6),
+        "density": _number(run.images.now.density),
+        "link": _link(run),
+        "clock": _clock(run),
+        "drops": {": ".join(filter(None, (item.place, item.reason))): item.count for item in unused(run)},
+        "sinks": [
+            {"name": sink.name, "written": sink.written, "dropped": sink.dropped, "failed": sink.failed}
+            for sink in run.sinks
+        ],
+        "carrier": run.carrier,
+    }
+
+
+def _trust(run: RunSnapshot) -> dict[str, object]:
+    if not run.processed and run.ended == "running" and run.failure is None:
+        return {"level": "unknown", "headline": "No pair has been processed yet.", "concerns": []}
+    said = headline(run)
+    return {
+        "level": said.grade.value,
+        "headline": said.sentence,
+        "concerns": [concern_values(item) | {"problem": item.sentence} for item in concerns(run)],
+    }
+
+
+def _rate(run: RunSnapshot, samples: Sequence[Sample]) -> float:
+    """Return results per s: of late while the run goes on, over all of it afterwards."""
+    recent = samples[-_RECENT:]
+    if run.ended != "running" or len(recent) < 2 or recent[-1].done_ns <= recent[0].done_ns:
+        return run.pairs_per_second
+    steps = recent[-1].number - recent[0].number
+    return steps / ((recent[-1].done_ns - recent[0].done_ns) / 1e9)
+
+
+def _link(run: RunSnapshot) -> dict[str, object]:
+    names = [run.carrier, *(tally.name for tally in run.link.links if tally.is_up), *(t.name for t in run.link.links)]
+    name = next((each for each in names if each), "")
+    return {"name": name, "up": any(tally.is_up for tally in run.link.links)}
+
+
+def _clock(run: RunSnapshot) -> dict[str, object]:
+    if run.estimate is None:
+        return {"known": False, "offset_ms": None, "uncertainty_us": None}
+    return {
+        "known": True,
+        "offset_ms": run.estimate.offset_ns / 1e6,
+        "uncertainty_us": run.estimate.uncertainty_ns / 1e3,
+    }
+
+
+def _number(value: float) -> float | None:
+    return round(value, 4) if math.isfinite(value) else None
