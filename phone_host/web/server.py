@@ -1,7 +1,7 @@
 """The page's server: a thread with an event loop of its own beside the pipeline. Light: aiohttp is imported at the start."""
 
 import asyncio
-import secrets
+import errno
 import socket
 import ssl
 import threading
@@ -10,13 +10,13 @@ from urllib.parse import quote
 
 from common.errors import SettingsError, TakenError, UnavailableError
 from phone_host.web.gate import Gate
+from phone_host.web.secret_files import new_token
 from phone_host.web.settings import LIMITS, Limits, PageSettings
 from phone_host.web.source import Source
 
 if TYPE_CHECKING:
     from phone_host.web.serving import Serving
 
-_TOKEN_BYTES: Final = 24
 _BACKLOG: Final = 64
 _SEND_BYTES: Final = 1 << 18
 """What the kernel keeps for a reader. Its own limit is some MB, which a slow reader would see minutes later."""
@@ -34,7 +34,7 @@ class PageServer:
 
     def __init__(self, source: Source, settings: PageSettings, limits: Limits = LIMITS) -> None:
         self._source, self._settings, self._limits = source, settings, limits
-        self._token = settings.token or secrets.token_urlsafe(_TOKEN_BYTES)
+        self._token = settings.token or new_token()
         self._thread: threading.Thread | None = None
         self._listens = threading.Event()
         self._failure: BaseException | None = None
@@ -50,9 +50,7 @@ class PageServer:
     @property
     def address(self) -> str:
         """Where the page is, without the token."""
-        scheme = "http" if self._settings.credentials is None else "https"
-        host = self._settings.host
-        return f"{scheme}://{f'[{host}]' if ':' in host else host}:{self.port}/"
+        return self.url.partition("?")[0]
 
     @property
     def url(self) -> str:
@@ -152,8 +150,6 @@ class PageServer:
 
 
 def _unavailable(host: str, port: int, error: OSError) -> UnavailableError:
-    import errno  # noqa: PLC0415
-
     if error.errno == errno.EADDRINUSE:
         return TakenError(
             f"port {port} of {host} is taken",
