@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import BinaryIO, Final, TypeVar
 
 from aiohttp import web
@@ -59,6 +60,7 @@ class Answers:
 
     def __init__(
         self,
+        *,
         hub: Hub,
         viewers: Viewers,
         gate: Gate,
@@ -262,9 +264,8 @@ async def _blocks(data: bytes) -> AsyncIterator[bytes | memoryview]:
 
 async def _read(file: BinaryIO, size: int) -> AsyncIterator[bytes]:
     file.seek(0)
-    while size > 0 and (block := await _aside(lambda: file.read(min(size, _BLOCK_BYTES)))):
-        size -= len(block)
-        yield block
+    for at in range(0, size, _BLOCK_BYTES):  # no more than was announced, should it grow
+        yield await _aside(partial(file.read, min(size - at, _BLOCK_BYTES)))
 
 
 async def _send(

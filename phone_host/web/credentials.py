@@ -171,8 +171,8 @@ def _may_sign(authority: x509.Certificate, names: tuple[str, ...]) -> bool:
 def _is_within(name: x509.GeneralName, allowed: Iterable[x509.GeneralName]) -> bool:
     if isinstance(name, x509.DNSName):
         return name in list(allowed)
-    networks = [each.value for each in allowed if isinstance(each, x509.IPAddress)]
-    return any(name.value in network for network in networks if network.version == name.value.version)
+    address = ipaddress.ip_address(str(name.value))
+    return any(address in ipaddress.ip_network(str(each.value)) for each in allowed if isinstance(each, x509.IPAddress))
 
 
 def _general_name(name: str) -> x509.GeneralName:
@@ -188,7 +188,9 @@ def _as_network(name: x509.GeneralName) -> x509.GeneralName:
 
 
 def _ends_soon(certificate: x509.Certificate, now: dt.datetime) -> bool:
-    return not certificate.not_valid_before_utc <= now < certificate.not_valid_after_utc - dt.timedelta(days=_RENEW_DAYS)
+    return (
+        not certificate.not_valid_before_utc <= now < certificate.not_valid_after_utc - dt.timedelta(days=_RENEW_DAYS)
+    )
 
 
 def _key_bytes(key: ec.EllipticCurvePrivateKey) -> bytes:
@@ -197,4 +199,6 @@ def _key_bytes(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _bad(path: Path) -> DataError:
-    return DataError(f"{path} and its key are no certificate of this program", "remove both: the next start makes new ones")
+    return DataError(
+        f"{path} and its key are no certificate of this program", "remove both: the next start makes new ones"
+    )

@@ -1,10 +1,11 @@
 """What every request passes: the gate, the rates, and the words for what went wrong. A shell around `gate`."""
 
 import logging
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
 
 from common import now
 from common.errors import TandemError
@@ -36,13 +37,14 @@ _REFUSALS: Final[Mapping[Refusal, tuple[int, Trouble]]] = {
     ),
 }
 _TOO_OFTEN: Final = Trouble("too many requests", "wait a second")
-_NOT_HERE: Final = Trouble("there is nothing at this address", "see /api/openapi.json")
-_NOT_SO: Final = Trouble("this address is not asked in this way", "see /api/openapi.json")
-_TOO_LONG: Final = Trouble("the request is too long", "send less")
+_TROUBLES: Final[Mapping[int, Trouble]] = {
+    404: Trouble("there is nothing at this address", "see /api/openapi.json"),
+    405: Trouble("this address is not asked in this way", "see /api/openapi.json"),
+    408: Trouble("the request took too long", "send it faster"),
+    413: Trouble("the request is too long", "send less"),
+}
 _BAD: Final = Trouble("the request could not be read", "see /api/openapi.json")
 _OURS: Final = Trouble("the program itself failed", "see its log")
-
-_Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 def problem(status: int, trouble: Trouble, headers: Mapping[str, str] | None = None) -> web.Response:
@@ -81,11 +83,11 @@ class Door:
         """Give every answer the headers that keep other sites away from it."""
         response.headers.update(self._headers)
 
-    def middleware(self) -> Callable[[web.Request, _Handler], Awaitable[web.StreamResponse]]:
+    def middleware(self) -> Middleware:
         """Return the function that aiohttp calls with each request."""
 
         @web.middleware
-        async def enter(request: web.Request, handler: _Handler) -> web.StreamResponse:
+        async def enter(request: web.Request, handler: Handler) -> web.StreamResponse:
             transport = request.transport
             self._connections.answering(transport, 1)
             try:
@@ -109,22 +111,17 @@ class Door:
             return problem(429, _TOO_OFTEN, {"Retry-After": "1"})
         return None
 
-    async def _answered(self, request: web.Request, handler: _Handler) -> web.StreamResponse:
+    async def _answered(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         try:
             return await handler(request)
-        except web.HTTPNotFound:
-            return problem(404, _NOT_HERE)
-        except web.HTTPMethodNotAllowed as error:
-            return problem(405, _NOT_SO, {"Allow": ", ".join(sorted(error.allowed_methods))})
-        except web.HTTPRequestEntityTooLarge:
-            return problem(413, _TOO_LONG)
         except web.HTTPException as error:
-            return problem(error.status, _BAD)
+            headers = {"Allow": error.headers["Allow"]} if "Allow" in error.headers else None
+            return problem(error.status, _TROUBLES.get(error.status, _BAD), headers)
         except TandemError as error:
             return problem(409, trouble_of(error))
         except (ConnectionError, TimeoutError):
             raise  # the peer is gone
-        except Exception:  # one answer fails, the server lives on
+        except Exception:  # noqa: BLE001 - one answer fails, the server lives on
             if self._complaints.take(now.monotonic_ns() / 1e9):
                 _LOG.exception("page: answer failed, path=%r", request.path)
             return problem(500, _OURS)

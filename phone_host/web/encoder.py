@@ -7,15 +7,15 @@ result is encoded, and only what somebody waits for.
 import asyncio
 import os
 import threading
-import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final, TypeVar, cast
+from typing import Final, TypeVar
 
 import cv2
 
+from common import now
 from phone_host.model import Processed
 from phone_host.output.ply import cloud_ply
 from phone_host.output.preview import disparity_picture
@@ -51,7 +51,7 @@ class Encoder:
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "page encoder", initializer=_be_nice)
-        self._rest_until_s = 0.0
+        self._rest_until_ns = 0
         self._number = -1
         self._made: dict[Hashable, asyncio.Future[bytes]] = {}
         self._parts_of = -1
@@ -85,15 +85,13 @@ class Encoder:
         return await asyncio.shield(begun)  # a viewer that leaves does not take it from the others
 
     def _after_rest(self, make: Callable[[], T]) -> T:
-        began_s = time.monotonic()
-        if self._rest_until_s > began_s:
-            time.sleep(self._rest_until_s - began_s)
-            began_s = time.monotonic()
+        if (rest_ns := self._rest_until_ns - now.monotonic_ns()) > 0:
+            threading.Event().wait(rest_ns / 1e9)
+        began_ns = now.monotonic_ns()
         try:
             return make()
         finally:
-            ended_s = time.monotonic()
-            self._rest_until_s = 2 * ended_s - began_s
+            self._rest_until_ns = 2 * now.monotonic_ns() - began_ns
 
     def _message(self, newest: Newest, wanted: Wanted) -> bytes:
         if newest.number != self._parts_of:
@@ -121,7 +119,7 @@ def _coloured(processed: Processed) -> bytes:
     """Return disparity.png as `stereo` writes it."""
     assert processed.disparity is not None
     drawn = disparity_picture(processed.disparity, processed.geometry)
-    return cast("bytes", cv2.imencode(".png", drawn, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes())
+    return cv2.imencode(".png", drawn, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
 
 
 def _cloud(processed: Processed) -> bytes:

@@ -85,6 +85,6 @@ def _numbers(folder: Path) -> list[int]:
 
 def _files(folder: Path) -> tuple[str, ...]:
     try:
-        return tuple(sorted(SAVED_FILES.intersection(os.listdir(folder))))
+        return tuple(sorted(SAVED_FILES.intersection(path.name for path in folder.iterdir())))
     except OSError:
         return ()

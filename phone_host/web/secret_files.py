@@ -59,7 +59,9 @@ def kept_credentials(folder: Path, names: Iterable[str], now: dt.datetime) -> Cr
     try:
         from phone_host.web.credentials import kept  # noqa: PLC0415 - only https needs cryptography
     except ModuleNotFoundError as error:
-        raise UnavailableError(f"https needs the package {error.name}", f"install it: pip install {error.name}") from error
+        raise UnavailableError(
+            f"https needs the package {error.name}", f"install it: pip install {error.name}"
+        ) from error
     return kept(folder, names, now)
 
 
@@ -109,4 +111,6 @@ def unusable(folder: Path, error: OSError) -> UnavailableError:
         folder: the folder.
         error: why.
     """
-    return UnavailableError(f"{folder} cannot be used ({error.strerror})", "make it readable and writable for you alone")
+    return UnavailableError(
+        f"{folder} cannot be used ({error.strerror})", "make it readable and writable for you alone"
+    )

@@ -21,7 +21,6 @@ from phone_host.web.viewers import Viewers
 _HANDSHAKE_S: Final = 10.0
 _LINE_BYTES: Final = 4096
 _FIELD_BYTES: Final = 8192
-_FAREWELL_S: Final = 1.0
 
 
 class Serving:
@@ -39,10 +38,12 @@ class Serving:
         page = files[INDEX].content["identity"] if INDEX in files else b""
         self._hub = Hub(source)
         self._viewers = Viewers(self._hub, limits)
-        self._connections = Connections(limits, lambda: self._http()())
+        self._connections = Connections(limits, self._protocol)
         door = Door(gate, limits, self._connections, content_policy(script_hashes(page)))
         authority = b"" if settings.credentials is None else settings.credentials.authority
-        self._answers = Answers(self._hub, self._viewers, gate, files, limits, authority)
+        self._answers = Answers(
+            hub=self._hub, viewers=self._viewers, gate=gate, files=files, limits=limits, authority=authority
+        )
         app = web.Application(middlewares=[door.middleware()], client_max_size=limits.body_bytes)
         app.add_routes(self._answers.routes())
         app.on_response_prepare.append(door.dress)
@@ -55,6 +56,7 @@ class Serving:
             max_field_size=_FIELD_BYTES,
             auto_decompress=False,  # a body of ours is never compressed; a bomb would be
             logger=_quiet(),
+            shutdown_timeout=1.0,
         )
         self._tasks: list[asyncio.Task[None]] = []
         self._server: asyncio.Server | None = None
@@ -68,8 +70,10 @@ class Serving:
         """
         await self._runner.setup()
         loop = asyncio.get_running_loop()
-        patience = {} if tls is None else {"ssl_handshake_timeout": _HANDSHAKE_S, "ssl_shutdown_timeout": 1.0}
-        self._server = await loop.create_server(self._connections, sock=listener, ssl=tls, **patience)
+        patience_s = None if tls is None else _HANDSHAKE_S
+        self._server = await loop.create_server(
+            self._connections, sock=listener, ssl=tls, ssl_handshake_timeout=patience_s
+        )
         self._tasks = [asyncio.ensure_future(each) for each in (self._connections.sweep(), self._hub.watch())]
 
     async def stop(self) -> None:
@@ -78,19 +82,17 @@ class Serving:
         self._server.close()
         self._hub.close()
         self._answers.close()
-        self._viewers.close()
+        await self._viewers.close()
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        deadline_s = asyncio.get_running_loop().time() + _FAREWELL_S
-        while len(self._viewers) and asyncio.get_running_loop().time() < deadline_s:
-            await asyncio.sleep(0.01)
         self._connections.close()
         await self._runner.cleanup()
 
-    def _http(self) -> web.Server:
+    def _protocol(self) -> asyncio.Protocol:
+        """Make the HTTP protocol of a new connection."""
         assert self._runner.server is not None
-        return self._runner.server
+        return self._runner.server()
 
 
 def _quiet() -> logging.Logger:

@@ -4,10 +4,11 @@ A viewer that reads slowly is sent less. One that neither reads nor acknowledges
 """
 
 import asyncio
+from collections.abc import Coroutine
 from contextlib import suppress
-from typing import Final
+from typing import Any, Final
 
-from aiohttp import WSMessage, WSMsgType, web
+from aiohttp import WSCloseCode, WSMessage, WSMsgType, web
 
 from phone_host.web.encoder import Wanted
 from phone_host.web.hub import Hub
@@ -30,11 +31,13 @@ class Viewer:
 
     Args:
         hub: what there is.
+        is_known: whether it is one of the user's own.
         is_near: whether it is on this machine.
     """
 
-    def __init__(self, hub: Hub, *, is_near: bool) -> None:
+    def __init__(self, hub: Hub, *, is_known: bool, is_near: bool) -> None:
         self._hub, self._loop = hub, asyncio.get_running_loop()
+        self.is_known: Final = is_known
         self._is_near = is_near
         self.wake: Final = asyncio.Event()
         self.wake.set()
@@ -97,6 +100,8 @@ class Viewers:
         self._hub, self._limits = hub, limits
         self._known: Final[dict[bool, int]] = {True: 0, False: 0}
         self._tasks: Final[set[asyncio.Task[None]]] = set()
+        self._served: Final[set[asyncio.Task[Any]]] = set()
+        self._closing = False
 
     def __len__(self) -> int:
         """Return how many there are."""
@@ -112,10 +117,11 @@ class Viewers:
             compress=False, max_msg_size=self._limits.message_bytes, autoping=False, timeout=_CLOSE_S
         )
         await socket.prepare(request)
-        viewer = Viewer(self._hub, is_near=is_near)
-        await self._serve(request, viewer, is_known, (self._send(socket, viewer), self._hear(socket, viewer)))
-        with suppress(OSError, RuntimeError, asyncio.TimeoutError):
-            await asyncio.wait_for(socket.close(), _CLOSE_S)
+        viewer = Viewer(self._hub, is_known=is_known, is_near=is_near)
+        await self._serve(viewer, request.transport, self._send(socket, viewer), self._hear(socket, viewer))
+        code = WSCloseCode.GOING_AWAY if self._closing else WSCloseCode.OK
+        with suppress(OSError, RuntimeError, TimeoutError):
+            await asyncio.wait_for(socket.close(code=code), _CLOSE_S)
         return socket
 
     async def events(self, request: web.Request, *, is_known: bool) -> web.StreamResponse:
@@ -123,21 +129,29 @@ class Viewers:
         stream = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
         await stream.prepare(request)
         if request.method == "GET":
-            viewer = Viewer(self._hub, is_near=True)
-            await self._serve(request, viewer, is_known, (self._stream(stream, viewer),))
+            viewer = Viewer(self._hub, is_known=is_known, is_near=True)
+            await self._serve(viewer, request.transport, self._stream(stream, viewer))
         return stream
 
-    def close(self) -> None:
-        """End all of them."""
-        for task in list(self._tasks):
+    async def close(self) -> None:
+        """Tell all of them goodbye."""
+        self._closing = True
+        for task in self._tasks:
             task.cancel()
+        if self._served:
+            await asyncio.wait(self._served, timeout=2 * _CLOSE_S)
 
-    async def _serve(self, request: web.Request, viewer: Viewer, is_known: bool, parts: tuple[object, ...]) -> None:  # noqa: FBT001
+    async def _serve(
+        self, request: web.Request, viewer: Viewer, is_known: bool, *parts: Coroutine[Any, Any, None]
+    ) -> None:
         """Run a viewer's parts until the first of them ends."""
-        self._known[is_known] += 1
+        served = asyncio.current_task()
+        assert served is not None
+        self._served.add(served)
+        served.add_done_callback(self._served.discard)
+        self._known[viewer.is_known] += 1
         self._hub.watchers.add(viewer.wake)
-        transport = request.transport
-        tasks = [asyncio.ensure_future(part) for part in (*parts, self._patience(viewer))]  # type: ignore[arg-type]
+        tasks = [asyncio.ensure_future(part) for part in (*parts, self._patience(viewer))]
         self._tasks.update(tasks)
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -145,14 +159,14 @@ class Viewers:
                 task for task in done if not task.cancelled() and isinstance(task.exception(), asyncio.TimeoutError)
             ]
             if gone and transport is not None:
-                transport.abort()  # type: ignore[attr-defined]
+                transport.abort()
         finally:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             self._tasks.difference_update(tasks)
             self._hub.watchers.discard(viewer.wake)
-            self._known[is_known] -= 1
+            self._known[viewer.is_known] -= 1
 
     async def _send(self, socket: web.WebSocketResponse, viewer: Viewer) -> None:
         await self._hub.refresh()
@@ -206,6 +220,8 @@ class Viewers:
         Raises:
             TimeoutError: it has.
         """
-        while viewer.silent_s() < self._limits.silent_s:
-            await asyncio.sleep(1.0)
-        raise TimeoutError
+        while True:
+            left_s = self._limits.silent_s - viewer.silent_s()
+            if left_s <= 0:
+                raise TimeoutError
+            await asyncio.sleep(min(left_s, 1.0))
