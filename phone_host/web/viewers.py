@@ -142,7 +142,7 @@ class Viewers:
             await asyncio.wait(self._served, timeout=2 * _CLOSE_S)
 
     async def _serve(
-        self, request: web.Request, viewer: Viewer, is_known: bool, *parts: Coroutine[Any, Any, None]
+        self, viewer: Viewer, transport: asyncio.Transport | None, *parts: Coroutine[Any, Any, None]
     ) -> None:
         """Run a viewer's parts until the first of them ends."""
         served = asyncio.current_task()
