@@ -85,6 +85,8 @@ def _numbers(folder: Path) -> list[int]:
 
 def _files(folder: Path) -> tuple[str, ...]:
     try:
-        return tuple(sorted(SAVED_FILES.intersection(path.name for path in folder.iterdir())))
+        with os.scandir(folder) as entries:
+            plain = {entry.name for entry in entries if entry.is_file(follow_symlinks=False)}
     except OSError:
         return ()
+    return tuple(sorted(SAVED_FILES & plain))

@@ -1,4 +1,4 @@
-"""What the page's server is started with. Pure, and light: it does not import the server."""
+"""What the page's server is started with. Light: nothing of the server is imported."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

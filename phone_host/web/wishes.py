@@ -85,7 +85,7 @@ def read_command(text: str | bytes) -> Command | None:
     """
     said = _object(text)
     values = said.get("values", {})
-    if said.get("do") not in {each.value for each in Do} or not set(said) <= {"do", "values"}:
+    if said.get("do") not in [each.value for each in Do] or not set(said) <= {"do", "values"}:
         return None
     if not isinstance(values, dict) or len(values) > _MOST_VALUES:
         return None

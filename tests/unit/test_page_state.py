@@ -1,0 +1,101 @@
+"""The state as JSON: whole, with samples and report only where they belong."""
+
+import json
+from dataclasses import replace
+
+from phone_host.measure.accounts import LinkAccount, LinkTally
+from phone_host.measure.trouble import Trouble
+from phone_host.model import PairCounts
+from phone_host.sync.clock import ClockEstimate
+from phone_host.web.openapi import description
+from phone_host.web.source import Activity, Answer, Measured, PageState
+from phone_host.web.state_json import answer_values, measured_values, sample, state_text, whole_text
+from tests.support.page_source import PageSource
+from tests.support.run_snapshots import MS, run
+from tests.support.samples import LEDGER
+
+SAMPLES = [sample(number, replace(LEDGER, done_ns=number * 100 * MS, time_skew_ns=-MS)) for number in range(200)]
+
+
+def told(state: PageState, **texts: object) -> dict[str, object]:
+    """Return the state as a browser reads it."""
+    read: dict[str, object] = json.loads(whole_text(state_text(state, SAMPLES), SAMPLES, **texts))  # type: ignore[arg-type]
+    return read
+
+
+def test_an_idle_program_has_nothing_live() -> None:
+    """Without a run there are neither samples nor a report; every field that is described is there."""
+    values = told(PageSource().state())
+    assert values["live"] is None
+    assert values["report"] is None
+    assert values["trouble"] == {"problem": "no board is chosen", "remedy": "choose one first"}
+    schemas = description()["components"]["schemas"]  # type: ignore[index]
+    assert set(values) == set(schemas["State"]["required"])
+    assert told(PageState(activity=Activity.ENDING, guide={"coverage": 0.5}))["guide"] == {"coverage": 0.5}
+
+
+def test_a_run_has_its_newest_samples() -> None:
+    """At most 120 are told: done, s, then delays and time skew, ms. The rate is that of the newest: one each 100 ms."""
+    state = PageState(activity=Activity.RUNNING, run=replace(run(5), ended="running"))
+    values = told(state, report='{"pairs": 5}')
+    live = values["live"]
+    assert isinstance(live, dict)
+    assert len(live["samples"]) == 120
+    assert live["samples"][-1] == [19.9, 0, 0, 0, 0, 0, 19900, 19900, -1]
+    assert live["pairs_per_s"] == 10.0
+    assert live["time_skew_ms"] == 0
+    assert values["report"] == {"pairs": 5}
+    assert live["trust"]["level"] in {"good", "warning", "bad"}
+    assert live["clock"] == {"known": False, "offset_ms": None, "uncertainty_us": None}
+    assert live["link"] == {"name": "", "up": False}
+
+
+def test_a_run_without_pairs_is_not_judged_yet() -> None:
+    """Nothing can be said before the first pair; a run that ended without one is bad."""
+    state = PageState(activity=Activity.RUNNING, run=replace(run(0), ended="running"))
+    live = told(state)["live"]
+    assert isinstance(live, dict)
+    assert live["trust"]["level"] == "unknown"
+    assert live["density"] is None
+    ended = told(PageState(activity=Activity.IDLE, run=run(0)))["live"]
+    assert isinstance(ended, dict)
+    assert ended["trust"]["level"] == "bad"
+    assert ended["pairs_per_s"] is None
+
+
+def test_rate_of_an_ended_run_is_that_of_all_of_it() -> None:
+    """Five pairs 50 ms apart are 20 a second, whatever the newest samples say."""
+    live = told(PageState(activity=Activity.IDLE, run=run(5)))["live"]
+    assert isinstance(live, dict)
+    assert live["pairs_per_s"] == 20.0
+    assert live["trust"]["concerns"] == []
+
+
+def test_links_clock_and_drops() -> None:
+    """The carrier is named first, else a link that is up; drops stand by place and reason; stills have no time skew."""
+    links = [LinkTally("serial"), LinkTally("tcp", is_up=True)]
+    clock = ClockEstimate(
+        reference_ns=0, offset_ns=5 * MS, skew=0, skew_uncertainty=0, uncertainty_ns=2000, round_trip_ns=1, low_ns=0,
+        high_ns=0, skew_low=0, skew_high=0,
+    )  # fmt: skip
+    counts = PairCounts(received=9, paired=5, dropped=2, taken=3)
+    snapshot = replace(run(3), link=LinkAccount([], links=links), estimate=clock, counts=counts, timeless=True)
+    live = told(PageState(activity=Activity.IDLE, run=snapshot))["live"]
+    assert isinstance(live, dict)
+    assert live["link"] == {"name": "tcp", "up": True}
+    assert live["clock"] == {"known": True, "offset_ms": 5.0, "uncertainty_us": 2.0}
+    assert 2 in live["drops"].values()
+    assert live["time_skew_ms"] is None
+    carried = told(PageState(activity=Activity.IDLE, run=replace(snapshot, carrier="serial")))["live"]
+    assert isinstance(carried, dict)
+    assert carried["link"]["name"] == "serial"
+
+
+def test_answers() -> None:
+    """What happened, or why it did not; places with None where there is no depth."""
+    assert answer_values(Answer(words="Done.")) == {"words": "Done."}
+    assert answer_values(Answer(trouble=Trouble("p", "r"))) == {"problem": "p", "remedy": "r"}
+    measured = Measured(
+        places_m=((1, 2, 3), None), distances_m=(3.7, None), place_sigmas_m=(0.1, None), words="no depth"
+    )
+    assert measured_values(measured)["places_m"] == [[1, 2, 3], None]
