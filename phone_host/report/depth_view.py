@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from common.words import counted
-from phone_host.model import Epipolar, Processed
+from phone_host.model import Processed
 from phone_host.output.preview import colour_disparity, colour_range_px, depth_range_m
 from phone_host.report import depth_data
 from phone_host.report.depth_data import Grid, Points

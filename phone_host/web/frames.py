@@ -8,9 +8,10 @@ import json
 import math
 import struct
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -46,7 +47,7 @@ class Part:
         data: its bytes.
     """
 
-    entry: dict[str, object]
+    entry: Mapping[str, Any]
     data: bytes
 
 

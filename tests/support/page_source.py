@@ -86,7 +86,16 @@ class PageSource:
         ledger = replace(LEDGER, sequence=number, done_ns=(number + 1) * 50_000_000, dequeued_ns=number * 50_000_000)
         board = BoardFrame(message=FRAME, link="tcp", marks=FRAME.marks, received_ns=0, offset_ns=0, uncertainty_ns=0)
         moment = Stamp(0, HOST_CLOCK)
-        host = Frame(0, moment, moment, 1, 1, FRAME.pixel_format, None, b"")
+        host = Frame(
+            sequence=0,
+            exposed=moment,
+            grabbed=moment,
+            width_px=1,
+            height_px=1,
+            pixel_format=FRAME.pixel_format,
+            exposure_ns=None,
+            payload=b"",
+        )
         pair = FramePair(board=board, host=host, time_skew_ns=0, paired_ns=0, queued_ns=0)
         return Newest(number, Result(number, pair, self.processed, ledger))
 

@@ -17,6 +17,13 @@ from tests.support.samples import LEDGER
 from tests.support.stereo_pages import GEOMETRY, LIMITS, processed
 
 
+def decoded(data: bytes) -> np.ndarray:
+    """Decode a picture."""
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None
+    return image
+
+
 def unpacked(part: Part) -> np.ndarray:
     """Turn a grid back into px, as the page does."""
     data = zlib.decompress(part.data) if part.entry["type"] == "u16+deflate" else part.data
@@ -74,8 +81,7 @@ def test_a_message_says_what_is_in_it() -> None:
     assert header["ledger"]["processing_ms"] == 3.0  # type: ignore[index]
     # The box fills a ninth of the picture, the strip at 8 m a sixth: both are beyond the first and last hundredth.
     assert header["range"] == [5.0, 40.0]
-    sizes = [cv2.imdecode(np.frombuffer(each, np.uint8), cv2.IMREAD_COLOR).shape for each in data[:2]]
-    assert sizes == [(60, 80, 3), (120, 160, 3)]
+    assert [decoded(each).shape for each in data[:2]] == [(60, 80, 3), (120, 160, 3)]
 
 
 def test_without_depth_there_is_no_geometry() -> None:

@@ -73,7 +73,7 @@ def test_rate_of_an_ended_run_is_that_of_all_of_it() -> None:
 
 def test_links_clock_and_drops() -> None:
     """The carrier is named first, else a link that is up; drops stand by place and reason; stills have no time skew."""
-    links = [LinkTally("serial"), LinkTally("tcp", is_up=True)]
+    links = (LinkTally("serial"), LinkTally("tcp", is_up=True))
     clock = ClockEstimate(
         reference_ns=0, offset_ns=5 * MS, skew=0, skew_uncertainty=0, uncertainty_ns=2000, round_trip_ns=1, low_ns=0,
         high_ns=0, skew_low=0, skew_high=0,
