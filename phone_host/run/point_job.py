@@ -12,19 +12,14 @@ from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
 from common.orientation import Orientation
 from phone_host.measure.trust import Concern
-from phone_host.model import Disparity, RectifiedPair, StereoGeometry
+from phone_host.run.seen_pair import MissedPoint, Outcome, Point, SeenPair, seen_pair
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import decode_files, open_image, require_same_size, size_px
-from phone_host.stereo.measured_point import MeasuredPoint, measured_point
-from phone_host.stereo.point_match import PointMatch, match_point
-from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.images import decode_files, open_image, require_same_size
 from phone_host.stereo.rectify import rectify_points
-from phone_host.stereo.rig_errors import Known, RigErrors, ZeroError, rig_errors
-from phone_host.stereo.wide_limits import Wide, why_wide
+from phone_host.stereo.rig_errors import Known
 
-Point = tuple[float, float]
 Size = tuple[int, int]
 
 ELSEWHERE: Final = "choose a point on a surface with texture, away from its edges and not too far"
@@ -50,24 +45,6 @@ class PointJob:
     make_core: Callable[[Size], StereoCore]
     most_pixels: int
     mounted: tuple[Orientation, Orientation]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FoundPoint:
-    """A point that was measured, and why its limits lie far apart; None: they do not."""
-
-    point: MeasuredPoint
-    wide: Wide | None
-
-
-@dataclass(frozen=True, slots=True)
-class MissedPoint:
-    """A point that was not, and why."""
-
-    problem: str
-
-
-Outcome = FoundPoint | MissedPoint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,8 +91,8 @@ def measure_points(job: PointJob, watcher: Watcher) -> Measured:
     images = decode_files(opened[0], opened[1], core.reductions(left_px, right_px))
     watcher.say("matching")
     processed = core.compute(*images, now.monotonic_ns, whole_px=(left_px, right_px))
-    geometry, disparity, search = processed.geometry, processed.disparity, processed.search
-    if geometry is None or disparity is None or search is None:
+    seen = seen_pair(core, processed)
+    if seen is None:
         raise SettingsError("there are no millimetres without focal length and baseline", "give --calibration")
     watcher.say("checking")
     concerns = judge_pair(core, processed, job.mounted).concerns
@@ -124,12 +101,9 @@ def measure_points(job: PointJob, watcher: Watcher) -> Measured:
         why = f"these images cannot be measured, because {blocking.sentence} ({blocking.remedy})"
         raise DataError(why, "mend that, then measure again")
     watcher.say("measuring")
-    rectifier = core.rectifier_for(size_px(processed.pair.left))
-    errors = ZeroError() if rectifier is None else rig_errors(rectifier.rig, rectifier.rectification)
-    seen = _Seen(processed.pair, disparity, geometry, 1 / search.scale, rectifier, errors)
     points = tuple(_measured(point, seen) for point in job.points_px)
     _require_one(job.points_px, points)
-    return Measured(points, errors.known, concerns)
+    return Measured(points, seen.errors.known, concerns)
 
 
 def _require_one(asked_px: tuple[Point, ...], points: tuple[Outcome, ...]) -> None:
@@ -145,29 +119,10 @@ def point_text(point_px: Point) -> str:
     return f"{point_px[0]:g},{point_px[1]:g}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
-    """A matched pair, how many of its px one px of the matched images is, and what is known of its rig."""
-
-    pair: RectifiedPair
-    disparity: Disparity
-    geometry: StereoGeometry
-    step_px: float
-    rectifier: Rectifier | None
-    errors: RigErrors
-
-
-def _measured(asked_px: Point, seen: _Seen) -> Outcome:
-    at_px, rectifier = asked_px, seen.rectifier
-    if rectifier is not None:
-        turn = rectifier.rectification.R_left
-        [(x, y)] = rectify_points(np.array([asked_px]), rectifier.rig.left, turn, seen.geometry).tolist()
-        at_px = (x, y)
-    match = match_point(seen.pair, seen.disparity, at_px, seen.step_px)
-    if not isinstance(match, PointMatch):
-        return MissedPoint(match.value)
-    epipolar = seen.pair.epipolar
-    point = measured_point(at_px, match, seen.geometry, epipolar, seen.errors)
-    if not np.isfinite(point.point_m).all():
-        return MissedPoint("cannot be told from infinity")
-    return FoundPoint(point, why_wide(point, match, epipolar))
+def _measured(asked_px: Point, seen: SeenPair) -> Outcome:
+    rectifier = seen.rectifier
+    if rectifier is None:
+        return seen.measured(asked_px)
+    turn = rectifier.rectification.R_left
+    [(x, y)] = rectify_points(np.array([asked_px]), rectifier.rig.left, turn, seen.geometry).tolist()
+    return seen.measured((x, y))

@@ -15,17 +15,9 @@ from common.places import Kind, kind_of
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_text
-from phone_host.run.point_job import (
-    ELSEWHERE,
-    FoundPoint,
-    Measured,
-    MissedPoint,
-    Outcome,
-    PointJob,
-    measure_points,
-    point_text,
-)
+from phone_host.run.point_job import ELSEWHERE, Measured, PointJob, measure_points, point_text
 from phone_host.run.progress_bar import step_bar
+from phone_host.run.seen_pair import FoundPoint, MissedPoint, Outcome
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
