@@ -17,7 +17,7 @@ from phone_host.output.listed import LIST, ListedFolder, claim
 from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.run.file_sink import NAMES, FileSink
 from phone_host.verbs.output_folders import spare_inputs
-from phone_host.verbs.run.command import spare
+from phone_host.verbs.run.prepared import spare
 from tests.unit.test_replay import fill
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
