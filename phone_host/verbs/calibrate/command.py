@@ -1,65 +1,19 @@
 """phone-host calibrate: calibrate two cameras from pictures of a board."""
 
 import argparse
-import math
-from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
-from common.errors import DataError, UnavailableError
-from common.places import Kind, kind_of
+from common.errors import DataError
 from common.program.commandline import INTERRUPTED
 from common.program.terminal import say
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
-from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
-from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
-from phone_host.calibration.causes.mistakes import Finding
-from phone_host.calibration.causes.name import BoardSession, name_mistake
-from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corners
-from phone_host.calibration.out_of_step import out_of_step
-from phone_host.calibration.session_snapshot import Taken
-from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
-from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.rig_yaml import is_rig
-from phone_host.run.progress_bar import step_bar
-from phone_host.settings import most_pixels
-from phone_host.stereo.view_files import ViewFiles, pair_files
-from phone_host.verbs.calibrate.board import Known, board_in, unseen_remedy
-from phone_host.verbs.calibrate.cause import assessed, calibrated_as_last, cause_report
-from phone_host.verbs.calibrate.earlier import (
-    Session,
-    asked_of,
-    calibrated,
-    every_pair,
-    notes,
-    require_first_sizes,
-    saved_views,
-    session_of,
-    with_earlier_cameras,
-)
-from phone_host.verbs.calibrate.figures import (
-    pairing_notes,
-    rejections,
-    report_of,
-    report_of_failure,
-    summary,
-    unwritten,
-)
+from phone_host.verbs.calibrate.earlier import asked_of
+from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place
 from phone_host.verbs.calibrate.given import require_pictures
-from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
-from phone_host.verbs.calibrate.importing import export_lines, import_calibration, write_exports
-from phone_host.verbs.calibrate.page import session_of_failure, session_of_rig, with_rectified, write_page
-from phone_host.verbs.calibrate.rig_file import replace_rig
-from phone_host.verbs.globs import two_lists
+from phone_host.verbs.calibrate.importing import import_calibration
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import PAGE, claim_names, keep_other_report, require_file, unwritable
-from phone_host.verbs.units import baseline_mm
 
 _CHECK_FAILED = 4
-_NOT_FOUND = frozenset({Reason.NOT_FOUND_LEFT, Reason.NOT_FOUND_RIGHT, Reason.NOT_FOUND_BOTH})
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,56 +22,22 @@ def run(options: argparse.Namespace) -> int:
         return import_calibration(options)
     require_pictures(options)
     asked = asked_of(options)
-    mounted = orientations(options)
-    require_file(options.out)
-    if kind_of(options.out) is not Kind.MISSING and not is_rig(options.out):
-        raise UnavailableError(f"{options.out} is not a calibration, and would be replaced", "name another --out")
+    orientations(options)
+    require_rig_place(options.out)
     live = None
     if options.live:
         from phone_host.verbs.calibrate.live import take_views  # noqa: PLC0415 - cameras and links: 0.2 s that pictures need not wait for
 
         live = take_views(options, asked)
-    files = pair_files(*(live.folders if live is not None else two_lists(options.images)))
-    require_first_sizes(files, asked, options, mounted)
-    keep_other_report(options.out.parent, "calibrate")
-    claim_names(options.out.parent, options.out, "report.json", PAGE)
-    beside = cameras_beside(files, mounted)
-    session, known = session_of(
-        options, asked, lambda named: board_in(files, named, most_pixels(None, options.max_megapixels))
-    )
-    views, found, finding, pairs = _calibrated(files, session, options, mounted)
-    wrong = None if finding is None else finding.misplaced
-    hint = "" if wrong is None else arrangement_hint(views, mounted, wrong, is_live=options.live)
-    if isinstance(found, DataError):
-        remedy = hint or ("" if finding is None else f"{finding.sentence}: {finding.remedy}") or found.remedy
-        return _report_failure(files, views, known, DataError(found.problem, remedy), options)
-    if beside is not None:
-        require_sizes(*beside, views.sizes_px)
-    rejected = (*views.rejected, *found.rejected)
-    judgement = assessed(found, rejected, finding, hint)
-    if live is not None and not options.pose_only and is_guessed(found.bends):
-        used = {each.name for each in found.used}
-        seen = [pair for pair in every_pair(session, pairs) if pair.name in used]
-        judgement = with_corners(judgement, unseen_in(seen, session.board, found.rig.left, found.rig.right))
-    rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
-    rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict.value)
-    report = report_of(files, views, rejected, found, judgement) | known.as_report() | cause_report(finding, hint)
-    report |= replace_rig(options.out, rig, found.rectification, saved_views(session, found, pairs))
-    report |= {} if live is None else live.as_report()
-    exported: list[str] = []
-    if found.rectification is not None:
-        report |= write_exports(options, rig, found.rectification)
-        exported = export_lines(report, found.rectification)
-    taken = _taken(files, views, every_pair(session, pairs), session.board)
-    page = session_of_rig(taken, found, rig, rejected, report)
-    limit = most_pixels(None, options.max_megapixels)
-    report |= write_page(options.out, with_rectified(page, taken, files, mounted, limit))
-    _write_report(options.out, report)
-    said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
-    again = [] if live is None else live.as_lines(options)
-    _tell(options, report, [*said, *summary(report, views, found, rejected, options.out), *exported, *again])
+    made = calibrate_pictures(options, asked, live)
+    if options.json:
+        print(json_text(made.report))
+    else:
+        say(made.lines)
+    if isinstance(made.verdict, DataError):
+        raise made.verdict
     # Asked only now: Ctrl-C may have come while the rig was computed.
-    return exit_code(judgement.verdict, is_interrupted=live is not None and live.signals.interrupted)
+    return exit_code(made.verdict, is_interrupted=live is not None and live.signals.interrupted)
 
 
 def exit_code(verdict: Verdict, *, is_interrupted: bool) -> int:
@@ -125,77 +45,3 @@ def exit_code(verdict: Verdict, *, is_interrupted: bool) -> int:
     if verdict is Verdict.REJECT:
         return _CHECK_FAILED
     return INTERRUPTED if is_interrupted else 0
-
-
-def _calibrated(
-    files: ViewFiles, session: Session, options: argparse.Namespace, mounted: Mounted
-) -> tuple[BoardViews, Calibration | DataError, Finding | None, list[BoardPair]]:
-    """Search all images and calibrate.
-
-    Returns:
-        The views; the calibration, or why there is none; what is wrong with the session; and the pairs as they were used.
-    """
-    limit, board = most_pixels(None, options.max_megapixels), session.board
-    with step_bar("finding the board", len(files.pairs)) as step:
-        views = look_for_boards(files, board, step, limit, mounted)
-        step.say("fitting the rig")
-        shifted = out_of_step(*views.in_order, board, views.sizes_px)
-        if shifted is not None:
-            return views, out_of_step_error(shifted), None, list(views.pairs)
-        found: Calibration | DataError
-        pairs = list(views.pairs)
-        try:
-            found = calibrated(session, pairs, views.sizes_px)
-        except DataError as failure:
-            found = failure
-        step.say("looking for mistakes")
-        baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
-        taken = BoardSession(
-            pairs=views.pairs, board=board, sizes_px=views.sizes_px, looks=views.looks, baseline_m=baseline_m
-        )
-        finding = name_mistake(taken, found)
-        if session.rig is not None:  # the earlier pairs stood otherwise, or its lenses are kept
-            return views, found, finding, pairs
-        return views, *calibrated_as_last(taken, found, finding, session.side)
-
-
-def _report_failure(
-    files: ViewFiles, views: BoardViews, known: Known, failure: DataError, options: argparse.Namespace
-) -> int:
-    """Write and print the report of a calibration that gave no rig.
-
-    Raises:
-        DataError: always: why there is none.
-    """
-    unseen = sum(each.reason in _NOT_FOUND for each in views.rejected)
-    error = failure
-    if 2 * unseen > len(files.pairs):
-        limit = most_pixels(None, options.max_megapixels)
-        error = DataError(failure.problem, unseen_remedy(files, known.board, limit))
-    report = report_of_failure(files, views, error) | known.as_report() | replace_rig(options.out, None, None)
-    report |= write_page(options.out, session_of_failure(_taken(files, views, list(views.pairs), known.board), report))
-    _write_report(options.out, report)
-    _tell(
-        options,
-        report,
-        [*pairing_notes(files), known.as_line(), *rejections(views.rejected), *unwritten(report, options.out)],
-    )
-    raise error
-
-
-def _taken(files: ViewFiles, views: BoardViews, pairs: list[BoardPair], board: Board) -> Taken:
-    return Taken(order=[name for name, _, _ in files.pairs], views=views, pairs=pairs, board=board)
-
-
-def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[str]) -> None:
-    if options.json:
-        print(json_text(report))
-    else:
-        say(lines)
-
-
-def _write_report(out: Path, report: dict[str, Any]) -> None:
-    try:
-        write_text(out.with_name("report.json"), json_text(report, indent=2) + "\n")
-    except OSError as error:
-        raise unwritable(out, error) from error

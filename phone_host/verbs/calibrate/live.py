@@ -4,11 +4,11 @@ import argparse
 import logging
 import math
 import sys
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from common import now
 from common.errors import DataError, SettingsError
@@ -58,6 +58,14 @@ _WAITED_NS: Final = 1_000_000_000
 """A board that is there is met within a fifth of this; then there is nothing to say."""
 
 
+class Interrupted(Protocol):
+    """Knows whether somebody wants the end of it all, not only of the views."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether that is so by now."""
+
+
 @dataclass(frozen=True, slots=True)
 class Live:
     """How a live calibration went.
@@ -72,7 +80,7 @@ class Live:
     last: GuideSnapshot
     left: Path
     right: Path
-    signals: StopSignals
+    signals: Interrupted
 
     @property
     def folders(self) -> tuple[str, str]:
@@ -97,31 +105,86 @@ class Live:
         return [f"{taken}; to calibrate from them again:", f"         {command}"] if command else [taken]
 
 
-def take_views(options: argparse.Namespace, asked: Asked) -> Live:
-    """Take views until it is enough.
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedViews:
+    """A live calibration that is ready to begin.
+
+    Attributes:
+        live: takes the views.
+        named: addresses of the board.
+        left: folder of the left pictures.
+        right: folder of the right ones.
+    """
+
+    live: LiveCalibration
+    named: tuple[str, ...]
+    left: Path
+    right: Path
+
+    @property
+    def note(self) -> str:
+        """What keeps views from coming; empty: nothing."""
+        host = self.live.host
+        if host.refused is not None:
+            return f"waiting: {host.refused.problem}: {host.refused.remedy}"
+        if not host.has_met_board:
+            waits = now.monotonic_ns() - host.started_ns > _WAITED_NS
+            return f"waiting for a board at {' and '.join(self.named)}" if waits else ""
+        return self.live.trouble
+
+    def run(self, stop: Callable[[], bool], shows: Sequence[Shows]) -> None:
+        """Take views before presenters.
+
+        Args:
+            stop: called several times a second.
+            shows: they show how it goes.
+
+        Raises:
+            TandemError: as `LiveCalibration.run`.
+        """
+
+        def show() -> None:
+            snapshot, views, note = self.live.snapshot(), self.live.views, self.note
+            for each in shows:
+                each.show(snapshot, views, note)
+
+        try:
+            self.live.run(stop, show)
+        except OSError as error:
+            raise unwritable(self.left, error, "LEFT or --snapshots") from error
+        show()
+
+    def taken(self, signals: Interrupted) -> Live:
+        """Return how it went.
+
+        Args:
+            signals: what may have interrupted it.
+
+        Raises:
+            DataError: too few views were taken to calibrate from.
+        """
+        last = self.live.snapshot()
+        if last.views < _LEAST_VIEWS:
+            raise _too_few(last)
+        return Live(last, self.left, self.right, signals)
+
+
+def prepare_views(options: argparse.Namespace, asked: Asked) -> PreparedViews:
+    """Open everything that a live calibration needs.
 
     Args:
         options: the command's.
         asked: what they ask for, with what the earlier calibration says.
 
     Raises:
-        SettingsError: an option is missing or not valid, or the person shows another board.
+        SettingsError: an option is missing or not valid.
         UnavailableError: the board, the camera or a folder cannot be had.
-        DataError: too few views were taken to calibrate from.
     """
     _check(options)
-    logs.set_up(log_level("error"))  # doubts about pairs are the gates' business
     settings = _settings(options, asked)
     for folder in (settings.left, settings.right, options.snapshots):
         if folder is not None:
             require_folder(folder)
-    camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels)
-    keys = key_folder(options.keys or "")
-    named = tuple(options.link or (find_board_and_say(keys.path, options.wait),))
-    uris = [parse_link(uri, listens_by_default=False) for uri in named]
-    for uri in uris:
-        tell_insecure(uri)
-    signals = StopSignals()
     baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
 
     def grow(views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size]) -> Progress:
@@ -134,20 +197,48 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
         )
         return grown(views, session, sizes_px, baseline_m)
 
-    try:
-        live = LiveCalibration(settings, camera, open_links(uris, keys), grow)
-        _run(live, options, signals, named)
-    except OSError as error:
-        raise unwritable(settings.left, error, "LEFT or --snapshots") from error
-    last = live.snapshot()
-    if last.views < _LEAST_VIEWS:
-        if last.views:
-            kept = f"{counted(last.views, 'view')} kept in {settings.left} and {settings.right}"
-            say(f"phone-host: {kept}; the next --live replaces them", sys.stderr, flush=True)
-        if signals.interrupted:
-            raise KeyboardInterrupt
-        raise _too_few(last)
-    return Live(last, settings.left, settings.right, signals)
+    with ExitStack() as opened:  # what cannot be had closes what was
+        camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels)
+        opened.enter_context(closing(camera))
+        keys = key_folder(options.keys or "")
+        named = tuple(options.link or (find_board_and_say(keys.path, options.wait),))
+        uris = [parse_link(uri, listens_by_default=False) for uri in named]
+        for uri in uris:
+            tell_insecure(uri)
+        links = open_links(uris, keys)
+        for link in links:
+            opened.enter_context(closing(link))
+        try:
+            live = LiveCalibration(settings, camera, links, grow)
+        except OSError as error:
+            raise unwritable(settings.left, error, "LEFT or --snapshots") from error
+        opened.pop_all()
+    return PreparedViews(live, named, settings.left, settings.right)
+
+
+def take_views(options: argparse.Namespace, asked: Asked) -> Live:
+    """Take views until it is enough.
+
+    Args:
+        options: the command's.
+        asked: what they ask for, with what the earlier calibration says.
+
+    Raises:
+        SettingsError: an option is missing or not valid, or the person shows another board.
+        UnavailableError: the board, the camera or a folder cannot be had.
+        DataError: too few views were taken to calibrate from.
+    """
+    logs.set_up(log_level("error"))  # doubts about pairs are the gates' business
+    prepared = prepare_views(options, asked)
+    signals = StopSignals()
+    _run(prepared, options, signals)
+    views = prepared.live.snapshot().views
+    if 0 < views < _LEAST_VIEWS:
+        kept = f"{counted(views, 'view')} kept in {prepared.left} and {prepared.right}"
+        say(f"phone-host: {kept}; the next --live replaces them", sys.stderr, flush=True)
+    if views < _LEAST_VIEWS and signals.interrupted:
+        raise KeyboardInterrupt
+    return prepared.taken(signals)
 
 
 def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:
@@ -238,7 +329,7 @@ def _seen_before(asked: Asked, *, pose_only: bool) -> frozenset[Want]:
     return CORNERS - unseen_in(pairs_of(asked.views), board_of(asked.views), asked.rig.left, asked.rig.right)
 
 
-def _run(live: LiveCalibration, options: argparse.Namespace, signals: StopSignals, named: Sequence[str]) -> None:
+def _run(prepared: PreparedViews, options: argparse.Namespace, signals: StopSignals) -> None:
     """Run it before all presenters that are wanted."""
     command = speech_program() if options.sound else ()
     is_terminal = sys.stderr.isatty()
@@ -250,20 +341,16 @@ def _run(live: LiveCalibration, options: argparse.Namespace, signals: StopSignal
             ending.callback(voice.finish)
             shows.append(Spoken(voice.say))
         if options.snapshots is not None:
-            shows.append(SnapshotFiles(options.snapshots))
+            try:
+                shows.append(SnapshotFiles(options.snapshots))
+            except OSError as error:
+                raise unwritable(prepared.left, error, "LEFT or --snapshots") from error
         if is_terminal:
             tell_sides()
             shows.append(ending.enter_context(picture))
         else:
             shows.append(Lines())
-
-        def show() -> None:
-            snapshot, views, note = live.snapshot(), live.views, _note(live, named)
-            for each in shows:
-                each.show(snapshot, views, note)
-
-        live.run(lambda: signals.stop, show)
-        show()
+        prepared.run(lambda: signals.stop, shows)
 
 
 def ring_instead(picture: Picture, program: str, reason: OSError) -> None:
@@ -271,17 +358,6 @@ def ring_instead(picture: Picture, program: str, reason: OSError) -> None:
     picture.rings = True
     remedy = "the terminal's bell rings instead; install espeak-ng, or give --no-sound"
     _LOG.error(logs.event("voice_off", program=program, reason=reason.strerror, remedy=remedy))
-
-
-def _note(live: LiveCalibration, named: Sequence[str]) -> str:
-    """Return what keeps views from coming; empty: nothing."""
-    host = live.host
-    if host.refused is not None:
-        return f"waiting: {host.refused.problem}: {host.refused.remedy}"
-    if not host.has_met_board:
-        waits = now.monotonic_ns() - host.started_ns > _WAITED_NS
-        return f"waiting for a board at {' and '.join(named)}" if waits else ""
-    return live.trouble
 
 
 def _too_few(last: GuideSnapshot) -> DataError:

@@ -1,0 +1,310 @@
+"""A run as its options describe it, whoever asks: `run` itself, or the page. Prepares it, and writes its report."""
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from common import now
+from common.camera.base import Camera, upright_px
+from common.errors import SettingsError
+from common.link.base import Link
+from common.link.factory import open_links, parse_link, tell_insecure
+from common.places import Kind, kind_of, resolved
+from common.program.settings import Resolved, with_origins
+from common.stamp import HOST_CLOCK
+from phone_host.boards.discovery import find_board_and_say, remember
+from phone_host.camera.examples import EXAMPLE
+from phone_host.camera.factory import open_camera
+from phone_host.camera.http_uri import without_password
+from phone_host.declared_settings import PhoneHostSettings
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble
+from phone_host.model import Side, TimeOffset
+from phone_host.report.run_json import build
+from phone_host.report.run_page import run_page
+from phone_host.run.file_sink import NAMES
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason, HostSettings
+from phone_host.run.sinks import Sink
+from phone_host.run.time_limit import patience_s
+from phone_host.settings import check, key_folder, matcher_is_given, resolve_settings
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_note
+from phone_host.sync.fifo import FifoSettings
+from phone_host.sync.phase import Whose
+from phone_host.verbs.output_folders import keep_other_report, spare_inputs
+from phone_host.verbs.run.budget import budget_wanted
+from phone_host.verbs.stereo_options import build_core, depth_wanted, output_options, overlay_of
+
+_MOST_SECONDS: Final = 10_000_000
+"""Four months; more than that is a slip of the hand."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Opened:
+    """Everything that a run needs, open, before it takes its results folder.
+
+    Attributes:
+        options: of `run`.
+        found: its settings.
+        camera: of this machine.
+        links: to the board.
+        named: its addresses.
+        keys: folder that remembers it.
+        core: computes depth; None: nobody asked for it.
+        board_side: which view the board's camera gives.
+    """
+
+    options: argparse.Namespace
+    found: Resolved[PhoneHostSettings]
+    camera: Camera
+    links: Sequence[Link]
+    named: tuple[str, ...]
+    keys: Path
+    core: StereoCore | None
+    board_side: Side
+
+    def prepared(self, words: Sequence[str], sinks: Sequence[Sink] = ()) -> "PreparedRun":
+        """Take the results folder; whatever cannot be had closes the rest.
+
+        Args:
+            words: of the command line, from which settings.json knows what was given.
+            sinks: further ones.
+
+        Raises:
+            SettingsError: options contradict each other.
+            UnavailableError: the folder cannot be had.
+            DataError: the overlay belongs to another rig.
+        """
+        with ExitStack() as opened:
+            opened.enter_context(closing(self.camera))
+            for link in self.links:
+                opened.enter_context(closing(link))
+            if self.options.out is not None:
+                keep_other_report(self.options.out, "run")
+            host = Host(_host_settings(self, words), self.camera, self.links, self.core, sinks)
+            opened.pop_all()
+        return PreparedRun(host, self.named, self.keys, self.board_side, self.options.out)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ended:
+    """A run that has ended.
+
+    Attributes:
+        snapshot: its last one.
+        report: content of report.json.
+        is_complete: whether everything that was asked for was written.
+        missing: what was not, and why, in words; empty: nothing.
+    """
+
+    snapshot: RunSnapshot
+    report: dict[str, Any]
+    is_complete: bool
+    missing: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedRun:
+    """A run that is ready to begin: its camera and links are open. `host.run` closes them, whenever it is stopped.
+
+    Attributes:
+        host: runs.
+        named: addresses of the board.
+        keys: folder that remembers the board.
+        board_side: which view the board's camera gives.
+        out: folder for results; None: none.
+    """
+
+    host: Host
+    named: tuple[str, ...]
+    keys: Path
+    board_side: Side
+    out: Path | None
+
+    def ended(self, ended: EndReason) -> Ended:
+        """Write the report of a run that has ended, and remember its board.
+
+        Args:
+            ended: why it did.
+        """
+        is_plain = len(self.named) == 1 and "?" not in self.named[0] and self.named[0].startswith("tcp://")
+        if self.host.has_met_board and is_plain:
+            remember(self.keys, self.named[0])
+        return self._written(self.host.snapshot(ended.value))
+
+    def failed(self, failure: Trouble) -> Ended:
+        """Write the report of a run that an error ended.
+
+        Args:
+            failure: the error.
+        """
+        return self._written(self.host.snapshot("failed", failure))
+
+    def _written(self, snapshot: RunSnapshot) -> Ended:
+        report = build(snapshot)
+        page = "" if self.out is None else _page(self.host, snapshot, self.board_side, self.out)
+        is_complete = self.host.write_report(report, page)
+        return Ended(snapshot, report, is_complete, self.host.missing_files)
+
+
+def checked(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
+    """Resolve the settings and check them and all numbers, as far as that can be done without opening anything.
+
+    Args:
+        options: of `run`.
+
+    Raises:
+        SettingsError: a setting or an option is not valid.
+    """
+    found = resolve_settings(options)
+    check(found.values)
+    _check_numbers(options)
+    depth_wanted(options)
+    return found
+
+
+def open_run(options: argparse.Namespace, found: Resolved[PhoneHostSettings], tell: Callable[[str], None]) -> Opened:
+    """Open the camera, the core and the links of a run.
+
+    Args:
+        options: of `run`.
+        found: its settings, from `checked`.
+        tell: takes a line that the user should know.
+
+    Raises:
+        SettingsError: options contradict each other.
+        UnavailableError: the camera or a link cannot be had.
+        DataError: the rig or the camera's images cannot be used.
+    """
+    settings = found.values
+    if not settings.camera:
+        raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    if options.out is not None:
+        spare(options.out, replayed(settings.camera), settings.calibration, options.overlay)
+    with ExitStack() as opened:  # what cannot be had closes what was
+        camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
+        opened.enter_context(closing(camera))
+        core, board_side = _core(options, settings, upright_px(camera), tell)
+        overlay_of(options, core)
+        budget_wanted(options, found, core)
+        keys = key_folder(settings.keys)
+        named = settings.link or (find_board_and_say(keys.path, patience_s(options.wait, options.seconds)),)
+        uris = [parse_link(uri, listens_by_default=False) for uri in named]
+        for uri in uris:
+            tell_insecure(uri)
+        links = open_links(uris, keys)
+        opened.pop_all()
+    if core is not None and options.complete and (options.out is None or not options.save_every):
+        tell("--complete does nothing here: no pair is saved; give --out DIR and --save-every N")
+    return Opened(options, found, camera, links, tuple(named), keys.path, core, board_side)
+
+
+def replayed(uri: str) -> str:
+    """Return the path of a camera that replays images; empty for any other camera."""
+    return uri.removeprefix("replay:").partition("?")[0] if uri.startswith("replay:") else ""
+
+
+def spare(out: Path, replay: str, calibration: str, overlay: Path | None = None) -> None:
+    """Refuse a results folder that would lose the inputs, or holds the replay's photographs.
+
+    Args:
+        out: folder for the results.
+        replay: folder, glob or file that the own camera replays; empty: another camera.
+        calibration: path of the rig; empty: none.
+        overlay: correction of an earlier run; None: none.
+
+    Raises:
+        SettingsError: it is such a folder.
+    """
+    inputs = {"--camera": replay, "--calibration": calibration, "--overlay": "" if overlay is None else str(overlay)}
+    spare_inputs(out, NAMES, {what: Path(path) for what, path in inputs.items() if path})
+    if not replay:
+        return
+    try:
+        folder = Path(replay) if kind_of(replay) is Kind.FOLDER else Path(replay).parent
+    except OSError:  # the camera will say why
+        return
+    if resolved(out) == resolved(folder):
+        raise SettingsError(
+            f"--out {out} is the folder of the photographs of --camera",
+            f"give a folder of its own, such as --out {out / 'scan'}",
+        )
+
+
+def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str:
+    """Make the page of a run, with links to the clouds it saved (maps where it has no geometry)."""
+    saved = sorted(path.relative_to(out).as_posix() for path in out.glob("pair-*/cloud.ply"))
+    saved = saved or sorted(path.relative_to(out).as_posix() for path in out.glob("pair-*/disparity.pfm"))
+    return run_page(snapshot, host.last, board_side, host.sample(), saved)
+
+
+def _core(
+    options: argparse.Namespace, settings: PhoneHostSettings, size_px: tuple[int, int], tell: Callable[[str], None]
+) -> tuple[StereoCore | None, Side]:
+    """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else left."""
+    images = replayed(settings.camera)
+    core, rig_side = build_core(
+        options,
+        settings.calibration,
+        settings.matcher,
+        size_px,
+        Path(images) if images else None,
+        temporal=settings.temporal,
+    )
+    board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
+    if rig_side not in {None, board_side}:
+        raise SettingsError(
+            f"--board-side {board_side.value} contradicts {settings.calibration}",
+            "leave it out, or calibrate with the board there",
+        )
+    if core is None and options.temporal:
+        raise SettingsError(
+            "--temporal without --calibration or --rectified, so no depth is computed",
+            "add one of them, or leave it out",
+        )
+    if core is None:
+        tell("no --calibration and not --rectified: pairs and delays only, no depth")
+    return core, board_side
+
+
+def _host_settings(opened: Opened, words: Sequence[str]) -> HostSettings:
+    options, found, core = opened.options, opened.found, opened.core
+    settings, wait_s = found.values, patience_s(options.wait, options.seconds)
+    shown = replace(found, values=replace(settings, camera=without_password(settings.camera)))
+    return HostSettings(
+        matcher_note="" if core is None or matcher_is_given(found) else default_note(),
+        resolved=with_origins(shown, vars(options), words),
+        board_side=opened.board_side,
+        tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
+        fifo=FifoSettings.parse(settings.fifo),
+        pairs=options.pairs,
+        seconds_ns=round(options.seconds * 1e9),
+        wait_ns=None if wait_s is None else round(wait_s * 1e9),
+        out=options.out,
+        save_every=options.save_every,
+        axes=output_options(options).axes,
+        corrects=not options.no_correction,
+        time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
+        interpolate=settings.interpolate,
+        most_pixels=settings.most_pixels,
+        steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
+        budget=budget_wanted(options, found, core),
+        overlay=overlay_of(options, core),
+    )
+
+
+def _check_numbers(options: argparse.Namespace) -> None:
+    for name, value in (("--pairs", options.pairs), ("--save-every", options.save_every)):
+        if value < 0:
+            raise SettingsError(f"{name} {value}", "give 0 or more")
+    if options.budget == 0:
+        raise SettingsError("--budget is 0 ms", "give the time for each pair, for example 30ms, or leave it out")
+    if not 0 <= options.seconds <= _MOST_SECONDS:
+        raise SettingsError(f"--seconds is {options.seconds:g}", f"give 0 (no limit) to {_MOST_SECONDS} seconds")
+    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
+        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")
