@@ -19,6 +19,9 @@ from phone_host.sync.fifo import FifoSettings
 
 ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
 
+PAGE_TABLE: Final = "page"
+"""The table of the settings file in which the page keeps options of `run` that are no settings."""
+
 _MOST_BUDGET_MS: Final = 60_000
 """The largest photographs take half a minute (docs/depth.md)."""
 
@@ -30,7 +33,7 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
     """Resolve the settings from file, environment and a verb's options. Options named like a setting are used."""
     given = {item.name: getattr(options, item.name, None) for item in fields(PhoneHostSettings)}
     given["link"] = tuple(given["link"]) if given["link"] else None
-    resolved = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given)
+    resolved = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given, aside=PAGE_TABLE)
     if matcher_is_given(resolved):
         return resolved
     return replace(resolved, values=replace(resolved.values, matcher=default_matcher().value))
@@ -86,7 +89,8 @@ def chosen_keys(file: Path | None, option: str | None) -> KeyFolder:
     Raises:
         SettingsError: the file or the environment is invalid.
     """
-    return key_folder(resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"keys": option}).values.keys)
+    found = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"keys": option}, aside=PAGE_TABLE)
+    return key_folder(found.values.keys)
 
 
 def most_pixels(file: Path | None, option: int | None) -> int:
@@ -99,7 +103,8 @@ def most_pixels(file: Path | None, option: int | None) -> int:
     Raises:
         SettingsError: a setting is invalid.
     """
-    values = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"max_megapixels": option}).values
+    given = {"max_megapixels": option}
+    values = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, given, aside=PAGE_TABLE).values
     _check_megapixels(values)
     return values.most_pixels
 

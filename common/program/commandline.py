@@ -101,14 +101,23 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         return word[:2] not in known and not any(option.startswith(name) for option in known)
 
     def error(self, message: str) -> NoReturn:
-        """Print the problem as one line on stderr, without the usage, and exit with code 2.
+        """Print the problem as one line on stderr, without the usage, and exit with code 2."""
+        self.exit(2, f"{self.prog}: error: {self.problem(message)}: see {self.prog} --help\n")
+
+    def problem(self, message: str) -> str:
+        """Say in one line of plain words what argparse found wrong.
 
         An unknown option goes before what is missing: the one may be the other, misspelt.
         """
         if message.startswith(_MISSING) and (unknown := [word for word in self._words if self._is_unknown(word)]):
             message = self._unknown(unknown)
-        one_line = printable(_plain(" ".join(message.split())))
-        self.exit(2, f"{self.prog}: error: {one_line}: see {self.prog} --help\n")
+        return printable(_plain(" ".join(message.split())))
+
+    @property
+    def declared(self) -> dict[str, argparse.Action]:
+        """The options, by their long name without dashes."""
+        found = self._option_string_actions.items()
+        return {name.removeprefix("--"): action for name, action in found if name.startswith("--")}
 
 
 def _guess(word: str, known: Iterable[str]) -> str:

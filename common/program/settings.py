@@ -38,7 +38,9 @@ class Resolved(Generic[T]):
     origins: tuple[tuple[str, str], ...]
 
 
-def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str, object]) -> Resolved[T]:
+def resolve(
+    kind: type[T], prefix: str, file: Path | None, options: Mapping[str, object], *, aside: str = ""
+) -> Resolved[T]:
     """Work out the settings.
 
     Args:
@@ -46,6 +48,7 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
         prefix: prefix of the environment variables, for example `BOARD_AGENT`.
         file: a TOML file, or None.
         options: options from the command line, by field name; None means not given.
+        aside: name of a table in the file that others read.
 
     Returns:
         The settings with their origins.
@@ -54,7 +57,7 @@ def resolve(kind: type[T], prefix: str, file: Path | None, options: Mapping[str,
         SettingsError: the file cannot be read, or a key or value makes no sense.
     """
     hints = get_type_hints(kind)
-    in_file = {} if file is None else _read(file, set(hints))
+    in_file = {} if file is None else _read(file, set(hints), aside)
     values: dict[str, Any] = {}
     origins = []
     for item in fields(kind):  # type: ignore[arg-type]  # T is always a dataclass
@@ -146,7 +149,12 @@ _MOST_SHOWN = 80
 """Characters of a wrong line that an error shows."""
 
 
-def _read(file: Path, known: set[str]) -> dict[str, Any]:
+def read_file(file: Path) -> dict[str, Any]:
+    """Return what a settings file holds, whatever it is.
+
+    Raises:
+        SettingsError: it cannot be read, or is not TOML.
+    """
     text = ""
     try:
         text = read_whole(file, _MOST_BYTES).decode("utf-8")
@@ -166,6 +174,12 @@ def _read(file: Path, known: set[str]) -> dict[str, Any]:
         ) from None
     except (ValueError, RecursionError):  # a number of thousands of digits; lists in lists, thousands deep
         raise SettingsError(f"settings file {file} holds a number or a list beyond all measure", "remove it") from None
+    return content
+
+
+def _read(file: Path, known: set[str], aside: str) -> dict[str, Any]:
+    content = read_file(file)
+    content.pop(aside, None)
     if unknown := set(content) - known:
         raise SettingsError(f"unknown key {min(unknown)!r} in {file}", f"the keys are {', '.join(sorted(known))}")
     return content

@@ -19,6 +19,7 @@ from common import now
 from common.errors import TandemError, UnavailableError
 from common.files import opened_folder, read_file, replacing_in
 from phone_host.boards.found import LISTEN_S, Found
+from phone_host.boards.udev_rule import find_usb_board
 
 GADGET: Final = "tcp://192.168.7.2:5555"
 """A BeagleBone on its USB cable."""
@@ -73,6 +74,21 @@ def find_board_and_say(state: Path, wait_s: float | None) -> str:
     link = find_board(state, lambda: now.monotonic_ns() / 1e9, wait_s)
     sys.stderr.write(f"phone-host: found {link}\n")
     return link
+
+
+def list_boards(state: Path) -> list[Found]:
+    """Look once everywhere, for some seconds; return each board that answers.
+
+    Args:
+        state: the folder in which the last board is remembered.
+    """
+    announced = _announced()
+    names = {board.link: board.name for board in announced}
+    asked = tuple(dict.fromkeys((*_last(state), GADGET, THIS_MACHINE, *names)))
+    found = [Found(names.get(link, ""), link) for link in answering(asked)]
+    with suppress(TandemError):
+        found.append(Found("board on the USB cable", f"serial:/dev/{find_usb_board(None).device}"))
+    return found
 
 
 def remember(state: Path, link: str) -> None:

@@ -9,6 +9,7 @@ import importlib
 import os
 import socket
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -69,47 +70,45 @@ class Question:
     keys: KeyFolder
 
 
-def examine(question: Question) -> list[Finding]:
+def examine(question: Question) -> Iterator[Finding]:
     """Check this machine for a run.
 
     Args:
         question: what the run would use.
 
-    Returns:
+    Yields:
         The findings, in the order in which problems arise.
 
     Raises:
         SettingsError: a URI is invalid.
     """
     account = machine.own_account()
-    findings = [check_python(sys.version_info[:3], sys.platform)]
+    yield check_python(sys.version_info[:3], sys.platform)
     packages = [check_package(package) for package in _packages()]
-    findings += packages
-    findings.append(native_finding())
+    yield from packages
+    yield native_finding()
     works = all(finding.verdict is not Grade.FAIL for finding in packages)
     if is_http(question.camera):
-        findings.append(_server(question.camera))
+        yield _server(question.camera)
     elif question.camera:
-        findings += examine_camera(question.camera, account, Unit("phone-host"))
+        yield from examine_camera(question.camera, account, Unit("phone-host"))
     else:
-        findings.append(_cameras())
-    findings.append(_ports())
-    findings.append(
-        check_bluetooth(machine.read_bluetooth(), wanted=any(uri.startswith("rfcomm:") for uri in question.links))
-    )
+        yield _cameras()
+    yield _ports()
+    yield check_bluetooth(machine.read_bluetooth(), wanted=any(uri.startswith("rfcomm:") for uri in question.links))
     if not question.links:
-        findings.append(ok("board", "not asked: give --link"))
+        yield ok("board", "not asked: give --link")
     for uri in question.links:
-        findings += _examine_board(uri, question.wait_s, question.keys, works=works)
+        yield from _examine_board(uri, question.wait_s, question.keys, works=works)
     if question.calibration and works:
         from phone_host.doctor.vision_checks import read_rig_readings  # noqa: PLC0415 - numpy and OpenCV, seen to work
 
-        findings.append(check_rig(read_rig_readings(question.calibration, question.camera)))
-    findings += check_clocks(machine.read_clocks(Path(__file__).parent))
-    findings += examine_out(question.out)
+        yield check_rig(read_rig_readings(question.calibration, question.camera))
+    yield from check_clocks(machine.read_clocks(Path(__file__).parent))
+    yield from examine_out(question.out)
     log = machine.read_kernel_log()
-    findings += [check_power(log, machine.read_supply()), check_usb_log(log)]
-    return findings
+    yield check_power(log, machine.read_supply())
+    yield check_usb_log(log)
 
 
 def native_finding() -> Finding:

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,13 +87,16 @@ def require_rig_place(out: Path) -> None:
         raise UnavailableError(f"{out} is not a calibration, and would be replaced", "name another --out")
 
 
-def calibrate_pictures(options: argparse.Namespace, asked: Asked, live: "Live | None") -> Made:
+def calibrate_pictures(
+    options: argparse.Namespace, asked: Asked, live: "Live | None", may_write: Callable[[], None] = lambda: None
+) -> Made:
     """Find the board in all pairs, calibrate, judge and write.
 
     Args:
         options: of `calibrate`.
         asked: what they ask for.
         live: the live calibration that took the pictures; None: they lie in the folders that the options name.
+        may_write: called when everything is computed; what it raises keeps anything from being written.
 
     Raises:
         DataError: the pictures cannot be used at all.
@@ -109,6 +113,7 @@ def calibrate_pictures(options: argparse.Namespace, asked: Asked, live: "Live | 
         options, asked, lambda named: board_in(files, named, most_pixels(None, options.max_megapixels))
     )
     views, found, finding, pairs = _calibrated(files, session, options, mounted)
+    may_write()
     wrong = None if finding is None else finding.misplaced
     hint = "" if wrong is None else arrangement_hint(views, mounted, wrong, is_live=options.live)
     if isinstance(found, DataError):

@@ -1,0 +1,44 @@
+"""Checks the two chosen cameras: what the doctor says, then a run of some seconds without depth."""
+
+import math
+
+from common.doctor.finding import Finding, Grade
+from common.words import counted
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble
+
+
+def obstacle(findings: list[Finding]) -> Trouble | None:
+    """Return the first finding that nothing works with; None: there is none."""
+    failed = next((each for each in findings if each.verdict is Grade.FAIL), None)
+    return None if failed is None else Trouble(f"{failed.what}: {failed.text}", failed.remedy)
+
+
+def seen(snapshot: RunSnapshot) -> str:
+    """Say what the trial run saw; empty: no pair.
+
+    Args:
+        snapshot: its last one.
+    """
+    if not snapshot.processed:
+        return ""
+    skew_ms = snapshot.delays.spread("time_skew").p50_ns / 1e6
+    rate = (snapshot.processed - 1) / snapshot.seconds if snapshot.seconds > 0 else math.nan
+    speed = f", {rate:.0f} a second" if math.isfinite(rate) else ""
+    return f"both cameras are seen: {counted(snapshot.processed, 'pair')}{speed}, time skew {skew_ms:.1f} ms"
+
+
+def unseen(snapshot: RunSnapshot) -> Trouble:
+    """Return why the trial run saw no pair.
+
+    Args:
+        snapshot: its last one.
+    """
+    received, own = snapshot.counts.received, snapshot.counts.host_frames
+    if not received:
+        return Trouble("no image came from the board", "see what board-agent says there, or run board-agent doctor")
+    if not own:
+        return Trouble("no image came from this machine's camera", "see whether another program uses it")
+    return Trouble(
+        "images came from both cameras, but none belong together", "give a greater tolerance, or the same frame rate"
+    )

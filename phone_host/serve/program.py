@@ -1,0 +1,132 @@
+"""What the station needs of the commands: it may not import them, so whoever starts it hands them over."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from common.keys import KeyFolder
+from phone_host.calibration.guide.guide import View
+from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.doctor.host_doctor import Question
+from phone_host.live.calibration import LiveCalibration
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble
+from phone_host.output.axes import Axes
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason
+from phone_host.run.sinks import Sink
+from phone_host.stereo.core import StereoCore
+
+Choices = Mapping[str, str]
+"""Options of `run`, by name without dashes."""
+
+SinksOf = Callable[[StereoCore | None], Sequence[Sink]]
+
+
+class Over(Protocol):
+    """A run that has ended."""
+
+    @property
+    def snapshot(self) -> RunSnapshot:
+        """Its last snapshot."""
+
+    @property
+    def missing(self) -> str:
+        """What could not be written, and why; empty: nothing."""
+
+
+class ReadyRun(Protocol):
+    """A run that is ready to begin."""
+
+    @property
+    def host(self) -> Host:
+        """Runs, and closes camera and links at its end."""
+
+    def ended(self, ended: EndReason) -> Over:
+        """Write the report of a run that has ended."""
+
+    def failed(self, failure: Trouble) -> Over:
+        """Write the report of a run that an error ended."""
+
+
+class Shows(Protocol):
+    """Takes what a live calibration shows."""
+
+    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
+        """Take the present state; called several times a second."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibrated:
+    """What came of a live calibration.
+
+    Attributes:
+        words: one sentence.
+        rig: the calibration to use from now on; None: it is not fit for use.
+        trouble: why not; None: it is.
+    """
+
+    words: str
+    rig: Path | None
+    trouble: Trouble | None
+
+
+class ReadyCalibration(Protocol):
+    """A live calibration that is ready to begin."""
+
+    @property
+    def live(self) -> LiveCalibration:
+        """Takes the views."""
+
+    def run(self, stop: Callable[[], bool], shows: Sequence[Shows]) -> None:
+        """Take views until it is enough."""
+
+    def finish(self, may_write: Callable[[], None]) -> Calibrated:
+        """Calibrate from the views, and write what came of it.
+
+        Args:
+            may_write: raises if nothing shall be written.
+        """
+
+
+class Program(Protocol):
+    """What the commands do, for the page."""
+
+    @property
+    def keys(self) -> KeyFolder:
+        """This machine's key and the boards that it knows."""
+
+    @property
+    def matchers(self) -> tuple[str, ...]:
+        """Names that --matcher takes."""
+
+    def kept(self) -> Choices:
+        """Return the choices of the settings file."""
+
+    def keep(self, choices: Choices) -> None:
+        """Write the choices into the settings file."""
+
+    def changed(self, choices: Choices, changes: Choices) -> Choices:
+        """Return choices with some changed, checked as the command line is."""
+
+    def shown(self, choices: Choices) -> Choices:
+        """Return the choices as others may see them, without passwords."""
+
+    def command(self, choices: Choices) -> str:
+        """Return the command line that does the same, quoted for a shell."""
+
+    def run(self, choices: Choices, sinks_of: SinksOf) -> ReadyRun:
+        """Open everything that a run needs."""
+
+    def trial(self, choices: Choices, sinks_of: SinksOf) -> ReadyRun:
+        """Open everything that a run of some seconds without depth needs."""
+
+    def question(self, choices: Choices) -> Question:
+        """Return what the doctor is to look at."""
+
+    def calibration(self, choices: Choices, values: Choices) -> ReadyCalibration:
+        """Open everything that a live calibration needs."""
+
+    def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
+        """Return the folder of the snapshots, and the axes of their points."""

@@ -1,0 +1,67 @@
+"""The way from nothing to a run, in words. Pure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from common.words import counted
+from phone_host.web.source import Choice, Step, StepName
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Facts:
+    """What the steps are told from.
+
+    Attributes:
+        choices: options of `run`, by name.
+        boards: boards that were found.
+        checked: what the last check of these two cameras came to; empty: there was none, or it failed.
+        pairs: how many pairs the last run with these choices processed.
+    """
+
+    choices: Mapping[str, str]
+    boards: tuple[Choice, ...] = ()
+    checked: str = ""
+    pairs: int = 0
+
+
+def steps(facts: Facts) -> tuple[Step, ...]:
+    """Return the steps, each with what it has come to or what to do now."""
+    link, camera = facts.choices.get("link", ""), facts.choices.get("camera", "")
+    has_both = bool(link and camera)
+    return (
+        _board(link, facts.boards),
+        Step(name=StepName.CAMERA, done=bool(camera), words=camera or "choose this machine's camera"),
+        _step(
+            StepName.CHECK,
+            facts.checked,
+            "check both cameras before you calibrate" if has_both else "choose both cameras first",
+        ),
+        _calibration(facts.choices),
+        _step(
+            StepName.RUN,
+            counted(facts.pairs, "pair") + " processed" if facts.pairs else "",
+            "run" if has_both else "choose both cameras first",
+        ),
+    )
+
+
+def _step(name: StepName, come_to: str, to_do: str) -> Step:
+    return Step(name=name, done=bool(come_to), words=come_to or to_do)
+
+
+def _board(link: str, boards: tuple[Choice, ...]) -> Step:
+    stranger = next((board for board in boards if board.uri in link.split() and board.needs_code), None)
+    if stranger is not None:
+        words = "run `sudo board-agent pair` on the board and type the code that it shows"
+        return Step(name=StepName.BOARD, done=False, words=words)
+    return _step(StepName.BOARD, link, "find the board, or type its address")
+
+
+def _calibration(choices: Mapping[str, str]) -> Step:
+    if "rectified" in choices:
+        return Step(name=StepName.CALIBRATION, done=True, words="the images come rectified")
+    return _step(
+        StepName.CALIBRATION,
+        choices.get("calibration", ""),
+        "calibrate, or name a rig.yaml; without it there is no depth",
+    )

@@ -1,0 +1,1 @@
+"""phone-host serve: its options (light), and its command."""

@@ -1,0 +1,103 @@
+"""The page's choices are options of `phone-host run` by name. They become a command line, and are read by what reads command lines."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from typing import Final, NoReturn
+
+from common.errors import SettingsError
+from common.program.commandline import ExamplesFirstParser
+from phone_host.verbs.calibrate import arguments as calibrate_arguments
+from phone_host.verbs.run import arguments as run_arguments
+
+_YES: Final = frozenset({"yes", "true", "on", "1"})
+_NO: Final = frozenset({"", "no", "false", "off", "0"})
+
+_NOT_CHOSEN: Final = frozenset(
+    {"help", "version", "config", "json", "debug", "serve", "open", "keys", "log-level", "wait"}
+)
+"""Options of `run` that are not the page's: what concerns this program as a whole, and what a page cannot be asked."""
+
+_SHORT: Final = frozenset({"link", "camera", "board-side", "tolerance", "fifo", "max-megapixels"})
+"""What a run without depth needs."""
+
+
+class _Strict(ExamplesFirstParser):
+    """A parser that raises what it would print."""
+
+    def error(self, message: str) -> NoReturn:
+        """See ExamplesFirstParser."""
+        raise SettingsError(self.problem(message), "give it as on the command line: phone-host run --help")
+
+
+def _parser(arguments: type | object) -> _Strict:
+    made = _Strict("phone-host", add_help=False)
+    arguments.add_arguments(made)  # type: ignore[union-attr]
+    made.add_argument("--json", action="store_true")
+    made.add_argument("--debug", action="store_true")
+    return made
+
+
+def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict[str, str]:
+    """Return choices with some changed; an empty value takes one back.
+
+    Args:
+        choices: by the option's name.
+        changes: likewise.
+
+    Raises:
+        SettingsError: there is no such option, or it is a switch and the value neither yes nor no.
+    """
+    declared = _parser(run_arguments).declared
+    made = dict(choices)
+    for name, value in changes.items():
+        if name not in declared or name in _NOT_CHOSEN:
+            raise SettingsError(f"{name!r} is no option of a run that the page can set", "see phone-host run --help")
+        made.pop(name, None)
+        kept = value.strip()
+        if _is_switch(declared[name]):
+            if kept.lower() not in _YES | _NO:
+                raise SettingsError(f"{name} is {value!r}", "give yes or no")
+            kept = "yes" if kept.lower() in _YES else ""
+        if kept:
+            made[name] = kept
+    return made
+
+
+def run_words(choices: Mapping[str, str]) -> list[str]:
+    """Return choices as the words of a command line, after `run`."""
+    declared, words = _parser(run_arguments).declared, []
+    for name, value in choices.items():
+        action = declared[name]
+        if _is_switch(action):
+            words.append(f"--{name}")
+        else:
+            for each in value.split() if name == "link" else [value]:
+                words += [f"--{name}={each}"] if each.startswith("-") else [f"--{name}", each]
+    return words
+
+
+def run_options(words: Sequence[str]) -> argparse.Namespace:
+    """Read words as `phone-host run` reads them.
+
+    Raises:
+        SettingsError: they are not valid.
+    """
+    return argparse.Namespace(**vars(_parser(run_arguments).parse_args(list(words))))
+
+
+def calibrate_options(words: Sequence[str]) -> argparse.Namespace:
+    """Read words as `phone-host calibrate` reads them.
+
+    Raises:
+        SettingsError: they are not valid.
+    """
+    return _parser(calibrate_arguments).parse_args(list(words))
+
+
+def without_depth(choices: Mapping[str, str]) -> dict[str, str]:
+    """Return what of the choices a run without depth needs."""
+    return {name: value for name, value in choices.items() if name in _SHORT}
+
+
+def _is_switch(action: argparse.Action) -> bool:
+    return action.nargs == 0

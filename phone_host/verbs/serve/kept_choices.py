@@ -1,0 +1,91 @@
+"""The page's choices in the settings file: settings as its keys, other options of `run` in the table [page]."""
+
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Final
+
+from common.errors import SettingsError
+from common.files import opened_folder, replacing_in
+from common.keys import default_folder
+from common.program.settings import read_file
+from common.program.settings_file import Value, changed
+from phone_host.declared_settings import PhoneHostSettings
+from phone_host.settings import PAGE_TABLE
+from phone_host.verbs.serve.choices import run_options, run_words
+
+NAME: Final = "phone-host.toml"
+_NAMES: Final = {item.name.replace("_", "-"): item.name for item in fields(PhoneHostSettings)}
+_OF_PROGRAM: Final = ("keys", "log-level")
+"""Settings that concern the program and not the page's choices. They stay as they are."""
+
+
+def usual_file() -> Path:
+    """Return the settings file if no option names another."""
+    return default_folder(os.environ, service=False) / NAME
+
+
+def kept(file: Path) -> tuple[dict[str, str], list[str]]:
+    """Read the choices.
+
+    Args:
+        file: the settings file; it may be missing.
+
+    Returns:
+        The choices by option, and the words of the settings that are not the page's.
+
+    Raises:
+        SettingsError: it cannot be read, or is not TOML.
+    """
+    if not file.exists():
+        return {}, []
+    content = read_file(file)
+    found = {name: _as_words(content[key]) for name, key in _NAMES.items() if key in content}
+    table = content.get(PAGE_TABLE, {})
+    if isinstance(table, dict):
+        found |= {name: value for name, value in table.items() if isinstance(value, str)}
+    others = [word for name in _OF_PROGRAM if found.get(name) for word in (f"--{name}", found[name])]
+    return {name: value for name, value in found.items() if value and name not in _OF_PROGRAM}, others
+
+
+def keep(file: Path, choices: Mapping[str, str]) -> None:
+    """Write the choices, whole or not at all. What else the file says stays, with its comments.
+
+    Args:
+        file: the settings file; created with its folder if missing.
+        choices: by option.
+
+    Raises:
+        SettingsError: the file is written in a way that cannot be changed, or cannot be written.
+    """
+    text = ""
+    with suppress(FileNotFoundError):
+        text = file.read_text(encoding="utf-8")
+    options = vars(run_options(run_words(choices)))
+    keys: dict[str, Value | None] = {}
+    for name, key in _NAMES.items():
+        if name not in _OF_PROGRAM:
+            value: Any = options[key] if name in choices else None
+            keys[key] = tuple(value) if isinstance(value, list) else value
+    others = {name: value for name, value in choices.items() if name not in _NAMES}
+    new = changed(text, keys, PAGE_TABLE, others)
+    if new == text:
+        return
+    try:
+        with (
+            opened_folder(file.parent.absolute(), make=True) as folder,
+            replacing_in(folder, file.name, mode=0o600) as writing,  # a camera's address may hold a password
+        ):
+            writing.write(new.encode())
+    except OSError as error:
+        raise SettingsError(
+            f"settings file {file} cannot be written ({error.strerror})", "make room, or name another with --config"
+        ) from None
+
+
+def _as_words(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else ""
+    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
