@@ -21,6 +21,7 @@ from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
 from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.run import arguments as run
+from phone_host.verbs.serve import arguments as serve
 from phone_host.verbs.settings import arguments as settings
 from phone_host.verbs.stereo import arguments as stereo
 from phone_host.verbs.target import arguments as target
@@ -38,6 +39,7 @@ class Arguments(Protocol):
 
 _VERBS: Final[dict[str, Arguments]] = {
     "demo": demo,
+    "serve": serve,
     "run": run,
     "target": target,
     "calibrate": calibrate,

@@ -3,7 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Final
 
 from common.errors import TandemError
@@ -22,6 +22,10 @@ _WORDS: Final = {
     Activity.RUNNING: "a run is going on",
     Activity.ENDING: "the last activity is still ending",
 }
+
+
+class StoppedError(Exception):
+    """An activity ends because somebody stopped it."""
 
 
 class Task:
@@ -46,6 +50,15 @@ class Task:
     def stop(self) -> None:
         """Ask it to end."""
         self._stop.set()
+
+    def go_on(self) -> None:
+        """Raise if it shall end.
+
+        Raises:
+            StoppedError: it shall.
+        """
+        if self.stopped():
+            raise StoppedError
 
     @property
     def may_be_left(self) -> bool:
@@ -124,9 +137,20 @@ class Activities:
             self._end(task, is_left=True)
         return True
 
+    def wait(self, patience_s: float) -> None:
+        """Wait for the end of what goes on.
+
+        Args:
+            patience_s: no longer than this.
+        """
+        thread = self._thread
+        if thread is not None:
+            thread.join(patience_s)
+
     def _work(self, task: Task, work: Callable[[Task], None]) -> None:
         try:
-            work(task)
+            with suppress(StoppedError):
+                work(task)
         except Exception as error:  # noqa: BLE001 - an activity's root: the page tells what happened
             if not isinstance(error, TandemError):
                 _LOG.exception("an activity failed")

@@ -5,36 +5,38 @@ from collections.abc import Sequence
 from typing import Final
 
 from phone_host.run.seen_pair import FoundPoint, Outcome, Point, seen_pair
-from phone_host.serve.shelf import Shelved
+from phone_host.serve.shelf import Shelf, Shelved
 from phone_host.stereo.measured_point import SIGMAS_95, Within, distance_between
 from phone_host.web.source import Measured
 
 _NO_DEPTH: Final = "this pair has no depth in metres: give a calibration, and run"
-GONE: Final = "this pair is gone by now: tap again"
-NOTHING: Final = "there is no pair yet: run first"
+_GONE: Final = "this pair is gone by now: tap again"
+_NOTHING: Final = "there is no pair yet: run first"
 
 
-def unmeasured(count: int, words: str) -> Measured:
-    """Return that nothing was measured.
+def answered(shelf: Shelf, points_px: Sequence[Point], number: int | None) -> Measured:
+    """Measure points of a pair, as `phone-host measure` does.
 
     Args:
-        count: number of points that were asked for.
-        words: why.
+        shelf: holds the pairs.
+        points_px: x, y of one or two points of the rectified left image, px.
+        number: of the pair; None: the newest.
     """
+    shelved = shelf.newest() if number is None else shelf.numbered(number)
+    if shelved is None:
+        return _unmeasured(len(points_px), _NOTHING if number is None else _GONE)
+    return _measured(shelved, points_px)
+
+
+def _unmeasured(count: int, words: str) -> Measured:
     nothing = (None,) * count
     return Measured(places_m=nothing, distances_m=nothing, place_sigmas_m=nothing, words=words)
 
 
-def measured(shelved: Shelved, points_px: Sequence[Point]) -> Measured:
-    """Measure points of a pair, as `phone-host measure` does.
-
-    Args:
-        shelved: the pair.
-        points_px: x, y of one or two points of the rectified left image, px.
-    """
+def _measured(shelved: Shelved, points_px: Sequence[Point]) -> Measured:
     seen = None if shelved.core is None else seen_pair(shelved.core, shelved.newest.result.processed)
     if seen is None:
-        return unmeasured(len(points_px), _NO_DEPTH)
+        return _unmeasured(len(points_px), _NO_DEPTH)
     found = [seen.measured(point) if _is_place(point) else None for point in points_px]
     lengths = [each.point.distance if isinstance(each, FoundPoint) else None for each in found]
     first, second = (*found, None, None)[:2]

@@ -15,13 +15,15 @@ class Facts:
         choices: options of `run`, by name.
         boards: boards that were found.
         checked: what the last check of these two cameras came to; empty: there was none, or it failed.
-        pairs: how many pairs the last run with these choices processed.
+        pairs: how many pairs the last run processed.
+        is_running: whether one goes on.
     """
 
     choices: Mapping[str, str]
     boards: tuple[Choice, ...] = ()
     checked: str = ""
     pairs: int = 0
+    is_running: bool = False
 
 
 def steps(facts: Facts) -> tuple[Step, ...]:
@@ -39,10 +41,16 @@ def steps(facts: Facts) -> tuple[Step, ...]:
         _calibration(facts.choices),
         _step(
             StepName.RUN,
-            counted(facts.pairs, "pair") + " processed" if facts.pairs else "",
+            _run_words(facts),
             "run" if has_both else "choose both cameras first",
         ),
     )
+
+
+def _run_words(facts: Facts) -> str:
+    if facts.is_running:
+        return "it runs"
+    return f"the last run gave {counted(facts.pairs, 'pair')}" if facts.pairs else ""
 
 
 def _step(name: StepName, come_to: str, to_do: str) -> Step:

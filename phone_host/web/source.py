@@ -66,6 +66,23 @@ class Choice:
     needs_code: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """One thing that a check has looked at.
+
+    Attributes:
+        what: the thing.
+        grade: ok, warn or fail.
+        words: what was found.
+        remedy: what to do about it; empty: nothing.
+    """
+
+    what: str
+    grade: str
+    words: str
+    remedy: str = ""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageState:
     """Everything that the page shows beside images.
@@ -80,6 +97,7 @@ class PageState:
         matchers: names that `--matcher` takes.
         run: the run, live or the last one; None: there was none.
         guide: the live calibration, as its guide.json has it; None: there was none.
+        checks: what the last check has looked at, in order.
         trouble: what went wrong last; None: nothing.
         changed: grows with each change of anything but `run` and `guide`.
     """
@@ -93,6 +111,7 @@ class PageState:
     matchers: tuple[str, ...] = ()
     run: RunSnapshot | None = None
     guide: Mapping[str, object] | None = None
+    checks: tuple[Checked, ...] = ()
     trouble: Trouble | None = None
     changed: int = 0
 
@@ -117,7 +136,7 @@ class Command:
     Attributes:
         do: what.
         values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
-            `board` and `square`. Empty for the others.
+            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one. Empty for the others.
     """
 
     do: Do

@@ -88,6 +88,10 @@ def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
         "settings": dict(state.settings),
         "boards": [_choice(item) for item in state.boards],
         "cameras": [_choice(item) for item in state.cameras],
+        "checks": [
+            {"what": each.what, "grade": each.grade, "words": each.words, "remedy": each.remedy}
+            for each in state.checks
+        ],
         "matchers": list(state.matchers),
         "guide": None if state.guide is None else dict(state.guide),
         "trouble": None if state.trouble is None else trouble_values(state.trouble),

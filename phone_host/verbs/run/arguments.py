@@ -16,6 +16,7 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
   phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase    # both cameras expose together
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --budget 30ms    # coarser depth rather than slower
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --serve    # shows the page of this run
   phone-host run --camera 'replay:right?loop=1' --pairs 300 --json    # no depth: pairs and delays only
 """
 
@@ -108,4 +109,11 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         default=30,
         metavar="N",
         help="save every Nth pair, beginning with the first; 0 saves none (default 30)",
+    )
+    parser.add_argument(
+        "--serve",
+        nargs="?",
+        const="",
+        metavar="HOST:PORT",
+        help="show the run on a page of this machine (default 127.0.0.1:8765); phone-host serve does more",
     )

@@ -3,7 +3,8 @@
 import argparse
 import sys
 from collections.abc import Callable
-from contextlib import nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
+from typing import TYPE_CHECKING
 
 from common.program import logs
 from common.program.commandline import INTERRUPTED
@@ -18,7 +19,10 @@ from phone_host.report.summary import summary
 from phone_host.run.host_settings import EndReason
 from phone_host.run.terminal_view import LiveTable
 from phone_host.run.waiting_note import WaitingNote
-from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
+from phone_host.verbs.run.prepared import Ended, Opened, PreparedRun, checked, open_run
+
+if TYPE_CHECKING:
+    from phone_host.serve.beside import BesideRun
 
 _CHECK_FAILED = 4
 
@@ -29,16 +33,35 @@ def run(options: argparse.Namespace) -> int:
     logs.set_up(log_level(found.values.log_level))
     opened = open_run(options, found, _tell)
     signals = StopSignals()
-    prepared = opened.prepared(sys.argv)
-    try:
-        ended = _watched(options, prepared, lambda: signals.stop)
-    except BaseException as error:
-        with suppress(Exception):  # tell what ended the run, not what followed
-            failed = prepared.failed(trouble_of(error))
-            if options.json:
-                print(json_text(failed.report))
-        raise
-    return _finish(options, prepared, signals, ended)
+    with _page(opened) as page:
+        prepared = opened.prepared(sys.argv, () if page is None else (page.sink,))
+        if page is not None:
+            page.watch(prepared.host.snapshot)
+
+        def stopped() -> bool:
+            return signals.stop or (page is not None and page.stopped())
+
+        try:
+            ended = _watched(options, prepared, stopped)
+        except BaseException as error:
+            with suppress(Exception):  # tell what ended the run, not what followed
+                failed = prepared.failed(trouble_of(error))
+                if options.json:
+                    print(json_text(failed.report))
+            raise
+        written = prepared.ended(ended)
+        if page is not None:
+            page.ended(written.snapshot)
+    return _finish(options, prepared, written, ended, signals, is_stopped=stopped())
+
+
+def _page(opened: Opened) -> "AbstractContextManager[BesideRun | None]":
+    """Serve the page of a run, if it is wanted."""
+    if opened.options.serve is None:
+        return nullcontext()
+    from phone_host.verbs.run.page_beside import page_beside  # noqa: PLC0415 - a server that most runs do without
+
+    return page_beside(opened)
 
 
 def _watched(options: argparse.Namespace, prepared: PreparedRun, stop: Callable[[], bool]) -> EndReason:
@@ -52,10 +75,17 @@ def _watched(options: argparse.Namespace, prepared: PreparedRun, stop: Callable[
         return host.run(stop, live.refresh if live else note.refresh)
 
 
-def _finish(options: argparse.Namespace, prepared: PreparedRun, signals: StopSignals, ended: EndReason) -> int:
-    """Write and print the report of a run; return its exit code."""
-    host, written = prepared.host, prepared.ended(ended)
-    snapshot = written.snapshot
+def _finish(
+    options: argparse.Namespace,
+    prepared: PreparedRun,
+    written: Ended,
+    ended: EndReason,
+    signals: StopSignals,
+    *,
+    is_stopped: bool,
+) -> int:
+    """Print the report of a run; return its exit code."""
+    host, snapshot = prepared.host, written.snapshot
     missing = f"\nnot written: {written.missing}: make room and run again" if written.missing else ""
     told = summary(snapshot, columns()) + missing
     text = json_text(written.report) if options.json else headed(told, columns(), rows())
@@ -68,7 +98,7 @@ def _finish(options: argparse.Namespace, prepared: PreparedRun, signals: StopSig
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
-    is_wrong = not signals.stop and (depth_is_wrong(snapshot) or snapshot.spoiled_counts.nothing_whole)
+    is_wrong = not is_stopped and (depth_is_wrong(snapshot) or snapshot.spoiled_counts.nothing_whole)
     return _CHECK_FAILED if too_few or is_wrong or not written.is_complete else 0
 
 

@@ -76,6 +76,20 @@ def run_words(choices: Mapping[str, str]) -> list[str]:
     return words
 
 
+def choices_of(options: argparse.Namespace) -> dict[str, str]:
+    """Return the options of a run that differ from the usual ones, as choices.
+
+    Args:
+        options: of `run`.
+    """
+    found = {}
+    for name, action in _parser(run_arguments).declared.items():
+        value = getattr(options, action.dest, None)
+        if name not in _NOT_CHOSEN and value != action.default and value is not None:
+            found[name] = "yes" if _is_switch(action) else " ".join(value) if isinstance(value, list) else str(value)
+    return found
+
+
 def run_options(words: Sequence[str]) -> argparse.Namespace:
     """Read words as `phone-host run` reads them.
 

@@ -1,0 +1,98 @@
+"""The page beside an ordinary `run`: it shows the run, may stop it and take snapshots. All else needs a run of its own."""
+
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from common.errors import TandemError
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.output.axes import Axes
+from phone_host.serve.memory import Memory
+from phone_host.serve.point_answer import answered
+from phone_host.serve.program import Choices
+from phone_host.serve.shelf import PageSink, Shelf
+from phone_host.serve.snapshots import keep_newest
+from phone_host.stereo.core import StereoCore
+from phone_host.web.source import Activity, Answer, Command, Do, Measured, Newest, PageState
+
+_NEEDS_SERVE: Final = Trouble(
+    "this page stands beside a run that was started on the command line",
+    "stop it and run `phone-host serve`, where the page sets everything",
+)
+
+
+class BesideRun:
+    """The source behind the page of `run --serve`.
+
+    Args:
+        choices: the run's options, as they may be shown.
+        command: the run's command line.
+        core: of the run.
+        snapshots: folder for snapshots.
+        axes: of the points in them.
+    """
+
+    def __init__(self, choices: Choices, command: str, core: StereoCore | None, *, snapshots: Path, axes: Axes) -> None:
+        self._command, self._snapshots, self._axes = command, snapshots, axes
+        self._shelf = Shelf()
+        self._memory = Memory(choices)
+        self.sink = PageSink(self._shelf, core)
+        self._stop = threading.Event()
+        self._has_ended = False
+
+    def watch(self, ask: Callable[[], RunSnapshot]) -> None:
+        """Begin to show the run.
+
+        Args:
+            ask: returns its snapshot.
+        """
+        self._memory.watch(ask)
+
+    def stopped(self) -> bool:
+        """Whether the page has stopped the run."""
+        return self._stop.is_set()
+
+    def ended(self, snapshot: RunSnapshot) -> None:
+        """The run is over: show its last snapshot from now on."""
+        self._memory.last(snapshot)
+        self._has_ended = True
+        self._shelf.tell()
+
+    def state(self) -> PageState:
+        """See Source."""
+        activity = Activity.RUNNING
+        if self._has_ended or self._stop.is_set():
+            activity = Activity.IDLE if self._has_ended else Activity.ENDING
+        return self._memory.state(activity, self._memory.choices, self._command, ())
+
+    def newest(self) -> Newest | None:
+        """See Source."""
+        found = self._shelf.newest()
+        return None if found is None else found.newest
+
+    def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
+        """See Source."""
+        return self._shelf.subscribe(told)
+
+    def command(self, command: Command) -> Answer:
+        """See Source."""
+        if command.do is Do.STOP:
+            self._stop.set()
+            self._shelf.tell()
+            return Answer(words="it is ending")
+        if command.do is not Do.SNAPSHOT:
+            return Answer(trouble=_NEEDS_SERVE)
+        try:
+            return keep_newest(self._shelf, self._snapshots, self._axes)
+        except TandemError as error:
+            return Answer(trouble=trouble_of(error))
+
+    def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
+        """See Source."""
+        return answered(self._shelf, points_px, number)
+
+    def saved(self) -> str:
+        """See Source."""
+        return str(self._snapshots) if self._snapshots.is_dir() else ""

@@ -1,0 +1,174 @@
+"""What the station knows beside images: choices, what was found, how the last activities went. Any thread may use it."""
+
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Final
+
+from common import now
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble
+from phone_host.serve.program import Calibrated, Choices
+from phone_host.serve.steps import Facts, steps
+from phone_host.web.source import Activity, Checked, Choice, PageState
+
+_FRESH_NS: Final = 150_000_000
+"""A snapshot of a run serves so long: however often the state is asked for, the run is read a few times a second."""
+
+
+class Memory:
+    """The station's memory.
+
+    Args:
+        choices: with which it begins.
+    """
+
+    def __init__(self, choices: Choices) -> None:
+        self._lock = threading.RLock()
+        self._choices: Choices = dict(choices)
+        self._boards: tuple[Choice, ...] = ()
+        self._cameras: tuple[Choice, ...] = ()
+        self._checks: tuple[Checked, ...] = ()
+        self._checked: tuple[Choices, str] = ({}, "")
+        self._pairs = 0
+        self._trouble: Trouble | None = None
+        self._guide: Mapping[str, object] | None = None
+        self._ask: Callable[[], RunSnapshot] | None = None
+        self._run: RunSnapshot | None = None
+        self._read_ns = 0
+        self._changed = 0
+        self._was: tuple[object, ...] = ()
+        self.has_given_up = False
+
+    @property
+    def choices(self) -> Choices:
+        """The choices now."""
+        return self._choices
+
+    @property
+    def trouble(self) -> Trouble | None:
+        """What went wrong last."""
+        return self._trouble
+
+    def choose(self, choices: Choices) -> None:
+        """Take new choices."""
+        self._choices = dict(choices)
+
+    def found(self, boards: tuple[Choice, ...], cameras: tuple[Choice, ...]) -> None:
+        """Take what was found."""
+        self._boards, self._cameras = boards, cameras
+
+    def enrolled(self, link: str, name: str) -> None:
+        """A board knows this machine now."""
+        others = tuple(board for board in self._boards if board.uri != link)
+        self._boards = (Choice(uri=link, name=name), *others)
+
+    def checking(self, checks: Sequence[Checked]) -> None:
+        """Take what a check has found so far."""
+        self._checks = tuple(checks)
+
+    def checked(self, choices: Choices, words: str) -> None:
+        """Both cameras are as they should be."""
+        self._checked = (_cameras_of(choices), words)
+
+    def ran(self, pairs: int) -> None:
+        """A run has processed so many pairs."""
+        self._pairs = pairs
+
+    def guide(self, content: Mapping[str, object]) -> None:
+        """Take what the live calibration shows."""
+        self._guide = content
+
+    def calibrated(self, done: Calibrated) -> None:
+        """Take what a calibration came to: its words stay with the guide."""
+        self._guide = {**(self._guide or {}), "result": done.words}
+        self._trouble = done.trouble
+
+    def fail(self, trouble: Trouble) -> None:
+        """Something went wrong."""
+        self._trouble = trouble
+
+    def forgive(self) -> None:
+        """What went wrong before concerns nobody any more."""
+        self._trouble = None
+
+    def gave_up(self, given_up: bool) -> None:  # noqa: FBT001 - the host's own value
+        """Note whether native code is left behind."""
+        self.has_given_up = self.has_given_up or given_up
+
+    def watch(self, ask: Callable[[], RunSnapshot]) -> None:
+        """From now on the run can be asked.
+
+        Args:
+            ask: returns the run's snapshot.
+        """
+        with self._lock:
+            self._ask, self._read_ns = ask, 0
+
+    @contextmanager
+    def live(self, ask: Callable[[], RunSnapshot]) -> Iterator[None]:
+        """While the block runs, the run can be asked.
+
+        Args:
+            ask: returns the run's snapshot.
+        """
+        self.watch(ask)
+        try:
+            yield
+        finally:
+            with self._lock:
+                if self._ask is ask:
+                    self._ask = None
+
+    def last(self, snapshot: RunSnapshot) -> None:
+        """Take the last snapshot of a run."""
+        with self._lock:
+            self._ask, self._run = None, snapshot
+
+    def state(self, activity: Activity, settings: Choices, command: str, matchers: tuple[str, ...]) -> PageState:
+        """Return everything.
+
+        Args:
+            activity: what goes on.
+            settings: the choices, as they may be shown.
+            command: the command line that does the same.
+            matchers: names of the matchers.
+        """
+        with self._lock:
+            run = self._fresh()
+            same = self._checked[0] == _cameras_of(self._choices)
+            facts = Facts(
+                choices=settings,
+                boards=self._boards,
+                checked=self._checked[1] if same else "",
+                pairs=self._pairs,
+                is_running=activity is Activity.RUNNING,
+            )
+            told = steps(facts)
+            here = (activity, told, command, settings, self._boards, self._cameras, self._checks, self._trouble)
+            if here != self._was:
+                self._was, self._changed = here, self._changed + 1
+            return PageState(
+                activity=activity,
+                steps=told,
+                command=command,
+                settings=settings,
+                boards=self._boards,
+                cameras=self._cameras,
+                matchers=matchers,
+                run=run,
+                guide=self._guide,
+                checks=self._checks,
+                trouble=self._trouble,
+                changed=self._changed,
+            )
+
+    def _fresh(self) -> RunSnapshot | None:
+        now_ns = now.monotonic_ns()
+        if self._ask is not None and now_ns - self._read_ns > _FRESH_NS:
+            self._run, self._read_ns = self._ask(), now_ns
+        return self._run
+
+
+def _cameras_of(choices: Choices) -> Choices:
+    return {name: choices[name] for name in ("link", "camera") if name in choices}

@@ -1,0 +1,262 @@
+"""The page's root: it leads from nothing to a run. One activity at a time, each in a thread of its own; whatever fails, the page lives.
+
+page ── Source ── Station ─┬ Activities: enrol | check | calibrate | run, in a thread
+├ Shelf: the newest results, from the run's sink
+└ Program: what the commands do, handed over by `serve`
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Final
+
+from common.errors import SettingsError, TandemError
+from common.link.enrolment_door import pairing_address
+from common.link.factory import parse_link
+from common.protocol.enrolment_code import read_code
+from common.words import counted
+from phone_host.boards.enrolment import PairingCall
+from phone_host.doctor.host_doctor import examine
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.serve import check, find
+from phone_host.serve.activities import Activities, Task
+from phone_host.serve.guide_keeper import GuideKeeper
+from phone_host.serve.memory import Memory
+from phone_host.serve.point_answer import answered
+from phone_host.serve.program import Choices, Program, ReadyRun
+from phone_host.serve.shelf import PageSink, Shelf
+from phone_host.serve.snapshots import keep_newest
+from phone_host.stereo.core import StereoCore
+from phone_host.web.source import Activity, Answer, Checked, Command, Do, Measured, Newest, PageState
+
+_END_S: Final = 20.0
+"""A run that ends writes its report; a slow card takes seconds for that."""
+
+_DOOR_S: Final = 3.0
+"""Whoever types a code stands before the board: its door is open, or it is not."""
+
+_ANSWER_S: Final = 12.0
+"""The door's own patience, and a little more."""
+
+
+class Station:
+    """The source behind the page of `serve`.
+
+    Args:
+        program: what the commands do.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self._shelf = Shelf()
+        self._memory = Memory(program.kept())
+        self._activities = Activities(self._shelf.tell, self._memory.fail)
+        self._do: dict[Do, Callable[[Choices], Answer]] = {
+            Do.FIND: self._find,
+            Do.ENROL: self._enrol,
+            Do.SET: self._set,
+            Do.CHECK: self._check,
+            Do.CALIBRATE: self._calibrate,
+            Do.RUN: self._run,
+            Do.STOP: self._stop,
+            Do.SNAPSHOT: self._snapshot,
+        }
+
+    def state(self) -> PageState:
+        """See Source."""
+        choices = self._memory.choices
+        command = self._program.command(choices) if choices.get("camera") else ""
+        return self._memory.state(self._activities.now, self._program.shown(choices), command, self._program.matchers)
+
+    def newest(self) -> Newest | None:
+        """See Source."""
+        found = self._shelf.newest()
+        return None if found is None else found.newest
+
+    def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
+        """See Source."""
+        return self._shelf.subscribe(told)
+
+    def command(self, command: Command) -> Answer:
+        """See Source."""
+        try:
+            return self._do[command.do](command.values)
+        except TandemError as error:
+            return Answer(trouble=trouble_of(error))
+        finally:
+            self._shelf.tell()
+
+    def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
+        """See Source."""
+        return answered(self._shelf, points_px, number)
+
+    def saved(self) -> str:
+        """See Source."""
+        folder, _ = self._program.snapshots(self._memory.choices)
+        return str(folder) if folder.is_dir() else ""
+
+    def close(self) -> None:
+        """End what goes on, in order."""
+        self._activities.stop(_END_S)
+
+    @property
+    def has_given_up(self) -> bool:
+        """Whether native code still computes a pair that nobody waits for. The process may have to end without it."""
+        return self._memory.has_given_up
+
+    def _find(self, values: Choices) -> Answer:
+        del values
+        boards, cameras = find.find_boards(self._program.keys), find.find_cameras()
+        self._memory.found(boards, cameras)
+        taken = [
+            name
+            for name, there in (("link", boards), ("camera", cameras))
+            if len(there) == 1 and not self._memory.choices.get(name)
+        ]
+        only = {name: (boards if name == "link" else cameras)[0].uri for name in taken}
+        if only:
+            self._choose(only)
+        told = f"found {counted(len(boards), 'board')} and {counted(len(cameras), 'camera')}"
+        return Answer(words=f"{told}; the only one is chosen" if only else told)
+
+    def _enrol(self, values: Choices) -> Answer:
+        link, code = values.get("link", ""), read_code(values.get("code", ""))
+        uri = parse_link(link, listens_by_default=False)
+        if not uri.address.startswith("tcp://") or uri.listens:
+            raise SettingsError(f"link {link!r} needs no code", "choose it, and check")
+
+        def work(task: Task) -> None:
+            call = PairingCall(pairing_address(uri.address), self._program.keys, uri.address, patience_s=_DOOR_S)
+            call.ask()
+            if task.stopped():
+                return
+            peer = call.prove(code, uri.address, lambda: None)
+            self._memory.enrolled(uri.address, peer.name)
+            self._choose({"link": uri.address})
+
+        return self._begun(Activity.ENROLLING, work, "the board is enrolled", _ANSWER_S)
+
+    def _set(self, values: Choices) -> Answer:
+        self._choose(values)
+        is_busy = self._activities.now is not Activity.IDLE
+        return Answer(words="set; it counts from the next run on: stop, then run" if is_busy else "set")
+
+    def _choose(self, changes: Choices) -> None:
+        """Change choices and keep them.
+
+        Raises:
+            SettingsError: they are not valid, or cannot be kept.
+        """
+        new = self._program.changed(self._memory.choices, changes)
+        self._memory.choose(new)
+        self._program.keep(new)
+
+    def _check(self, values: Choices) -> Answer:
+        del values
+        choices = self._both_chosen()
+
+        def work(task: Task) -> None:
+            findings = []
+            for finding in examine(self._program.question(choices)):
+                if task.stopped():
+                    return
+                findings.append(finding)
+                self._memory.checking(
+                    [Checked(each.what, each.verdict.value, each.text, each.remedy) for each in findings]
+                )
+            if (trouble := check.obstacle(findings)) is not None:
+                self._memory.fail(trouble)
+                return
+            over = self._watched(task, self._program.trial(choices, self._sinks))
+            if task.stopped():
+                return
+            if told := check.seen(over):
+                self._memory.checked(choices, told)
+            else:
+                self._memory.fail(check.unseen(over))
+
+        return self._begun(Activity.CHECKING, work, "the check begins")
+
+    def _calibrate(self, values: Choices) -> Answer:
+        choices = self._both_chosen()
+
+        def work(task: Task) -> None:
+            ready = self._program.calibration(choices, values)
+            keeper = GuideKeeper(self._memory.guide, self._shelf.tell)
+            with task.held(), self._memory.live(ready.live.host.snapshot):
+                ready.run(task.stopped, (keeper,))
+            if task.stopped():
+                return
+            done = ready.finish(task.go_on)
+            if done.rig is not None:
+                self._choose({"calibration": str(done.rig), "rectified": ""})
+            self._memory.calibrated(done)
+
+        return self._begun(Activity.CALIBRATING, work, "the calibration begins: show the board to both cameras")
+
+    def _run(self, values: Choices) -> Answer:
+        del values
+        choices = self._both_chosen()
+
+        def work(task: Task) -> None:
+            over = self._watched(task, self._program.run(choices, self._sinks))
+            if not task.is_left:
+                self._memory.ran(over.processed)
+
+        return self._begun(Activity.RUNNING, work, "the run begins")
+
+    def _watched(self, task: Task, ready: ReadyRun) -> RunSnapshot:
+        """Run, show it, and write its report; return its last snapshot."""
+        with task.held(), self._memory.live(ready.host.snapshot):
+            try:
+                ended = ready.host.run(task.stopped)
+            except Exception as error:
+                with suppress(Exception):  # tell what ended the run, not what followed
+                    self._memory.last(ready.failed(trouble_of(error)).snapshot)
+                raise
+            over = ready.ended(ended)
+        self._memory.last(over.snapshot)
+        self._memory.gave_up(ready.host.has_given_up)
+        if over.missing:
+            self._memory.fail(Trouble(f"not written: {over.missing}", "make room and run again"))
+        return over.snapshot
+
+    def _stop(self, values: Choices) -> Answer:
+        del values
+        if not self._activities.stop():
+            return Answer(words="nothing goes on")
+        return Answer(words="stopped" if self._activities.now is Activity.IDLE else "it is ending")
+
+    def _snapshot(self, values: Choices) -> Answer:
+        del values
+        return keep_newest(self._shelf, *self._program.snapshots(self._memory.choices))
+
+    def _sinks(self, core: StereoCore | None) -> tuple[PageSink, ...]:
+        return (PageSink(self._shelf, core),)
+
+    def _both_chosen(self) -> Choices:
+        choices = self._memory.choices
+        for name, what in (("link", "board"), ("camera", "camera of this machine")):
+            if not choices.get(name):
+                raise SettingsError(f"no {what} is chosen", "find one, or type its address")
+        return choices
+
+    def _begun(self, activity: Activity, work: Callable[[Task], None], words: str, patience_s: float = 0.0) -> Answer:
+        """Begin an activity; wait for its end, if it is short.
+
+        Args:
+            activity: which one.
+            work: does it.
+            words: what to answer.
+            patience_s: wait so long for its end, s.
+        """
+
+        def forgiven(task: Task) -> None:
+            self._memory.forgive()
+            work(task)
+
+        trouble = self._activities.begin(activity, forgiven)
+        if trouble is None and patience_s:
+            self._activities.wait(patience_s)
+            trouble = self._memory.trouble
+        return Answer(words="" if trouble else words, trouble=trouble)

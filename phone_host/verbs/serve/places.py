@@ -1,0 +1,20 @@
+"""Where the page puts what nobody gave a place."""
+
+import os
+from pathlib import Path
+
+
+def data_folder() -> Path:
+    """Return where results lie that nobody gave a place (XDG base directory specification)."""
+    home = os.environ.get("XDG_DATA_HOME", "")
+    base = Path(home) if home.startswith("/") else Path(os.environ.get("HOME", "/")) / ".local" / "share"
+    return base / "tandemscan"
+
+
+def snapshot_folder(out: Path | None) -> Path:
+    """Return the folder of the snapshots. No run empties it.
+
+    Args:
+        out: folder for the results of runs; None: none.
+    """
+    return (out or data_folder()) / "snapshots"

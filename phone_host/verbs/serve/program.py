@@ -1,0 +1,178 @@
+"""What the commands do, for the page: the page's choices go through the same code as a command line."""
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common.errors import DataError
+from common.keys import KeyFolder
+from common.program.extensions import registered_names
+from common.program.invocation import command_line
+from phone_host.calibration.verdict import Verdict
+from phone_host.camera.http_uri import without_password
+from phone_host.doctor.host_doctor import Question
+from phone_host.live.calibration import LiveCalibration
+from phone_host.live.calibration_view import Shows
+from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.output.axes import Axes
+from phone_host.output.rig_files.imported import read_own_rig
+from phone_host.run.pair_budget import usable_matchers
+from phone_host.serve.program import Calibrated, Choices, SinksOf
+from phone_host.settings import chosen_keys
+from phone_host.stereo.matcher_names import MATCHERS
+from phone_host.verbs.calibrate.earlier import Asked, asked_of
+from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place
+from phone_host.verbs.calibrate.live import PreparedViews, prepare_views
+from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
+from phone_host.verbs.serve.choices import calibrate_options, run_options, run_words, with_changes, without_depth
+from phone_host.verbs.serve.kept_choices import keep, kept
+from phone_host.verbs.serve.places import data_folder, snapshot_folder
+from phone_host.verbs.stereo_options import refuse_rejected
+
+_TRIAL_S: Final = 2.5
+"""Two seconds show the rate of both cameras; a clock is known after less than one."""
+
+_BOARD_S: Final = 4.0
+_RIG: Final = Path("rig") / "rig.yaml"
+_OF_CALIBRATION: Final = ("board", "square", "baseline", "views")
+
+
+class Commands:
+    """The commands, for the page.
+
+    Args:
+        file: the settings file.
+        keys: value of --keys; None: not given.
+        tell: takes a line that the user should know.
+
+    Raises:
+        SettingsError: the settings file is not valid.
+    """
+
+    def __init__(self, file: Path, keys: str | None, tell: Callable[[str], None]) -> None:
+        self._file, self._tell = file, tell
+        self._kept, others = kept(file)
+        self._fixed = [*others, *(("--keys", keys) if keys else ())]
+        self.keys: KeyFolder = chosen_keys(file if file.exists() else None, keys)
+        self.matchers: tuple[str, ...] = (*(name.value for name in usable_matchers()), *registered_names(MATCHERS))
+
+    def kept(self) -> Choices:
+        """See Program."""
+        return self._kept
+
+    def keep(self, choices: Choices) -> None:
+        """See Program."""
+        keep(self._file, choices)
+
+    def changed(self, choices: Choices, changes: Choices) -> Choices:
+        """See Program."""
+        shown = self.shown(choices)
+        new = with_changes(choices, {name: value for name, value in changes.items() if value != shown.get(name)})
+        options = self._options(new)
+        found = checked(options)
+        rig = changes.get("calibration")
+        if rig and "rectified" not in new:
+            refuse_rejected(read_own_rig(Path(rig)), rig, allowed=options.use_rejected_rig)
+        del found
+        return new
+
+    def shown(self, choices: Choices) -> Choices:
+        """See Program."""
+        return {name: without_password(value) if name == "camera" else value for name, value in choices.items()}
+
+    def command(self, choices: Choices) -> str:
+        """See Program."""
+        return command_line("phone-host", "run", *self._fixed, *run_words(self.shown(choices)))
+
+    def run(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
+        """See Program."""
+        words = [*self._fixed, *run_words(choices)]
+        options = run_options(words)
+        opened = open_run(options, checked(options), self._tell)
+        return opened.prepared(["phone-host", "run", *words], sinks_of(opened.core))
+
+    def trial(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
+        """See Program."""
+        short = {**without_depth(choices), "seconds": str(_TRIAL_S)}
+        options = run_options([*self._fixed, *run_words(short), "--wait", str(_BOARD_S)])
+        opened = open_run(options, checked(options), lambda _: None)
+        return opened.prepared((), sinks_of(None))
+
+    def question(self, choices: Choices) -> Question:
+        """See Program."""
+        options = self._options(choices)
+        settings = checked(options).values
+        return Question(
+            camera=settings.camera,
+            links=settings.link,
+            calibration="" if options.rectified else settings.calibration,
+            out=options.out or data_folder(),
+            wait_s=_BOARD_S,
+            keys=self.keys,
+        )
+
+    def calibration(self, choices: Choices, values: Choices) -> "Calibration":
+        """See Program."""
+        given = {**without_depth(choices), **{name: values[name] for name in _OF_CALIBRATION if values.get(name)}}
+        given.pop("fifo", None)
+        words = [word for word in self._fixed if word != "--log-level"]
+        for name, value in given.items():
+            for each in value.split() if name == "link" else [value]:
+                words += [f"--{name}", each]
+        out = Path(values.get("out") or data_folder() / _RIG)
+        options = calibrate_options(["--live", "--no-sound", *words, "--out", str(out)])
+        asked = asked_of(options)
+        require_rig_place(out)
+        return Calibration(options, asked, prepare_views(options, asked))
+
+    def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
+        """See Program."""
+        out = choices.get("out", "")
+        return snapshot_folder(Path(out) if out else None), Axes(choices.get("axes", Axes.CAMERA.value))
+
+    def _options(self, choices: Choices) -> argparse.Namespace:
+        return run_options([*self._fixed, *run_words(choices)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A live calibration that is ready to begin.
+
+    Attributes:
+        options: of `calibrate`.
+        asked: what they ask for.
+        views: takes the pictures.
+    """
+
+    options: argparse.Namespace
+    asked: Asked
+    views: PreparedViews
+
+    @property
+    def live(self) -> LiveCalibration:
+        """See ReadyCalibration."""
+        return self.views.live
+
+    def run(self, stop: Callable[[], bool], shows: Sequence[Shows]) -> None:
+        """See ReadyCalibration."""
+        self.views.run(stop, shows)
+
+    def finish(self, may_write: Callable[[], None]) -> Calibrated:
+        """See ReadyCalibration."""
+        made = calibrate_pictures(self.options, self.asked, self.views.taken(_Nobody()), may_write)
+        if isinstance(made.verdict, DataError):
+            trouble = trouble_of(made.verdict)
+            return Calibrated(words=f"no calibration: {trouble.problem}", rig=None, trouble=trouble)
+        words = f"verdict {made.verdict.value}: {self.options.out}"
+        if made.verdict is Verdict.REJECT:
+            remedy = str(made.report.get("remedy") or "calibrate again")
+            return Calibrated(words=words, rig=None, trouble=Trouble("the calibration is rejected", remedy))
+        return Calibrated(words=words, rig=self.options.out.absolute(), trouble=None)
+
+
+class _Nobody:
+    """Nobody wants the end of it all: the page's stop does not come this far."""
+
+    interrupted = False
