@@ -79,12 +79,16 @@ class Activities:
     """Runs activities.
 
     Args:
+        begins: called before an activity begins, in the thread that asks for it.
         changed: called, from any thread, after each change.
         failed: takes what ended an activity.
     """
 
-    def __init__(self, changed: Callable[[], None], failed: Callable[[Trouble], None]) -> None:
-        self._changed, self._failed = changed, failed
+    def __init__(
+        self, begins: Callable[[], None], changed: Callable[[], None], failed: Callable[[Trouble], None]
+    ) -> None:
+        self._begins, self._changed, self._failed = begins, changed, failed
+        self._is_closed = False
         self._lock = threading.Lock()
         self._task: Task | None = None
         self._thread: threading.Thread | None = None
@@ -111,6 +115,9 @@ class Activities:
         with self._lock:
             if self._task is not None:
                 return Trouble(_WORDS[self.now], "stop it first, or wait for its end")
+            if self._is_closed:
+                return Trouble("the program is ending", "start phone-host serve again")
+            self._begins()
             self._task = task
             self._thread = threading.Thread(target=self._work, args=(task, work), name=activity.value, daemon=True)
             self._thread.start()
@@ -136,6 +143,16 @@ class Activities:
         if thread.is_alive() and task.may_be_left:
             self._end(task, is_left=True)
         return True
+
+    def close(self, patience_s: float) -> None:
+        """Stop what goes on, and begin nothing more.
+
+        Args:
+            patience_s: wait so long for its end.
+        """
+        with self._lock:
+            self._is_closed = True
+        self.stop(patience_s)
 
     def wait(self, patience_s: float) -> None:
         """Wait for the end of what goes on.

@@ -81,16 +81,21 @@ class Memory:
 
     def calibrated(self, done: Calibrated) -> None:
         """Take what a calibration came to: its words stay with the guide."""
-        self._guide = {**(self._guide or {}), "result": done.words}
+        self.result(done.words)
         self._trouble = done.trouble
+
+    def result(self, words: str) -> None:
+        """Take in one sentence how a live calibration ended."""
+        self._guide = {**(self._guide or {}), "result": words}
 
     def fail(self, trouble: Trouble) -> None:
         """Something went wrong."""
         self._trouble = trouble
 
-    def forgive(self) -> None:
-        """What went wrong before concerns nobody any more."""
-        self._trouble = None
+    def begin(self) -> None:
+        """Something new begins: the last run, and what went wrong, concern nobody any more."""
+        with self._lock:
+            self._trouble = self._run = None
 
     def gave_up(self, given_up: bool) -> None:  # noqa: FBT001 - the host's own value
         """Note whether native code is left behind."""

@@ -50,7 +50,7 @@ class Station:
         self._program = program
         self._shelf = Shelf()
         self._memory = Memory(program.kept())
-        self._activities = Activities(self._shelf.tell, self._memory.fail)
+        self._activities = Activities(self._memory.begin, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
             Do.FIND: self._find,
             Do.ENROL: self._enrol,
@@ -97,7 +97,7 @@ class Station:
 
     def close(self) -> None:
         """End what goes on, in order."""
-        self._activities.stop(_END_S)
+        self._activities.close(_END_S)
 
     @property
     def has_given_up(self) -> bool:
@@ -186,6 +186,8 @@ class Station:
             with task.held(), self._memory.live(ready.live.host.snapshot):
                 ready.run(task.stopped, (keeper,))
             if task.stopped():
+                views = counted(ready.live.snapshot().views, "view")
+                self._memory.result(f"stopped: {views} taken and kept, nothing computed from them")
                 return
             done = ready.finish(task.go_on)
             if done.rig is not None:
@@ -250,12 +252,7 @@ class Station:
             words: what to answer.
             patience_s: wait so long for its end, s.
         """
-
-        def forgiven(task: Task) -> None:
-            self._memory.forgive()
-            work(task)
-
-        trouble = self._activities.begin(activity, forgiven)
+        trouble = self._activities.begin(activity, work)
         if trouble is None and patience_s:
             self._activities.wait(patience_s)
             trouble = self._memory.trouble

@@ -68,6 +68,7 @@ def test_from_nothing_to_depth_by_the_api_alone(film: Path, tmp_path: Path) -> N
         client.do("run")
         until(lambda: client.pairs() >= 5, "five pairs")
         tapped = client.post("/api/measure", {"points": [[120, 90], [200, 150]], "number": None})
+        assert tapped["words"] == ""
         for place, sigma in zip(tapped["places_m"], tapped["place_sigmas_m"], strict=True):
             assert place[2] == pytest.approx(DEPTH_M, abs=max(4 * sigma, 0.01))
             assert 0 < sigma < 0.02
