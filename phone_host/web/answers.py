@@ -18,7 +18,7 @@ from phone_host.web.hub import Hub
 from phone_host.web.openapi import description
 from phone_host.web.saved_pairs import open_saved, saved_pairs
 from phone_host.web.settings import Limits
-from phone_host.web.source import Answer
+from phone_host.web.source import Answer, Do
 from phone_host.web.state_json import answer_values, measured_values, whole_text
 from phone_host.web.static_files import INDEX, StaticFile, chosen_encoding
 from phone_host.web.viewers import Viewers
@@ -202,10 +202,10 @@ class Answers:
         command = read_command(await _body(request))
         if command is None:
             return problem(400, _NO_COMMAND)
-        answer = await self._in_turn(lambda: self._hub.source.command(command))
+        answer = await self._in_turn(lambda: self._hub.source.command(command), waits=command.do is not Do.STOP)
         if answer is None:
             return problem(503, _BUSY, {"Retry-After": "1"})
-        self._hub.wake()
+        self._hub.outdate()
         return _json(json_text(answer_values(answer)), 200 if answer.trouble is None else 409)
 
     async def _measure(self, request: web.Request) -> web.StreamResponse:
@@ -215,13 +215,13 @@ class Answers:
         measured = await self._hub.encoder.run(lambda: self._hub.source.measure(asked.points_px, asked.number))
         return _json(json_text(measured_values(measured)))
 
-    async def _in_turn(self, do: Callable[[], Answer]) -> Answer | None:
-        """Run a command in its thread, one after another; None: too many wait."""
+    async def _in_turn(self, do: Callable[[], Answer], *, waits: bool = True) -> Answer | None:
+        """Run a command in its thread, one after another; a stop `waits` for no other. None: too many wait."""
         if self._commands >= self._limits.commands:
             return None
         self._commands += 1
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._commander, do)
+            return await asyncio.get_running_loop().run_in_executor(self._commander if waits else None, do)
         finally:
             self._commands -= 1
 

@@ -30,6 +30,7 @@ class Hub:
         self.report = "null"
         self.report_version = 0
         self._built_s = self._reported_s = float("-inf")
+        self._commands = 0
         self._samples: deque[Sample] = deque(maxlen=MOST_SAMPLES)
         self._building = asyncio.Lock()
         self._loop = asyncio.get_running_loop()
@@ -49,15 +50,21 @@ class Hub:
             now_s = self._loop.time()
             if now_s - self._built_s < _STATE_S:
                 return
-            with_report = now_s - self._reported_s >= _REPORT_S
+            with_report, commands = now_s - self._reported_s >= _REPORT_S, self._commands
             state, report = await self.encoder.run(lambda: self._built(with_report=with_report))
-            self._built_s = self._loop.time()
+            self._built_s = self._loop.time() if commands == self._commands else float("-inf")
             if state != self.state:
                 self.state, self.state_version = state, self.state_version + 1
             if with_report:
-                self._reported_s = self._built_s
+                self._reported_s = now_s
                 if report != self.report:
                     self.report, self.report_version = report, self.report_version + 1
+
+    def outdate(self) -> None:
+        """A command was done: whoever asks next gets the state after it."""
+        self._commands += 1
+        self._built_s = float("-inf")
+        self.wake()
 
     async def watch(self) -> None:
         """Keep the state up to date while somebody looks, for ever."""
