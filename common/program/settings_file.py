@@ -41,14 +41,11 @@ def changed(text: str, keys: Mapping[str, Value | None], table: str, content: Ma
         wanted[table] = dict(content)
     lines = _without_table(text.splitlines(), table)
     first = next((at for at, line in enumerate(lines) if _TABLE.match(line)), len(lines))
-    head, tail = lines[:first], lines[first:]
+    head, tail = _trimmed(lines[:first]), _trimmed(lines[first:])
     for key, value in keys.items():
         head = _with_key(head, key, value)
-    while tail and not tail[-1].strip():
-        tail.pop()
-    if content:
-        tail += ["", f"[{table}]", *(f"{_key(name)} = {_text(value)}" for name, value in content.items())]
-    made = "\n".join([*head, *tail]).strip("\n") + "\n"
+    own = [f"[{table}]", *(f"{_key(name)} = {_text(value)}" for name, value in content.items())] if content else []
+    made = "\n\n".join("\n".join(part) for part in (head, tail, own) if part) + "\n"
     if _meaning(made) != wanted:
         raise SettingsError("the settings file is written in a way that cannot be changed here", "edit it by hand")
     return made
@@ -67,6 +64,13 @@ def _without_table(lines: list[str], table: str) -> list[str]:
         return lines
     end = next((at for at in range(begin + 1, len(lines)) if _TABLE.match(lines[at])), len(lines))
     return lines[:begin] + lines[end:]
+
+
+def _trimmed(lines: list[str]) -> list[str]:
+    """Return lines without the empty ones at their end."""
+    while lines and not lines[-1].strip():
+        lines = lines[:-1]
+    return lines
 
 
 def _with_key(lines: list[str], key: str, value: Value | None) -> list[str]:

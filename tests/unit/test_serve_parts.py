@@ -1,0 +1,359 @@
+"""The parts of the page's root: shelf, activities, steps, choices and what is kept of them."""
+
+import io
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.doctor.finding import fail, ok
+from common.errors import DataError, SettingsError, UnavailableError
+from common.ledger import StageTimes
+from common.peers import Peer
+from phone_host.boards.found import Found
+from phone_host.measure.trouble import Trouble
+from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result
+from phone_host.output.axes import Axes
+from phone_host.serve import check
+from phone_host.serve.activities import Activities, Task
+from phone_host.serve.find import board_choice
+from phone_host.serve.memory import Memory
+from phone_host.serve.point_answer import answered
+from phone_host.serve.shelf import PageSink, Shelf
+from phone_host.serve.snapshots import keep_newest
+from phone_host.serve.steps import Facts, steps
+from phone_host.verbs.serve.choices import choices_of, run_options, run_words, with_changes, without_depth
+from phone_host.verbs.serve.kept_choices import keep, kept
+from phone_host.verbs.serve.page import address_of, own_settings
+from phone_host.verbs.serve.program import Commands
+from phone_host.verbs.serve.status import Status, told
+from phone_host.web.source import Activity, Choice, PageState, StepName
+from tests.support.run_snapshots import run
+from tests.support.samples import LEDGER
+
+
+def _result(number: int, size: int = 8) -> Result:
+    image = np.full((size, size), number % 256, np.uint8)
+    pair = RectifiedPair(image, image)
+    cloud = np.zeros((size, size, 3), np.float32)
+    frames = FramePair.__new__(FramePair)  # no frame is looked at
+    return Result(number, frames, Processed(pair, None, cloud, StageTimes()), LEDGER)
+
+
+def test_the_shelf_numbers_all_results_and_keeps_the_newest() -> None:
+    """Numbers grow by one over all runs; only the newest has its cloud; of many, the last 32 are kept, and of large ones fewer."""
+    shelf = Shelf()
+    assert shelf.newest() is None
+    first, second = PageSink(shelf, None), PageSink(shelf, None)
+    for number in range(30):
+        first.offer(_result(number))
+    for number in range(10):
+        second.offer(_result(number))
+    newest = shelf.newest()
+    assert newest is not None
+    assert (newest.newest.number, newest.newest.result.number) == (40, 9)
+    assert newest.newest.result.processed.cloud is not None
+    before = shelf.numbered(39)
+    assert before is not None
+    assert before.newest.result.processed.cloud is None
+    assert shelf.numbered(9) is not None
+    assert shelf.numbered(8) is None
+    for number in range(3):
+        second.offer(_result(number, 4000))
+    assert shelf.numbered(39) is None
+
+
+def test_a_viewer_that_fails_is_told_no_more_and_ends_nothing() -> None:
+    """Subscribers are told of each result until they leave or fail; the run's thread never sees the failure."""
+    shelf, calls = Shelf(), []
+
+    def broken() -> None:
+        calls.append("broken")
+        raise RuntimeError
+
+    shelf.subscribe(broken)
+    leave = shelf.subscribe(lambda: calls.append("sound"))
+    sink = PageSink(shelf, None)
+    sink.await_place(0)
+    sink.offer(_result(0))
+    sink.offer(_result(1))
+    leave()
+    sink.offer(_result(2))
+    sink.finish()
+    assert sorted(calls) == ["broken", "sound", "sound"]
+    assert (sink.failure, sink.accounts) == (None, ())
+
+
+def test_a_tap_without_depth_says_why() -> None:
+    """No pair, a pair that is gone, and one without a core are told in words; nothing is measured."""
+    shelf = Shelf()
+    assert "no pair" in answered(shelf, [(1, 1)], None).words
+    shelf.put(_result(0), None)
+    assert "gone" in answered(shelf, [(1, 1), (2, 2)], 7).words
+    without = answered(shelf, [(1, 1), (2, 2)], None)
+    assert "no depth" in without.words
+    assert (without.places_m, without.length_m) == ((None, None), None)
+
+
+def test_snapshots_take_the_next_free_number(tmp_path: Path) -> None:
+    """Each snapshot gets a folder of its own; without a pair, or where nothing can be written, the reason is told."""
+    shelf, folder = Shelf(), tmp_path / "shots"
+    with pytest.raises(DataError, match="no pair"):
+        keep_newest(shelf, folder, Axes.CAMERA)
+    shelf.put(_result(0), None)
+    for name in ("pair-000000", "pair-000001"):
+        assert keep_newest(shelf, folder, Axes.CAMERA).words.endswith(name)
+        assert (folder / name / "left.png").exists()
+    (tmp_path / "file").touch()
+    with pytest.raises(UnavailableError):
+        keep_newest(shelf, tmp_path / "file", Axes.CAMERA)
+
+
+class _Watched:
+    """Activities with what they tell."""
+
+    def __init__(self) -> None:
+        self.begun = self.changes = 0
+        self.failures: list[Trouble] = []
+        self.all = Activities(self._begin, self._change, self.failures.append)
+
+    def _begin(self) -> None:
+        self.begun += 1
+
+    def _change(self) -> None:
+        self.changes += 1
+
+
+def test_one_activity_at_a_time_stopped_at_any_moment() -> None:
+    """A second one is refused in words; stop ends the first, and then another may begin; after the close none may."""
+    seen = _Watched()
+    inside = threading.Event()
+
+    def work(task: Task) -> None:
+        inside.set()
+        with task.held():
+            while not task.stopped():
+                threading.Event().wait(0.001)
+        task.go_on()
+        raise AssertionError
+
+    assert seen.all.now is Activity.IDLE
+    assert not seen.all.stop()
+    assert seen.all.begin(Activity.RUNNING, work) is None
+    assert inside.wait(60)
+    assert seen.all.now is Activity.RUNNING
+    refused = seen.all.begin(Activity.CHECKING, work)
+    assert refused is not None
+    assert refused.problem == "a run is going on"
+    assert seen.all.stop(60)
+    assert seen.all.now is Activity.IDLE
+    assert (seen.begun, seen.failures) == (1, [])
+    seen.all.close(60)
+    late = seen.all.begin(Activity.RUNNING, work)
+    assert late is not None
+    assert "ending" in late.problem
+
+
+def test_what_waits_for_a_device_is_left_and_its_failure_concerns_nobody() -> None:
+    """An activity that holds nothing is left to itself when it does not end; one that holds cameras is waited for."""
+    seen, ends, holds = _Watched(), threading.Event(), threading.Event()
+
+    def deaf(task: Task) -> None:
+        del task
+        ends.wait(60)
+        raise ValueError("too late")
+
+    assert seen.all.begin(Activity.ENROLLING, deaf) is None
+    seen.all.stop(0.0)
+    assert seen.all.now is Activity.IDLE
+
+    def holding(task: Task) -> None:
+        with task.held():
+            holds.set()
+            ends.wait(60)
+
+    assert seen.all.begin(Activity.RUNNING, holding) is None
+    assert holds.wait(60)
+    seen.all.stop(0.0)
+    assert seen.all.now is Activity.ENDING
+    ends.set()
+    seen.all.wait(60)
+    assert seen.all.now is Activity.IDLE
+    assert seen.failures == []
+
+
+def test_a_failure_is_told_with_its_remedy() -> None:
+    """An error of ours in its own words; a mistake of the program as such."""
+    seen = _Watched()
+    for error in (SettingsError("bad", "mend it"), KeyError("x")):
+
+        def work(task: Task, error: Exception = error) -> None:
+            del task
+            raise error
+
+        assert seen.all.begin(Activity.CHECKING, work) is None
+        seen.all.wait(60)
+    assert seen.failures[0] == Trouble("bad", "mend it")
+    assert "the program itself failed" in seen.failures[1].problem
+
+
+def test_the_steps_lead_from_nothing_to_a_run() -> None:
+    """Each step says what to do until it is done, then what it has come to; a board that wants its code is not done."""
+    nothing = steps(Facts(choices={}))
+    assert [step.name for step in nothing] == list(StepName)
+    assert not any(step.done for step in nothing)
+    both = {"link": "tcp://b:1", "camera": "v4l2:auto"}
+    stranger = (Choice(uri="tcp://b:1", name="b", needs_code=True),)
+    assert "board-agent pair" in steps(Facts(choices=both, boards=stranger))[0].words
+    chosen = steps(Facts(choices=both))
+    assert [step.done for step in chosen] == [True, True, False, False, False]
+    all_done = steps(Facts(choices={**both, "calibration": "rig.yaml"}, checked="seen", pairs=2))
+    assert all(step.done for step in all_done)
+    assert all_done[-1].words == "the last run gave 2 pairs"
+    assert steps(Facts(choices={**both, "rectified": "yes"}, is_running=True))[3].done
+    assert steps(Facts(choices=both, is_running=True))[4].words == "it runs"
+
+
+def test_choices_are_a_command_line_and_back() -> None:
+    """Values, switches and several links become words, which the command's own parser reads; and its options become choices."""
+    made = with_changes({"far": "5m"}, {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "far": "", "near": " 300 "})
+    assert made == {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "near": "300"}
+    assert run_words(made) == ["--link", "tcp://a:1", "--link", "tcp://b:2", "--rectified", "--near", "300"]
+    options = run_options(run_words(made))
+    assert (options.link, options.rectified, options.near) == (["tcp://a:1", "tcp://b:2"], True, "300")
+    assert choices_of(options) == made
+    assert with_changes(made, {"rectified": "no"}) == {"link": "tcp://a:1 tcp://b:2", "near": "300"}
+    assert run_words({"crop": "-1,0,2,2"}) == ["--crop=-1,0,2,2"]
+    assert without_depth(made) == {"link": "tcp://a:1 tcp://b:2"}
+
+
+@pytest.mark.parametrize(
+    "changes", [{"colour": "red"}, {"config": "x"}, {"json": "yes"}, {"serve": ":1"}, {"rectified": "perhaps"}]
+)
+def test_what_is_no_option_of_a_run_cannot_be_set(changes: dict[str, str]) -> None:
+    """Unknown names, options of the program itself, and a switch that is neither on nor off."""
+    with pytest.raises(SettingsError):
+        with_changes({}, changes)
+
+
+def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
+    """Settings become keys that `run --config` reads, other options a table of the page; keys of the program are not the page's."""
+    file = tmp_path / "new" / "host.toml"
+    assert kept(file) == ({}, [])
+    choices = {"link": "tcp://a:1", "tolerance": "5ms", "temporal": "yes", "near": "300"}
+    keep(file, choices)
+    assert file.stat().st_mode & 0o777 == 0o600
+    file.write_text('keys = "k"  # mine\n' + file.read_text())
+    assert kept(file) == ({**choices, "tolerance": "5.0"}, ["--keys", "k"])
+    keep(file, {"near": "200"})
+    assert file.read_text() == 'keys = "k"  # mine\n\n[page]\nnear = "200"\n'
+    keep(file, {"near": "200"})
+    (tmp_path / "folder").touch()
+    with pytest.raises(SettingsError):
+        keep(tmp_path / "folder" / "host.toml", choices)
+
+
+def test_what_is_set_is_checked_as_on_the_command_line(tmp_path: Path) -> None:
+    """A bad number, a rig that is none and contradicting limits are refused; a password is not shown, and its place holder changes nothing."""
+    commands = Commands(tmp_path / "host.toml", str(tmp_path / "keys"), lambda _: None)
+    for changes in ({"pairs": "many"}, {"calibration": str(tmp_path)}, {"near": "9m", "far": "1m"}, {"link": "x:y"}):
+        with pytest.raises((SettingsError, DataError)):
+            commands.changed({}, changes)
+    secret = {"camera": "http://me:secret@10.0.0.2:8080/video"}
+    shown = commands.shown(secret)
+    assert "secret" not in shown["camera"] + commands.command(secret)
+    assert commands.changed(secret, {**shown, "near": "300"}) == {**secret, "near": "300"}
+    assert commands.command({"near": "300"}).endswith(f"run --keys {tmp_path}/keys --near 300")
+    assert commands.snapshots({"out": "scan", "axes": "y-up"}) == (Path("scan/snapshots"), Axes.Y_UP)
+
+
+@pytest.mark.parametrize(
+    ("text", "there"),
+    [
+        (None, ("127.0.0.1", 8765)),
+        ("", ("127.0.0.1", 8765)),
+        ("localhost:9000", ("localhost", 9000)),
+        (":9000", ("127.0.0.1", 9000)),
+        ("9000", ("127.0.0.1", 9000)),
+        ("localhost", ("localhost", 8765)),
+        ("[::1]:80", ("::1", 80)),
+        ("[::1]", ("::1", 8765)),
+    ],
+)
+def test_an_address_may_leave_out_what_is_usual(text: str | None, there: tuple[str, int]) -> None:
+    """Host, port or both."""
+    assert address_of(text) == there
+
+
+def test_an_address_that_is_none_or_that_others_reach_is_refused(tmp_path: Path) -> None:
+    """A port beyond all ports, and anything but loopback without https."""
+    for text in ("localhost:99999", "localhost:x"):
+        with pytest.raises(SettingsError, match="address"):
+            address_of(text)
+    with pytest.raises(SettingsError) as refused:
+        own_settings("0.0.0.0:8765", tmp_path)
+    assert "--lan" in refused.value.remedy
+    assert not (tmp_path / "page-token").exists()
+
+
+def test_a_board_across_the_network_needs_its_code_once() -> None:
+    """One on this machine never does; a stranger does; a board that was enrolled has its name."""
+    peer = Peer(name="bone", key="k" * 40, added="2026", address="tcp://10.0.0.2:5555")
+    assert board_choice(Found("shed", "tcp://10.0.0.3:5555"), ()).needs_code
+    assert not board_choice(Found("", "tcp://127.0.0.1:5555"), ()).needs_code
+    known = board_choice(Found("", peer.address), (peer,))
+    assert (known.name, known.needs_code) == ("bone", False)
+
+
+def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
+    """Pairs, rate and skew; or which camera sent nothing; or the finding that stops everything."""
+    assert check.obstacle([ok("python", "there")]) is None
+    assert check.obstacle([ok("a", "b"), fail("camera", "gone", "plug it in")]) == Trouble("camera: gone", "plug it in")
+    assert check.seen(run(21)) == "both cameras are seen: 21 pairs, 20 a second, time skew 0.0 ms"
+    assert check.seen(run(0)) == ""
+    nothing = run(0)
+    assert "board" in check.unseen(nothing).problem
+    assert "this machine" in check.unseen(replace(nothing, counts=PairCounts(received=3))).problem
+    assert "belong" in check.unseen(replace(nothing, counts=PairCounts(received=3, host_frames=3))).problem
+
+
+def test_the_memory_tells_a_change_once() -> None:
+    """`changed` grows with each change and only then; a run is asked at most a few times a second; a new activity forgets the last run."""
+    memory, asked = Memory({"camera": "v4l2:auto"}), []
+
+    def state() -> PageState:
+        return memory.state(Activity.IDLE, memory.choices, "", ())
+
+    assert state().changed == state().changed == 1
+    memory.fail(Trouble("a", "b"))
+    assert state().changed == 2
+
+    def ask() -> object:
+        asked.append(1)
+        return run(3)
+
+    with memory.live(ask):  # type: ignore[arg-type]  # it returns one
+        assert state().run is state().run is not None
+    assert len(asked) == 1
+    memory.begin()
+    assert (state().run, state().trouble) == (None, None)
+    memory.last(run(2))
+    assert state().run is not None
+
+
+def test_the_terminal_tells_what_goes_on() -> None:
+    """Where there is no terminal, a line for each change; a trouble is told with its remedy."""
+    written = io.StringIO()
+    status = Status(written)
+    ready = PageState(activity=Activity.IDLE)
+    for state in (ready, ready, replace(ready, activity=Activity.RUNNING, run=run(3)), ready):
+        status.show(state)
+    status.clear()
+    assert written.getvalue().splitlines() == [
+        "phone-host: ready",
+        "phone-host: running: 3 pairs",
+        "phone-host: ready",
+    ]
+    assert told(replace(ready, trouble=Trouble("no rig", "calibrate"))) == "ready; no rig: calibrate"
