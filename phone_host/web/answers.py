@@ -18,7 +18,7 @@ from phone_host.web.hub import Hub
 from phone_host.web.openapi import description
 from phone_host.web.saved_pairs import open_saved, saved_pairs
 from phone_host.web.settings import Limits
-from phone_host.web.source import Answer, Do
+from phone_host.web.source import Answer, Command, Do
 from phone_host.web.state_json import answer_values, measured_values, whole_text
 from phone_host.web.static_files import INDEX, StaticFile, chosen_encoding
 from phone_host.web.viewers import Viewers
@@ -70,7 +70,7 @@ class Answers:
     ) -> None:
         self._hub, self._viewers, self._gate, self._files, self._limits = hub, viewers, gate, files, limits
         self._authority = authority
-        self._commander = ThreadPoolExecutor(1, "page command")
+        self._commander = ThreadPoolExecutor(limits.commands + 1, "page command")
         self._commands = self._downloads = 0
 
     def routes(self) -> list[web.RouteDef]:
@@ -202,7 +202,7 @@ class Answers:
         command = read_command(await _body(request))
         if command is None:
             return problem(400, _NO_COMMAND)
-        answer = await self._in_turn(lambda: self._hub.source.command(command), waits=command.do is not Do.STOP)
+        answer = await self._done(command)
         if answer is None:
             return problem(503, _BUSY, {"Retry-After": "1"})
         self._hub.outdate()
@@ -215,15 +215,17 @@ class Answers:
         measured = await self._hub.encoder.run(lambda: self._hub.source.measure(asked.points_px, asked.number))
         return _json(json_text(measured_values(measured)))
 
-    async def _in_turn(self, do: Callable[[], Answer], *, waits: bool = True) -> Answer | None:
-        """Run a command in its thread, one after another; a stop `waits` for no other. None: too many wait."""
-        if self._commands >= self._limits.commands:
+    async def _done(self, command: Command) -> Answer | None:
+        """Have a command done; None: too many are under way. To stop is always possible."""
+        counts = command.do is not Do.STOP
+        if counts and self._commands >= self._limits.commands:
             return None
-        self._commands += 1
+        self._commands += counts
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._commander if waits else None, do)
+            loop = asyncio.get_running_loop()
+            return await loop.run_in_executor(self._commander, self._hub.source.command, command)
         finally:
-            self._commands -= 1
+            self._commands -= counts
 
 
 def _json(text: str, status: int = 200) -> web.Response:

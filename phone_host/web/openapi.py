@@ -5,6 +5,7 @@ from typing import Final
 from common.versions import PACKAGE_VERSION
 from phone_host.output.pair_files import RUN_FILES
 from phone_host.web.source import Activity, Do, StepName
+from phone_host.web.wishes import MOST_NUMBER, MOST_POINTS, MOST_PX, MOST_TEXT, MOST_VALUES
 
 _Json = dict[str, object]
 
@@ -12,11 +13,11 @@ _TEXT: Final[_Json] = {"type": "string"}
 _NUMBER: Final[_Json] = {"type": ["number", "null"]}
 _POINT: Final[_Json] = {
     "type": "array",
-    "items": {"type": "number", "minimum": -1e5, "maximum": 1e5},
+    "items": {"type": "number", "minimum": -MOST_PX, "maximum": MOST_PX},
     "minItems": 2,
     "maxItems": 2,
 }
-_WHOLE: Final[_Json] = {"type": "integer", "minimum": 0, "maximum": 2**53 - 1}
+_WHOLE: Final[_Json] = {"type": "integer", "minimum": 0, "maximum": MOST_NUMBER}
 
 _REFUSED: Final = (401, 403, 421, 429)
 """What any request may be answered: no token, another site, another name, too often."""
@@ -85,8 +86,9 @@ def _schemas() -> _Json:
         report={"type": ["object", "null"]},
     )
     pair = _object(number=_WHOLE, files={"type": "array", "items": {"enum": [file.value for file in RUN_FILES]}})
-    values = {"type": "object", "additionalProperties": {"type": "string", "maxLength": 1000}, "maxProperties": 64}
-    points = {"type": "array", "items": _POINT, "minItems": 1, "maxItems": 2}
+    text = {"type": "string", "maxLength": MOST_TEXT, "description": "without control characters"}
+    values = {"type": "object", "additionalProperties": text, "maxProperties": MOST_VALUES}
+    points = {"type": "array", "items": _POINT, "minItems": 1, "maxItems": MOST_POINTS}
     number = {"anyOf": [_WHOLE, {"type": "null"}]}
     return {
         "State": state,

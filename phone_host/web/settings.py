@@ -83,7 +83,7 @@ class Limits:
         idle_s: how long a connection may take for a request, and how long it may wait between two.
         silent_s: how long a viewer may leave a pair without acknowledgement, or take for a message.
         downloads: large answers under way at once.
-        commands: commands under way or waiting at once.
+        commands: commands under way at once, but for `stop`.
     """
 
     connections: int = 96

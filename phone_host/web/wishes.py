@@ -1,6 +1,6 @@
 """Reads what viewers say, and what programs send: strangers' JSON as values. Pure."""
 
-import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -11,10 +11,15 @@ from phone_host.web.source import Command, Do
 
 MOST_HZ: Final = 30.0
 _LEAST_HZ: Final = 0.1
-_MOST_VALUES: Final = 64
-_MOST_TEXT: Final = 1000
-_MOST_POINTS: Final = 2
-_MOST_PX: Final = 100_000.0
+MOST_VALUES: Final = 64
+MOST_TEXT: Final = 1000
+MOST_POINTS: Final = 2
+MOST_PX: Final = 100_000.0
+MOST_NUMBER: Final = 2**53 - 1
+"""Beyond, JSON's readers no longer tell whole numbers apart (RFC 8259, section 6)."""
+
+_PLAIN: Final = re.compile(r"[ -~\u00a0-\ud7ff\ue000-\U0010ffff]*")
+"""Without control characters, which would reach terminals and logs, and without halves of letters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +72,9 @@ def read_wish(text: str) -> Ack | Want | None:
     """
     said = _object(text)
     match said.get("kind"):
-        case "ack" if _is_whole(said.get("number")):
-            return Ack(said["number"])
+        case "ack":
+            number = _whole(said.get("number"))
+            return None if number is None else Ack(number)
         case "want":
             return _want(said)
     return None
@@ -87,10 +93,10 @@ def read_command(text: str | bytes) -> Command | None:
     values = said.get("values", {})
     if said.get("do") not in [each.value for each in Do] or not set(said) <= {"do", "values"}:
         return None
-    if not isinstance(values, dict) or len(values) > _MOST_VALUES:
+    if not isinstance(values, dict) or len(values) > MOST_VALUES:
         return None
     texts = (text for pair in values.items() for text in pair)
-    if not all(isinstance(text, str) and len(text) <= _MOST_TEXT and text.isprintable() for text in texts):
+    if not all(isinstance(text, str) and len(text) <= MOST_TEXT and _PLAIN.fullmatch(text) for text in texts):
         return None
     return Command(do=Do(said["do"]), values=values)
 
@@ -106,20 +112,21 @@ def read_measure(text: str | bytes) -> MeasureRequest | None:
     """
     said = _object(text)
     points, number = said.get("points"), said.get("number")
-    if not isinstance(points, list) or not 1 <= len(points) <= _MOST_POINTS or not set(said) <= {"points", "number"}:
+    if not isinstance(points, list) or not 1 <= len(points) <= MOST_POINTS or not set(said) <= {"points", "number"}:
         return None
     if not all(isinstance(point, list) and len(point) == 2 and all(map(_is_place, point)) for point in points):
         return None
-    if number is not None and not _is_whole(number):
+    whole = _whole(number)
+    if number is not None and whole is None:
         return None
-    return MeasureRequest(tuple((float(x), float(y)) for x, y in points), number)
+    return MeasureRequest(tuple((float(x), float(y)) for x, y in points), whole)
 
 
 def _want(said: Mapping[str, Any]) -> Want | None:
-    views, width, hz = said.get("views"), said.get("width", 640), said.get("hz", 10)
+    views, width, hz = said.get("views"), _whole(said.get("width", 640)), said.get("hz", 10)
     if not isinstance(views, list) or not {view.value for view in View}.issuperset(map(str, views)):
         return None
-    if not _is_whole(width) or not _is_number(hz) or not hz > 0:
+    if width is None or not _is_number(hz) or not hz > 0:
         return None
     return Want(
         tuple(view for view in View if view.value in views),
@@ -137,13 +144,14 @@ def _object(text: str | bytes) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _is_whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**53
+def _whole(value: object) -> int | None:
+    """Return a number that counts something. For JSON, 5.0 is whole, too."""
+    return int(value) if _is_number(value) and value >= 0 and value == int(value) else None  # type: ignore[operator, call-overload]
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e9 and math.isfinite(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= MOST_NUMBER
 
 
 def _is_place(value: object) -> bool:
-    return _is_number(value) and abs(value) <= _MOST_PX  # type: ignore[arg-type]
+    return _is_number(value) and abs(value) <= MOST_PX  # type: ignore[arg-type]

@@ -40,6 +40,7 @@ class PageSource:
 
     def __init__(self, shown: Processed | None = None, saved: str = "") -> None:
         self.processed = processed() if shown is None else shown
+        self.asked: list[Command] = []
         self.commands: list[Command] = []
         self.asked_states = 0
         self.run: RunSnapshot | None = None
@@ -111,6 +112,7 @@ class PageSource:
 
     def command(self, command: Command) -> Answer:
         """Record a command; a test may block it. A run is refused."""
+        self.asked.append(command)
         self.blocked.wait(30)
         self.commands.append(command)
         return Answer(trouble=REFUSED) if command.do is Do.RUN else Answer(words=f"Did {command.do.value}.")
