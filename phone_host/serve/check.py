@@ -1,4 +1,4 @@
-"""Checks the two chosen cameras: what the doctor says, then a run of some seconds without depth."""
+"""What a check of the two chosen cameras came to: what the doctor said, and what a run of some seconds without depth saw. Pure."""
 
 import math
 

@@ -3,8 +3,11 @@
 import argparse
 import select
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
+from common.errors import TakenError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
@@ -17,6 +20,7 @@ from phone_host.verbs.serve.kept_choices import usual_file
 from phone_host.verbs.serve.page import lan_settings, open_browser, own_settings, served, tell_page
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import stderr_status
+from phone_host.web.settings import PageSettings
 
 _STEP_S: Final = 0.25
 
@@ -32,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     settings = make(options.address, commands.keys.path)
     station = Station(commands)
     signals = StopSignals()
-    with served(station, settings) as server:
+    with _opened_if_taken(settings, is_asked=options.open), served(station, settings) as server:
         print(json_text({"url": server.url}) if options.json else f"phone-host: the page: {server.url}", flush=True)
         tell_page(server, settings)
         if options.open:
@@ -45,3 +49,15 @@ def run(options: argparse.Namespace) -> int:
     if signals.interrupted and station.has_given_up:
         leave()  # the interpreter's end would wait for native code
     return INTERRUPTED if signals.interrupted else 0
+
+
+@contextmanager
+def _opened_if_taken(settings: PageSettings, *, is_asked: bool) -> Iterator[None]:
+    """Where a page is served already, as by the service, open that one. It gets no token: who knows who serves there."""
+    try:
+        yield
+    except TakenError:
+        if is_asked:
+            scheme = "http" if settings.credentials is None else "https"
+            open_browser(f"{scheme}://127.0.0.1:{settings.port}/")
+        raise

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
@@ -60,9 +59,7 @@ def keep(file: Path, choices: Mapping[str, str]) -> None:
     Raises:
         SettingsError: the file is written in a way that cannot be changed, or cannot be written.
     """
-    text = ""
-    with suppress(FileNotFoundError):
-        text = file.read_text(encoding="utf-8")
+    text = file.read_text(encoding="utf-8") if file.exists() else ""
     options = vars(run_options(run_words(choices)))
     keys: dict[str, Value | None] = {}
     for name, key in _NAMES.items():
