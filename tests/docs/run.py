@@ -32,6 +32,8 @@ _HARDWARE: Final = (
     "host.toml",
     "wall",
     "opencv-bm",
+    "phone-host serve",  # until it is stopped; tests/system/test_serve.py
+    "--serve",
     "XDG_RUNTIME_DIR",  # two programs in two terminals; tests/system runs such pairs
 )
 """Stands for a device, an address or a name of the reader's own. `wall` has its own test (test_contributing.py)."""
