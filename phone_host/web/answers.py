@@ -10,7 +10,6 @@ from aiohttp import web
 
 from phone_host.measure.trouble import Trouble
 from phone_host.output.json_text import json_text
-from phone_host.report import run_json
 from phone_host.web.door import KNOWN, problem
 from phone_host.web.encoder import FILES, has_data
 from phone_host.web.gate import Gate, is_loopback
@@ -147,12 +146,8 @@ class Answers:
         return _json(whole_text(self._hub.state, self._hub.samples_since(-1)))
 
     async def _report(self, _request: web.Request) -> web.StreamResponse:
-        def built() -> str:
-            run = self._hub.source.state().run
-            return "" if run is None else json_text(run_json.build(run))
-
-        text = await self._hub.encoder.run(built)
-        return _json(text) if text else problem(404, _NOT_YET)
+        await self._hub.refresh()
+        return problem(404, _NOT_YET) if self._hub.report == "null" else _json(self._hub.report)
 
     async def _openapi(self, _request: web.Request) -> web.StreamResponse:
         return _json(json_text(description()))
@@ -179,7 +174,13 @@ class Answers:
             self._downloads -= 1
 
     async def _pairs(self, _request: web.Request) -> web.StreamResponse:
-        found = await self._hub.encoder.run(lambda: saved_pairs(self._hub.source.saved()))
+        if self._downloads >= self._limits.downloads:
+            return problem(503, _BUSY, {"Retry-After": "1"})
+        self._downloads += 1
+        try:
+            found = await _aside(lambda: saved_pairs(self._hub.source.saved()))
+        finally:
+            self._downloads -= 1
         pairs = [{"number": pair.number, "files": list(pair.files)} for pair in found]
         return _json(json_text({"pairs": pairs}))
 

@@ -140,7 +140,8 @@ def asked_of(request: web.Request) -> Asked:
         method=request.method,
         kind=kind,
         peer=request.remote or "",
-        host=said.get("Host", ""),
+        # A target with a host of its own overrides the header (RFC 9112, section 3.2.2). No browser sends one to a server.
+        host=said.get("Host", "") if request.raw_path.startswith("/") else "",
         origin=said.get("Origin", ""),
         site=said.get("Sec-Fetch-Site", ""),
         mode=said.get("Sec-Fetch-Mode", ""),

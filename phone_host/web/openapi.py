@@ -42,7 +42,7 @@ def description() -> _Json:
             "/api/right.jpg": _newest("Rectified right image", "image/jpeg"),
             "/api/disparity.png": _newest("Disparity in colours with its scale", "image/png"),
             "/api/cloud.ply": _newest("Points in metres, with colours", "application/octet-stream"),
-            "/api/pairs": _get("The saved pairs", _json("Pairs")),
+            "/api/pairs": _get("The saved pairs", _json("Pairs"), 503),
             "/api/pairs/{number}/{file}": _saved(),
             "/api/openapi.json": _get("This description", _json("Report")),
             "/api/authority.pem": _get(

@@ -19,6 +19,8 @@ from phone_host.web.static_files import INDEX, PACKAGE_PAGE, read_files, script_
 from phone_host.web.viewers import Viewers
 
 _HANDSHAKE_S: Final = 10.0
+_LINGER_S: Final = 1.0
+"""How long a refused body is read on, so that the refusal is not lost."""
 _LINE_BYTES: Final = 4096
 _FIELD_BYTES: Final = 8192
 
@@ -56,6 +58,7 @@ class Serving:
             max_field_size=_FIELD_BYTES,
             auto_decompress=False,  # a body of ours is never compressed; a bomb would be
             logger=_quiet(),
+            lingering_time=_LINGER_S,
             shutdown_timeout=1.0,
         )
         self._tasks: list[asyncio.Task[None]] = []
