@@ -100,9 +100,10 @@ docs-run: $(READY) ## run every command line of the documentation that needs no 
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/docs.txt
 	@touch $@
 
-fuzz: .venv/.ready-fuzz ## feed pairs to the native matcher, and hostile bytes to every reader, guided by coverage (BYTES=1e9, MINUTES=10, TARGETS="match wire")
+fuzz: .venv/.ready-fuzz ## feed pairs to the native matcher, requests to the page, and hostile bytes to every reader, guided by coverage (BYTES=1e9, MINUTES=10, TARGETS="match page wire")
 	@$(if $(TARGETS),$(if $(filter match,$(TARGETS)),,:)) $(BIN)/python -m tests.native.fuzz_match $(if $(MINUTES),--minutes $(MINUTES))
-	@$(if $(TARGETS),$(if $(filter-out match,$(TARGETS)),,:)) $(BIN)/python -m tests.fuzz $(if $(BYTES),--bytes $(BYTES)) $(if $(MINUTES),--minutes $(MINUTES)) $(filter-out match,$(TARGETS))
+	@$(if $(TARGETS),$(if $(filter page,$(TARGETS)),,:)) env EXAMPLES=500 $(BIN)/python -m pytest -q -o timeout=1800 tests/web/test_api_description.py
+	@$(if $(TARGETS),$(if $(filter-out match page,$(TARGETS)),,:)) $(BIN)/python -m tests.fuzz $(if $(BYTES),--bytes $(BYTES)) $(if $(MINUTES),--minutes $(MINUTES)) $(filter-out match page,$(TARGETS))
 
 .venv/.ready-fuzz: $(READY) requirements/fuzz.txt
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/fuzz.txt

@@ -26,7 +26,9 @@ class _Strict(ExamplesFirstParser):
 
     def error(self, message: str) -> NoReturn:
         """See ExamplesFirstParser."""
-        raise SettingsError(f"not valid: {self.problem(message)}", "give it as on the command line: phone-host run --help")
+        raise SettingsError(
+            f"not valid: {self.problem(message)}", "give it as on the command line: phone-host run --help"
+        )
 
 
 def _parser(arguments: type | object) -> _Strict:
