@@ -70,6 +70,7 @@ two photographs whose rows already match, without a calibration:
   phone-host stereo left.png right.png --rectified --disparities 64 --out scan
 
 two cameras, live; the other one hangs on a board or a second computer that runs board-agent:
+  phone-host serve --open    # leads through all of it in the browser
   phone-host doctor
   phone-host pair
   phone-host run --camera v4l2:auto --calibration rig.yaml --out scan

@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Final, NoReturn
 
 from common.errors import SettingsError
@@ -39,6 +40,12 @@ def _parser(arguments: type | object) -> _Strict:
     return made
 
 
+@cache
+def _declared() -> dict[str, argparse.Action]:
+    """Return the options of `run`: the state asks for them several times a second."""
+    return _parser(run_arguments).declared
+
+
 def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict[str, str]:
     """Return choices with some changed; an empty value takes one back.
 
@@ -49,7 +56,7 @@ def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict
     Raises:
         SettingsError: there is no such option, or it is a switch and the value neither yes nor no.
     """
-    declared = _parser(run_arguments).declared
+    declared = _declared()
     made = dict(choices)
     for name, value in changes.items():
         if name not in declared or name in _NOT_CHOSEN:
@@ -67,7 +74,7 @@ def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict
 
 def run_words(choices: Mapping[str, str]) -> list[str]:
     """Return choices as the words of a command line, after `run`."""
-    declared, words = _parser(run_arguments).declared, []
+    declared, words = _declared(), []
     for name, value in choices.items():
         action = declared[name]
         if _is_switch(action):
@@ -85,7 +92,7 @@ def choices_of(options: argparse.Namespace) -> dict[str, str]:
         options: of `run`.
     """
     found = {}
-    for name, action in _parser(run_arguments).declared.items():
+    for name, action in _declared().items():
         value = getattr(options, action.dest, None)
         if name not in _NOT_CHOSEN and value != action.default and value is not None:
             found[name] = "yes" if _is_switch(action) else " ".join(value) if isinstance(value, list) else str(value)

@@ -11,13 +11,12 @@ from common.errors import TakenError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
-from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.serve.station import Station
 from phone_host.verbs.serve.kept_choices import usual_file
-from phone_host.verbs.serve.page import lan_settings, open_browser, own_settings, served, tell_page
+from phone_host.verbs.serve.page import first_url, lan_settings, open_browser, own_settings, served, tell_page
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import stderr_status
 from phone_host.web.settings import PageSettings
@@ -27,20 +26,21 @@ _STEP_S: Final = 0.25
 
 def run(options: argparse.Namespace) -> int:
     """Serve the page until stopped."""
-    logs.set_up(log_level("warning"))
     status = stderr_status()
     commands = Commands(
         options.config or usual_file(), options.keys, lambda line: say(f"phone-host: {line}", sys.stderr)
     )
+    logs.set_up(commands.log_level)
     make = lan_settings if options.lan else own_settings
     settings = make(options.address, commands.keys.path)
     station = Station(commands)
     signals = StopSignals()
     with _opened_if_taken(settings, is_asked=options.open), served(station, settings) as server:
-        print(json_text({"url": server.url}) if options.json else f"phone-host: the page: {server.url}", flush=True)
+        url = first_url(server, settings)
+        print(json_text({"url": url}) if options.json else f"phone-host: the page: {url}", flush=True)
         tell_page(server, settings)
         if options.open:
-            open_browser(server.url)
+            open_browser(url)
         while not signals.stop:
             status.show(station.state())
             select.select([signals.reader], [], [], _STEP_S)

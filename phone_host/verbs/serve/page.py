@@ -88,6 +88,11 @@ def served(source: Source, settings: PageSettings) -> Iterator[PageServer]:
         server.stop()
 
 
+def first_url(server: PageServer, settings: PageSettings) -> str:
+    """Return the page's first address on this machine."""
+    return server.url_at(DEFAULT_HOST) if settings.host == _EVERYWHERE else server.url
+
+
 def tell_page(server: PageServer, settings: PageSettings) -> None:
     """Say on stderr how other machines open the page, if they may."""
     if settings.credentials is None:

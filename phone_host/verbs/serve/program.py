@@ -10,6 +10,7 @@ from common.errors import DataError
 from common.keys import KeyFolder
 from common.program.extensions import registered_names
 from common.program.invocation import command_line
+from common.program.settings import log_level
 from phone_host.calibration.verdict import Verdict
 from phone_host.camera.http_uri import without_password
 from phone_host.doctor.host_doctor import Question
@@ -57,6 +58,11 @@ class Commands:
         self._fixed = [*others, *(("--keys", keys) if keys else ())]
         self.keys: KeyFolder = chosen_keys(file if file.exists() else None, keys)
         self.matchers: tuple[str, ...] = (*(name.value for name in usable_matchers()), *registered_names(MATCHERS))
+
+    @property
+    def log_level(self) -> int:
+        """The least important messages that are logged, as the settings file says."""
+        return log_level(checked(self._options({})).values.log_level)
 
     def kept(self) -> Choices:
         """See Program."""
