@@ -10,12 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
+from common.keys import KeyFolder
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import read_rig, write_rig
 from phone_host.scene.demo_scene import plane_scene
 from phone_host.scene.scene import render, rig_poses
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.boards import render_pair
+from tests.support.enrolment_rig import on_every_network
 from tests.support.page_client import page
 from tests.support.programs import board, host, ledgers, program, until
 from tests.support.rigs import small_rig
@@ -176,18 +178,31 @@ def test_a_live_calibration_by_the_api_becomes_the_rig_of_the_next_run(tmp_path:
     assert json.loads((rig.parent / "report.json").read_text())["command"] == "calibrate"
 
 
-def test_an_address_that_cannot_be_served_is_refused(tmp_path: Path) -> None:
-    """A taken port is exit 3, an address that others reach is exit 2 without --lan; each in one line with the remedy."""
+def test_a_board_is_enrolled_by_its_code(tmp_path: Path) -> None:
+    """A wrong code is told with its remedy; with the one that `board-agent pair` shows, both know each other, and the board is chosen."""
+    keys = tmp_path / "page-keys"
+    with (
+        on_every_network(tmp_path) as rig,
+        page(["serve", "127.0.0.1:0", "--keys", str(keys)], tmp_path) as (_, client),
+    ):
+        assert "digits" in client.do("enrol", link=rig.link, code="12")["remedy"]
+        with program("board_agent.cli", ["pair", "--keys", rig.board_keys], tmp_path, "owner") as owner:
+            until(lambda: "type this code" in owner.out.read_text(), "the code is shown")
+            told = client.do("enrol", link=rig.link, code=owner.out.read_text().split()[-1])
+        assert told == {"words": "the board is enrolled"}
+        assert client.state()["settings"]["link"] == rig.link
+    assert [peer.address for peer in KeyFolder(keys).peers()] == [rig.link]
+
+
+def test_a_port_that_is_taken_is_told_with_the_remedy(tmp_path: Path) -> None:
+    """Exit 3, one line."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
         with host(["serve", f"127.0.0.1:{port}"], tmp_path, "taken") as first:
             assert first.wait() == 3
-    assert f"{port}" in first.stderr.splitlines()[-1]
-    with host(["serve", "0.0.0.0:0"], tmp_path, "open") as second:
-        assert second.wait() == 2
-    assert "--lan" in second.stderr
+    assert f"port {port} of 127.0.0.1 is taken: " in first.stderr.splitlines()[-1]
 
 
 def _board_films(folder: Path) -> None:
