@@ -104,6 +104,13 @@ class BundleResult:
         """Return the root mean square distance of all corners of both cameras, px (counted like OpenCV's stereoCalibrate)."""
         return rms_px(self.left_errors_px, self.right_errors_px)
 
+    def sigmas_px(self) -> tuple[float, float]:
+        """Return the standard deviation of a coordinate that is left in the left and in the right images, px; never below what detectors reach."""
+        left, right = (
+            max(rms_px(errors) / 2**0.5, _LEAST_SIGMA_PX) for errors in (self.left_errors_px, self.right_errors_px)
+        )
+        return left, right
+
     def view_rms_px(self) -> tuple[Vector, Vector]:
         """Return the root mean square distance of each view, (V,) px, left and right."""
         left, right = (

@@ -152,6 +152,7 @@ def _view(
         outline_m=SE3.of(found.poses[place]).apply(_outline_m(board)),
         vertical_px=vertical,
         as_seen_px=as_seen,
+        in_space=found.used[place].in_space,
     )
 
 

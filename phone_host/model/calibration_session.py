@@ -42,6 +42,32 @@ class SeenBoard:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BoardInSpace:
+    """A board as a rig sees it in one view; NaN where fewer than twelve corners are seen by both cameras.
+
+    Attributes:
+        miss: by how much the two rays of a corner miss each other, in standard deviations; root mean square: 1 is noise.
+        size: its size, as a share of the true one.
+        size_sigma: standard deviation of that by the corners' noise.
+        bows_m: (2,) how far its middle stands out from its ends along the rows and along the columns, m; positive: away from
+            the cameras.
+        bow_sigmas_m: (2,) standard deviations of these, m.
+    """
+
+    miss: float
+    size: float
+    size_sigma: float
+    bows_m: Floats
+    bow_sigmas_m: Floats
+
+    @property
+    def bow_m(self) -> tuple[float, float]:
+        """The larger of both bows and its standard deviation, m; NaN: not known."""
+        axis = int(abs(self.bows_m[1]) > abs(self.bows_m[0]))
+        return float(self.bows_m[axis]), float(self.bow_sigmas_m[axis])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SessionView:
     """One pair of images.
 
@@ -54,6 +80,7 @@ class SessionView:
         outline_m: (4, 3) the board's outer corners in turn, in the left camera's axes, m; (0, 3): the view is not used.
         vertical_px: (M,) left minus right across the rows after rectification, px; empty: not known.
         as_seen_px: (M,) the same before a drift of the cameras was taken out of the corners.
+        in_space: the board as the rig sees it; None: the view is not used.
     """
 
     name: str
@@ -64,6 +91,7 @@ class SessionView:
     outline_m: Floats = field(default_factory=lambda: _none(0, 3))
     vertical_px: Floats = field(default_factory=lambda: _none(0))
     as_seen_px: Floats = field(default_factory=lambda: _none(0))
+    in_space: BoardInSpace | None = None
 
     @property
     def is_used(self) -> bool:

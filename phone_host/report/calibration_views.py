@@ -33,6 +33,11 @@ _LEAST_IN_TILE: Final = 3
 _EMPTY: Final = 0.6
 """A third of the image of whose tiles more than this share is empty counts as empty."""
 
+_FIGURES: Final = (
+    "Errors are RMS. Then the board as the rig sees it in space: by how many standard deviations the rays of left and right miss each other"
+    " (1 is noise), how large it is, and how far its middle stands out. A view whose rays miss was not taken at one moment; one whose board"
+    " is larger or smaller than the others contradicts them in depth; a board that is bent in all views alike is not flat."
+)
 _95_PERCENT: Final = 1.96
 _LINES: Final = 7
 _TURNS: Final = (("about x (up and down: rows)", 4), ("about y (left and right: depth)", 5), ("about z (roll)", 2))
@@ -155,9 +160,15 @@ def views_card(session: CalibrationSession) -> str:
         more = "".join(_view(view, session, scale) for view in shown[_MOST_SHOWN:])
         rest = counted(len(shown) - _MOST_SHOWN, "more view", "more views")
         content += f'<details><summary>{rest}</summary><div class="views2">{more}</div></details>'
-    rows = [(view.name, f"{_one_rms(view.left):.3f}", f"{_one_rms(view.right):.3f}", _vertical(view)) for view in used]
-    numbers = table(("pair", "left, px", "right, px", "vertical, px"), rows)
-    content += f"<details><summary>Figures of all views, RMS</summary>{numbers}</details>"
+    rows = [
+        (view.name, f"{_one_rms(view.left):.3f}", f"{_one_rms(view.right):.3f}", _vertical(view), *_in_space(view))
+        for view in used
+    ]
+    numbers = table(
+        ("pair", "left, px", "right, px", "vertical, px", "rays miss, \u03c3", "board\u2019s size, %", "its bow, mm"),
+        rows,
+    )
+    content += f'<details><summary>Figures of all views</summary><p class="sub">{_FIGURES}</p>{numbers}</details>'
     return section("What is left in each view", words, content)
 
 
@@ -300,3 +311,15 @@ def _rms_px(view: SessionView) -> float:
 
 def _vertical(view: SessionView) -> str:
     return f"{np.sqrt((view.vertical_px**2).mean()):.3f}" if len(view.vertical_px) else "\u2013"
+
+
+def _in_space(view: SessionView) -> tuple[str, str, str]:
+    board = view.in_space
+    if board is None or not math.isfinite(board.size):
+        return "\u2013", "\u2013", "\u2013"
+    bow_m, sigma_m = board.bow_m
+    return (
+        f"{board.miss:.2f}",
+        f"{board.size * 100:.2f} \u00b1 {board.size_sigma * 100:.2f}",
+        f"{bow_m * 1e3:+.2f} \u00b1 {sigma_m * 1e3:.2f}",
+    )

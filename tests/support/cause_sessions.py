@@ -165,9 +165,12 @@ def _moved(points: Vector, motion: Vector) -> Vector:
 
 
 def _session(
-    random: np.random.Generator, motions: Callable[[int], list[_Motion]] | None = None, stretch: float = 1.0
+    random: np.random.Generator,
+    motions: Callable[[int], list[_Motion]] | None = None,
+    stretch: float = 1.0,
+    bend: tuple[float, float] = (0.0, 0.0),
 ) -> Made:
-    """A session with a motion in each view."""
+    """A session with a motion in each view; the board is bent along its rows and along its columns by a share of their length."""
     rig, board = random_rig(random), _BOARDS[random.integers(len(_BOARDS))]
     count = int(random.integers(10, 22))
     noise_px = random.uniform(0.05, 0.18) * max(1.0, rig.left.width_px / 1280)
@@ -176,6 +179,9 @@ def _session(
     middle = flat.mean(axis=0)
     away = np.linalg.norm(flat - middle, axis=1)
     flat[:, 2] += bow_m * (away / away.max()) ** 2
+    flat[:, 2] += (2 * (flat - middle) / np.ptp(flat, axis=0).clip(1e-9))[:, :2] ** 2 @ (
+        bend * np.ptp(flat[:, :2], axis=0)
+    )
     own = motions(count) if motions is not None else [_STILL] * count
     pairs = []
     for index, (pose, motion) in enumerate(zip(random_poses(rig, board, count, random), own, strict=True)):
@@ -338,6 +344,15 @@ def unstiff(random: np.random.Generator) -> Made:
     return replace(_session(random, motions), truth=f"{('drift', 'knock', 'loose')[kind]} {degrees:.2f} degrees")
 
 
+def bent(random: np.random.Generator) -> Made:
+    """The board is bent by 1 to 3 % of its length, as paper that is not glued down: along its rows, its columns, or both."""
+    share = random.uniform(0.01, 0.03) * random.choice([-1, 1])
+    kind = int(random.integers(3))
+    bend = ((share, 0.0), (0.0, share), (share, share))[kind]
+    truth = f"{share:+.1%} along its {('rows', 'columns', 'rows and columns')[kind]}"
+    return replace(_session(random, bend=bend), truth=truth)
+
+
 def _pictured(random: np.random.Generator, spoil: Callable[[Image], Image], spoiled: float) -> Made:
     """A session of images, of which a share is spoiled."""
     rig, board = _small(random_rig(random)), _BOARDS[random.integers(len(_BOARDS))]
@@ -393,4 +408,5 @@ MAKERS: Final[dict[Mistake, Callable[[np.random.Generator], Made]]] = {
     Mistake.ROWS: rows,
     Mistake.FOCUS: focus,
     Mistake.UNSTIFF: unstiff,
+    Mistake.BENT: bent,
 }

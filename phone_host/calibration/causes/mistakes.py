@@ -25,6 +25,7 @@ class Mistake(Enum):
         ROWS: the board moved while rows were exposed one after the other.
         FOCUS: focus or zoom changed between views.
         UNSTIFF: the cameras turned against each other between views.
+        BENT: the board is not flat.
     """
 
     SWAPPED = "swapped sides"
@@ -39,6 +40,7 @@ class Mistake(Enum):
     ROWS = "rolling shutter"
     FOCUS = "focus changed"
     UNSTIFF = "rig not stiff"
+    BENT = "board not flat"
 
 
 class Course(Enum):

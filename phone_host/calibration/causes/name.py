@@ -1,7 +1,7 @@
 """Names the mistake of a session of board views, or none. Pure.
 
 From the plainest to the finest: what the images look like; which pictures belong together; how the cameras stand to each
-other; how the pairs deviate from one stiff rig; and whether the squares can be as large as was said.
+other; how the pairs deviate from one stiff rig; whether the squares can be as large as was said; and whether the board is flat.
 """
 
 import math
@@ -17,6 +17,7 @@ from common.words import counted
 from phone_host.calibration.arrangement import Misplaced, misplaced
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.calibrate import Sizes
+from phone_host.calibration.causes.bent import bent
 from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.lone import both_alone
 from phone_host.calibration.causes.looks import SeenLook
@@ -95,6 +96,7 @@ def name_mistake(session: BoardSession, found: Calibration | DataError) -> Findi
         or _stretched(session)
         or _deviating(session, found)
         or _other_square(session, found)
+        or (None if isinstance(found, DataError) else bent(found, session.board))
     )
 
 
