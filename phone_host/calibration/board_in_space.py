@@ -79,7 +79,9 @@ def boards_in_space(
     shape = (len(pairs), len(points_m))
     points, covariances = found.points_m.reshape(*shape, 3), found.covariance_m2.reshape(*shape, 3, 3)
     chi2 = found.chi2.reshape(shape)
-    return tuple(_board(*each, points_m, pose) for *each, pose in zip(points, covariances, chi2, poses, strict=True))
+    return tuple(
+        _board(points[view], covariances[view], chi2[view], points_m, poses[view]) for view in range(len(pairs))
+    )
 
 
 def _board(points: Vector, covariances: Vector, chi2: Vector, points_m: Vector, pose: Vector) -> BoardInSpace:
