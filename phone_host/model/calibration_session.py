@@ -1,12 +1,11 @@
 """What a calibration's page shows: copied values of a session of board views and of the rig that came of it. No behaviour."""
 
 from dataclasses import dataclass, field
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model.rig import Rectification, Rig
+from phone_host.model.rig import Rectification, Rig, Verdict
 
 Size = tuple[int, int]
 """Width and height, px."""
@@ -16,14 +15,6 @@ Floats = NDArray[np.float64]
 
 def _none(*shape: int) -> Floats:
     return np.empty(shape)
-
-
-class Verdict(Enum):
-    """What the calibration is good for."""
-
-    GOOD = "good"
-    USABLE = "usable"
-    REJECT = "reject"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

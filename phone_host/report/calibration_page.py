@@ -7,7 +7,8 @@ import numpy as np
 
 from common.imagesize.head import size_text
 from common.words import counted
-from phone_host.model.calibration_session import CalibrationSession, SessionRig, Verdict
+from phone_host.model import Verdict
+from phone_host.model.calibration_session import CalibrationSession, SessionRig
 from phone_host.report.calibration_figures import camera_tables, figures_card
 from phone_host.report.calibration_space import rig_card
 from phone_host.report.calibration_views import (

@@ -12,7 +12,8 @@ from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.session_snapshot import Taken, session_rig, session_views
 from phone_host.calibration.small_picture import small_jpeg
 from phone_host.calibration.view_turns import view_turns
-from phone_host.model.calibration_session import CalibrationSession, RectifiedView, Verdict
+from phone_host.model import Verdict
+from phone_host.model.calibration_session import CalibrationSession, RectifiedView
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 

@@ -73,7 +73,7 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
             (folder / "right" / f"{index}.png").write_bytes(encoded(".png", _shaken(pair[1])))
         code, report = _calibrate(folder)
         assert (code, report["verdict"], report.get("earlier_rig")) == (4, "reject", earlier)
-        assert read_rig(folder / "rig.yaml").verdict == "reject"
+        assert read_rig(folder / "rig.yaml").is_rejected
         assert read_rig(folder / "rig.yaml.old").verdict == good.verdict
         assert "refuse this calibration unless --use-rejected-rig is given" in capsys.readouterr().out
 

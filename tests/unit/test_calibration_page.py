@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from phone_host.calibration.session_snapshot import session_views
-from phone_host.model.calibration_session import CalibrationSession, Verdict
+from phone_host.model import Verdict
+from phone_host.model.calibration_session import CalibrationSession
 from phone_host.report.calibration_page import calibration_page, verdict_words
 from tests.support.calibration_sessions import REJECTED, calibration, rectified, session, taken, turned
 from tests.support.html import Page

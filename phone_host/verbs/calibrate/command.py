@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         seen = [pair for pair in every_pair(session, pairs) if pair.name in used]
         judgement = with_corners(judgement, unseen_in(seen, session.board, found.rig.left, found.rig.right))
     rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
-    rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict.value)
+    rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict)
     report = report_of(files, views, rejected, found, judgement) | known.as_report() | cause_report(finding, hint)
     report |= replace_rig(options.out, rig, found.rectification, saved_views(session, found, pairs))
     report |= {} if live is None else live.as_report()

@@ -16,9 +16,8 @@ from phone_host.calibration.board_views import BoardViews, turn_text
 from phone_host.calibration.fit_quality import LensTrial
 from phone_host.calibration.verdict import SHARE_GOOD, Assessment
 from phone_host.declared_settings import NEAR_M
-from phone_host.model import Rectification, Rig
+from phone_host.model import Rectification, Rig, Verdict
 from phone_host.model.calibration_session import BoardInSpace
-from phone_host.output.rig_yaml import REJECTED
 from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_error_px
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.view_files import ViewFiles
@@ -52,7 +51,7 @@ def report_of_failure(files: ViewFiles, views: BoardViews, error: DataError) -> 
         "command": "calibrate",
         "pairs": _pairs(files, views.rejected, 0),
         **_turned(views),
-        "verdict": REJECTED,
+        "verdict": Verdict.REJECT.value,
         "problem": error.problem,
         "remedy": error.remedy,
     }
@@ -279,6 +278,6 @@ def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> lis
     if calibration.rectification is None:
         return unwritten(report, out)
     rows = [f"written to {out} and {out.with_name('report.json')}{earlier_words(report)}", f"look at {report['page']}"]
-    if report["verdict"] == REJECTED:
+    if report["verdict"] == Verdict.REJECT.value:
         rows.append(REFUSED)
     return rows

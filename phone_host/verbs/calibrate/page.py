@@ -9,8 +9,8 @@ from phone_host.calibration.board_views import Mounted
 from phone_host.calibration.rectified_view import fullest, rectified_view
 from phone_host.calibration.session_snapshot import Taken, session_rig, session_views
 from phone_host.calibration.view_turns import view_turns
-from phone_host.model import Rig
-from phone_host.model.calibration_session import CalibrationSession, Verdict
+from phone_host.model import Rig, Verdict
+from phone_host.model.calibration_session import CalibrationSession
 from phone_host.output.atomic import write_text
 from phone_host.report.calibration_page import calibration_page
 from phone_host.stereo.view_files import ViewFiles
