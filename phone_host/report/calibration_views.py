@@ -17,7 +17,7 @@ from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_coverage import coverage_map, tile_views
 from phone_host.svg.plot_depth import Mark, over_distance
 from phone_host.svg.plot_parts import legend, svg
-from phone_host.svg.plot_tilts import Tilt, tilt_disc
+from phone_host.svg.plot_tilts import TiltedBoard, tilt_disc
 
 Floats = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def _distances(views: list[SessionView]) -> str:
         away_m = float(np.linalg.norm(view.outline_m.mean(axis=0)))
         title = f"{view.name}: {away_m:.2f} m away, tilted by {angle:.0f}°"
         marks.append(Mark(away_m, angle, title))
-        tilts.append(Tilt(angle, float(normal[0]), float(normal[1]), title))
+        tilts.append(TiltedBoard(angle, float(normal[0]), float(normal[1]), title))
     far = two_widths(partial(over_distance, marks, [], "tilt, °", "tilt of the boards over their distance"), HALF_PX)
     way = two_widths(partial(tilt_disc, tilts, "which way the boards were tilted"), HALF_PX)
     words = "Each dot is a board, seen from the left camera. The middle faces the camera; 20° to 45° in all directions teach most."

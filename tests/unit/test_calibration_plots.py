@@ -16,7 +16,7 @@ from phone_host.svg.plot_arrows import enlarged
 from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_coverage import coverage_map, tile_views
 from phone_host.svg.plot_rig import Shape, in_space, seen_from
-from phone_host.svg.plot_tilts import Tilt, tilt_disc
+from phone_host.svg.plot_tilts import TiltedBoard, tilt_disc
 from tests.support.boards import BOARD
 from tests.support.calibration_sessions import calibration, pairs, taken, turned
 from tests.support.html import Page
@@ -67,7 +67,7 @@ def test_courses_show_their_limits_and_as_many_names_as_fit() -> None:
 
 def test_a_disc_of_tilts_holds_the_steepest() -> None:
     """A board that faces the camera lies in the middle, one tilted to the right beside it."""
-    drawn = Page(tilt_disc([Tilt(0.0, 0.0, 0.0, "flat"), Tilt(70.0, 1.0, 0.0, "steep")], "tilts", 300))
+    drawn = Page(tilt_disc([TiltedBoard(0.0, 0.0, 0.0, "flat"), TiltedBoard(70.0, 1.0, 0.0, "steep")], "tilts", 300))
     dots = [each for each in drawn.every("circle") if "fill-opacity" in each]
     assert [float(each["cx"] or 0) for each in dots] == pytest.approx([150, 150 + 130 - 18])
     assert "steep" in drawn.words

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.gates import Gate, Glance, is_alike
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.picture import guide_svg
@@ -34,7 +34,7 @@ from tests.unit.test_guide_gates import BOARD, NONE, SIZES, corners, tilted
 
 SECOND_NS = 1_000_000_000
 LOOK_NS = SECOND_NS // 10
-SHARP = Look(2.0, 0.0, 0.0)
+SHARP = BoardLook(2.0, 0.0, 0.0)
 
 
 def grown(views: tuple[View, ...], verdict: Verdict, *taught: Taught, hopeless: bool = False) -> Progress:
@@ -52,7 +52,7 @@ class Show:
         self.now_ns = 0
 
     def show(
-        self, left: NDArray[np.float64], seconds: float = 0.5, look: Look = SHARP, *, right_sees: bool = True
+        self, left: NDArray[np.float64], seconds: float = 0.5, look: BoardLook = SHARP, *, right_sees: bool = True
     ) -> Gate:
         """Hold a board before both cameras for a while; return what became of the last look."""
         gate = Gate.NOT_FOUND
@@ -208,9 +208,9 @@ def test_it_says_what_keeps_a_view_from_being_taken() -> None:
     for step in range(8):
         show.show(corners(0.4 + step / 50), 0.1)
     assert show.words == Words.STILL.value
-    assert show.show(corners(), 1.0, Look(9.0, 0.0, 0.0)) is Gate.BLURRED
+    assert show.show(corners(), 1.0, BoardLook(9.0, 0.0, 0.0)) is Gate.BLURRED
     assert show.words == Words.BLURRED.value
-    assert show.show(corners(), 1.0, Look(2.0, 0.5, 0.0)) is Gate.GLARE
+    assert show.show(corners(), 1.0, BoardLook(2.0, 0.5, 0.0)) is Gate.GLARE
     assert show.words == Words.GLARE.value
     for step in range(8):
         show.show(corners(0.54 + step / 50), 0.1)

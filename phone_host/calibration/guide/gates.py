@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.target import Corners
 from phone_host.calibration.verdict import REFERENCE_PX
 
@@ -141,7 +141,7 @@ def is_paired_well(glance: Glance, speed: float) -> bool:
     )
 
 
-def sharp(looks: tuple[Look, Look], sizes_px: tuple[Size, Size], sharpest_px: tuple[float, float]) -> Gate:
+def sharp(looks: tuple[BoardLook, BoardLook], sizes_px: tuple[Size, Size], sharpest_px: tuple[float, float]) -> Gate:
     """Return whether a view is sharp and evenly lit: READY, or why not.
 
     Args:

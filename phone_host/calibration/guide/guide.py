@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.coverage import Coverage
 from phone_host.calibration.guide.gates import (
     NOT_SEEN,
@@ -102,7 +102,7 @@ class View:
 
     name: str
     glance: Glance
-    looks: tuple[Look, Look]
+    looks: tuple[BoardLook, BoardLook]
 
     @property
     def pair(self) -> BoardPair:
@@ -165,7 +165,7 @@ class Guide:
         self._give_up(now_ns)
         return self._note(gate)
 
-    def examine(self, glance: Glance, looks: tuple[Look, Look], now_ns: int) -> Gate:
+    def examine(self, glance: Glance, looks: tuple[BoardLook, BoardLook], now_ns: int) -> Gate:
         """Judge a view that was READY by its exact corners, and take it unless it is blurred.
 
         Args:
