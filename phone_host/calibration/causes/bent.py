@@ -13,7 +13,7 @@ from phone_host.calibration.causes.mistakes import Finding, Mistake
 from phone_host.calibration.target import Board
 
 _BENT: Final = 0.005
-"""Share of the board's side: 1 mm of 200 mm, of which a lens that bends for the board hides a quarter. Boards of four real rigs stay below 0.003."""
+"""Share of the board's side: 1 mm of 200 mm, of which a lens that gives way may hide a third. Boards of four real rigs stay below 0.003."""
 
 _SIGMAS: Final = 5.0
 _LEAST_VIEWS: Final = 6
