@@ -20,7 +20,7 @@ from phone_host.geometry.lens import rays_through
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of
 from phone_host.geometry.triangulate import Intersections, triangulate
 from phone_host.model import CameraModel, Rig
-from phone_host.model.calibration_session import BoardInSpace
+from phone_host.model.calibration_series import BoardInSpace
 
 _STEPS: Final = 4
 """Gauss-Newton from the rig's own pose of the board: the second step is already below the noise."""

@@ -12,7 +12,7 @@ from phone_host.calibration.fit_quality import LensTrial, Squares
 from phone_host.calibration.next_view import NextView
 from phone_host.calibration.target import Corners
 from phone_host.model import Rectification, Rig
-from phone_host.model.calibration_session import BoardInSpace
+from phone_host.model.calibration_series import BoardInSpace
 
 
 class Reason(Enum):

@@ -21,7 +21,7 @@ from phone_host.verbs.calibrate.cause import cause_report, with_cause
 from phone_host.verbs.calibrate.command import run
 from phone_host.verbs.calibrate.figures import report_of, summary
 from tests.support.boards import poses, render_pair
-from tests.support.calibration_sessions import calibration, taken
+from tests.support.calibration_series import calibration, taken
 from tests.support.oriented import oriented
 from tests.support.pictures import encoded
 from tests.support.rigs import small_rig

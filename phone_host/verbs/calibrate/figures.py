@@ -17,7 +17,7 @@ from phone_host.calibration.fit_quality import LensTrial
 from phone_host.calibration.verdict import SHARE_GOOD, Assessment
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import Rectification, Rig, Verdict
-from phone_host.model.calibration_session import BoardInSpace
+from phone_host.model.calibration_series import BoardInSpace
 from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_error_px
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.view_files import ViewFiles

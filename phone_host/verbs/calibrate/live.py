@@ -25,7 +25,7 @@ from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.board_views import BoardViews, Size
 from phone_host.calibration.causes.looks import SeenLook
 from phone_host.calibration.causes.mistakes import Mistake
-from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.earlier_views import board_of, pairs_of
 from phone_host.calibration.guide.guide import View
 from phone_host.calibration.guide.progress import Progress, lessons
@@ -44,7 +44,7 @@ from phone_host.run.host_settings import HostSettings
 from phone_host.settings import key_folder, most_pixels
 from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.cause import assessed
-from phone_host.verbs.calibrate.earlier import Asked, Session, calibrated
+from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated
 from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.hints import arrangement_hint
 from phone_host.verbs.orientation_arguments import orientations
@@ -125,14 +125,14 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
     baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
 
     def grow(views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size]) -> Progress:
-        session = Session(
+        series = Series(
             board=board,
             side=settings.host.board_side,
             path=options.earlier or Path(),
             rig=asked.rig,
             views=None if options.pose_only else asked.views,
         )
-        return grown(views, session, sizes_px, baseline_m)
+        return grown(views, series, sizes_px, baseline_m)
 
     try:
         live = LiveCalibration(settings, camera, open_links(uris, keys), grow)
@@ -150,12 +150,12 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
     return Live(last, settings.left, settings.right, signals)
 
 
-def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:
+def grown(views: tuple[View, ...], series: Series, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:
     """Calibrate from the views so far and judge, as the command does at the end.
 
     Args:
         views: the views.
-        session: the board, and what an earlier calibration gives.
+        series: the board, and what an earlier calibration gives.
         sizes_px: of the left and of the right images.
         baseline_m: as the user measured it, m; NaN: not told.
     """
@@ -165,11 +165,11 @@ def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size]
     )
     found: Calibration | DataError
     try:
-        found = calibrated(session, pairs, sizes_px)
+        found = calibrated(series, pairs, sizes_px)
     except DataError as error:
         found = error
-    board = session.board
-    shown = BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
+    board = series.board
+    shown = BoardSeries(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
     finding = name_mistake(shown, found)
     wrong = None if finding is None else finding.misplaced
     seen = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=sizes_px, looks=looks)

@@ -1,4 +1,4 @@
-"""What a calibration's page shows: copied values of a session of board views and of the rig that came of it. No behaviour."""
+"""What a calibration's page shows: copied values of a series of board views and of the rig that came of it. No behaviour."""
 
 from dataclasses import dataclass, field
 
@@ -59,7 +59,7 @@ class BoardInSpace:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SessionView:
+class SeriesView:
     """One pair of images.
 
     Attributes:
@@ -155,7 +155,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SessionRig:
+class SeriesRig:
     """The rig that came of it, and its figures.
 
     Attributes:
@@ -186,8 +186,8 @@ class SessionRig:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class CalibrationSession:
-    """A session.
+class CalibrationSeries:
+    """A series.
 
     Attributes:
         verdict: what the rig is good for.
@@ -209,11 +209,11 @@ class CalibrationSession:
     remedy: str
     board: str
     sizes_px: tuple[Size, Size]
-    views: tuple[SessionView, ...]
+    views: tuple[SeriesView, ...]
     problem: str = ""
     cause: str = ""
     cause_words: str = ""
-    found: SessionRig | None = None
+    found: SeriesRig | None = None
     turns: ViewTurns | None = None
     rectified: RectifiedView | None = None
     is_straightened: bool = False
