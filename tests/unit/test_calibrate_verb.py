@@ -64,7 +64,7 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
     folder = _folders(tmp_path, lambda image: encoded(".png", image))
     code, report = _calibrate(folder)
     good = read_rig(folder / "rig.yaml")
-    assert (code, good.verdict) == (0, report["verdict"])
+    assert (code, good.verdict) == (0, Verdict(report["verdict"]))
     assert good.zero_sigma_px > 0
     assert report["zero_sigma_px"] == pytest.approx(good.zero_sigma_px, abs=1e-4)
     assert report["depth_limit_m"] > 0
