@@ -177,18 +177,19 @@ def _tags(grey: Image, most: int) -> dict[int, Corners]:
     """Return the four corners of each tag, clockwise from its upper left one. Kalibr prints tags with a border of two bits, others of one."""
     dictionary = cv2.aruco.getPredefinedDictionary(MarkFamily.APRILTAG_36H11.value)
     parted, factor = _parted(grey)
-    for border in (2, 1):
+    read = dict[int, Corners]()
+    for border in (2, 1):  # read with the wrong one, a tag may pass for another
         parameters = cv2.aruco.DetectorParameters()
         parameters.markerBorderBits = border
         corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(parted)
-        if len(corners):
+        if len(corners) > len(read):
             numbers = [int(number) for number in np.asarray(ids).ravel()]
-            return {
+            read = {
                 number: (np.asarray(four, np.float64).reshape(4, 2) + 0.5) / factor - 0.5
                 for number, four in zip(numbers, corners, strict=True)
                 if number < most
             }
-    return {}
+    return read
 
 
 def _parted(grey: Image) -> tuple[Image, float]:
