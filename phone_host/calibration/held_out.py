@@ -18,8 +18,8 @@ from phone_host.model import Rig
 
 _PARTS: Final = 5
 _LEAST_PAIRS: Final = 6
-_NEIGHBOUR: Final = 1.01
-"""Corners whose distance is the least one, up to a hundredth, span one square."""
+_NEIGHBOUR: Final = 0.01
+"""Corners whose distance is a side, up to this share, span one."""
 
 
 def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleState, free: FreeParameters) -> Squares:
@@ -31,7 +31,7 @@ def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleStat
         state: the rig fitted to all of them.
         free: what was estimated.
     """
-    true_m = float(np.min(np.linalg.norm(np.diff(points_m, axis=0), axis=1)))
+    true_m = _side_m(points_m)
     sides: list[Vector] = []
     parts = min(_PARTS, len(pairs)) if len(pairs) >= _LEAST_PAIRS else 0
     for part in range(parts):
@@ -60,8 +60,12 @@ def square_sides_m(pairs: list[BoardPair], points_m: Vector, rig: Rig) -> Vector
     return np.asarray(sides[np.isfinite(sides)], np.float64)
 
 
+def _side_m(points_m: Vector) -> float:
+    """Return the side of a square, or of an AprilGrid's tag: its gaps are so narrow that noise makes them longer."""
+    return float(np.linalg.norm(points_m[1] - points_m[0]))
+
+
 def _neighbours(points_m: Vector) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    apart = np.linalg.norm(points_m[:, np.newaxis] - points_m[np.newaxis], axis=2)
-    least = apart[apart > 0].min()
-    first, second = np.nonzero(np.triu(apart <= least * _NEIGHBOUR, 1))
+    apart, side_m = np.linalg.norm(points_m[:, np.newaxis] - points_m[np.newaxis], axis=2), _side_m(points_m)
+    first, second = np.nonzero(np.triu(np.abs(apart - side_m) <= side_m * _NEIGHBOUR, 1))
     return first, second
