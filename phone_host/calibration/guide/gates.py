@@ -38,6 +38,9 @@ _WASHED: Final = 0.05
 _LEAST_SEEN, _LEAST_CORNERS = 0.3, 12
 """Share and number of a board's corners, for boards of which a part is enough."""
 
+_SAME_PX: Final = 0.5
+"""Two cameras at different places never see all corners of a board so close to the same pixels."""
+
 _ALIKE, _SAME_SHAPE = 0.05, 0.006
 """Two views are alike if their corners lie closer than the first on average, and, once brought together, closer than the second, in
 image widths. A board that fills 0.4 of the width and turns by 25 degrees in its place changes its shape by 0.009."""
@@ -53,6 +56,7 @@ class Gate(Enum):
     NOT_FOUND_LEFT = "board not found left"
     NOT_FOUND_RIGHT = "board not found right"
     PART = "too few corners"
+    SAME = "both cameras show the same picture"
     NOTHING_NEW = "nothing new"
     MOVING = "moving"
     APART = "not the same moment"
@@ -62,7 +66,7 @@ class Gate(Enum):
     TAKEN = "taken"
 
 
-NOT_SEEN: Final = frozenset({Gate.NOT_FOUND, Gate.NOT_FOUND_LEFT, Gate.NOT_FOUND_RIGHT, Gate.PART})
+NOT_SEEN: Final = frozenset({Gate.NOT_FOUND, Gate.NOT_FOUND_LEFT, Gate.NOT_FOUND_RIGHT, Gate.PART, Gate.SAME})
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -97,7 +101,10 @@ def found(glance: Glance) -> Gate:
             pass
     both = np.isfinite(glance.left_px).all(axis=1) & np.isfinite(glance.right_px).all(axis=1)
     is_enough = (both.sum() >= _LEAST_CORNERS and both.mean() >= _LEAST_SEEN) or bool(both.all())
-    return Gate.READY if is_enough else Gate.PART
+    if not is_enough:
+        return Gate.PART
+    apart = np.abs(glance.left_px[both] - glance.right_px[both])
+    return Gate.SAME if glance.sizes_px[0] == glance.sizes_px[1] and apart.max() < _SAME_PX else Gate.READY
 
 
 def speed_widths_s(before: Glance | None, now: Glance) -> float:

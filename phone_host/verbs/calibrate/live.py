@@ -28,7 +28,7 @@ from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.earlier_views import board_of, pairs_of
 from phone_host.calibration.guide.guide import View
-from phone_host.calibration.guide.progress import Progress, lessons
+from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.unseen import unseen_in
 from phone_host.calibration.guide.wants import CORNERS, Want
@@ -53,7 +53,10 @@ from phone_host.verbs.units import baseline_mm
 
 _LOG = logging.getLogger(__name__)
 
-_LEAST_VIEWS, _MOST_VIEWS = 3, 99
+_MOST_VIEWS: Final = 99
+_LEAST_ADDED: Final = 3
+"""So few views may be added to those of an earlier calibration."""
+
 _WAITED_NS: Final = 1_000_000_000
 """A board that is there is met within a fifth of this; then there is nothing to say."""
 
@@ -140,13 +143,14 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
     except OSError as error:
         raise unwritable(settings.left, error, "LEFT or --snapshots") from error
     last = live.snapshot()
-    if last.views < _LEAST_VIEWS:
-        if last.views:
-            kept = f"{counted(last.views, 'view')} kept in {settings.left} and {settings.right}"
-            say(f"phone-host: {kept}; the next --live replaces them", sys.stderr, flush=True)
-        if signals.interrupted:
-            raise KeyboardInterrupt
-        raise _too_few(last)
+    least = _least_views(options)
+    if last.views < least:
+        reason = _too_few(last, least)
+        if not signals.interrupted:
+            raise reason
+        kept = f", kept in {settings.left} and {settings.right} until the next --live" if last.views else ""
+        say(f"phone-host: no rig: {reason.problem}{kept}", sys.stderr, flush=True)
+        raise KeyboardInterrupt
     return Live(last, settings.left, settings.right, signals)
 
 
@@ -192,8 +196,9 @@ def grown(views: tuple[View, ...], series: Series, sizes_px: tuple[Size, Size], 
 def _check(options: argparse.Namespace) -> None:
     if not options.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
-    if not _LEAST_VIEWS <= options.views <= _MOST_VIEWS:
-        raise SettingsError(f"--views is {options.views}", f"give {_LEAST_VIEWS} to {_MOST_VIEWS}")
+    least = _least_views(options)
+    if not least <= options.views <= _MOST_VIEWS:
+        raise SettingsError(f"--views is {options.views}", f"give {least} to {_MOST_VIEWS}")
     if len(options.images) not in {0, 2}:
         raise SettingsError(
             f"--live with {counted(len(options.images), 'folder')}",
@@ -204,6 +209,11 @@ def _check(options: argparse.Namespace) -> None:
             "--live does not take --rotate-left, --rotate-right, --flip-left or --flip-right",
             "add rotate= or flip= to the camera's address",
         )
+
+
+def _least_views(options: argparse.Namespace) -> int:
+    """Return how many views there must be for a rig to know how exact it is."""
+    return LEAST_STATED if options.earlier is None else _LEAST_ADDED
 
 
 def _settings(options: argparse.Namespace, asked: Asked) -> LiveSettings:
@@ -284,10 +294,10 @@ def _note(live: LiveCalibration, named: Sequence[str]) -> str:
     return live.trouble
 
 
-def _too_few(last: GuideSnapshot) -> DataError:
+def _too_few(last: GuideSnapshot, least: int) -> DataError:
     refused = max(last.refused, key=lambda each: each[1], default=None)
     reason = "" if refused is None else f"; most looks were refused: {refused[0].value}"
     return DataError(
         f"only {counted(last.views, 'view')} taken{reason}",
-        f"show the board as it is told; {_LEAST_VIEWS} are the least",
+        f"show the board as it is told; {least} are the least",
     )
