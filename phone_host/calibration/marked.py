@@ -24,6 +24,9 @@ _SEARCHED_PX: Final = 1600
 
 _MOST_ENLARGED: Final = 2.0
 
+_CELL_PX, _CELL_RIM = 8, 0.3
+"""Each bit of a tag is looked at in so many pixels, and told by its middle: blur mixes its rim, this share of it, with its neighbours."""
+
 LEAST_SEEN: Final = 8
 """Fewer corners hardly determine where the board is: two marks may give four in a line."""
 
@@ -181,6 +184,7 @@ def _tags(grey: Image, most: int) -> dict[int, Corners]:
     for border in (2, 1):  # read with the wrong one, a tag may pass for another
         parameters = cv2.aruco.DetectorParameters()
         parameters.markerBorderBits = border
+        parameters.perspectiveRemovePixelPerCell, parameters.perspectiveRemoveIgnoredMarginPerCell = _CELL_PX, _CELL_RIM
         corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(parted)
         if len(corners) > len(read):
             numbers = [int(number) for number in np.asarray(ids).ravel()]

@@ -240,6 +240,40 @@ def test_a_board_that_left_a_picture_is_told_the_way_back() -> None:
     assert show.words == Words.SHOW_BOTH.value
 
 
+def test_a_board_that_became_too_small_is_asked_closer() -> None:
+    """A small board that is lost in the middle was too far away; after some seconds it may be anywhere."""
+    show = Show()
+    show.show(corners(square=0.028))
+    show.show(NONE, 6.0)
+    assert show.words == Want.NEAR.value
+    show.show(NONE, 9.0)
+    assert show.words == Words.SHOW_BOTH.value
+
+
+def test_a_camera_that_never_sees_the_board_is_named() -> None:
+    """From the start on, and however long it takes."""
+    show = Show()
+    show.show(corners(), 2.0, right_sees=False)
+    assert show.words == Words.SHOW_RIGHT.value
+    show.show(corners(), 30.0, right_sees=False)
+    assert show.words == Words.SHOW_RIGHT.value
+
+
+def test_few_views_state_nothing() -> None:
+    """Four views have a calibration whose figures and verdict are not told; five have; why there is none is told at once."""
+    show, rig = Show(), unlike_rig()
+    sizes = ((rig.left.width_px, rig.left.height_px), (rig.right.width_px, rig.right.height_px))
+    show.show(corners())
+    for count, verdict in ((4, ""), (5, "usable")):
+        made = calibrate(exact_pairs(rig, poses(count, seed=2), 0.1), BOARD, sizes)
+        progress = replace(grown((), Verdict.USABLE), views=count, calibration=made)
+        show.guide.grow(progress, show.now_ns)
+        shown = show.guide.snapshot(show.now_ns)
+        assert (shown.verdict, math.isfinite(shown.depth_error_m)) == (verdict, bool(verdict))
+    show.guide.grow(grown((), Verdict.REJECT), show.now_ns)
+    assert show.guide.snapshot(show.now_ns).remedy == "more"
+
+
 def test_exact_corners_are_judged_too() -> None:
     """A board that is found small and not at full size is not taken."""
     show = Show()

@@ -110,6 +110,15 @@ def test_a_part_of_the_board_is_enough(board: Board, sheet: tuple[Image, NDArray
     np.testing.assert_array_equal(agree(found, found[::-1], board), found[::-1])  # marks leave nothing to agree on
 
 
+@pytest.mark.parametrize("border", [1, 2])
+def test_tags_are_read_from_far_away(border: int) -> None:
+    """Tags of 45 px, blurred until they hang together with the squares they touch: nine in ten corners are found within 0.5 px."""
+    image, places = _seen(*_grid_sheet(border, upward=False), size=(400, 300))
+    found = find_corners(image, _GRID)
+    assert np.isfinite(found[:, 0]).mean() >= 0.9
+    assert np.nanmax(np.linalg.norm(found - places, axis=1)) < 0.5
+
+
 def test_a_photograph_is_read_small_and_refined_whole() -> None:
     """12 megapixels: as exact in px as a small image."""
     image, true = _seen(*_charuco_sheet(), size=(4000, 3000))

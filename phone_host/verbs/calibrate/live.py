@@ -3,6 +3,7 @@
 import argparse
 import logging
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -97,7 +98,12 @@ class Live:
         """Return it for the summary: where the pictures are, and how they are calibrated again."""
         taken = f"live     {counted(self.last.views, 'view')} in {self.last.seconds:.0f} s"
         command = command_again(options, *self.folders)
-        return [f"{taken}; to calibrate from them again:", f"         {command}"] if command else [taken]
+        again = [f"{taken}; to calibrate from them again:", f"         {command}"] if command else [taken]
+        if self.last.verdict != Verdict.GOOD.value:
+            return again
+        links = [word for uri in options.link or () for word in ("--link", uri)]
+        run = ["phone-host", "run", *links, "--camera", options.camera, "--calibration", str(options.out)]
+        return [*again, f"next     {shlex.join(run)}"]
 
 
 def take_views(options: argparse.Namespace, asked: Asked) -> Live:
