@@ -82,7 +82,7 @@ def test_two_cameras_never_show_the_same_picture() -> None:
     """The same corners to a fraction of a pixel at the same size are one camera's; a board 1 px aside is another's."""
     same = Glance(at_ns=0, skew_ns=0, left_px=corners(), right_px=corners() + 0.1, sizes_px=(SIZES[0], SIZES[0]))
     assert found(same) is Gate.SAME
-    assert found(replace(same, right_px=corners() + [1.0, 0.0])) is Gate.READY
+    assert found(replace(same, right_px=corners() + np.array([1.0, 0.0]))) is Gate.READY
 
 
 def test_of_a_board_with_marks_enough_corners_must_be_common() -> None:
