@@ -75,9 +75,7 @@ def test_corners_that_are_not_seen_are_left_out() -> None:
 
 
 def test_five_views_that_contradict_each_other_say_so() -> None:
-    """A hand moves between two exposures: all right corners of a view shift together. The depth error that is stated grows with it, though
-    corners scatter no more than before.
-    """
+    """Right corners of a view shift together, as a hand moves between two exposures: what is stated grows by more than their scatter."""
     rig, random = unlike_rig(), np.random.default_rng(7)
     pairs = exact_pairs(rig, poses(5, seed=2), 0.05)
     moved = [replace(pair, right_px=pair.right_px + random.normal(0, 0.3, 2)) for pair in pairs]
