@@ -12,6 +12,7 @@ from phone_host.calibration.fit_quality import LensTrial, Squares
 from phone_host.calibration.next_view import NextView
 from phone_host.calibration.target import Corners
 from phone_host.model import Rectification, Rig
+from phone_host.model.calibration_series import BoardInSpace
 
 
 class Reason(Enum):
@@ -68,12 +69,14 @@ class Used:
         left_px: root mean square reprojection error in the left image, px.
         right_px: the same, right.
         vertical_px: root mean square vertical error after rectification, px; NaN when the rig cannot be rectified.
+        in_space: the board as the rig sees it.
     """
 
     name: str
     left_px: float
     right_px: float
     vertical_px: float
+    in_space: BoardInSpace
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -316,7 +316,7 @@ def _batches(images: Iterator[Path]) -> Iterator[list[Path]]:
 
 
 def _sample(files: ViewFiles) -> Iterator[Path]:
-    """Give images of both sides, spread over the session whatever its length: neighbours look alike."""
+    """Give images of both sides, spread over the series whatever its length: neighbours look alike."""
     paths = [path for _, left, right in files.pairs for path in (left, right)]
     step = next((each for each in (7, 11, 13, 17, 19, 23) if len(paths) % each), 1)
     yield from (paths[index * step % len(paths)] for index in range(len(paths)))

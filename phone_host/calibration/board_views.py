@@ -12,7 +12,7 @@ from common.imagesize.head import MOST_PIXELS
 from common.imagesize.head import size_text as px_text
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
-from phone_host.calibration.causes.looks import Look, SeenLook, look_at
+from phone_host.calibration.causes.looks import BoardLook, SeenLook, look_at
 from phone_host.calibration.out_of_step import FileCorners
 from phone_host.calibration.small_picture import PREVIEW_PX, small_jpeg
 from phone_host.calibration.target import Board, Corners, agree, find_corners
@@ -66,7 +66,7 @@ class _Seen:
     size_px: Size
     turned: Orientation
     corners: Corners
-    look: Look
+    look: BoardLook
     picture: bytes
 
 

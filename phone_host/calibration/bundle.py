@@ -46,7 +46,9 @@ __all__ = [
 
 _MOST_PASSES = 4  # each has a noise estimate that the outliers of the one before no longer inflate
 _SAME_NOISE = 0.002  # relative change of the noise estimate below which another pass changes nothing
-_JACKKNIFE_VIEWS = 8  # with fewer, leaving one out leaves too little
+# With fewer, leaving one out leaves too little. With 5 to 7 views of hand-held boards depth erred by 1.3 to 1.6 of what independent
+# corners say, and by 0.9 of what the jackknife says.
+_JACKKNIFE_VIEWS = 5
 _LEAST_LEFT = 1e-6  # share of what all views know that is left without one: rounding must not make it negative
 _TO_MEAN = 0.5  # how far a scatter that a dozen views show is drawn to its mean
 ROUGHLY = 1e-5
@@ -103,6 +105,13 @@ class BundleResult:
     def rms_px(self) -> float:
         """Return the root mean square distance of all corners of both cameras, px (counted like OpenCV's stereoCalibrate)."""
         return rms_px(self.left_errors_px, self.right_errors_px)
+
+    def sigmas_px(self) -> tuple[float, float]:
+        """Return the standard deviation of a coordinate that is left in the left and in the right images, px; never below what detectors reach."""
+        left, right = (
+            max(rms_px(errors) / 2**0.5, _LEAST_SIGMA_PX) for errors in (self.left_errors_px, self.right_errors_px)
+        )
+        return left, right
 
     def view_rms_px(self) -> tuple[Vector, Vector]:
         """Return the root mean square distance of each view, (V,) px, left and right."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.bend import Bend
+from phone_host.calibration.board_in_space import boards_in_space
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected, Used
 from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import (
@@ -353,9 +354,10 @@ def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibrat
         rig = replace(rig, zero_sigma_px=zero_sigma_px(rig, rectification))
         depths = tuple((depth_m, depth_sigma_m(rig, rectification, depth_m)) for depth_m in DEPTHS_M)
         advice = next_view(result, fitted.free, points_m, rectification)
+    boards = boards_in_space(pairs, points_m, rig, state.poses, result.sigmas_px())
     used = tuple(
-        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=rms(v))
-        for pair, a, b, v in zip(pairs, *result.view_rms_px(), vertical, strict=True)
+        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=rms(v), in_space=board)
+        for pair, a, b, v, board in zip(pairs, *result.view_rms_px(), vertical, boards, strict=True)
     )
     return Calibration(
         rig=rig,

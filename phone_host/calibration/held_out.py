@@ -10,18 +10,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.calibration.board_in_space import ray_crossings
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.bundle import BundleState, BundleView, FreeParameters, Vector, adjust_roughly, rig_of
 from phone_host.calibration.fit_quality import Squares
-from phone_host.geometry.lens import rays_through
-from phone_host.geometry.se3 import SE3
-from phone_host.geometry.triangulate import triangulate
-from phone_host.model import CameraModel, Rig
+from phone_host.model import Rig
 
 _PARTS: Final = 5
 _LEAST_PAIRS: Final = 6
-_NEIGHBOUR: Final = 1.01
-"""Corners whose distance is the least one, up to a hundredth, span one square."""
+_NEIGHBOUR: Final = 0.01
+"""Corners whose distance is a side, up to this share, span one."""
 
 
 def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleState, free: FreeParameters) -> Squares:
@@ -33,7 +31,7 @@ def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleStat
         state: the rig fitted to all of them.
         free: what was estimated.
     """
-    true_m = float(np.min(np.linalg.norm(np.diff(points_m, axis=0), axis=1)))
+    true_m = _side_m(points_m)
     sides: list[Vector] = []
     parts = min(_PARTS, len(pairs)) if len(pairs) >= _LEAST_PAIRS else 0
     for part in range(parts):
@@ -56,30 +54,18 @@ def square_sides_m(pairs: list[BoardPair], points_m: Vector, rig: Rig) -> Vector
         points_m: (N, 3) corners in the board's axes.
         rig: the rig.
     """
-    left, right = (np.concatenate([pair.left_px for pair in pairs]), np.concatenate([pair.right_px for pair in pairs]))
-    slopes = np.stack([_slopes(left, rig.left), _slopes(right, rig.right)])
-    # Both images' corners are as noisy in pixels; the finer camera's rays are surer.
-    noise = np.array([np.eye(2) / (model.matrix[0, 0] * model.matrix[1, 1]) for model in (rig.left, rig.right)])
-    noises = np.broadcast_to(noise[:, np.newaxis], (*slopes.shape, 2))
-    found = triangulate(slopes, noises, (SE3.identity(), SE3(rig.R_right_left, rig.t_right_left_m.reshape(3))))
-    points = found.points_m.reshape(len(pairs), -1, 3)
+    points = ray_crossings(pairs, rig).points_m.reshape(len(pairs), -1, 3)
     first, second = _neighbours(points_m)
     sides = np.linalg.norm(points[:, first] - points[:, second], axis=2)
     return np.asarray(sides[np.isfinite(sides)], np.float64)
 
 
-def _slopes(corners: Vector, model: CameraModel) -> Vector:
-    """Return (N, 2) x / z and y / z of the rays of corners; NaN where one is not seen, or lies aside of the image plane."""
-    slopes = np.full(corners.shape, np.nan)
-    seen = np.flatnonzero(np.isfinite(corners).all(axis=1))
-    rays = rays_through(corners[seen], model)
-    ahead = rays[:, 2] > 0
-    slopes[seen[ahead]] = rays[ahead, :2] / rays[ahead, 2:]
-    return slopes
+def _side_m(points_m: Vector) -> float:
+    """Return the side of a square, or of an AprilGrid's tag: its gaps are so narrow that noise makes them longer."""
+    return float(np.linalg.norm(points_m[1] - points_m[0]))
 
 
 def _neighbours(points_m: Vector) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    apart = np.linalg.norm(points_m[:, np.newaxis] - points_m[np.newaxis], axis=2)
-    least = apart[apart > 0].min()
-    first, second = np.nonzero(np.triu(apart <= least * _NEIGHBOUR, 1))
+    apart, side_m = np.linalg.norm(points_m[:, np.newaxis] - points_m[np.newaxis], axis=2), _side_m(points_m)
+    first, second = np.nonzero(np.triu(np.abs(apart - side_m) <= side_m * _NEIGHBOUR, 1))
     return first, second

@@ -22,6 +22,11 @@ Corners = NDArray[np.float64]
 _SEARCHED_PX: Final = 1600
 """Longer side: marks are read in an image no larger; corners are refined in the whole one."""
 
+_MOST_ENLARGED: Final = 2.0
+
+_CELL_PX, _CELL_RIM = 8, 0.3
+"""Each bit of a tag is looked at in so many pixels, and told by its middle: blur mixes its rim, this share of it, with its neighbours."""
+
 LEAST_SEEN: Final = 8
 """Fewer corners hardly determine where the board is: two marks may give four in a line."""
 
@@ -174,18 +179,32 @@ def _april_grid(grey: Image, columns: int, rows: int) -> Corners:
 def _tags(grey: Image, most: int) -> dict[int, Corners]:
     """Return the four corners of each tag, clockwise from its upper left one. Kalibr prints tags with a border of two bits, others of one."""
     dictionary = cv2.aruco.getPredefinedDictionary(MarkFamily.APRILTAG_36H11.value)
-    for border in (2, 1):
+    parted, factor = _parted(grey)
+    read = dict[int, Corners]()
+    for border in (2, 1):  # read with the wrong one, a tag may pass for another
         parameters = cv2.aruco.DetectorParameters()
         parameters.markerBorderBits = border
-        corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(grey)
-        if len(corners):
+        parameters.perspectiveRemovePixelPerCell, parameters.perspectiveRemoveIgnoredMarginPerCell = _CELL_PX, _CELL_RIM
+        corners, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(parted)
+        if len(corners) > len(read):
             numbers = [int(number) for number in np.asarray(ids).ravel()]
-            return {
-                number: np.asarray(four, np.float64).reshape(4, 2)
+            read = {
+                number: (np.asarray(four, np.float64).reshape(4, 2) + 0.5) / factor - 0.5
                 for number, four in zip(numbers, corners, strict=True)
                 if number < most
             }
-    return {}
+    return read
+
+
+def _parted(grey: Image) -> tuple[Image, float]:
+    """Return an image in which tags and the squares that they touch are apart, and how much larger it is.
+
+    Where they touch, blur joins them, and no tag has an outline of its own. So white is widened by a pixel, in an image of up to twice
+    the size: tags are read twice as far away.
+    """
+    factor = float(np.clip(_SEARCHED_PX / max(grey.shape), 1.0, _MOST_ENLARGED))
+    large = cv2.resize(grey, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC)
+    return np.asarray(cv2.dilate(large, np.ones((3, 3), np.uint8))), factor
 
 
 def _is_upward(tags: dict[int, Corners], across: int) -> bool:

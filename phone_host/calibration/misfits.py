@@ -2,23 +2,24 @@
 
 import numpy as np
 
-from common.errors import DataError
+from phone_host.calibration.board_in_space import misses
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.bundle import BundleResult, BundleState, Vector, rig_of, rms_px
 from phone_host.calibration.calibrate_alone import FAR_OFF_PX, corners_of, off_words, own_errors_px
 from phone_host.model import Rectification, Rig, Side
-from phone_host.stereo.rectify import across_lines_px, rectify_points, rectify_rig
+from phone_host.stereo.rectify import across_lines_px, rectify_points
 
 # A pair is rejected when its error is twice the median pair's, but never below this floor: smaller errors do no harm.
 _OUTLIER_FACTOR, _OUTLIER_FLOOR_PX = 2.0, 0.3
 # Lenses bend as little as few pairs allow, which one pair shows more than another: less than this many need an error of three times the median pair's.
 _FEW_PAIRS, _FEW_FACTOR = 8, 3.0
-# Row errors carry a third of the information and scatter more from pair to pair.
-_ROWS_FACTOR = 2.5
+# By how much rays miss each other carries a quarter of the information and scatters more from pair to pair. Rows that differ by
+# 0.3 px are brought together by moving both corners by half of that.
+_RAYS_FACTOR, _RAYS_FLOOR_PX = 2.5, 0.3 / 2**0.5
 
 
 def misfits(pairs: list[BoardPair], result: BundleResult, points_m: Vector) -> list[tuple[int, Rejected]]:
-    """Find pairs that fit much worse than the others, worst first: by reprojection error, or by rows that do not match."""
+    """Find pairs that fit much worse than the others, worst first: by reprojection error, or by rays that miss each other."""
     errors = np.fmax(*result.view_rms_px())
     usual = float(np.median(errors))
     factor = _FEW_FACTOR if len(pairs) < _FEW_PAIRS else _OUTLIER_FACTOR
@@ -31,27 +32,21 @@ def misfits(pairs: list[BoardPair], result: BundleResult, points_m: Vector) -> l
         )
         for index in np.flatnonzero(by_error > 1)
     ]
-    try:
-        rig = rig_of(result.state)
-        rectification = rectify_rig(rig)
-    except DataError:  # swapped, vertical, ...: the same check reports it at the end
-        vertical = np.zeros(len(pairs))
-    else:
-        vertical = np.array([rms(vertical_errors_px(pair, rig, rectification)) for pair in pairs])
-    usual = float(np.median(vertical))
-    by_rows = vertical / max(_ROWS_FACTOR * usual, _OUTLIER_FLOOR_PX)
+    missed = misses(pairs, rig_of(result.state))
+    usual = float(np.median(missed))
+    by_rays = missed / max(_RAYS_FACTOR * usual, _RAYS_FLOOR_PX)
     found += [
         (
-            by_rows[index],
+            by_rays[index],
             index,
             Rejected(
                 pairs[index].name,
                 Reason.MOVED,
-                f"rows of left and right differ by {vertical[index]:.2f} px, others by {usual:.2f} px: board or cameras"
-                " moved between the two exposures",
+                f"rays of left and right miss each other by {missed[index]:.2f} px, others by {usual:.2f} px: board or"
+                " cameras moved between the two exposures",
             ),
         )
-        for index in np.flatnonzero(by_rows > 1)
+        for index in np.flatnonzero(by_rays > 1)
     ]
     return [(int(index), why) for _, index, why in sorted(found, key=lambda each: -each[0])]
 

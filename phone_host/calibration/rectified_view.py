@@ -1,4 +1,4 @@
-"""One pair of a session after rectification, made small: what a matcher will see. Reads the pair's files once more."""
+"""One pair of a series after rectification, made small: what a matcher will see. Reads the pair's files once more."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.small_picture import shrunk_to, small_jpeg, small_size
 from phone_host.calibration.target import Corners
 from phone_host.model import CameraModel, Rectification, Rig
-from phone_host.model.calibration_session import RectifiedView
+from phone_host.model.calibration_series import RectifiedView
 from phone_host.stereo.images import decode_file, open_image
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_points

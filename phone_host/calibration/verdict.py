@@ -14,8 +14,8 @@ import numpy as np
 
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 from phone_host.calibration.next_view import DEPTH_M, Kind
-from phone_host.model import Rig
-from phone_host.model.calibration_session import Limits, Verdict
+from phone_host.model import Rig, Verdict
+from phone_host.model.calibration_series import Limits
 
 __all__ = [
     "GOOD_PX",

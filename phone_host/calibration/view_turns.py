@@ -14,7 +14,7 @@ from phone_host.calibration.bundle import Vector
 from phone_host.geometry.lens import project_linearised
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of
 from phone_host.model import Rig
-from phone_host.model.calibration_session import ViewTurns
+from phone_host.model.calibration_series import ViewTurns
 
 _NUMBERS: Final = 9
 _STEPS: Final = 5

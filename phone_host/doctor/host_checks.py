@@ -22,10 +22,6 @@ _USABLE_PX: Final = 1.0
 """With a stereo RMS above one pixel, the rows of the two images do not match, and no matcher finds much."""
 
 
-_REJECT: Final = "reject"
-"""The verdict of a calibration whose depth is wrong."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Package:
     """A Python package that the host imports.
@@ -59,7 +55,7 @@ class RigReadings:
         baseline_m: baseline, m.
         host_size_px: image size of the host camera in the rig, px.
         asked_size_px: image size that the host camera is asked for, px; None if the URI does not say.
-        verdict: the calibration's own verdict; empty: the file states none.
+        is_rejected: whether its own calibration found it unfit.
     """
 
     path: str
@@ -69,7 +65,7 @@ class RigReadings:
     baseline_m: float = float("nan")
     host_size_px: tuple[int, int] = (0, 0)
     asked_size_px: tuple[int, int] | None = None
-    verdict: str = ""
+    is_rejected: bool = False
 
 
 class Answer(Enum):
@@ -170,7 +166,7 @@ def check_rig(rig: RigReadings) -> Finding:
             remedy = f"ask for size={width_px}x{height_px} or another size of this shape, or calibrate at {asked}"
             return fail("rig", f"{text}, but the camera is asked for {asked}, another shape", remedy)
         text += f", scaled to {asked}" if is_scaling(rig.host_size_px, asked_px) else f", cropped to {asked}"
-    if rig.verdict == _REJECT:
+    if rig.is_rejected:
         return warn("rig", f"{text}, verdict reject", "calibrate again; report.json beside it says what was wrong")
     if rig.rms_px > _USABLE_PX:
         return warn("rig", text, "calibrate again with sharper pictures of a flat board")

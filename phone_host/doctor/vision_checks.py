@@ -98,6 +98,6 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
         rms_px=rig.rms_stereo_px,
         baseline_m=float(np.linalg.norm(rig.t_right_left_m)),
         host_size_px=(own.width_px, own.height_px),
-        verdict=rig.verdict,
+        is_rejected=rig.is_rejected,
         asked_size_px=asked_px if asked_px is None else camera_orientation(camera).turned_size(asked_px),
     )

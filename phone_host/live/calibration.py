@@ -175,7 +175,12 @@ class LiveCalibration:
         if silent_ns < _SILENT_NS:
             return ""
         run = self.host.snapshot()
-        is_away = bool(run.away) and not run.away[-1].is_over
+        last = run.away[-1] if run.away else None
+        if last is not None and last.is_over:
+            back_ns = self.host.started_ns + round((last.at_s + last.seconds) * 1e9)
+            if now_ns - back_ns < _NO_PAIRS_NS:
+                return "the board is back: pairs come in a moment; the views so far are kept"
+        is_away = last is not None and not last.is_over
         what = (
             "the board is away: check its power and its link"
             if is_away

@@ -50,6 +50,7 @@ from phone_host.model.rig import (
     Rig,
     Side,
     TimeOffset,
+    Verdict,
 )
 from phone_host.model.run import (
     BoardFrame,
@@ -116,4 +117,5 @@ __all__ = [
     "Trend",
     "Turn",
     "Unwritten",
+    "Verdict",
 ]

@@ -26,8 +26,13 @@ class Side(Enum):
 RIG_PARAMETERS: Final = 30
 """Twelve of each camera, six of their relative pose; see `Rig.covariance`."""
 
-REJECTED: Final = "reject"
-"""The verdict of a calibration that found its rig unfit."""
+
+class Verdict(Enum):
+    """What a calibration is good for."""
+
+    GOOD = "good"
+    USABLE = "usable"
+    REJECT = "reject"
 
 
 class Lens(Enum):
@@ -101,7 +106,7 @@ class Rig:
         time_offset: time offset between the two cameras' stamps.
         zero_sigma_px: standard uncertainty of the disparity of infinitely far points, px, at the size of the rig's
             images; NaN = not measured.
-        verdict: how the calibration judged itself (good, usable or reject); empty: not stated.
+        verdict: how the calibration judged itself; None: not stated.
         left_camera: which camera the left one was, and how it was set; None: not stated.
         right_camera: the same for the right one.
         covariance: (30, 30) float64 of the parameters: fx fy cx cy and eight coefficients of the left camera (in the order of
@@ -120,7 +125,7 @@ class Rig:
     rms_stereo_px: float = float("nan")
     time_offset: TimeOffset = TimeOffset()
     zero_sigma_px: float = float("nan")
-    verdict: str = ""
+    verdict: Verdict | None = None
     left_camera: RememberedCamera | None = None
     right_camera: RememberedCamera | None = None
     covariance: NDArray[np.float64] = field(default_factory=lambda: np.full((RIG_PARAMETERS, RIG_PARAMETERS), np.nan))
@@ -129,7 +134,7 @@ class Rig:
     @property
     def is_rejected(self) -> bool:
         """Whether its own calibration found it unfit."""
-        return self.verdict == REJECTED
+        return self.verdict is Verdict.REJECT
 
     @property
     def baseline_sigma_m(self) -> float:

@@ -22,18 +22,13 @@ from common.camera_identity import RememberedCamera
 from common.errors import DataError
 from common.files import read_whole
 from common.versions import RIG_FORMAT
-from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset
+from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset, Verdict
 from phone_host.output.atomic import write_text
 from phone_host.output.rig_cameras import read_camera, write_camera
 from phone_host.output.rig_lenses import known_lens, lens_of, require_count, usual_lens
 from phone_host.output.rig_sigmas import read_covariance, write_sigmas
 from phone_host.output.rig_views import RigViews, read_views, write_views
 from phone_host.output.yaml_depth import is_too_deep
-
-REJECTED = "reject"
-"""The verdict of a rig that `run` and `stereo` do not use unless they are told to."""
-
-VERDICTS = ("good", "usable", REJECTED)
 
 _LARGEST_IMAGE_PX = 100_000
 _ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits has this error
@@ -90,8 +85,8 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification, views: RigView
     storage.write("rms_stereo", rig.rms_stereo_px)
     storage.writeComment("standard uncertainty of the disparity of infinitely far points, px; what the rig is good for")
     storage.write("zero_sigma", rig.zero_sigma_px)
-    if rig.verdict:
-        storage.write("verdict", rig.verdict)
+    if rig.verdict is not None:
+        storage.write("verdict", rig.verdict.value)
     for key, camera in (("left_camera", rig.left_camera), ("right_camera", rig.right_camera)):
         if camera is not None:
             write_camera(storage, key, camera)
@@ -377,12 +372,13 @@ class _Reader:
             )
         return TimeOffset(round(offset_ns), round(uncertainty_ns))
 
-    def verdict(self) -> str:
-        """Read what the calibration is good for; empty if it is missing."""
+    def verdict(self) -> Verdict | None:
+        """Read what the calibration is good for; None if it is missing."""
         value = self.text("verdict", "")
-        if value and value not in VERDICTS:
-            raise self.problem("verdict", f"is {value!r}", f"write {', '.join(VERDICTS[:-1])} or {VERDICTS[-1]}")
-        return value
+        known = [each.value for each in Verdict]
+        if value and value not in known:
+            raise self.problem("verdict", f"is {value!r}", f"write {', '.join(known[:-1])} or {known[-1]}")
+        return Verdict(value) if value else None
 
     def camera(self, key: str, model: CameraModel) -> RememberedCamera | None:
         """Read which camera one of the two was; None if it is missing."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from common.imagesize.head import size_text
 from phone_host.model import CameraModel, Lens
-from phone_host.model.calibration_session import SessionRig
+from phone_host.model.calibration_series import SeriesRig
 from phone_host.report.page_frame import section, table
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ _HALF: Final = 12
 """Parameters of a camera in the rig's covariance."""
 
 
-def figures_card(found: SessionRig) -> str:
+def figures_card(found: SeriesRig) -> str:
     """Make the card with the figures, their limits and what they mean.
 
     Args:
@@ -59,7 +59,7 @@ _MEANINGS: Final = (
 )
 
 
-def _rows(found: SessionRig) -> list[_Row]:
+def _rows(found: SeriesRig) -> list[_Row]:
     errors, limits = found.vertical_px, found.limits
     if not np.isfinite(errors).all():
         return []
@@ -70,13 +70,13 @@ def _rows(found: SessionRig) -> list[_Row]:
     ]
 
 
-def _rms(found: SessionRig) -> list[_Row]:
+def _rms(found: SeriesRig) -> list[_Row]:
     rig = found.rig
     alone = f"{rig.rms_left_px:.3f}, {rig.rms_right_px:.3f} px"
     return [("RMS left, right", alone, _DASH, _DASH), ("RMS together", f"{rig.rms_stereo_px:.3f} px", _DASH, _DASH)]
 
 
-def _baseline(found: SessionRig) -> list[_Row]:
+def _baseline(found: SeriesRig) -> list[_Row]:
     baseline_m, sigma_m = float(np.linalg.norm(found.rig.t_right_left_m)), found.baseline_sigma_m
     if not math.isfinite(sigma_m):
         return [("baseline", f"{baseline_m * 1e3:.2f} mm", _DASH, _DASH)]
@@ -84,7 +84,7 @@ def _baseline(found: SessionRig) -> list[_Row]:
     return [("baseline", words, *_shares(found))]
 
 
-def _depths(found: SessionRig) -> list[_Row]:
+def _depths(found: SeriesRig) -> list[_Row]:
     return [
         (
             f"depth error at {depth_m:g} m",
@@ -96,7 +96,7 @@ def _depths(found: SessionRig) -> list[_Row]:
     ]
 
 
-def _squares(found: SessionRig) -> list[_Row]:
+def _squares(found: SeriesRig) -> list[_Row]:
     if not math.isfinite(found.square_mean_m):
         return []
     off = round(found.square_mean_m / found.square_m - 1, 4) + 0.0
@@ -105,14 +105,14 @@ def _squares(found: SessionRig) -> list[_Row]:
     return [("squares held out", words, *_shares(found))]
 
 
-def _far(found: SessionRig) -> list[_Row]:
+def _far(found: SeriesRig) -> list[_Row]:
     if not (math.isfinite(found.far_m) and math.isfinite(found.rig.zero_sigma_px)):
         return []
     words = f"{found.far_m:.3g} m (infinity ± {found.rig.zero_sigma_px:.2f} px)"
     return [("far limit", words, _DASH, _DASH)]
 
 
-def _shares(found: SessionRig) -> tuple[str, str]:
+def _shares(found: SeriesRig) -> tuple[str, str]:
     return f"{found.limits.good_share:.0%}", f"{found.limits.usable_share:.0%}"
 
 
@@ -121,7 +121,7 @@ def _millimetres(length_m: float) -> str:
     return f"{millimetres:.0f}" if millimetres >= _WHOLE_MM else f"{millimetres:.2g}"
 
 
-def camera_tables(found: SessionRig) -> str:
+def camera_tables(found: SeriesRig) -> str:
     """Make the card with both cameras' parameters and their relative pose.
 
     Args:

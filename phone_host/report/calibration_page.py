@@ -7,7 +7,8 @@ import numpy as np
 
 from common.imagesize.head import size_text
 from common.words import counted
-from phone_host.model.calibration_session import CalibrationSession, SessionRig, Verdict
+from phone_host.model import Verdict
+from phone_host.model.calibration_series import CalibrationSeries, SeriesRig
 from phone_host.report.calibration_figures import camera_tables, figures_card
 from phone_host.report.calibration_space import rig_card
 from phone_host.report.calibration_views import (
@@ -31,68 +32,68 @@ _COLOURS: Final = {
 _DEPTH_M: Final = 1.0
 
 
-def calibration_page(session: CalibrationSession) -> str:
+def calibration_page(series: CalibrationSeries) -> str:
     """Make the page.
 
     Args:
-        session: what it shows.
+        series: what it shows.
 
     Returns:
         An HTML document.
     """
-    found = session.found
+    found = series.found
     parts = [
-        heading(_TITLE, _subtitle(session), _COLOURS[session.verdict], verdict_words(session)),
-        "" if found is None else figures_row(_figures(session, found)),
+        heading(_TITLE, _subtitle(series), _COLOURS[series.verdict], verdict_words(series)),
+        "" if found is None else figures_row(_figures(series, found)),
         "" if found is None else figures_card(found),
-        coverage_card(session),
-        rectified_card(session),
-        views_card(session),
-        rejected_card(session),
-        field_card(session),
-        course_card(session),
-        "" if found is None else rig_card(session, found),
+        coverage_card(series),
+        rectified_card(series),
+        views_card(series),
+        rejected_card(series),
+        field_card(series),
+        course_card(series),
+        "" if found is None else rig_card(series, found),
         "" if found is None else camera_tables(found),
-        files_section(_files(session)),
+        files_section(_files(series)),
     ]
     return document(_TITLE, "".join(parts))
 
 
-def verdict_words(session: CalibrationSession) -> str:
+def verdict_words(series: CalibrationSeries) -> str:
     """Say what the rig is good for and, unless it is good, what to do."""
-    because = f", {session.cause}" if session.cause else ""
-    match session.verdict:
+    because = f", {series.cause}" if series.cause else ""
+    match series.verdict:
         case Verdict.GOOD:
-            told = f" But mind: {_sentence(session.cause_words)}" if session.cause else ""
+            told = f" But mind: {_sentence(series.cause_words)}" if series.cause else ""
             return f"Good: scan with it.{told}"
         case Verdict.USABLE:
-            return f"Usable{because}: {_sentence(session.remedy)}"
+            return f"Usable{because}: {_sentence(series.remedy)}"
         case Verdict.REJECT:
-            what = f"{session.problem}: {session.remedy}" if session.problem else session.remedy
+            what = f"{series.problem}: {series.remedy}" if series.problem else series.remedy
             return f"Rejected{because}: {_sentence(what)}"
         case _:
-            assert_never(session.verdict)
+            assert_never(series.verdict)
 
 
 def _sentence(words: str) -> str:
     return f"{words.replace('+-', '±')}."
 
 
-def _subtitle(session: CalibrationSession) -> str:
-    used = sum(view.is_used for view in session.views)
-    left, right = (f"{size_text(size)} px" for size in session.sizes_px)
+def _subtitle(series: CalibrationSeries) -> str:
+    used = sum(view.is_used for view in series.views)
+    left, right = (f"{size_text(size)} px" for size in series.sizes_px)
     sizes = left if left == right else f"left {left}, right {right}"
-    return f"{used} of {counted(len(session.views), 'pair')} used; {session.board}; images {sizes}"
+    return f"{used} of {counted(len(series.views), 'pair')} used; {series.board}; images {sizes}"
 
 
-def _figures(session: CalibrationSession, found: SessionRig) -> tuple[Figure, ...]:
+def _figures(series: CalibrationSeries, found: SeriesRig) -> tuple[Figure, ...]:
     baseline_mm = float(np.linalg.norm(found.rig.t_right_left_m)) * 1e3
     depths = dict(found.depths)
     figures = [
         Figure(
             label="pairs used",
-            value=str(sum(view.is_used for view in session.views)),
-            unit=f"of {len(session.views)}",
+            value=str(sum(view.is_used for view in series.views)),
+            unit=f"of {len(series.views)}",
         )
     ]
     p95_px = float(np.percentile(found.vertical_px, 95))
@@ -119,6 +120,6 @@ def _figures(session: CalibrationSession, found: SessionRig) -> tuple[Figure, ..
     return tuple(figures)
 
 
-def _files(session: CalibrationSession) -> tuple[FileLink, ...]:
-    rig = () if not session.rig_file else (FileLink(session.rig_file, "the calibration, for run, stereo and measure"),)
+def _files(series: CalibrationSeries) -> tuple[FileLink, ...]:
+    rig = () if not series.rig_file else (FileLink(series.rig_file, "the calibration, for run, stereo and measure"),)
     return (*rig, FileLink("report.json", "all figures"))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import CameraModel
-from phone_host.model.calibration_session import CalibrationSession, SessionRig
+from phone_host.model.calibration_series import CalibrationSeries, SeriesRig
 from phone_host.report.page_frame import HALF_PX, section, two_widths
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plot_rig import Shape, in_space, seen_from
@@ -24,14 +24,14 @@ _OBLIQUE: Final = (-35.0, 28.0)
 _ABOVE: Final = (0.0, 90.0)
 
 
-def rig_card(session: CalibrationSession, found: SessionRig) -> str:
+def rig_card(series: CalibrationSeries, found: SeriesRig) -> str:
     """Make the card.
 
     Args:
-        session: whose boards are drawn.
+        series: whose boards are drawn.
         found: whose cameras are.
     """
-    shapes = _boards(session)
+    shapes = _boards(series)
     rig = found.rig
     away_m = float(np.median([np.linalg.norm(shape.lines[0][:-1].mean(axis=0)) for shape in shapes])) if shapes else 1.0
     shapes += [
@@ -52,7 +52,7 @@ def _drawn(shapes: list[Shape], view: Floats, label: str, width_px: int) -> str:
     return in_space(shapes, view, label, width_px)
 
 
-def _boards(session: CalibrationSession) -> list[Shape]:
+def _boards(series: CalibrationSeries) -> list[Shape]:
     return [
         Shape(
             lines=(np.vstack([view.outline_m, view.outline_m[:1]]),),
@@ -60,7 +60,7 @@ def _boards(session: CalibrationSession) -> list[Shape]:
             title=f"{view.name}: {np.linalg.norm(view.outline_m.mean(axis=0)):.2f} m away",
             opacity=0.1,
         )
-        for view in session.views
+        for view in series.views
         if len(view.outline_m)
     ]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.words import counted
-from phone_host.model.calibration_session import CalibrationSession, RectifiedView, SeenBoard, SessionView, Size
+from phone_host.model.calibration_series import CalibrationSeries, RectifiedView, SeenBoard, SeriesView, Size
 from phone_host.report.page_frame import HALF_PX, section, table, two_widths
 from phone_host.report.report_page import Picture, picture_uri
 from phone_host.svg.plot_arrows import Enlarged, SeenErrors, arrow_field, enlarged, photo_arrows
@@ -17,7 +17,7 @@ from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_coverage import coverage_map, tile_views
 from phone_host.svg.plot_depth import Mark, over_distance
 from phone_host.svg.plot_parts import legend, svg
-from phone_host.svg.plot_tilts import Tilt, tilt_disc
+from phone_host.svg.plot_tilts import TiltedBoard, tilt_disc
 
 Floats = NDArray[np.float64]
 
@@ -33,19 +33,24 @@ _LEAST_IN_TILE: Final = 3
 _EMPTY: Final = 0.6
 """A third of the image of whose tiles more than this share is empty counts as empty."""
 
+_FIGURES: Final = (
+    "Errors are RMS. Then the board as the rig sees it in space: by how many standard deviations the rays of left and right miss each other"
+    " (1 is noise), how large it is, and how far its middle stands out. A view whose rays miss was not taken at one moment; one whose board"
+    " is larger or smaller than the others contradicts them in depth; a board that is bent in all views alike is not flat."
+)
 _95_PERCENT: Final = 1.96
 _LINES: Final = 7
 _TURNS: Final = (("about x (up and down: rows)", 4), ("about y (left and right: depth)", 5), ("about z (roll)", 2))
 
 
-def coverage_card(session: CalibrationSession) -> str:
+def coverage_card(series: CalibrationSeries) -> str:
     """Make the card that shows where in the images, how far and how tilted boards were seen."""
-    used = [view for view in session.views if view.is_used] or [v for v in session.views if len(v.left.corners_px)]
+    used = [view for view in series.views if view.is_used] or [v for v in series.views if len(v.left.corners_px)]
     if not used:
         return ""
     sides = "".join(
         _coverage(name, [getattr(view, name).corners_px for view in used], size)
-        for name, size in zip(("left", "right"), session.sizes_px, strict=True)
+        for name, size in zip(("left", "right"), series.sizes_px, strict=True)
     )
     content = f'<div class="pair">{sides}</div>'
     placed = [view for view in used if len(view.outline_m)]
@@ -80,7 +85,7 @@ def _empty_words(counts: NDArray[np.int64]) -> str:
     return f"{words}; hardly any: {', '.join(empty)}" if empty else words
 
 
-def _distances(views: list[SessionView]) -> str:
+def _distances(views: list[SeriesView]) -> str:
     marks, tilts = [], []
     for view in views:
         normal = np.cross(view.outline_m[1] - view.outline_m[0], view.outline_m[3] - view.outline_m[0])
@@ -89,16 +94,16 @@ def _distances(views: list[SessionView]) -> str:
         away_m = float(np.linalg.norm(view.outline_m.mean(axis=0)))
         title = f"{view.name}: {away_m:.2f} m away, tilted by {angle:.0f}°"
         marks.append(Mark(away_m, angle, title))
-        tilts.append(Tilt(angle, float(normal[0]), float(normal[1]), title))
+        tilts.append(TiltedBoard(angle, float(normal[0]), float(normal[1]), title))
     far = two_widths(partial(over_distance, marks, [], "tilt, °", "tilt of the boards over their distance"), HALF_PX)
     way = two_widths(partial(tilt_disc, tilts, "which way the boards were tilted"), HALF_PX)
     words = "Each dot is a board, seen from the left camera. The middle faces the camera; 20° to 45° in all directions teach most."
     return f'<div><h3>Distance and tilt</h3>{far}</div><div><h3>Which way boards faced</h3>{way}<p class="sub">{words}</p></div>'
 
 
-def rectified_card(session: CalibrationSession) -> str:
+def rectified_card(series: CalibrationSeries) -> str:
     """Make the card with a rectified pair and row lines."""
-    shown = session.rectified
+    shown = series.rectified
     if shown is None:
         return ""
     rows = "column" if shown.is_vertical else "row"
@@ -136,34 +141,40 @@ def _rectified(shown: RectifiedView) -> str:
     return svg(round(whole_w), whole_h, "left and right image after rectification, with lines", parts)
 
 
-def views_card(session: CalibrationSession) -> str:
+def views_card(series: CalibrationSeries) -> str:
     """Make the card with the pictures of the used views, the worst ones first."""
-    used = [view for view in session.views if view.is_used]
+    used = [view for view in series.views if view.is_used]
     if not used:
         return ""
     scale = _scale(used, _ARROW_SHARE)
     worst = sorted(used, key=lambda view: -_rms_px(view))
-    times = _times(scale, session)
+    times = _times(scale, series)
     words = (
         f"Arrows lead from where the rig expects a corner to where it was seen{times}; the bar shows their scale. The worst views"
         " come first. Arrows that all point one way: the board or a camera moved; arrows at one end: blur, glare or a board that is"
         " not flat."
     )
     shown = worst[:_MOST_PICTURES]
-    content = f'<div class="views2">{"".join(_view(view, session, scale) for view in shown[:_MOST_SHOWN])}</div>'
+    content = f'<div class="views2">{"".join(_view(view, series, scale) for view in shown[:_MOST_SHOWN])}</div>'
     if len(shown) > _MOST_SHOWN:
-        more = "".join(_view(view, session, scale) for view in shown[_MOST_SHOWN:])
+        more = "".join(_view(view, series, scale) for view in shown[_MOST_SHOWN:])
         rest = counted(len(shown) - _MOST_SHOWN, "more view", "more views")
         content += f'<details><summary>{rest}</summary><div class="views2">{more}</div></details>'
-    rows = [(view.name, f"{_one_rms(view.left):.3f}", f"{_one_rms(view.right):.3f}", _vertical(view)) for view in used]
-    numbers = table(("pair", "left, px", "right, px", "vertical, px"), rows)
-    content += f"<details><summary>Figures of all views, RMS</summary>{numbers}</details>"
+    rows = [
+        (view.name, f"{_one_rms(view.left):.3f}", f"{_one_rms(view.right):.3f}", _vertical(view), *_in_space(view))
+        for view in used
+    ]
+    numbers = table(
+        ("pair", "left, px", "right, px", "vertical, px", "rays miss, \u03c3", "board\u2019s size, %", "its bow, mm"),
+        rows,
+    )
+    content += f'<details><summary>Figures of all views</summary><p class="sub">{_FIGURES}</p>{numbers}</details>'
     return section("What is left in each view", words, content)
 
 
-def rejected_card(session: CalibrationSession) -> str:
+def rejected_card(series: CalibrationSeries) -> str:
     """Make the card with the views that are not used, and why."""
-    out = [view for view in session.views if not view.is_used]
+    out = [view for view in series.views if not view.is_used]
     if not out:
         return ""
     scale = Enlarged(1.0, 1.0)
@@ -171,9 +182,9 @@ def rejected_card(session: CalibrationSession) -> str:
     unseen = [view for view in out if view not in seen]
     content = ""
     if seen:
-        content += f'<div class="views2">{"".join(_view(view, session, scale) for view in seen[:_MOST_SHOWN])}</div>'
+        content += f'<div class="views2">{"".join(_view(view, series, scale) for view in seen[:_MOST_SHOWN])}</div>'
         if len(seen) > _MOST_SHOWN:
-            more = "".join(_view(view, session, scale) for view in seen[_MOST_SHOWN:])
+            more = "".join(_view(view, series, scale) for view in seen[_MOST_SHOWN:])
             rest = counted(len(seen) - _MOST_SHOWN, "more view", "more views")
             content += f'<details><summary>{rest}</summary><div class="views2">{more}</div></details>'
     if unseen:
@@ -181,10 +192,10 @@ def rejected_card(session: CalibrationSession) -> str:
     return section(f"Not used: {counted(len(out), 'pair')}", "Dots are corners that were found.", content)
 
 
-def _view(view: SessionView, session: CalibrationSession, scale: Enlarged) -> str:
+def _view(view: SeriesView, series: CalibrationSeries, scale: Enlarged) -> str:
     pictures = "".join(
         _photo(board, size, scale, f"{view.name}, {side}")
-        for board, size, side in zip((view.left, view.right), session.sizes_px, ("left", "right"), strict=True)
+        for board, size, side in zip((view.left, view.right), series.sizes_px, ("left", "right"), strict=True)
     )
     if view.is_used:
         said = f"left {_one_rms(view.left):.3f}, right {_one_rms(view.right):.3f}, vertical {_vertical(view)} px RMS"
@@ -203,24 +214,24 @@ def _photo(board: SeenBoard, size: Size, scale: Enlarged, label: str) -> str:
     )
 
 
-def _why(view: SessionView) -> str:
+def _why(view: SeriesView) -> str:
     return f"{view.reason}: {view.detail}" if view.detail else view.reason
 
 
-def field_card(session: CalibrationSession) -> str:
+def field_card(series: CalibrationSeries) -> str:
     """Make the card with the mean errors over each image."""
-    used = [view for view in session.views if view.is_used]
+    used = [view for view in series.views if view.is_used]
     if not used:
         return ""
     fields = [
         _field([getattr(view, side) for view in used], size)
-        for side, size in zip(("left", "right"), session.sizes_px, strict=True)
+        for side, size in zip(("left", "right"), series.sizes_px, strict=True)
     ]
     every = np.concatenate([errors for _, errors in fields])
     if not len(every):
         return ""
     scale, drawn = enlarged(every, _FIELD_SHARE), ""
-    for name, (places, errors), size in zip(("left", "right"), fields, session.sizes_px, strict=True):
+    for name, (places, errors), size in zip(("left", "right"), fields, series.sizes_px, strict=True):
         seen = SeenErrors(size_px=size, places=places, errors_px=errors)
         draw = partial(arrow_field, seen, scale, f"mean residuals of the {name} image")
         title = f"{name} camera, enlarged {scale.times(size[0])} times"
@@ -248,10 +259,10 @@ def _field(boards: list[SeenBoard], size: Size) -> tuple[Floats, Floats]:
     return means[:, :2], means[:, 2:]
 
 
-def course_card(session: CalibrationSession) -> str:
+def course_card(series: CalibrationSeries) -> str:
     """Make the card with vertical error and relative rotation over the order of the views."""
-    used = [view for view in session.views if view.is_used and len(view.as_seen_px)]
-    turns = session.turns
+    used = [view for view in series.views if view.is_used and len(view.as_seen_px)]
+    turns = series.turns
     content = ""
     if len(used) > 1:
         means = np.array([view.as_seen_px.mean() for view in used])
@@ -274,17 +285,17 @@ def course_card(session: CalibrationSession) -> str:
         "Views in the order in which they were taken. A rig that is stiff scatters about 0; a trend or a step means that the"
         " cameras turned against each other. Bars hold 95 % by the noise of the corners."
     )
-    if session.is_straightened:
+    if series.is_straightened:
         words += " The trend shown here was taken out before the rig was computed: it stands as in the last view."
     return section("Over the order of the views", words, content)
 
 
-def _scale(views: list[SessionView], share: float) -> Enlarged:
+def _scale(views: list[SeriesView], share: float) -> Enlarged:
     return enlarged(np.concatenate([board.residuals_px for view in views for board in (view.left, view.right)]), share)
 
 
-def _times(scale: Enlarged, session: CalibrationSession) -> str:
-    left, right = (scale.times(size[0]) for size in session.sizes_px)
+def _times(scale: Enlarged, series: CalibrationSeries) -> str:
+    left, right = (scale.times(size[0]) for size in series.sizes_px)
     return f", enlarged {left} times" if left == right else f", enlarged {left} times left and {right} times right"
 
 
@@ -293,10 +304,22 @@ def _one_rms(board: SeenBoard) -> float:
     return float(np.sqrt((errors**2).sum(axis=1).mean())) if len(errors) else math.nan
 
 
-def _rms_px(view: SessionView) -> float:
+def _rms_px(view: SeriesView) -> float:
     both = [rms for rms in (_one_rms(view.left), _one_rms(view.right)) if math.isfinite(rms)]
     return max(both, default=0.0)
 
 
-def _vertical(view: SessionView) -> str:
+def _vertical(view: SeriesView) -> str:
     return f"{np.sqrt((view.vertical_px**2).mean()):.3f}" if len(view.vertical_px) else "\u2013"
+
+
+def _in_space(view: SeriesView) -> tuple[str, str, str]:
+    board = view.in_space
+    if board is None or not math.isfinite(board.size):
+        return "\u2013", "\u2013", "\u2013"
+    bow_m, sigma_m = board.bow_m
+    return (
+        f"{board.miss:.2f}",
+        f"{board.size * 100:.2f} \u00b1 {board.size_sigma * 100:.2f}",
+        f"{bow_m * 1e3:+.2f} \u00b1 {sigma_m * 1e3:.2f}",
+    )

@@ -15,7 +15,7 @@ from phone_host.calibration.running.watch import DriftWatch
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, Image, Result, Side
 from phone_host.output.overlay_yaml import overlay_text
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import Look
+from phone_host.stereo.evidence import Examined
 
 _LOG = logging.getLogger(__name__)
 
@@ -112,7 +112,7 @@ class DriftKeeper:
         self._session, self._last_ns = session, done_ns
         return Moment(result, timed)
 
-    def judge(self, moment: Moment, look: Look, at_s: float) -> None:
+    def judge(self, moment: Moment, look: Examined, at_s: float) -> None:
         """Take what was seen in a pair into account, and have the next pairs corrected.
 
         Args:

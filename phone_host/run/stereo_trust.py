@@ -15,7 +15,7 @@ from phone_host.model import Processed
 from phone_host.report.depth_data import density
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import Look, has_depth, look_at, maps_of
+from phone_host.stereo.evidence import Examined, has_depth, look_at, maps_of
 
 _UNMATCHED: Final = no_depth(None, None)
 _OF_FILES: Final = "check that the scene has texture, and that --calibration or --rectified fits the images"
@@ -25,7 +25,7 @@ def judge_pair(
     core: StereoCore,
     processed: Processed,
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT),
-    look: Look | None = None,
+    look: Examined | None = None,
 ) -> PairTrust:
     """Judge one pair.
 

@@ -92,7 +92,7 @@ def density(processed: Processed) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Examined:
     """What was seen in one pair.
 
     Attributes:
@@ -113,7 +113,7 @@ def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
     return look_at(processed, maps).evidence
 
 
-def look_at(processed: Processed, maps: PointMaps | None) -> Look:
+def look_at(processed: Processed, maps: PointMaps | None) -> Examined:
     """Measure the evidence in one pair.
 
     Args:
@@ -126,7 +126,7 @@ def look_at(processed: Processed, maps: PointMaps | None) -> Look:
     left, right = grey(pair.left), grey(pair.right)
     if maps is None or disparity is None:
         blind = Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
-        return Look(blind, left, right, Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, np.float32)))
+        return Examined(blind, left, right, Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, np.float32)))
     height_px, width_px = left.shape
     from_rig = isinstance(maps, ThroughRig)
     is_cropped = isinstance(maps, ThroughRig) and maps.rig.is_cropped
@@ -168,7 +168,7 @@ def look_at(processed: Processed, maps: PointMaps | None) -> Look:
         off_middle=None if from_rig else _off_middle(processed),
         matched_scale=1.0 if processed.search is None else processed.search.scale,
     )
-    return Look(evidence, left, right, upright)
+    return Examined(evidence, left, right, upright)
 
 
 def _wanted(disparity: Disparity, processed: Processed) -> Disparity:

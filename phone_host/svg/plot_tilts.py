@@ -13,7 +13,7 @@ _BELOW_PX: Final = 18
 
 
 @dataclass(frozen=True, slots=True)
-class Tilt:
+class TiltedBoard:
     """How one board was tilted.
 
     Attributes:
@@ -29,7 +29,7 @@ class Tilt:
     title: str
 
 
-def tilt_disc(tilts: Sequence[Tilt], label: str, width_px: int) -> str:
+def tilt_disc(tilts: Sequence[TiltedBoard], label: str, width_px: int) -> str:
     """Draw the tilts, and rings at 20 and 45 degrees, between which views teach most.
 
     Args:

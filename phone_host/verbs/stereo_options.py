@@ -24,8 +24,6 @@ from phone_host.stereo.scaled_rig import scaled_geometry
 from phone_host.verbs.stereo_numbers import crop_of, pixels, point_px, scale_of
 from phone_host.verbs.units import baseline_mm, limit_mm
 
-"""`Rig.verdict` of a rig that should not be used (`calibration.verdict`)."""
-
 _KITTI_FOLDER: Final = re.compile(r"image_0?([0-3])")
 """KITTI's folders of images are called by the camera: 0 and 1 are grey, 2 and 3 colour, each left before right."""
 

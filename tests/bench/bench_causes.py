@@ -1,13 +1,13 @@
 """Whether the causes of bad calibrations are told apart: `python -m tests.bench.bench_causes [--help]`.
 
-Sessions of board views are made by exact geometry with one mistake each, of random kind and size (see
-`tests/support/cause_sessions.py`); blur and glare are rendered. 50 good sessions have what good sessions have: noise, a
-board that is not flat, one pair in which it moved. Half of the good sessions tell a measured baseline. Sessions with an
+Series of board views are made by exact geometry with one mistake each, of random kind and size (see
+`tests/support/cause_series.py`); blur and glare are rendered. 50 good series have what good series have: noise, a
+board that is not flat, one pair in which it moved. Half of the good series tell a measured baseline. Series with an
 odd number were never looked at while limits were chosen (`held out`); both halves are shown. With $SCAN_DATA, real
-sessions are judged as they are, and with a mistake of each class made on their corners or images;
+series are judged as they are, and with a mistake of each class made on their corners or images;
 they are printed, not counted: rigs that turned while they were calibrated are among them.
 
-To reach: 95 % of 200 mistakes named rightly; none of 50 good sessions accused. Exit 4 when one is missed.
+To reach: 95 % of 200 mistakes named rightly; none of 50 good series accused. Exit 4 when one is missed.
 """
 
 import argparse
@@ -31,8 +31,8 @@ from phone_host.calibration.causes.mistakes import Mistake
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.cause_judge import finding_of
-from tests.support.cause_real import real_sessions
-from tests.support.cause_sessions import MAKERS, Made, good, good_pictures
+from tests.support.cause_real import real_seriess
+from tests.support.cause_series import MAKERS, Made, good, good_pictures
 
 _MISTAKES, _GOOD = 200, 50
 _GOOD_PICTURES: Final = 0.2
@@ -42,7 +42,7 @@ _NONE: Final = "good"
 
 @dataclass(frozen=True, slots=True)
 class _Case:
-    """One session: what is made (None: nothing wrong), and its seed."""
+    """One series: what is made (None: nothing wrong), and its seed."""
 
     made: Mistake | None
     seed: int
@@ -76,7 +76,7 @@ def main() -> int:
         for each in pool.map(_judge, cases):
             judged.append(each)
             bar.advance(task)
-    real = list(real_sessions())
+    real = list(real_seriess())
     verdicts = _verdicts(judged)
     if options.json:
         shown = {"verdicts": [asdict(verdict) for verdict in verdicts], "named": _counts(judged)}
@@ -105,11 +105,9 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="bench_causes", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument(
-        "--mistakes", type=int, default=_MISTAKES, help="how many sessions with a mistake (default 200)"
-    )
-    parser.add_argument("--good", type=int, default=_GOOD, help="how many good sessions (default 50)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first session of each kind (default 0)")
+    parser.add_argument("--mistakes", type=int, default=_MISTAKES, help="how many series with a mistake (default 200)")
+    parser.add_argument("--good", type=int, default=_GOOD, help="how many good series (default 50)")
+    parser.add_argument("--seed", type=int, default=0, help="of the first series of each kind (default 0)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser.parse_args()
@@ -134,7 +132,7 @@ def _judge(case: _Case) -> _Judged:
 
 
 def _matrix(judged: list[_Judged]) -> Table:
-    """The confusion matrix: made in rows, named in columns; rows of tuned and held-out sessions together."""
+    """The confusion matrix: made in rows, named in columns; rows of tuned and held-out series together."""
     kinds = [*Mistake, None]
     table = Table("made", *(_word(kind) for kind in kinds), "right", "held out")
     for made in kinds:
@@ -174,7 +172,7 @@ def _verdicts(judged: list[_Judged]) -> list[Verdict]:
             f"{named} of {len(bad)}",
             f"{_TO_REACH:.0%} of them",
         ),
-        Verdict("good sessions accused", not accused, f"{len(accused)} of {goods}", "none"),
+        Verdict("good series accused", not accused, f"{len(accused)} of {goods}", "none"),
     ]
 
 

@@ -42,7 +42,13 @@ def main() -> int:
     options = _options()
     console, busy = Console(width=170), Busyness()
     sessions = list[Session]()
-    setting = Setting(fps=options.fps, patience_s=options.patience, is_free=options.free, kind=options.board)
+    setting = Setting(
+        fps=options.fps,
+        other_fps=options.other_fps,
+        patience_s=options.patience,
+        is_free=options.free,
+        kind=options.board,
+    )
     with tempfile.TemporaryDirectory(prefix="guide") as scratch:
         folder = options.keep or Path(scratch)
         seeds = range(options.seed, options.seed + options.runs)
@@ -76,7 +82,8 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--runs", type=int, default=_RUNS, help="how many sessions (default 20)")
     parser.add_argument("--seed", type=int, default=_SEED, help="of the first session (default 0)")
     parser.add_argument("--jobs", type=int, default=1, help="sessions at once (default 1)")
-    parser.add_argument("--fps", type=int, default=_FPS, help="frames per second of both cameras (default 15)")
+    parser.add_argument("--fps", type=int, default=_FPS, help="frames per second (default 15)")
+    parser.add_argument("--other-fps", type=int, metavar="FPS", help="of the right camera (default: the same)")
     parser.add_argument("--patience", type=float, default=_PATIENCE_S, help="longest session, s (default 300)")
     parser.add_argument("--free", action="store_true", help="cameras that cannot be steered: exposures stay apart")
     parser.add_argument("--board", choices=BOARDS, default="chessboard", help="what is held (default chessboard)")

@@ -311,7 +311,7 @@ SOURCES: Final = (
     Source("opencv", Topic.CALIBRATION, "OpenCV's example images, 640x480. The side of the squares is unknown.", _CALIBRATE.format(left="opencv_stereo_calib/left*.jpg", right="opencv_stereo_calib/right*.jpg", board="9x6", square="25mm", name="opencv"), _opencv_images, 10),
     Source("rigs", Topic.CALIBRATION, "Real rigs, the same made unlike (right images cropped, scaled by 0.6, re-exposed, compressed again), and ten rendered rigs whose truth is known, beside OpenCV's `stereo_calib` recipe.", f"{_BENCH}bench_calibration --json", _rigs, 90),
     Source("corners", Topic.CALIBRATION, "Corners of rendered chessboards. `cornerSubPix` starts where ours does; `sectors` is OpenCV's findChessboardCornersSB.", f"{_BENCH}bench_corners --json", _corners, 60),
-    Source("causes", Topic.CALIBRATION, "Sessions of board views with one mistake each, and good ones: is the cause named?", f"{_BENCH}bench_causes --json", _verdicts, 300),
+    Source("causes", Topic.CALIBRATION, "Series of board views with one mistake each, and good ones: is the cause named?", f"{_BENCH}bench_causes --json", _verdicts, 300),
     Source("guide", Topic.CALIBRATION, "A simulated novice who follows the words of `calibrate --live`, with two painted cameras and a real link.", f"{_BENCH}bench_guide --jobs 2 --json", _verdicts, 900),
     Source("drift", Topic.CALIBRATION, "A rig that turns while it runs, and rigs that stand.", f"{_BENCH}bench_drift --json", _verdicts, 600),
     Source("measure", Topic.DEPTH, "Points of rendered rooms, measured as `phone-host measure` does: does the truth lie within what is stated?", f"{_BENCH}bench_measure --json", _verdicts, 300),

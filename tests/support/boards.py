@@ -30,12 +30,14 @@ def poses(
     return np.array(result)
 
 
-def exact_pairs(rig: Rig, board_poses: NDArray[np.float64], noise_px: float = 0.0, seed: int = 0) -> list[BoardPair]:
+def exact_pairs(
+    rig: Rig, board_poses: NDArray[np.float64], noise_px: float = 0.0, seed: int = 0, board: Board = BOARD
+) -> list[BoardPair]:
     """The corners that both cameras see, with Gaussian noise."""
     random = np.random.default_rng(seed)
     pairs = []
     for index, pose in enumerate(board_poses):
-        points = BOARD.points_m() @ np.asarray(cv2.Rodrigues(pose[:3])[0]).T + pose[3:]
+        points = board.points_m() @ np.asarray(cv2.Rodrigues(pose[:3])[0]).T + pose[3:]
         left, right = project_points(points, rig)
         left, right = (corners + random.normal(0, noise_px, corners.shape) for corners in (left, right))
         pairs.append(BoardPair(str(index), left, right))

@@ -1,18 +1,18 @@
-"""Names the mistake of a made session the way `phone-host calibrate` does, from corners or from images."""
+"""Names the mistake of a made series the way `phone-host calibrate` does, from corners or from images."""
 
 from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.looks import SeenLook, look_at
 from phone_host.calibration.causes.mistakes import Finding
-from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.target import agree, find_corners
 from phone_host.model import Side
-from tests.support.cause_sessions import Made
+from tests.support.cause_series import Made
 
 
 def finding_of(made: Made) -> Finding | None:
-    """What a session's views tell."""
+    """What a series's views tell."""
     pairs, looks = list(made.pairs), list[SeenLook]()
     for index, images in enumerate(made.images):
         corners = []
@@ -21,7 +21,7 @@ def finding_of(made: Made) -> Finding | None:
             looks.append(SeenLook(f"{side.value}{index}", side, look_at(image, corners[-1], made.board)))
         if len(corners[0]) and len(corners[1]):
             pairs.append(BoardPair(str(index), corners[0], agree(corners[0], corners[1], made.board)))
-    session = BoardSession(
+    series = BoardSeries(
         pairs=tuple(pairs),
         board=made.board,
         sizes_px=made.sizes_px,
@@ -33,4 +33,4 @@ def finding_of(made: Made) -> Finding | None:
         found = calibrate(pairs, made.board, made.sizes_px)
     except DataError as failure:
         found = failure
-    return name_mistake(session, found)
+    return name_mistake(series, found)

@@ -1,4 +1,4 @@
-"""Real sessions of $SCAN_DATA, as they are and with a mistake made on their corners: what is named."""
+"""Real series of $SCAN_DATA, as they are and with a mistake made on their corners: what is named."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ from phone_host.calibration.target import Board, agree, find_corners
 from phone_host.model import Image
 from phone_host.stereo.view_files import pair_files
 from tests.support.cause_judge import finding_of
-from tests.support.cause_sessions import Made
+from tests.support.cause_series import Made
 from tests.support.cause_spoils import blurring, lit
 
 Points = NDArray[np.float64]
@@ -48,7 +48,7 @@ REAL: Final = {
 
 @cache
 def real_pairs(name: str) -> tuple[tuple[BoardPair, ...], Board, Sizes]:
-    """Return a real session's corners, its board and the images' sizes."""
+    """Return a real series's corners, its board and the images' sizes."""
     data, real = Path(os.environ["SCAN_DATA"]), REAL[name]
     views = look_for_boards(pair_files(str(data / real.left), str(data / real.right)), real.board, lambda: None)
     return views.pairs, real.board, views.sizes_px
@@ -149,7 +149,7 @@ def _moved(made: Made) -> Iterator[tuple[str, Mistake, Made]]:
 
 
 def variants(name: str) -> Iterator[tuple[str, Mistake | None, Made]]:
-    """Give a real session as it is, and with a mistake of each class: made on its corners, blur and glare on its images.
+    """Give a real series as it is, and with a mistake of each class: made on its corners, blur and glare on its images.
 
     Args:
         name: of `REAL`.
@@ -181,8 +181,8 @@ def _lit(image: Image, board: Board) -> Image:
     return lit(image, (float(x), float(y)), 0.2 * float(np.ptp(corners, axis=0).max()))
 
 
-def real_sessions() -> Iterator[tuple[str, Mistake | None, Finding | None]]:
-    """Give each real session's name, the mistake made and what is named; nothing without $SCAN_DATA."""
+def real_seriess() -> Iterator[tuple[str, Mistake | None, Finding | None]]:
+    """Give each real series's name, the mistake made and what is named; nothing without $SCAN_DATA."""
     if not os.environ.get("SCAN_DATA"):
         return
     for name in REAL:

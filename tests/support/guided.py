@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.progress import Progress
@@ -125,7 +125,7 @@ def follow(
         corners = seen(rig, board, hand.at, random, _NOISE_PX)
         skew_ns = int(random.uniform(-16e6, 16e6))
         glance = Glance(at_ns=now_ns, skew_ns=skew_ns, left_px=corners[0], right_px=corners[1], sizes_px=sizes)
-        look = Look(2.5, 0.0, 0.1)
+        look = BoardLook(2.5, 0.0, 0.1)
         if guide.see(glance, now_ns) is Gate.READY and guide.examine(glance, (look, look), now_ns) is Gate.TAKEN:
             solve_at = now_ns + _SOLVE_NS
         if solve_at and now_ns >= solve_at and len(guide.views) >= 3:

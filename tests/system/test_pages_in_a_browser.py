@@ -10,7 +10,7 @@ from phone_host.model import Epipolar
 from phone_host.report.calibration_page import calibration_page
 from phone_host.report.page_links import NextCommand
 from phone_host.report.stereo_page import stereo_page
-from tests.support import calibration_sessions
+from tests.support import calibration_series
 from tests.support.browser import Browser, browser, needs_chromium
 from tests.support.stereo_pages import page_data, processed
 
@@ -107,7 +107,7 @@ def test_the_page_of_a_calibration_fits_the_window(
     """On a phone and on a desktop no part is wider than the window, every picture is shown, and its policy refuses nothing."""
     page, _ = shown
     path = tmp_path / "index.html"
-    path.write_text(calibration_page(calibration_sessions.session()))
+    path.write_text(calibration_page(calibration_series.series()))
     page.complaints.clear()
     page.open(path.as_uri(), width_px, dark=dark)
     assert page.ask("document.documentElement.scrollWidth") <= width_px

@@ -16,7 +16,7 @@ from phone_host.output.rig_yaml import read_rig, write_rig
 from phone_host.scene.demo_scene import plane_scene
 from phone_host.scene.scene import render, rig_poses
 from phone_host.stereo.rectify import rectify_rig
-from tests.support.boards import render_pair
+from tests.support.board_films import board_films
 from tests.support.enrolment_rig import on_every_network
 from tests.support.page_client import page
 from tests.support.programs import board, host, ledgers, program, until
@@ -160,11 +160,11 @@ def test_a_page_beside_a_run_changes_no_bit(film: Path, tmp_path: Path) -> None:
 
 def test_a_live_calibration_by_the_api_becomes_the_rig_of_the_next_run(tmp_path: Path) -> None:
     """Views of a rendered board: the guide is in the state, rig.yaml is written as `calibrate --live` does, and chosen."""
-    _board_films(tmp_path)
+    board_films(tmp_path)
     theirs = ["run", "--camera", f"replay:{tmp_path}/left?fps=10&loop=1", "--link", f"ipc://{tmp_path}/link"]
     with board(theirs, tmp_path), page(["serve", "127.0.0.1:0"], tmp_path) as (ours, client):
         client.do("set", link=f"ipc://{tmp_path}/link", camera=f"replay:{tmp_path}/right?fps=10&loop=1")
-        client.do("calibrate", square="25mm", views="4")
+        client.do("calibrate", square="25mm", views="5")
         until(lambda: (client.state()["guide"] or {}).get("views", 0) >= 1, "the first view")
         assert client.state()["guide"]["svg"].startswith("<svg")
         state = client.until_idle()
@@ -203,21 +203,3 @@ def test_a_port_that_is_taken_is_told_with_the_remedy(tmp_path: Path) -> None:
         with host(["serve", f"127.0.0.1:{port}"], tmp_path, "taken") as first:
             assert first.wait() == 3
     assert f"port {port} of 127.0.0.1 is taken: " in first.stderr.splitlines()[-1]
-
-
-def _board_films(folder: Path) -> None:
-    """Two films of a board that is tilted four ways, each still for a while."""
-    from tests.support.boards import BOARD  # noqa: PLC0415 - this test alone
-
-    middle = BOARD.points_m().mean(axis=0)
-    numbers = iter(range(1000))
-    for side in ("left", "right"):
-        (folder / side).mkdir()
-    for across, down in ((0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)):
-        turn = np.array([-down, across, 0.0])
-        pose = np.concatenate([turn, np.array([0.03, 0.0, 0.5]) - cv2.Rodrigues(turn)[0] @ middle])
-        pair = [cv2.imencode(".jpg", image)[1].tobytes() for image in render_pair(small_rig(), pose)]
-        for _ in range(12):
-            number = next(numbers)
-            for side, image in zip(("left", "right"), pair, strict=True):
-                (folder / side / f"{number}.jpg").write_bytes(image)

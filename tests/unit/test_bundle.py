@@ -72,3 +72,14 @@ def test_corners_that_are_not_seen_are_left_out() -> None:
     np.testing.assert_allclose(whole.rig.t_right_left_m, rig.t_right_left_m, atol=1e-5)
     assert len(whole.used) == 9
     assert whole.squares.mean_m == pytest.approx(0.025, rel=1e-5)
+
+
+def test_five_views_that_contradict_each_other_say_so() -> None:
+    """Right corners of a view shift together, as a hand moves between two exposures: what is stated grows by more than their scatter."""
+    rig, random = unlike_rig(), np.random.default_rng(7)
+    pairs = exact_pairs(rig, poses(5, seed=2), 0.05)
+    moved = [replace(pair, right_px=pair.right_px + random.normal(0, 0.3, 2)) for pair in pairs]
+    sizes = ((rig.left.width_px, rig.left.height_px), (rig.right.width_px, rig.right.height_px))
+    steady, shifted = (calibrate(each, BOARD, sizes) for each in (pairs, moved))
+    scatter = shifted.rig.rms_stereo_px / steady.rig.rms_stereo_px
+    assert dict(shifted.depths)[1.0] > 1.5 * scatter * dict(steady.depths)[1.0]

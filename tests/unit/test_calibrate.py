@@ -159,7 +159,7 @@ def test_few_pairs_are_never_good() -> None:
 
 
 def test_of_three_pairs_the_uncertainty_is_honest() -> None:
-    """Of eight sessions of three pairs, the baseline lies within 2.5 stated deviations in all; with k1 alone it is off by up to twenty."""
+    """Of eight series of three pairs, the baseline lies within 2.5 stated deviations in all; with k1 alone it is off by up to twenty."""
     true_m = float(np.linalg.norm(_rig().t_right_left_m))
     for seed in range(8):
         found = calibrate(exact_pairs(_rig(), poses(3, seed=seed), noise_px=0.02, seed=seed), BOARD, _SIZES)

@@ -25,7 +25,7 @@ from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.board import Known, Named, Origin
 from phone_host.verbs.calibrate.command import run
-from phone_host.verbs.calibrate.earlier import Session, asked_of, calibrated, notes, session_of
+from phone_host.verbs.calibrate.earlier import Series, asked_of, calibrated, notes, series_of
 from phone_host.verbs.calibrate.rig_file import replace_rig
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.pictures import encoded
@@ -49,9 +49,9 @@ def _options(folder: Path, *given: str) -> argparse.Namespace:
     return parser.parse_args([str(folder / "left"), str(folder / "right"), *given, "--out", str(folder / "new.yaml")])
 
 
-def _session(options: argparse.Namespace) -> Session:
-    """The session, where the pictures show the board that is named, or the usual one."""
-    return session_of(options, asked_of(options), lambda named: Known(named.board or BOARD, Origin.OPTION))[0]
+def _series(options: argparse.Namespace) -> Series:
+    """The series, where the pictures show the board that is named, or the usual one."""
+    return series_of(options, asked_of(options), lambda named: Known(named.board or BOARD, Origin.OPTION))[0]
 
 
 def _written(folder: Path, pairs: list[BoardPair], *, with_views: bool = True) -> Path:
@@ -68,29 +68,29 @@ def test_added_views_are_solved_together_with_the_earlier_ones(tmp_path: Path) -
     """Six pairs in the file and six new ones give what twelve give at once; what the file knows besides stays."""
     pairs = exact_pairs(unlike_rig(), poses(12, seed=3), noise_px=0.1)
     path = _written(tmp_path, pairs[:6])
-    session = _session(_options(tmp_path, "--from", str(path)))
+    series = _series(_options(tmp_path, "--from", str(path)))
     later = [replace(pair, name=str(number)) for number, pair in enumerate(pairs[6:])]
-    found = calibrated(session, later, _SIZES)
+    found = calibrated(series, later, _SIZES)
     at_once = calibrate(pairs, BOARD, _SIZES)
     np.testing.assert_allclose(found.rig.t_right_left_m, at_once.rig.t_right_left_m, atol=1e-6)
     assert len(found.used) == 12
     assert (found.rig.board_side, found.rig.time_offset) == (Side.RIGHT, TimeOffset(5_000_000, 100_000))
-    assert notes(session, later, _SIZES) == [f"from     6 pairs of {path} and 6 new ones"]
+    assert notes(series, later, _SIZES) == [f"from     6 pairs of {path} and 6 new ones"]
 
 
 def test_pictures_that_are_in_the_rig_already_do_not_count_twice(tmp_path: Path) -> None:
     """Of three known pairs and six new ones the six are added; known ones alone are refused."""
     pairs = exact_pairs(unlike_rig(), poses(12, seed=3), noise_px=0.1)
     path = _written(tmp_path, pairs[:6])
-    session = _session(_options(tmp_path, "--from", str(path)))
-    assert len(calibrated(session, pairs[3:], _SIZES).used) == 12
-    assert notes(session, pairs[3:], _SIZES) == [f"from     6 pairs of {path} and 6 new ones; 3 were in it already"]
+    series = _series(_options(tmp_path, "--from", str(path)))
+    assert len(calibrated(series, pairs[3:], _SIZES).used) == 12
+    assert notes(series, pairs[3:], _SIZES) == [f"from     6 pairs of {path} and 6 new ones; 3 were in it already"]
     with pytest.raises(DataError, match=r"in .*rig\.yaml already"):
-        calibrated(session, pairs[:2], _SIZES)
+        calibrated(series, pairs[:2], _SIZES)
 
 
 def test_names_that_are_taken_get_a_number() -> None:
-    """Every pair of a second session may be named as one of the first; another board is refused."""
+    """Every pair of a second series may be named as one of the first; another board is refused."""
     pairs = exact_pairs(unlike_rig(), poses(3, seed=3))
     names = [pair.name for pair in together(together(pairs, pairs[:2]), pairs[:1])]
     assert names == ["0", "1", "2", "0 (2)", "1 (2)", "0 (3)"]
@@ -121,15 +121,15 @@ def test_lenses_are_scaled_to_new_pictures_and_that_is_said(tmp_path: Path) -> N
     path = _written(tmp_path, exact_pairs(truth, poses(7, seed=1), noise_px=0.02), with_views=False)
     sizes = ((1280, 960), (1280, 680))
     seen = exact_pairs(scaled_rig(truth, *sizes), poses(6, seed=2), noise_px=0.02)
-    session = _session(_options(tmp_path, "--from", str(path), "--pose-only", "--board", "9x6", "--square", "25mm"))
-    found = calibrated(session, seen, sizes)
+    series = _series(_options(tmp_path, "--from", str(path), "--pose-only", "--board", "9x6", "--square", "25mm"))
+    found = calibrated(series, seen, sizes)
     np.testing.assert_allclose(found.rig.t_right_left_m, truth.t_right_left_m, atol=3e-4)
-    said = notes(session, seen, sizes)
+    said = notes(series, seen, sizes)
     assert said[1].endswith("the left lens is scaled: 640x480 to 1280x960 px")
     assert said[2].endswith("the right lens is cropped to its middle: 1280x720 to 1280x680 px")
     path = _written(tmp_path, exact_pairs(truth, poses(5, seed=1)))
     with pytest.raises(DataError, match=r"the new left pictures are 1280x960 px, those of .*rig.yaml 640x480 px"):
-        calibrated(_session(_options(tmp_path, "--from", str(path))), seen, sizes)
+        calibrated(_series(_options(tmp_path, "--from", str(path))), seen, sizes)
 
 
 def test_what_contradicts_the_earlier_calibration_is_refused(tmp_path: Path) -> None:
@@ -147,15 +147,15 @@ def test_what_contradicts_the_earlier_calibration_is_refused(tmp_path: Path) -> 
         (("--board", "9x6"), "--square is missing"),
     ):
         with pytest.raises(SettingsError) as caught:
-            _session(_options(tmp_path, *given))
+            _series(_options(tmp_path, *given))
         assert said in str(caught.value)
     for again in ("--pose-only", "--board 9x6", "--board auto", "--square 25mm"):
-        assert _session(_options(tmp_path, "--from", path, *again.split())).board == BOARD
+        assert _series(_options(tmp_path, "--from", path, *again.split())).board == BOARD
     small = ("--pose-only", "--board", "8x6", "--square", "30mm")
-    assert _session(_options(tmp_path, "--from", path, *small)).board == Board(8, 6, 0.03)
+    assert _series(_options(tmp_path, "--from", path, *small)).board == Board(8, 6, 0.03)
     bare = str(_written(tmp_path, pairs, with_views=False))
     with pytest.raises(DataError, match="does not hold the corners it was computed from"):
-        _session(_options(tmp_path, "--from", bare))
+        _series(_options(tmp_path, "--from", bare))
 
 
 def _filed(folder: Path, board: Board) -> Path:
@@ -183,7 +183,7 @@ def test_another_board_in_the_new_pictures_is_named_as_that(tmp_path: Path) -> N
     """Nobody gave --board, so the error does not speak of it but of the file."""
     options = _options(tmp_path, "--from", str(_filed(tmp_path, BOARD)))
     with pytest.raises(DataError, match=r"another board than .*rig\.yaml holds"):
-        session_of(options, asked_of(options), _another_board)
+        series_of(options, asked_of(options), _another_board)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ def test_the_earlier_calibration_knows_its_board_with_its_marks(tmp_path: Path, 
     assert (again.columns, again.rows, again.square_m) == (board.columns, board.rows, board.square_m)
     np.testing.assert_allclose(again.points_m(), board.points_m(), rtol=1e-7)
     assert type(again.marks) is type(board.marks)
-    known = _session(_options(tmp_path, "--from", str(tmp_path / "rig.yaml"), "--board", name)).board
+    known = _series(_options(tmp_path, "--from", str(tmp_path / "rig.yaml"), "--board", name)).board
     assert known == again
     with pytest.raises(DataError, match="the earlier calibration is 'charuco:9x9"):
         board_of(replace(read, board="charuco:9x9:28mm:20mm:5x5"))
@@ -220,7 +220,7 @@ def test_pictures_of_another_size_are_refused_before_they_are_searched(tmp_path:
 
 
 def test_the_command_adds_to_a_rig_and_solves_the_pose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """From pictures: the new file holds the views of both sessions and can be added to again; after --pose-only it holds none."""
+    """From pictures: the new file holds the views of both series and can be added to again; after --pose-only it holds none."""
     for index, pose in enumerate(poses(8, seed=8, depth_m=(0.4, 0.5))):
         for side, image in zip(("left", "right"), render_pair(small_rig(), pose), strict=True):
             folder = tmp_path / ("first" if index < 4 else "second") / side

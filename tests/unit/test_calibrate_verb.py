@@ -21,7 +21,7 @@ from phone_host.verbs.calibrate.cause import cause_report, with_cause
 from phone_host.verbs.calibrate.command import run
 from phone_host.verbs.calibrate.figures import report_of, summary
 from tests.support.boards import poses, render_pair
-from tests.support.calibration_sessions import calibration, taken
+from tests.support.calibration_series import calibration, taken
 from tests.support.oriented import oriented
 from tests.support.pictures import encoded
 from tests.support.rigs import small_rig
@@ -64,7 +64,7 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
     folder = _folders(tmp_path, lambda image: encoded(".png", image))
     code, report = _calibrate(folder)
     good = read_rig(folder / "rig.yaml")
-    assert (code, good.verdict) == (0, report["verdict"])
+    assert (code, good.verdict) == (0, Verdict(report["verdict"]))
     assert good.zero_sigma_px > 0
     assert report["zero_sigma_px"] == pytest.approx(good.zero_sigma_px, abs=1e-4)
     assert report["depth_limit_m"] > 0
@@ -73,7 +73,7 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
             (folder / "right" / f"{index}.png").write_bytes(encoded(".png", _shaken(pair[1])))
         code, report = _calibrate(folder)
         assert (code, report["verdict"], report.get("earlier_rig")) == (4, "reject", earlier)
-        assert read_rig(folder / "rig.yaml").verdict == "reject"
+        assert read_rig(folder / "rig.yaml").is_rejected
         assert read_rig(folder / "rig.yaml.old").verdict == good.verdict
         assert "refuse this calibration unless --use-rejected-rig is given" in capsys.readouterr().out
 

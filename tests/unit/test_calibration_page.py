@@ -1,4 +1,4 @@
-"""The page of `calibrate`: what it says and shows of a session, and that nothing in it comes from elsewhere."""
+"""The page of `calibrate`: what it says and shows of a series, and that nothing in it comes from elsewhere."""
 
 import math
 from dataclasses import replace
@@ -6,14 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.session_snapshot import session_views
-from phone_host.model.calibration_session import CalibrationSession, Verdict
+from phone_host.calibration.series_snapshot import series_views
+from phone_host.model import Verdict
+from phone_host.model.calibration_series import CalibrationSeries
 from phone_host.report.calibration_page import calibration_page, verdict_words
-from tests.support.calibration_sessions import REJECTED, calibration, rectified, session, taken, turned
+from tests.support.calibration_series import REJECTED, calibration, rectified, series, taken, turned
 from tests.support.html import Page
 
 
-def _page(shown: CalibrationSession) -> Page:
+def _page(shown: CalibrationSeries) -> Page:
     """Reads the page, whose elements are all closed and whose pictures are all inside it."""
     page = Page(calibration_page(shown))
     assert page.open == []
@@ -29,9 +30,9 @@ def _page(shown: CalibrationSession) -> Page:
     return page
 
 
-def test_a_page_shows_every_part_of_a_session() -> None:
+def test_a_page_shows_every_part_of_a_series() -> None:
     """Verdict with its remedy first, then figures with limits, coverage, rectified pair, views, rejected ones, field, order, space, cameras, files."""
-    page = _page(session())
+    page = _page(series())
     words = page.words
     titles = (
         "Usable: take pairs with the board in the corners of both images.",
@@ -67,7 +68,7 @@ def test_a_page_shows_every_part_of_a_session() -> None:
 def test_figures_of_the_page_are_those_of_the_calibration() -> None:
     """The 95th percentile of rows, the baseline and the focal length of each camera, beside what is good."""
     found = calibration()
-    page = _page(session())
+    page = _page(series())
     p95 = float(np.percentile(found.vertical_px, 95))
     baseline_mm = float(np.linalg.norm(found.rig.t_right_left_m)) * 1e3
     assert f"{p95:.3f} px" in page.words
@@ -95,13 +96,13 @@ def test_the_verdict_is_one_sentence_with_one_remedy_unless_it_is_good(
     verdict: Verdict, changes: dict[str, str], said: str
 ) -> None:
     """What is good needs none; a cause is named."""
-    assert verdict_words(replace(session(), verdict=verdict, **changes)) == said  # type: ignore[arg-type]
+    assert verdict_words(replace(series(), verdict=verdict, **changes)) == said  # type: ignore[arg-type]
 
 
 def test_names_from_outside_stay_text() -> None:
     """A pair, a reason, a remedy and a file that look like elements."""
     evil = "<script>alert(1)</script>"
-    whole = session()
+    whole = series()
     views = tuple(replace(view, name=evil, detail=evil if view.reason else "") for view in whole.views)
     assert whole.turns is not None
     assert whole.rectified is not None
@@ -121,13 +122,13 @@ def test_names_from_outside_stay_text() -> None:
 def test_views_that_gave_no_rig_are_shown_with_what_was_found() -> None:
     """Coverage and pictures of the boards that were found, and no figures."""
     found = taken()
-    shown = CalibrationSession(
+    shown = CalibrationSeries(
         verdict=Verdict.REJECT,
         problem="only 2 of at least 3 pairs can be used",
         remedy="take 15",
         board="b",
         sizes_px=found.views.sizes_px,
-        views=session_views(found, None, REJECTED),
+        views=series_views(found, None, REJECTED),
     )
     page = _page(shown)
     assert "Rejected: only 2 of at least 3 pairs can be used: take 15." in page.words
@@ -138,9 +139,9 @@ def test_views_that_gave_no_rig_are_shown_with_what_was_found() -> None:
     assert "3 more views" in page.words
 
 
-def test_a_session_without_any_board_has_only_its_reasons() -> None:
+def test_a_series_without_any_board_has_only_its_reasons() -> None:
     """No coverage, no pictures of used views."""
-    whole = session()
+    whole = series()
     shown = replace(whole, found=None, rectified=None, turns=None, views=tuple(v for v in whole.views if v.reason))
     page = _page(shown)
     assert "What the views cover" not in page.words
@@ -150,7 +151,7 @@ def test_a_session_without_any_board_has_only_its_reasons() -> None:
 
 def test_what_is_not_known_of_a_rig_is_left_out() -> None:
     """A rig whose lenses' uncertainty nobody stated has a baseline, but neither a sigma of it nor one of depth; no figure reads nan."""
-    shown = session()
+    shown = series()
     assert shown.found is not None
     rig = replace(shown.found.rig, covariance=np.full((30, 30), np.nan), zero_sigma_px=math.nan)
     depths = tuple((depth_m, math.nan) for depth_m, _ in shown.found.depths)
@@ -164,7 +165,7 @@ def test_what_is_not_known_of_a_rig_is_left_out() -> None:
 
 def test_a_rig_that_cannot_be_rectified_has_no_rows() -> None:
     """No vertical error, no depth, no far limit; boards and cameras are still drawn."""
-    whole = session()
+    whole = series()
     assert whole.found is not None
     nothing = replace(
         whole.found,
@@ -189,24 +190,24 @@ def test_a_drift_that_was_taken_out_is_shown_as_it_was_seen() -> None:
     used = taken(turned(0.05, 0))
     assert used.is_straightened
     assert not taken().is_straightened
-    views = session_views(used, calibration(), ())
+    views = series_views(used, calibration(), ())
     assert calibration().rectification is not None
     moved = np.abs(views[0].vertical_px - views[0].as_seen_px)
     focal_px = calibration().rig.left.matrix[0, 0]  # of the coarser camera: that of the rectified images
     assert moved == pytest.approx(np.radians(0.05) * focal_px, rel=0.15)
     assert all(np.array_equal(view.vertical_px, view.as_seen_px) for view in views[1:])
-    assert "taken out before the rig was computed" in _page(replace(session(), is_straightened=True)).words
+    assert "taken out before the rig was computed" in _page(replace(series(), is_straightened=True)).words
 
 
 def test_cameras_above_each_other_are_shown_above_each_other() -> None:
     """The lines are columns then."""
-    page = _page(replace(session(), rectified=rectified(is_vertical=True)))
+    page = _page(replace(series(), rectified=rectified(is_vertical=True)))
     assert "a matcher only looks along the column" in page.words
 
 
 def test_a_page_with_many_views_stays_small() -> None:
     """Of a hundred views only thirty have pictures."""
-    whole = session()
+    whole = series()
     used = [view for view in whole.views if view.is_used]
     many = tuple(replace(used[index % 8], name=f"v{index}") for index in range(100))
     page = _page(replace(whole, views=many))
@@ -217,7 +218,7 @@ def test_a_page_with_many_views_stays_small() -> None:
 
 def test_a_single_view_of_two_corners_has_neither_a_mean_nor_an_order() -> None:
     """Its pictures are shown without a list of more views; no tile has enough corners, and one view has no order."""
-    whole = session()
+    whole = series()
     one = next(view for view in whole.views if view.is_used)
     sides = {
         name: replace(side, corners_px=side.corners_px[:2], residuals_px=side.residuals_px[:2])

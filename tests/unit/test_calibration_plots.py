@@ -9,16 +9,16 @@ import pytest
 
 from phone_host.calibration.board_pairs import Reason, Rejected
 from phone_host.calibration.rectified_view import fullest, rectified_view
-from phone_host.calibration.session_snapshot import session_views
+from phone_host.calibration.series_snapshot import series_views
 from phone_host.calibration.small_picture import small_jpeg, small_size
 from phone_host.calibration.view_turns import view_turns
 from phone_host.svg.plot_arrows import enlarged
 from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_coverage import coverage_map, tile_views
 from phone_host.svg.plot_rig import Shape, in_space, seen_from
-from phone_host.svg.plot_tilts import Tilt, tilt_disc
+from phone_host.svg.plot_tilts import TiltedBoard, tilt_disc
 from tests.support.boards import BOARD
-from tests.support.calibration_sessions import calibration, pairs, taken, turned
+from tests.support.calibration_series import calibration, pairs, taken, turned
 from tests.support.html import Page
 
 
@@ -67,7 +67,7 @@ def test_courses_show_their_limits_and_as_many_names_as_fit() -> None:
 
 def test_a_disc_of_tilts_holds_the_steepest() -> None:
     """A board that faces the camera lies in the middle, one tilted to the right beside it."""
-    drawn = Page(tilt_disc([Tilt(0.0, 0.0, 0.0, "flat"), Tilt(70.0, 1.0, 0.0, "steep")], "tilts", 300))
+    drawn = Page(tilt_disc([TiltedBoard(0.0, 0.0, 0.0, "flat"), TiltedBoard(70.0, 1.0, 0.0, "steep")], "tilts", 300))
     dots = [each for each in drawn.every("circle") if "fill-opacity" in each]
     assert [float(each["cx"] or 0) for each in dots] == pytest.approx([150, 150 + 130 - 18])
     assert "steep" in drawn.words
@@ -110,13 +110,13 @@ def test_views_of_an_earlier_calibration_come_first_and_have_no_picture() -> Non
     """Their corners are known, their images are not; a new pair whose name was taken keeps its own picture."""
     renamed = [replace(pair, name=f"{pair.name} (2)") for pair in pairs()[4:]]
     earlier = [replace(pair, left_px=pair.left_px.copy()) for pair in pairs()[:4]]
-    views = session_views(taken([*renamed, *earlier]), None, ())
+    views = series_views(taken([*renamed, *earlier]), None, ())
     assert [view.name for view in views] == ["0", "1", "2", "3", "4 (2)", "5 (2)", "6 (2)", "7 (2)"]
     assert [bool(view.left.picture) for view in views] == [False] * 4 + [True] * 4
     assert not any(view.is_used for view in views)
     found = calibration()
     namesake = Rejected("3", Reason.NOT_FOUND_LEFT, "it is new")
-    views = session_views(taken([replace(pair, left_px=pair.left_px.copy()) for pair in pairs()]), found, (namesake,))
+    views = series_views(taken([replace(pair, left_px=pair.left_px.copy()) for pair in pairs()]), found, (namesake,))
     assert [(view.is_used, view.detail) for view in views if view.name == "3"] == [(True, ""), (False, "it is new")]
 
 

@@ -1,4 +1,4 @@
-"""Mistakes of a session of board views are told apart by what two cameras see; good sessions accuse nobody."""
+"""Mistakes of a series of board views are told apart by what two cameras see; good series accuse nobody."""
 
 import math
 import os
@@ -22,11 +22,11 @@ from phone_host.verbs.calibrate.cause import cause_report, with_cause
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.cause_judge import finding_of
 from tests.support.cause_real import real_pairs, variants
-from tests.support.cause_sessions import MAKERS, Made, good, good_pictures, partners, unstiff
+from tests.support.cause_series import MAKERS, Made, good, good_pictures, partners, unstiff
 from tests.support.rigs import small_rig
 
 _FEW = 11
-"""A session of that many views is solved in half the time of most; of those of images, three pairs are looked at."""
+"""A series of that many views is solved in half the time of most; of those of images, three pairs are looked at."""
 
 
 def _random(seed: int) -> np.random.Generator:
@@ -35,10 +35,10 @@ def _random(seed: int) -> np.random.Generator:
 
 @cache
 def _unstiff(course: Course) -> tuple[Made, Finding]:
-    """The first small session whose cameras turn in a way, and what is named."""
+    """The first small series whose cameras turn in a way, and what is named."""
     word = {Course.DRIFT: "drift", Course.KNOCK: "knock", Course.LOOSE: "loose"}[course]
-    sessions = (unstiff(_random(seed)) for seed in range(99))
-    made = next(made for made in sessions if made.truth.startswith(word) and len(made.pairs) <= _FEW)
+    series = (unstiff(_random(seed)) for seed in range(99))
+    made = next(made for made in series if made.truth.startswith(word) and len(made.pairs) <= _FEW)
     found = deviation(tuple(made.pairs), made.board, made.sizes_px)
     assert found is not None
     return made, found
@@ -46,7 +46,7 @@ def _unstiff(course: Course) -> tuple[Made, Finding]:
 
 @pytest.mark.parametrize("mistake", list(Mistake))
 def test_each_mistake_is_named(mistake: Mistake) -> None:
-    """A session of random cameras and boards with one mistake: its name, a sentence with figures and a remedy are given."""
+    """A series of random cameras and boards with one mistake: its name, a sentence with figures and a remedy are given."""
     made = next(made for made in (MAKERS[mistake](_random(seed)) for seed in range(30)) if len(made.pairs) <= _FEW)
     found = finding_of(replace(made, images=made.images[:3]))
     assert found is not None
@@ -56,8 +56,8 @@ def test_each_mistake_is_named(mistake: Mistake) -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 3])
-def test_a_good_session_accuses_nobody(seed: int) -> None:
-    """Noise, a board that is not flat, and one pair in which it moved are no mistake of the session."""
+def test_a_good_series_accuses_nobody(seed: int) -> None:
+    """Noise, a board that is not flat, and one pair in which it moved are no mistake of the series."""
     assert finding_of(good(_random(seed))) is None
 
 
@@ -165,7 +165,7 @@ def test_a_mistake_is_the_first_remedy_and_caps_the_verdict() -> None:
 @pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.skipif(not os.environ.get("SCAN_DATA"), reason="SCAN_DATA is not set: no real images")
-def test_a_real_session_and_the_mistakes_made_on_it() -> None:
+def test_a_real_series_and_the_mistakes_made_on_it() -> None:
     """OpenCV's sample pairs tell of no mistake; made on their corners, each is named."""
     for what, mistake, made in variants("opencv_stereo_calib"):
         if not made.images:

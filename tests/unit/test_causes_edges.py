@@ -1,4 +1,4 @@
-"""Sessions that tell little or nothing: too few views, views that are no boards, and deviations too small or too rare to name."""
+"""Series that tell little or nothing: too few views, views that are no boards, and deviations too small or too rare to name."""
 
 import math
 import re
@@ -20,7 +20,7 @@ from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.lone import both_alone
 from phone_host.calibration.causes.looks import look_at
 from phone_host.calibration.causes.mistakes import Course, Mistake
-from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.causes.partners import wrong_partners
 from phone_host.calibration.fit_quality import Squares
 from phone_host.calibration.marked import MarkFamily
@@ -87,8 +87,8 @@ def _calibration(rig: Rig, obstacle: DataError | None = None) -> Calibration:
     )
 
 
-def _session(pairs: tuple[BoardPair, ...] = (), board: Board = BOARD, baseline_m: float = math.nan) -> BoardSession:
-    return BoardSession(pairs=pairs, board=board, sizes_px=_SIZES, baseline_m=baseline_m)
+def _series(pairs: tuple[BoardPair, ...] = (), board: Board = BOARD, baseline_m: float = math.nan) -> BoardSeries:
+    return BoardSeries(pairs=pairs, board=board, sizes_px=_SIZES, baseline_m=baseline_m)
 
 
 def _stretched(model: CameraModel, factor: float) -> CameraModel:
@@ -103,37 +103,37 @@ def test_a_board_longer_than_a_room_is_a_wrong_unit() -> None:
         (0.5, "squares of 500 mm the board would be 4.5 m"),
         (0.001, "squares of 1 mm the board would be 0.009 m"),
     ):
-        found = name_mistake(_session(board=Board(9, 6, square_m)), DataError("nothing", "nothing"))
+        found = name_mistake(_series(board=Board(9, 6, square_m)), DataError("nothing", "nothing"))
         assert found is not None
         assert found.mistake is Mistake.SQUARE
         assert said in found.sentence
         assert found.most is Verdict.REJECT
-    assert name_mistake(_session(), DataError("nothing", "nothing")) is None
+    assert name_mistake(_series(), DataError("nothing", "nothing")) is None
 
 
 def test_a_measured_baseline_tells_the_square() -> None:
     """Cameras 100 mm apart by the board and 90 mm by the ruler: squares of 22.5 mm would fit, not 25 mm; a ruler off by 2 % accuses nobody."""
     rig = unlike_rig(right_centre_m=(0.1, 0.0, 0.0))
-    found = name_mistake(_session(baseline_m=0.09), _calibration(rig))
+    found = name_mistake(_series(baseline_m=0.09), _calibration(rig))
     assert found is not None
     assert found.mistake is Mistake.SQUARE
     assert (
         "100.0 mm apart, and you measured 90.0 mm: squares of 22.50 mm would fit, --square says 25 mm" in found.sentence
     )
     assert found.most is Verdict.REJECT
-    assert name_mistake(_session(baseline_m=0.098), _calibration(rig)) is None
+    assert name_mistake(_series(baseline_m=0.098), _calibration(rig)) is None
 
 
 def test_lenses_that_are_stretched_alike_tell_a_stretched_print() -> None:
     """Both cameras' pixels 3 % too wide: the print is; one camera's alone are its own."""
     rig = unlike_rig()
     both = replace(rig, left=_stretched(rig.left, 1.03), right=_stretched(rig.right, 1.03))
-    found = name_mistake(_session(), _calibration(both))
+    found = name_mistake(_series(), _calibration(both))
     assert found is not None
     assert found.mistake is Mistake.SQUARE
     assert "3.0% wider" in found.sentence
     one = replace(rig, left=_stretched(rig.left, 1.03), right=_stretched(rig.right, 1.0))
-    assert name_mistake(_session(), _calibration(one)) is None
+    assert name_mistake(_series(), _calibration(one)) is None
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_lenses_that_are_stretched_alike_tell_a_stretched_print() -> None:
 )
 def test_only_cameras_beside_each_other_are_swapped(centre: tuple[float, float, float], named: Mistake | None) -> None:
     """A rig that cannot be rectified is swapped if the right camera stands on the left, not if it stands ahead or below."""
-    found = name_mistake(_session(), _calibration(unlike_rig(centre), DataError("it cannot be", "exchange them")))
+    found = name_mistake(_series(), _calibration(unlike_rig(centre), DataError("it cannot be", "exchange them")))
     assert (found.mistake if found else None) is named
     assert found is None or found.remedy == "exchange them"
 
@@ -153,7 +153,7 @@ def test_views_in_one_point_tell_nothing() -> None:
         both_alone(list(pairs), BOARD.points_m(), _SIZES)
     assert deviation(pairs, BOARD, _SIZES) is None
     assert wrong_partners(list(pairs), BOARD, _SIZES) == []
-    assert name_mistake(_session(pairs), _calibration(unlike_rig())) is None
+    assert name_mistake(_series(pairs), _calibration(unlike_rig())) is None
 
 
 def test_two_views_give_no_lens_and_no_partners() -> None:
@@ -196,8 +196,8 @@ def test_a_focus_that_breathes_accuses_nobody() -> None:
 
 
 @pytest.mark.parametrize("moved", [{3: 0.001}, {1: 0.02, 3: -0.02, 6: 0.03}])
-def test_a_few_pairs_in_which_the_board_moved_are_not_the_session(moved: dict[int, float]) -> None:
-    """One of eight by 1 mm, and three of eight by centimetres: the others fit, so the session has no mistake in common."""
+def test_a_few_pairs_in_which_the_board_moved_are_not_the_series(moved: dict[int, float]) -> None:
+    """One of eight by 1 mm, and three of eight by centimetres: the others fit, so the series has no mistake in common."""
     assert deviation(_with_board_moved(_views(8), moved), BOARD, _SIZES) is None
 
 
@@ -341,9 +341,9 @@ def _fisheye_views(turn_deg: float) -> tuple[BoardPair, ...]:
 def test_a_fisheye_is_no_mistake_and_hides_none(turn_deg: float, named: Mistake | None) -> None:
     """The search knows no fisheye: good views must not look like those of a rolling shutter, and a knock is told in the true lens's words."""
     rig = Rig(left=_FISHEYE, right=_FISHEYE, R_right_left=np.eye(3), t_right_left_m=np.array([-0.1, 0, 0]))
-    session = BoardSession(pairs=_fisheye_views(turn_deg), board=BOARD, sizes_px=((1280, 960), (1280, 960)))
-    assert deviation(session.pairs, BOARD, session.sizes_px) is not None
-    finding = name_mistake(session, _calibration(rig))
+    series = BoardSeries(pairs=_fisheye_views(turn_deg), board=BOARD, sizes_px=((1280, 960), (1280, 960)))
+    assert deviation(series.pairs, BOARD, series.sizes_px) is not None
+    finding = name_mistake(series, _calibration(rig))
     assert (None if finding is None else finding.mistake) is named
     if finding is not None and finding.turned is not None:
         assert np.degrees(np.linalg.norm(finding.turned.turn_rad)) == pytest.approx(turn_deg, rel=0.1)

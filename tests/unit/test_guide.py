@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.gates import Gate, Glance, is_alike
 from phone_host.calibration.guide.guide import Guide, View
 from phone_host.calibration.guide.picture import guide_svg
@@ -34,7 +34,7 @@ from tests.unit.test_guide_gates import BOARD, NONE, SIZES, corners, tilted
 
 SECOND_NS = 1_000_000_000
 LOOK_NS = SECOND_NS // 10
-SHARP = Look(2.0, 0.0, 0.0)
+SHARP = BoardLook(2.0, 0.0, 0.0)
 
 
 def grown(views: tuple[View, ...], verdict: Verdict, *taught: Taught, hopeless: bool = False) -> Progress:
@@ -52,7 +52,7 @@ class Show:
         self.now_ns = 0
 
     def show(
-        self, left: NDArray[np.float64], seconds: float = 0.5, look: Look = SHARP, *, right_sees: bool = True
+        self, left: NDArray[np.float64], seconds: float = 0.5, look: BoardLook = SHARP, *, right_sees: bool = True
     ) -> Gate:
         """Hold a board before both cameras for a while; return what became of the last look."""
         gate = Gate.NOT_FOUND
@@ -208,9 +208,9 @@ def test_it_says_what_keeps_a_view_from_being_taken() -> None:
     for step in range(8):
         show.show(corners(0.4 + step / 50), 0.1)
     assert show.words == Words.STILL.value
-    assert show.show(corners(), 1.0, Look(9.0, 0.0, 0.0)) is Gate.BLURRED
+    assert show.show(corners(), 1.0, BoardLook(9.0, 0.0, 0.0)) is Gate.BLURRED
     assert show.words == Words.BLURRED.value
-    assert show.show(corners(), 1.0, Look(2.0, 0.5, 0.0)) is Gate.GLARE
+    assert show.show(corners(), 1.0, BoardLook(2.0, 0.5, 0.0)) is Gate.GLARE
     assert show.words == Words.GLARE.value
     for step in range(8):
         show.show(corners(0.54 + step / 50), 0.1)
@@ -238,6 +238,40 @@ def test_a_board_that_left_a_picture_is_told_the_way_back() -> None:
     assert show.words == "back from the left edge"
     show.show(NONE, 4.0)
     assert show.words == Words.SHOW_BOTH.value
+
+
+def test_a_board_that_became_too_small_is_asked_closer() -> None:
+    """A small board that is lost in the middle was too far away; after some seconds it may be anywhere."""
+    show = Show()
+    show.show(corners(square=0.028))
+    show.show(NONE, 6.0)
+    assert show.words == Want.NEAR.value
+    show.show(NONE, 9.0)
+    assert show.words == Words.SHOW_BOTH.value
+
+
+def test_a_camera_that_never_sees_the_board_is_named() -> None:
+    """From the start on, and however long it takes."""
+    show = Show()
+    show.show(corners(), 2.0, right_sees=False)
+    assert show.words == Words.SHOW_RIGHT.value
+    show.show(corners(), 30.0, right_sees=False)
+    assert show.words == Words.SHOW_RIGHT.value
+
+
+def test_few_views_state_nothing() -> None:
+    """Four views have a calibration whose figures and verdict are not told; five have; why there is none is told at once."""
+    show, rig = Show(), unlike_rig()
+    sizes = ((rig.left.width_px, rig.left.height_px), (rig.right.width_px, rig.right.height_px))
+    show.show(corners())
+    for count, verdict in ((4, ""), (5, "usable")):
+        made = calibrate(exact_pairs(rig, poses(count, seed=2), 0.1), BOARD, sizes)
+        progress = replace(grown((), Verdict.USABLE), views=count, calibration=made)
+        show.guide.grow(progress, show.now_ns)
+        shown = show.guide.snapshot(show.now_ns)
+        assert (shown.verdict, math.isfinite(shown.depth_error_m)) == (verdict, bool(verdict))
+    show.guide.grow(grown((), Verdict.REJECT), show.now_ns)
+    assert show.guide.snapshot(show.now_ns).remedy == "more"
 
 
 def test_exact_corners_are_judged_too() -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.coverage import COLUMNS, ROWS, Coverage, Depth, Tilt, depth_of, tilt_of
 from phone_host.calibration.guide.gates import (
     Gate,
@@ -78,6 +78,13 @@ def test_the_board_must_be_in_both_images(left: NDArray[np.float64], right: NDAr
     assert found(glance(left, right)) is gate
 
 
+def test_two_cameras_never_show_the_same_picture() -> None:
+    """The same corners to a fraction of a pixel at the same size are one camera's; a board 1 px aside is another's."""
+    same = Glance(at_ns=0, skew_ns=0, left_px=corners(), right_px=corners() + 0.1, sizes_px=(SIZES[0], SIZES[0]))
+    assert found(same) is Gate.SAME
+    assert found(replace(same, right_px=corners() + np.array([1.0, 0.0]))) is Gate.READY
+
+
 def test_of_a_board_with_marks_enough_corners_must_be_common() -> None:
     """Twenty corners that both see are enough; ten are not, whatever each sees alone."""
     few, enough = corners(), corners()
@@ -129,8 +136,8 @@ def test_a_view_must_be_sharp_by_the_cameras_own_measure(
     edge_px: float, washed: float, sharpest_px: float, gate: Gate
 ) -> None:
     """Edges of 4.5 px are blurred unless this camera's best are hardly better; above 6 px they always are. Lost contrast is glare."""
-    good = Look(2.0, 0.0, 0.0)
-    assert sharp((good, Look(edge_px, washed, 0.0)), SIZES, (2.0, sharpest_px)) is gate
+    good = BoardLook(2.0, 0.0, 0.0)
+    assert sharp((good, BoardLook(edge_px, washed, 0.0)), SIZES, (2.0, sharpest_px)) is gate
 
 
 def test_views_are_alike_if_the_board_is_at_nearly_the_same_place_in_both() -> None:

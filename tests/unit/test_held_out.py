@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from phone_host.calibration.board_names import named_board
 from phone_host.calibration.held_out import square_sides_m
 from phone_host.model import Rig
 from tests.support.boards import BOARD, exact_pairs, poses
@@ -33,3 +34,15 @@ def test_rows_that_miss_each_other_are_shared_by_their_noise() -> None:
     sides = square_sides_m(pairs, BOARD.points_m(), rig)
     assert sides.mean() == pytest.approx(0.025, rel=1e-3)
     assert sides.std() < 0.025 * 2e-3
+
+
+def test_of_an_aprilgrid_the_tags_are_measured() -> None:
+    """Gaps are a quarter as long, so that noise in depth makes them longer by per cents; tags stay within half a per cent."""
+    board, random = named_board("aprilgrid:4x3:48mm:12mm", None), np.random.default_rng(3)
+    pairs = [
+        replace(pair, left_px=pair.left_px + random.normal(0, 0.1, pair.left_px.shape))
+        for pair in exact_pairs(unlike_rig(), poses(4, seed=2), board=board)
+    ]
+    sides = square_sides_m(pairs, board.points_m(), unlike_rig())
+    assert len(sides) == 4 * 12 * 4
+    assert sides.mean() == pytest.approx(0.048, rel=5e-3)

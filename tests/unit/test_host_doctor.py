@@ -21,6 +21,7 @@ from phone_host.doctor.host_checks import (
     check_rig,
 )
 from phone_host.doctor.vision_checks import read_rig_readings
+from phone_host.model import Verdict
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.native.library import Missing, native
 from phone_host.stereo.rectify import rectify_rig
@@ -81,11 +82,10 @@ def test_packages_are_judged_by_version_and_company(package: Package, verdict: G
         (RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480)), OK, "640x480"),
         (RigReadings("rig.yaml", rms_px=2.5, baseline_m=0.1, host_size_px=(640, 480)), WARN, "2.50 px"),
         (
-            RigReadings("rig.yaml", rms_px=0.2, baseline_m=0.1, host_size_px=(640, 480), verdict="reject"),
+            RigReadings("rig.yaml", rms_px=0.2, baseline_m=0.1, host_size_px=(640, 480), is_rejected=True),
             WARN,
             "calibrate again",
         ),
-        (RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480), verdict="usable"), OK, "640x480"),
         (
             RigReadings("rig.yaml", baseline_m=0.1, host_size_px=(640, 480), asked_size_px=(1280, 720)),
             FAIL,
@@ -129,7 +129,7 @@ def test_ports_and_folder() -> None:
 def test_a_rig_files_verdict_reaches_the_doctor(tmp_path: Path) -> None:
     """A rig.yaml that says `reject` is warned of, one that says `good` is not."""
     rig = unlike_rig()
-    for verdict, grade in (("reject", WARN), ("good", OK)):
+    for verdict, grade in ((Verdict.REJECT, WARN), (Verdict.GOOD, OK)):
         judged = replace(rig, verdict=verdict)
         write_rig(tmp_path / "rig.yaml", judged, rectify_rig(judged))
         assert check_rig(read_rig_readings(str(tmp_path / "rig.yaml"), "")).verdict is grade

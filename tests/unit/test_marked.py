@@ -14,7 +14,7 @@ from phone_host.calibration.board_size import size_seen
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.looks import SeenLook, look_at
 from phone_host.calibration.causes.mistakes import Mistake
-from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.marked import MarkFamily
 from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
 from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard, marked_rectangles
@@ -110,6 +110,15 @@ def test_a_part_of_the_board_is_enough(board: Board, sheet: tuple[Image, NDArray
     np.testing.assert_array_equal(agree(found, found[::-1], board), found[::-1])  # marks leave nothing to agree on
 
 
+@pytest.mark.parametrize("border", [1, 2])
+def test_tags_are_read_from_far_away(border: int) -> None:
+    """Tags of 45 px, blurred until they hang together with the squares they touch: nine in ten corners are found within 0.5 px."""
+    image, places = _seen(*_grid_sheet(border, upward=False), size=(400, 300))
+    found = find_corners(image, _GRID)
+    assert np.isfinite(found[:, 0]).mean() >= 0.9
+    assert np.nanmax(np.linalg.norm(found - places, axis=1)) < 0.5
+
+
 def test_a_photograph_is_read_small_and_refined_whole() -> None:
     """12 megapixels: as exact in px as a small image."""
     image, true = _seen(*_charuco_sheet(), size=(4000, 3000))
@@ -136,8 +145,8 @@ def test_a_mirror_is_told_by_the_marks() -> None:
     assert look.is_mirrored
     plain = look_at(image, find_corners(image, _CHARUCO), _CHARUCO)
     looks = (SeenLook("a", Side.LEFT, plain), SeenLook("b", Side.RIGHT, look))
-    session = BoardSession(pairs=(), board=_CHARUCO, sizes_px=((960, 720), (960, 720)), looks=looks)
-    found = name_mistake(session, DataError("nothing", "nothing"))
+    series = BoardSeries(pairs=(), board=_CHARUCO, sizes_px=((960, 720), (960, 720)), looks=looks)
+    found = name_mistake(series, DataError("nothing", "nothing"))
     assert found is not None
     assert found.mistake is Mistake.MIRRORED
     assert found.misplaced is not None
@@ -206,7 +215,7 @@ def test_a_rig_is_calibrated_from_parts_of_boards() -> None:
     assert len(found.used) == 12
     truth = np.linalg.norm(unlike_rig().t_right_left_m)
     assert np.linalg.norm(found.rig.t_right_left_m) == pytest.approx(truth, rel=0.01)
-    assert name_mistake(BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes), found) is None
+    assert name_mistake(BoardSeries(pairs=tuple(pairs), board=board, sizes_px=sizes), found) is None
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from phone_host.cli import main
-from phone_host.model import RIG_PARAMETERS, Rig
+from phone_host.model import RIG_PARAMETERS, Rig, Verdict
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.cast import cast, rays_through
 from phone_host.scene.scene import Look, plane_scene, render, rig_poses
@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         image = render(_WALL, model, pose, look=Look(noise_sigma=1.0, seed=seed))
         cv2.imwrite(str(made / f"{name}.png"), image)
     _write(made / "rig.yaml", rig)
-    _write(made / "rejected.yaml", replace(rig, verdict="reject"))
+    _write(made / "rejected.yaml", replace(rig, verdict=Verdict.REJECT))
     _write(made / "plain.yaml", replace(rig, zero_sigma_px=float("nan")))
     covariance = np.zeros((RIG_PARAMETERS, RIG_PARAMETERS))
     covariance[-3:, -3:] = 4e-4 * np.outer(rig.t_right_left_m, rig.t_right_left_m)

@@ -10,7 +10,7 @@ import pytest
 from common.camera_identity import CameraIdentity, RememberedCamera
 from common.errors import DataError
 from common.orientation import Flip, Orientation
-from phone_host.model import UNMEASURED_NS, Rig, Side, TimeOffset
+from phone_host.model import UNMEASURED_NS, Rig, Side, TimeOffset, Verdict
 from phone_host.output.rig_yaml import is_rig, read_rig, write_rig, write_time_offset
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
@@ -165,13 +165,13 @@ def test_a_time_offset_of_no_use_is_named(tmp_path: Path, key: str, value: str) 
 
 def test_noise_of_zero_and_verdict_come_back(tmp_path: Path) -> None:
     """They are read as they were written; files of before, without them, say nothing."""
-    back = read_rig(_written(tmp_path, zero_sigma_px=0.375, verdict="usable"))
-    assert (back.zero_sigma_px, back.verdict) == (0.375, "usable")
+    back = read_rig(_written(tmp_path, zero_sigma_px=0.375, verdict=Verdict.USABLE))
+    assert (back.zero_sigma_px, back.verdict) == (0.375, Verdict.USABLE)
     path = _written(tmp_path)
     path.write_text(re.sub(r"^zero_sigma:.*\n", "", path.read_text(), flags=re.MULTILINE))
     back = read_rig(path)
     assert np.isnan(back.zero_sigma_px)
-    assert back.verdict == ""
+    assert back.verdict is None
     assert (back.left_camera, back.right_camera) == (None, None)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import DataError, SettingsError, TandemError
 from phone_host.cli import main
-from phone_host.model import Crop, Side, StereoGeometry
+from phone_host.model import Crop, Side, StereoGeometry, Verdict
 from phone_host.output.axes import Axes
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.core import StereoCore
@@ -170,12 +170,12 @@ def test_with_metres_the_range_follows_from_near() -> None:
 
 def test_a_rejected_rig_is_refused_unless_it_is_asked_for() -> None:
     """A rig with verdict reject is bad data, and the remedy names the option that uses it all the same; other verdicts pass."""
-    rejected = replace(unlike_rig(), verdict="reject")
+    rejected = replace(unlike_rig(), verdict=Verdict.REJECT)
     with pytest.raises(DataError, match=r"rig\.yaml was rejected") as caught:
         refuse_rejected(rejected, "rig.yaml", allowed=False)
     assert "--use-rejected-rig" in caught.value.remedy
     refuse_rejected(rejected, "rig.yaml", allowed=parsed("--use-rejected-rig").use_rejected_rig)
-    for verdict in ("", "good", "usable"):
+    for verdict in (None, Verdict.GOOD, Verdict.USABLE):
         refuse_rejected(replace(rejected, verdict=verdict), "rig.yaml", allowed=False)
 
 

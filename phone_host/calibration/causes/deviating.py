@@ -1,7 +1,7 @@
-"""Names how the pairs of a session deviate from one stiff rig, if they do. Pure.
+"""Names how the pairs of a series deviate from one stiff rig, if they do. Pure.
 
 A rule is only believed if it explains much of what contradicts a stiff rig, and more than the scatter of the pairs would,
-so that the imperfections that every good session has accuse nobody.
+so that the imperfections that every good series has accuse nobody.
 """
 
 import math
@@ -40,7 +40,7 @@ _MOST_PAIRS: Final = 60
 """More are thinned out: the work grows with their square."""
 
 _EXPLAINED_SHARE: Final = 0.35
-"""A rule with numbers for every pair must explain so much of the squares: on a good real session one explains 0.21."""
+"""A rule with numbers for every pair must explain so much of the squares: on a good real series one explains 0.21."""
 
 _EXPLAINED_PX: Final = 0.12
 _SIGMAS: Final = 5.0
@@ -52,7 +52,7 @@ _LEAST_ZOOM: Final = 0.003
 _APART_FACTOR, _APART_FLOOR_PX = 5.0, 3.0
 _MOST_APART: Final = 0.3
 _COMMON: Final = 0.5
-"""The median pair must deviate by this share of the mean square, or a few pairs are wrong and not the session."""
+"""The median pair must deviate by this share of the mean square, or a few pairs are wrong and not the series."""
 
 _COURSES: Final = frozenset({Rule.DRIFT, Rule.KNOCK, Rule.FOCUS_LEFT, Rule.FOCUS_RIGHT})
 _REFINED: Final = 4
@@ -65,7 +65,7 @@ _ANY_BETTER: Final = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Fitted:
-    """A session's pairs, its loosened rig, and what its rules say.
+    """A series's pairs, its loosened rig, and what its rules say.
 
     Attributes:
         apart_px: (V,) how far each pair's right view is from where the rig that most agree on predicts it, px.
@@ -106,7 +106,7 @@ def deviation(pairs: tuple[BoardPair, ...], board: Board, sizes_px: Sizes) -> Fi
         if fitted is None:
             return None
         found = _named(fitted, sizes_px)
-        together = _together(fitted)  # a few pairs that fit nothing are not the session's mistake
+        together = _together(fitted)  # a few pairs that fit nothing are not the series's mistake
         is_lone = together is not None and len(fitted.kept) - len(together) == 1
         if found is not None and found.mistake in {Mistake.UNSTIFF, Mistake.FOCUS} and not is_lone:
             return found  # many pairs lie apart for it; a single one may only look like it
@@ -160,7 +160,7 @@ def _fitted(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> _Fitted | 
 
 
 def _worth_refining(results: list[Weighed], loose: Loosened) -> list[Weighed]:
-    """Return the rules that may explain a session and are not yet exact: the best of few numbers, and the best form of each other."""
+    """Return the rules that may explain a series and are not yet exact: the best of few numbers, and the best form of each other."""
     stiff = next(each for each in results if each.rule is Rule.STIFF)
     better = [each for each in results if each.criterion < stiff.criterion - _ANY_BETTER]
     chosen = [each for each in better if each.rule in _COURSES and each.columns < loose.count][:_REFINED]
@@ -201,7 +201,7 @@ def _explained_px(each: Weighed, fitted: _Fitted) -> float:
 
 
 def _believed(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
-    """Return what a rule other than STIFF says, if it says something that a good session would not."""
+    """Return what a rule other than STIFF says, if it says something that a good series would not."""
     match each.rule:
         case Rule.DRIFT | Rule.KNOCK:
             return _turned(each, fitted, sizes_px[1])
@@ -301,7 +301,7 @@ def _focus_found(side: Side, what: str) -> Finding:
 
 
 def _explains_much(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> bool:
-    """Return whether a rule with numbers for every pair explains more than it would of a good session."""
+    """Return whether a rule with numbers for every pair explains more than it would of a good series."""
     factor = max(1.0, min(max(size) for size in sizes_px) / REFERENCE_PX)
     explained = 1 - each.squares_px2 / fitted.stiff.squares_px2
     enough = explained >= _EXPLAINED_SHARE and _explained_px(each, fitted) >= _EXPLAINED_PX * factor

@@ -33,7 +33,7 @@ _LEAST_CONTRAST: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class BoardLook:
     """What an image looks like.
 
     Attributes:
@@ -55,10 +55,10 @@ class SeenLook:
 
     name: str
     side: Side
-    look: Look
+    look: BoardLook
 
 
-def look_at(grey: Image, corners: Corners, board: Board) -> Look:
+def look_at(grey: Image, corners: Corners, board: Board) -> BoardLook:
     """Measure an image.
 
     Args:
@@ -70,7 +70,7 @@ def look_at(grey: Image, corners: Corners, board: Board) -> Look:
     if len(corners) == 0:
         marks = board.marks
         mirrored = marks is not None and is_mirrored(grey, board.columns, board.rows, marks)
-        return Look(float("nan"), float("nan"), bright, mirrored)
+        return BoardLook(float("nan"), float("nan"), bright, mirrored)
     grid = corners.reshape(board.rows, board.columns, 2)
     widths, contrasts = [], []
     reaches = _reaches(grid, board)
@@ -85,11 +85,11 @@ def look_at(grey: Image, corners: Corners, board: Board) -> Look:
         widths.append(float(np.median(width[clear])) if clear.any() else float("nan"))
         contrasts.append(contrast)
     if not contrasts:
-        return Look(float("nan"), float("nan"), bright)
+        return BoardLook(float("nan"), float("nan"), bright)
     together = np.concatenate(contrasts)
     # Half of the edges may be washed out: what is usual is told by the better ones.
     usual = float(np.percentile(together, 75))
-    return Look(float(np.nanmax(widths)), float((together < _FAINT * usual).mean()), bright)
+    return BoardLook(float(np.nanmax(widths)), float((together < _FAINT * usual).mean()), bright)
 
 
 def _reaches(grid: Vector, board: Board) -> tuple[float, float]:

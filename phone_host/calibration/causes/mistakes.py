@@ -1,4 +1,4 @@
-"""The mistakes that are told apart in a session of board views, and what is said about one. No behaviour."""
+"""The mistakes that are told apart in a series of board views, and what is said about one. No behaviour."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -10,7 +10,7 @@ from phone_host.model import CameraModel
 
 
 class Mistake(Enum):
-    """What is wrong with a session.
+    """What is wrong with a series.
 
     Attributes:
         SWAPPED: the right camera stands to the left of the left one.
@@ -25,6 +25,7 @@ class Mistake(Enum):
         ROWS: the board moved while rows were exposed one after the other.
         FOCUS: focus or zoom changed between views.
         UNSTIFF: the cameras turned against each other between views.
+        BENT: the board is not flat.
     """
 
     SWAPPED = "swapped sides"
@@ -39,6 +40,7 @@ class Mistake(Enum):
     ROWS = "rolling shutter"
     FOCUS = "focus changed"
     UNSTIFF = "rig not stiff"
+    BENT = "board not flat"
 
 
 class Course(Enum):
@@ -51,7 +53,7 @@ class Course(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Turned:
-    """How much two cameras turned against each other during a session.
+    """How much two cameras turned against each other during a series.
 
     Attributes:
         course: how.
@@ -87,7 +89,7 @@ class Finding:
         remedy: what to do.
         misplaced: the side and the turn, for MIRRORED, TURNED and UPSIDE_DOWN.
         turned: for UNSTIFF.
-        most: the best verdict that such a session may get.
+        most: the best verdict that such a series may get.
         explained_px: how much of the views' contradiction it explains, root mean square, px; NaN: it was found otherwise.
     """
 

@@ -1,7 +1,7 @@
-"""Names the mistake of a session of board views, or none. Pure.
+"""Names the mistake of a series of board views, or none. Pure.
 
 From the plainest to the finest: what the images look like; which pictures belong together; how the cameras stand to each
-other; how the pairs deviate from one stiff rig; and whether the squares can be as large as was said.
+other; how the pairs deviate from one stiff rig; whether the squares can be as large as was said; and whether the board is flat.
 """
 
 import math
@@ -17,6 +17,7 @@ from common.words import counted
 from phone_host.calibration.arrangement import Misplaced, misplaced
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.calibrate import Sizes
+from phone_host.calibration.causes.bent import bent
 from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.lone import both_alone
 from phone_host.calibration.causes.looks import SeenLook
@@ -28,7 +29,7 @@ from phone_host.calibration.verdict import REFERENCE_PX, Verdict, size_factor
 from phone_host.model import Side
 
 _SPOILED_SHARE: Final = 0.2
-"""A session is blurred or glaring if this share of its images is."""
+"""A series is blurred or glaring if this share of its images is."""
 
 _BLURRED_EDGE_PX: Final = 6.0
 """For images of up to 1280 px. Sharp edges are 1.5 to 3.5 px wide in the images of four real rigs; a blur of sigma gives 2.5 sigma."""
@@ -53,12 +54,12 @@ _ALIKE: Final = 0.3
 """Two cameras before one stretched print err alike to this share."""
 
 _EXPLAINED_SHARE: Final = 0.35
-"""Of the squares of each view alone: a good session's cannot be explained so."""
+"""Of the squares of each view alone: a good series's cannot be explained so."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class BoardSession:
-    """What a session of board views gives.
+class BoardSeries:
+    """What a series of board views gives.
 
     Attributes:
         pairs: the corners, in the order in which they were taken.
@@ -75,33 +76,34 @@ class BoardSession:
     baseline_m: float = math.nan
 
 
-def name_mistake(session: BoardSession, found: Calibration | DataError) -> Finding | None:
-    """Name what is wrong with a session.
+def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+    """Name what is wrong with a series.
 
     Args:
-        session: the session.
+        series: the series.
         found: what `calibrate` made of it.
 
     Returns:
         The mistake with its figures; None if the views tell of none.
     """
     return (
-        _absurd_square(session)
-        or _in_a_mirror(session)
-        or _spoiled(session)
-        or _exchanged(session, found)
-        or _placed(session, found)
+        _absurd_square(series)
+        or _in_a_mirror(series)
+        or _spoiled(series)
+        or _exchanged(series, found)
+        or _placed(series, found)
         or _swapped(found)
-        or _stretched(session)
-        or _deviating(session, found)
-        or _other_square(session, found)
+        or _stretched(series)
+        or _deviating(series, found)
+        or _other_square(series, found)
+        or (None if isinstance(found, DataError) else bent(found, series.board))
     )
 
 
-def _in_a_mirror(session: BoardSession) -> Finding | None:
+def _in_a_mirror(series: BoardSeries) -> Finding | None:
     """Name a side whose coded marks are seen in the mirror only."""
     for side in Side:
-        own = [each for each in session.looks if each.side is side]
+        own = [each for each in series.looks if each.side is side]
         if own and 2 * sum(each.look.is_mirrored for each in own) > len(own):
             return Finding(
                 mistake=Mistake.MIRRORED,
@@ -112,11 +114,11 @@ def _in_a_mirror(session: BoardSession) -> Finding | None:
     return None
 
 
-def _spoiled(session: BoardSession) -> Finding | None:
+def _spoiled(series: BoardSeries) -> Finding | None:
     """Name blur or glare, if many images have it."""
-    looks = session.looks
+    looks = series.looks
     blurred, glaring = list[str](), list[str]()
-    for side, size in zip(Side, session.sizes_px, strict=True):
+    for side, size in zip(Side, series.sizes_px, strict=True):
         own = [each for each in looks if each.side is side]
         seen = [each.look.bright for each in own if math.isfinite(each.look.edge_px)]
         usual = float(np.median(seen)) if seen else 0.0
@@ -142,7 +144,7 @@ def _spoiled(session: BoardSession) -> Finding | None:
     return None
 
 
-def _exchanged(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+def _exchanged(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
     """Name pictures that belong to another pair's partner."""
     misfits = (Reason.MOVED, Reason.CORNERS_LEFT, Reason.CORNERS_RIGHT)
     if (
@@ -151,7 +153,7 @@ def _exchanged(session: BoardSession, found: Calibration | DataError) -> Finding
         and found.rig.rms_stereo_px <= _CONTRADICTION_PX * size_factor(found.rig)
     ):
         return None  # all pairs fit one rig
-    wrong = wrong_partners(list(session.pairs), session.board, session.sizes_px)
+    wrong = wrong_partners(list(series.pairs), series.board, series.sizes_px)
     if not wrong:
         return None
     shown = ", ".join(f"left {left} with right {right}" for left, right in wrong[:4]) + (", ..." if wrong[4:] else "")
@@ -162,9 +164,9 @@ def _exchanged(session: BoardSession, found: Calibration | DataError) -> Finding
     )
 
 
-def _placed(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+def _placed(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
     """Name a turned or mirrored side; who knows the options given writes the sentence."""
-    wrong = misplaced(list(session.pairs), session.board, session.sizes_px, found)
+    wrong = misplaced(list(series.pairs), series.board, series.sizes_px, found)
     if wrong is None:
         return None
     if wrong.is_mirrored:
@@ -190,21 +192,21 @@ def _swapped(found: Calibration | DataError) -> Finding | None:
     return None
 
 
-def _deviating(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+def _deviating(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
     """Name how the pairs deviate from one stiff rig; what only a bent lens makes them do is none."""
-    finding = deviation(session.pairs, session.board, session.sizes_px)
+    finding = deviation(series.pairs, series.board, series.sizes_px)
     if finding is None or isinstance(found, DataError) or (is_plain(found.rig.left) and is_plain(found.rig.right)):
         return finding
-    plain = with_plain_lenses(list(session.pairs), found.rig)
-    finding = deviation(tuple(plain), session.board, session.sizes_px)
+    plain = with_plain_lenses(list(series.pairs), found.rig)
+    finding = deviation(tuple(plain), series.board, series.sizes_px)
     if finding is None or finding.turned is None:
         return finding
     return replace(finding, turned=replace(finding.turned, lens=found.rig.right))
 
 
-def _absurd_square(session: BoardSession) -> Finding | None:
+def _absurd_square(series: BoardSeries) -> Finding | None:
     """Name a square that no board has: it is told first, because nothing else depends on the scale."""
-    board = session.board
+    board = series.board
     longest_m = max(board.columns, board.rows) * board.square_m
     if _SMALLEST_BOARD_M <= longest_m <= _LARGEST_BOARD_M:
         return None
@@ -216,19 +218,19 @@ def _absurd_square(session: BoardSession) -> Finding | None:
     )
 
 
-def _other_square(session: BoardSession, found: Calibration | DataError) -> Finding | None:
+def _other_square(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
     """Name a square that cannot be as long as --square says, or that is no square."""
-    board = session.board
+    board = series.board
     if isinstance(found, DataError):
         return None
     baseline_m = float(np.linalg.norm(found.rig.t_right_left_m))
-    factor = session.baseline_m / baseline_m
+    factor = series.baseline_m / baseline_m
     sigma = 3 * found.baseline_sigma_m / baseline_m if math.isfinite(found.baseline_sigma_m) else 0.0
     if math.isfinite(factor) and abs(factor - 1) > BASELINE_OFF + sigma:
         return Finding(
             mistake=Mistake.SQUARE,
             sentence=(
-                f"the cameras would be {baseline_m * 1e3:.1f} mm apart, and you measured {session.baseline_m * 1e3:.1f} mm:"
+                f"the cameras would be {baseline_m * 1e3:.1f} mm apart, and you measured {series.baseline_m * 1e3:.1f} mm:"
                 f" squares of {board.square_m * factor * 1e3:.2f} mm would fit, --square says {board.square_m * 1e3:g} mm"
             ),
             remedy="measure ten squares together with a ruler",
@@ -242,10 +244,10 @@ def _other_square(session: BoardSession, found: Calibration | DataError) -> Find
     return None
 
 
-def _stretched(session: BoardSession) -> Finding | None:
+def _stretched(series: BoardSeries) -> Finding | None:
     """Name squares that are no squares: a board that is longer explains more, however each is turned."""
     try:
-        squares = _squares_by_stretch(list(session.pairs), session)
+        squares = _squares_by_stretch(list(series.pairs), series)
     except cv2.error:
         return None
     if squares is None:
@@ -259,15 +261,15 @@ def _stretched(session: BoardSession) -> Finding | None:
     return _no_squares(stretch)
 
 
-def _squares_by_stretch(pairs: list[BoardPair], session: BoardSession) -> tuple[float, float, float] | None:
+def _squares_by_stretch(pairs: list[BoardPair], series: BoardSeries) -> tuple[float, float, float] | None:
     """Return the squares that a board leaves which is shorter, as said, and longer, px^2, of the same pairs; None if they fit no lens.
 
     Raises:
         cv2.error: no lens explains the views.
     """
-    points_m, squares, common = session.board.points_m(), list[float](), pairs
+    points_m, squares, common = series.board.points_m(), list[float](), pairs
     for stretch in (-_STRETCHED, 0.0, _STRETCHED):
-        found = both_alone(pairs, points_m * [1 + stretch, 1.0, 1.0], session.sizes_px)
+        found = both_alone(pairs, points_m * [1 + stretch, 1.0, 1.0], series.sizes_px)
         if found is None:
             return None
         kept, left, right = found
@@ -275,7 +277,7 @@ def _squares_by_stretch(pairs: list[BoardPair], session: BoardSession) -> tuple[
         squares.append(left.squares_px2 + right.squares_px2)
     # A stretched board makes some views look wrong: what the others leave cannot be compared.
     if len(common) < len(pairs):
-        return _squares_by_stretch(common, session)
+        return _squares_by_stretch(common, series)
     return squares[0], squares[1], squares[2]
 
 

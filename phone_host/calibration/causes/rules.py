@@ -1,4 +1,4 @@
-"""Rules that a session's pairs may follow, and how well each explains the deviations of a loosened rig. Pure.
+"""Rules that a series's pairs may follow, and how well each explains the deviations of a loosened rig. Pure.
 
 A rule is a matrix: its columns say in which ways the deviations of all pairs may differ from one stiff rig. All rules
 contain the stiff rig itself. They are compared by the Bayesian information criterion (Schwarz 1978): the squares that are
@@ -33,7 +33,7 @@ _GAUGE: Final = 3
 
 
 class Rule(Enum):
-    """How the pairs of a session deviate from one stiff rig.
+    """How the pairs of a series deviate from one stiff rig.
 
     Attributes:
         STIFF: not at all.
@@ -58,7 +58,7 @@ class Rule(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Weighed:
-    """How well a rule explains a session.
+    """How well a rule explains a series.
 
     Attributes:
         rule: the rule.
@@ -85,7 +85,7 @@ def weighed(loose: Loosened) -> list[Weighed]:
     """Weigh every rule in each of its forms, the best first.
 
     Args:
-        loose: the loosened rig of a session, its pairs in the order in which they were taken.
+        loose: the loosened rig of a series, its pairs in the order in which they were taken.
     """
     results = [_weigh(loose, rule, columns, begins) for rule, columns, begins in _rules(loose)]
     return sorted(results, key=lambda each: each.criterion)

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.causes.looks import Look
+from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.target import Corners
 from phone_host.calibration.verdict import REFERENCE_PX
 
@@ -27,16 +27,19 @@ _APART_PX: Final = 0.15
 """The board may move so far between the two exposures of a pair: less than what corners of a good rig err by."""
 
 _BLURRED_PX, _MOST_BLURRED_PX = 4.0, 6.0
-"""Edges of sharp boards are 1 to 3 px wide (four real rigs). From 6 px on `causes` calls a session blurred."""
+"""Edges of sharp boards are 1 to 3 px wide (four real rigs). From 6 px on `causes` calls a series blurred."""
 
 _BLURRED_FACTOR: Final = 1.6
 """A camera that is soft by nature is compared with its own sharpest view."""
 
 _WASHED: Final = 0.05
-"""More of the edges may not have lost their contrast: from 0.08 on `causes` calls a session glaring."""
+"""More of the edges may not have lost their contrast: from 0.08 on `causes` calls a series glaring."""
 
 _LEAST_SEEN, _LEAST_CORNERS = 0.3, 12
 """Share and number of a board's corners, for boards of which a part is enough."""
+
+_SAME_PX: Final = 0.5
+"""Two cameras at different places never see all corners of a board so close to the same pixels."""
 
 _ALIKE, _SAME_SHAPE = 0.05, 0.006
 """Two views are alike if their corners lie closer than the first on average, and, once brought together, closer than the second, in
@@ -53,6 +56,7 @@ class Gate(Enum):
     NOT_FOUND_LEFT = "board not found left"
     NOT_FOUND_RIGHT = "board not found right"
     PART = "too few corners"
+    SAME = "both cameras show the same picture"
     NOTHING_NEW = "nothing new"
     MOVING = "moving"
     APART = "not the same moment"
@@ -62,7 +66,7 @@ class Gate(Enum):
     TAKEN = "taken"
 
 
-NOT_SEEN: Final = frozenset({Gate.NOT_FOUND, Gate.NOT_FOUND_LEFT, Gate.NOT_FOUND_RIGHT, Gate.PART})
+NOT_SEEN: Final = frozenset({Gate.NOT_FOUND, Gate.NOT_FOUND_LEFT, Gate.NOT_FOUND_RIGHT, Gate.PART, Gate.SAME})
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -97,7 +101,10 @@ def found(glance: Glance) -> Gate:
             pass
     both = np.isfinite(glance.left_px).all(axis=1) & np.isfinite(glance.right_px).all(axis=1)
     is_enough = (both.sum() >= _LEAST_CORNERS and both.mean() >= _LEAST_SEEN) or bool(both.all())
-    return Gate.READY if is_enough else Gate.PART
+    if not is_enough:
+        return Gate.PART
+    apart = np.abs(glance.left_px[both] - glance.right_px[both])
+    return Gate.SAME if glance.sizes_px[0] == glance.sizes_px[1] and apart.max() < _SAME_PX else Gate.READY
 
 
 def speed_widths_s(before: Glance | None, now: Glance) -> float:
@@ -141,7 +148,7 @@ def is_paired_well(glance: Glance, speed: float) -> bool:
     )
 
 
-def sharp(looks: tuple[Look, Look], sizes_px: tuple[Size, Size], sharpest_px: tuple[float, float]) -> Gate:
+def sharp(looks: tuple[BoardLook, BoardLook], sizes_px: tuple[Size, Size], sharpest_px: tuple[float, float]) -> Gate:
     """Return whether a view is sharp and evenly lit: READY, or why not.
 
     Args:

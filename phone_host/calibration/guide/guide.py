@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.causes.looks import Look
-from phone_host.calibration.guide.coverage import Coverage
+from phone_host.calibration.causes.looks import BoardLook
+from phone_host.calibration.guide.coverage import Coverage, Depth
 from phone_host.calibration.guide.gates import (
     NOT_SEEN,
     STILL_NS,
@@ -51,6 +51,9 @@ _LOST_NS: Final = 1_000_000_000
 
 _LEFT_NS: Final = 4_000_000_000
 """A board that left over an edge may have gone anywhere after this time."""
+
+_TOO_FAR_NS: Final = 12_000_000_000
+"""So long a board that was small when it was lost is asked closer: its squares or marks had become too small."""
 
 _REACTION_NS: Final = 500_000_000
 """So long after the words a hand stops. In this time a board that is moved to an edge leaves the picture."""
@@ -87,6 +90,7 @@ _ABSENT: Final = {
     Gate.NOT_FOUND_LEFT: Words.SHOW_LEFT,
     Gate.NOT_FOUND_RIGHT: Words.SHOW_RIGHT,
     Gate.PART: Words.PART,
+    Gate.SAME: Words.SAME,
 }
 
 
@@ -102,7 +106,7 @@ class View:
 
     name: str
     glance: Glance
-    looks: tuple[Look, Look]
+    looks: tuple[BoardLook, BoardLook]
 
     @property
     def pair(self) -> BoardPair:
@@ -165,7 +169,7 @@ class Guide:
         self._give_up(now_ns)
         return self._note(gate)
 
-    def examine(self, glance: Glance, looks: tuple[Look, Look], now_ns: int) -> Gate:
+    def examine(self, glance: Glance, looks: tuple[BoardLook, BoardLook], now_ns: int) -> Gate:
         """Judge a view that was READY by its exact corners, and take it unless it is blurred.
 
         Args:
@@ -234,7 +238,7 @@ class Guide:
 
     def snapshot(self, now_ns: int) -> GuideSnapshot:
         """Return everything that presenters show."""
-        progress = self._progress
+        progress = self._stated
         return GuideSnapshot(
             ended=self.ended,
             words=self._speech.words,
@@ -302,6 +306,11 @@ class Guide:
         if progress is None or progress.calibration is None or progress.verdict is Verdict.REJECT:
             return None
         return progress.calibration.rig
+
+    @property
+    def _stated(self) -> Progress | None:
+        """The calibration so far, if it may be told."""
+        return self._progress if self._progress is not None and self._progress.is_stated else None
 
     @property
     def _unseen(self) -> frozenset[Want]:
@@ -373,7 +382,7 @@ class Guide:
 
     def _wanted_words(self, now_ns: int) -> str:
         if self.ended is not Ended.RUNNING:
-            verdict = "" if self._progress is None else self._verdict(self._progress).verdict.value
+            verdict = "" if self._stated is None else self._verdict(self._stated).verdict.value
             return done(verdict, len(self.views))
         if self._is_heard(now_ns):
             return taken(len(self.views))
@@ -386,14 +395,17 @@ class Guide:
         return Words.STILL.value
 
     def _words_for_absent(self, now_ns: int) -> str:
-        if not self._has_seen:
-            never = now_ns - self._began_ns > _NEVER_NS
-            return Words.HELP.value if never else Words.SHOW_BOTH.value
-        if now_ns - self._seen_ns < _LOST_NS:
+        if not self._has_seen or self._gate is Gate.SAME:
+            never = self._gate is Gate.NOT_FOUND and now_ns - self._began_ns > _NEVER_NS
+            return Words.HELP.value if never else _ABSENT[self._gate].value
+        since_ns = now_ns - self._seen_ns
+        if since_ns < _LOST_NS:
             return self._speech.words
         way = ""
-        if self._placed is not None and now_ns - self._seen_ns < _LEFT_NS:
+        if self._placed is not None and since_ns < _LEFT_NS:
             left, right = self._placed.left, self._placed.right
             lost = {Gate.NOT_FOUND_LEFT: Placed(left, left), Gate.NOT_FOUND_RIGHT: Placed(right, right)}
             way = back(lost.get(self._gate, self._placed))
+        if not way and self._placed is not None and self._placed.fills < Depth.FAR.value and since_ns < _TOO_FAR_NS:
+            way = Want.NEAR.value
         return way or _ABSENT[self._gate].value

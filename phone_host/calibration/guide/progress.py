@@ -1,6 +1,7 @@
 """How a calibration grows: its verdict after some views, and what each wanted view would add. Pure."""
 
 from dataclasses import dataclass
+from typing import Final
 
 from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.guide.wants import ORDER, Want, spot_of
@@ -8,6 +9,9 @@ from phone_host.calibration.next_view import DEPTH_M, after_one_m
 from phone_host.calibration.rig_sigma import DEPTHS_M
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
+
+LEAST_STATED: Final = 5
+"""Fewer views do not show how much they contradict each other (`bundle`): what a rig of them states is too good, and is not told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +46,11 @@ class Progress:
     remedy: str
     is_hopeless: bool = False
     taught: tuple[Taught, ...] = ()
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether its figures and verdict may be told; why there is no rig is told at once."""
+        return self.calibration is None or len(self.calibration.used) >= LEAST_STATED
 
     @property
     def depth_error_m(self) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from phone_host.calibration.running.rows import RowModel, Sighting
 from phone_host.model import Image, Processed
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import Look, grey, maps_of
+from phone_host.stereo.evidence import Examined, grey, maps_of
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.evidence_track import Followed, follow
 from phone_host.stereo.stacked import lying, upright_points, upright_steps
@@ -26,7 +26,9 @@ class Timed:
     seconds: float = 0.0
 
 
-def sighting_of(core: StereoCore, processed: Processed, look: Look, timed: Timed) -> tuple[RowModel, Sighting] | None:
+def sighting_of(
+    core: StereoCore, processed: Processed, look: Examined, timed: Timed
+) -> tuple[RowModel, Sighting] | None:
     """Follow the features of a judged pair.
 
     Args:

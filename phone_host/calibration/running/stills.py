@@ -13,7 +13,7 @@ from phone_host.calibration.running.trend import Trends
 from phone_host.calibration.running.watch import FEWEST_CELLS, FEWEST_FEATURES, DriftWatch
 from phone_host.model import Drift, Processed
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import Look
+from phone_host.stereo.evidence import Examined
 
 _LEAST_PAIRS: Final = 7
 """From the first to the last of a line."""
@@ -27,7 +27,7 @@ class StillsWatch:
         self._trends = Trends(least=_LEAST_PAIRS)
         self._number = 0
 
-    def add(self, core: StereoCore, processed: Processed, look: Look) -> None:
+    def add(self, core: StereoCore, processed: Processed, look: Examined) -> None:
         """Take the next pair into account. Images that came rectified have no rig.
 
         Args:

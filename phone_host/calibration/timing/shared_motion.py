@@ -77,11 +77,11 @@ class Rows:
     row: NDArray[np.float64]
 
 
-Look = Callable[[Shot], Image]
+ReadImage = Callable[[Shot], Image]
 
 
 def measure_shared_motion(
-    board: Sequence[Shot], host: Sequence[Shot], rectifier: Rectifier, look: Look, advance: Callable[[float], None]
+    board: Sequence[Shot], host: Sequence[Shot], rectifier: Rectifier, look: ReadImage, advance: Callable[[float], None]
 ) -> Measured:
     """Measure the time offset.
 
@@ -138,7 +138,7 @@ def _rows(
     right: Sequence[Shot],
     offset_s: float,
     rectifier: Rectifier,
-    look: Look,
+    look: ReadImage,
     advance: Callable[[float], None],
 ) -> Rows:
     """Track features through three left images, and find them in the right image nearest in time to the middle one."""

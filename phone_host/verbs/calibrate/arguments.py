@@ -94,7 +94,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=25,
         metavar="N",
-        help="for --live: take at most so many views, 3 to 99 (default 25)",
+        help="for --live: take at most so many views, 5 to 99; 3 with --from (default 25)",
     )
     parser.add_argument(
         "--sound",

@@ -8,7 +8,7 @@ from phone_host.calibration.arrangement import is_contradicted
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Rejected
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.mistakes import Course, Finding
-from phone_host.calibration.causes.name import BoardSession
+from phone_host.calibration.causes.name import BoardSeries
 from phone_host.calibration.causes.unturned import unturned
 from phone_host.calibration.verdict import Assessment, Verdict, judge
 from phone_host.model import Side
@@ -17,12 +17,12 @@ _BEST_FIRST: Final = (Verdict.GOOD, Verdict.USABLE, Verdict.REJECT)
 
 
 def calibrated_as_last(
-    session: BoardSession, found: Calibration | DataError, finding: Finding | None, board_side: Side
+    series: BoardSeries, found: Calibration | DataError, finding: Finding | None, board_side: Side
 ) -> tuple[Calibration | DataError, Finding | None, list[BoardPair]]:
     """Give the rig as it stands in the last view, if the cameras turned against each other while the views were taken.
 
     Args:
-        session: the views.
+        series: the views.
         found: what all views give together, as if the rig were stiff.
         finding: what is wrong with them.
         board_side: which camera is on the board.
@@ -31,13 +31,13 @@ def calibrated_as_last(
         The rig without the drift, or what was found if there is none or the rig without it is no better; the finding; and
         the pairs that the rig was computed from.
     """
-    pairs = list(session.pairs)
+    pairs = list(series.pairs)
     turned = None if finding is None else finding.turned
     if turned is None or turned.course is Course.LOOSE:
         return found, finding, pairs
     straight = unturned(pairs, turned)
     try:
-        without = calibrate(straight, session.board, session.sizes_px, board_side)
+        without = calibrate(straight, series.board, series.sizes_px, board_side)
     except DataError:
         return found, finding, pairs
     if isinstance(found, Calibration) and len(without.used) < len(found.used):
@@ -51,7 +51,7 @@ def assessed(found: Calibration, rejected: tuple[Rejected, ...], finding: Findin
     Args:
         found: the calibration.
         rejected: all pairs that are not used.
-        finding: what is wrong with the session; None: nothing.
+        finding: what is wrong with the series; None: nothing.
         hint: what to do about a turned or mirrored side; empty: it is none.
     """
     judgement = judge(found, rejected)
@@ -66,7 +66,7 @@ def assessed(found: Calibration, rejected: tuple[Rejected, ...], finding: Findin
 
 
 def with_cause(judgement: Assessment, finding: Finding) -> Assessment:
-    """Give the mistake's remedy, which helps most, in place of all others; a session that has it may get no better verdict than it allows.
+    """Give the mistake's remedy, which helps most, in place of all others; a series that has it may get no better verdict than it allows.
 
     A rig that is good all the same needs no remedy: the mistake is only told.
     """

@@ -27,7 +27,7 @@ from phone_host.verbs.units import square_mm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Session:
+class Series:
     """What is to be calibrated with.
 
     Attributes:
@@ -106,7 +106,7 @@ def _mm(board: Board) -> float:
     return board.square_m * 1e3
 
 
-def session_of(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Known]) -> tuple[Session, Known]:
+def series_of(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Known]) -> tuple[Series, Known]:
     """Find the board, and join what is known of the earlier calibration.
 
     Args:
@@ -120,15 +120,15 @@ def session_of(options: argparse.Namespace, asked: Asked, find: Callable[[Named]
     """
     known = find(asked.named) if asked.views is None else _known(options, asked, find)
     if asked.rig is None:
-        return Session(board=known.board, side=Side(options.board_side or Side.LEFT.value), path=Path()), known
-    session = Session(
+        return Series(board=known.board, side=Side(options.board_side or Side.LEFT.value), path=Path()), known
+    series = Series(
         board=known.board,
         side=Side(options.board_side or asked.rig.board_side.value),
         path=options.earlier,
         rig=asked.rig,
         views=None if options.pose_only else asked.views,
     )
-    return session, known
+    return series, known
 
 
 def _known(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Known]) -> Known:
@@ -144,63 +144,63 @@ def _known(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Kn
         ) from error
 
 
-def calibrated(session: Session, pairs: list[BoardPair], sizes_px: Sizes) -> Calibration:
-    """Calibrate from the new pairs and what the session has.
+def calibrated(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> Calibration:
+    """Calibrate from the new pairs and what the series has.
 
     Raises:
         DataError: too few pairs are left, or the earlier calibration is for other images.
     """
-    if session.rig is None:
-        return calibrate(pairs, session.board, sizes_px, session.side)
-    if session.views is None:
-        earlier = scaled_rig(session.rig, *sizes_px)
-        found = solve_pose(pairs, session.board, replace(earlier, board_side=session.side))
+    if series.rig is None:
+        return calibrate(pairs, series.board, sizes_px, series.side)
+    if series.views is None:
+        earlier = scaled_rig(series.rig, *sizes_px)
+        found = solve_pose(pairs, series.board, replace(earlier, board_side=series.side))
     else:
-        _require_sizes(session.rig, session.path, sizes_px)
-        earlier_pairs = pairs_of(session.views)
+        _require_sizes(series.rig, series.path, sizes_px)
+        earlier_pairs = pairs_of(series.views)
         fresh = new_ones(earlier_pairs, pairs)
         if pairs and not fresh:
-            raise DataError(f"all of these pictures are in {session.path} already", "give other ones")
-        found = calibrate(together(earlier_pairs, fresh), session.board, sizes_px, session.side)
-    return replace(found, rig=replace(found.rig, time_offset=session.rig.time_offset))
+            raise DataError(f"all of these pictures are in {series.path} already", "give other ones")
+        found = calibrate(together(earlier_pairs, fresh), series.board, sizes_px, series.side)
+    return replace(found, rig=replace(found.rig, time_offset=series.rig.time_offset))
 
 
-def saved_views(session: Session, found: Calibration, pairs: list[BoardPair]) -> RigViews | None:
+def saved_views(series: Series, found: Calibration, pairs: list[BoardPair]) -> RigViews | None:
     """Return what rig.yaml keeps of the views; None after --pose-only, whose lenses come from others."""
-    if session.rig is not None and session.views is None:
+    if series.rig is not None and series.views is None:
         return None
-    return views_of(found, every_pair(session, pairs), session.board)
+    return views_of(found, every_pair(series, pairs), series.board)
 
 
-def every_pair(session: Session, pairs: list[BoardPair]) -> list[BoardPair]:
+def every_pair(series: Series, pairs: list[BoardPair]) -> list[BoardPair]:
     """Return the pairs that the rig was computed from: those of the earlier calibration that are wanted, and the new ones."""
-    if session.views is None:
+    if series.views is None:
         return pairs
-    earlier = pairs_of(session.views)
+    earlier = pairs_of(series.views)
     return together(earlier, new_ones(earlier, pairs))
 
 
-def with_earlier_cameras(session: Session, rig: Rig) -> Rig:
+def with_earlier_cameras(series: Series, rig: Rig) -> Rig:
     """Return the rig with the cameras of the earlier one, where nothing newer is known."""
-    if session.rig is None:
+    if series.rig is None:
         return rig
     return replace(
         rig,
-        left_camera=rig.left_camera or session.rig.left_camera,
-        right_camera=rig.right_camera or session.rig.right_camera,
+        left_camera=rig.left_camera or series.rig.left_camera,
+        right_camera=rig.right_camera or series.rig.right_camera,
     )
 
 
-def notes(session: Session, pairs: list[BoardPair], sizes_px: Sizes) -> list[str]:
+def notes(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> list[str]:
     """Say what was taken from the earlier calibration, and how."""
-    if session.rig is None:
+    if series.rig is None:
         return []
-    if session.views is not None:
-        fresh = len(every_pair(session, pairs)) - len(session.views.names)
+    if series.views is not None:
+        fresh = len(every_pair(series, pairs)) - len(series.views.names)
         known = f"; {len(pairs) - fresh} were in it already" if fresh < len(pairs) else ""
-        return [f"from     {len(session.views.names)} pairs of {session.path} and {fresh} new ones{known}"]
-    rows = [f"from     {session.path}: its lenses are kept, the relative pose is new"]
-    for side, model, size_px in (("left", session.rig.left, sizes_px[0]), ("right", session.rig.right, sizes_px[1])):
+        return [f"from     {len(series.views.names)} pairs of {series.path} and {fresh} new ones{known}"]
+    rows = [f"from     {series.path}: its lenses are kept, the relative pose is new"]
+    for side, model, size_px in (("left", series.rig.left, sizes_px[0]), ("right", series.rig.right, sizes_px[1])):
         if size_px != _size(model):
             way = "scaled" if is_scaling(_size(model), size_px) else "cropped to its middle"
             rows.append(f"         the {side} lens is {way}: {size_text(_size(model))} to {size_text(size_px)} px")

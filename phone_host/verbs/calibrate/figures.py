@@ -16,8 +16,8 @@ from phone_host.calibration.board_views import BoardViews, turn_text
 from phone_host.calibration.fit_quality import LensTrial
 from phone_host.calibration.verdict import SHARE_GOOD, Assessment
 from phone_host.declared_settings import NEAR_M
-from phone_host.model import Rectification, Rig
-from phone_host.output.rig_yaml import REJECTED
+from phone_host.model import Rectification, Rig, Verdict
+from phone_host.model.calibration_series import BoardInSpace
 from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_error_px
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.view_files import ViewFiles
@@ -51,7 +51,7 @@ def report_of_failure(files: ViewFiles, views: BoardViews, error: DataError) -> 
         "command": "calibrate",
         "pairs": _pairs(files, views.rejected, 0),
         **_turned(views),
-        "verdict": REJECTED,
+        "verdict": Verdict.REJECT.value,
         "problem": error.problem,
         "remedy": error.remedy,
     }
@@ -83,6 +83,7 @@ def _figures(calibration: Calibration) -> dict[str, Any]:
                 "left_px": round(used.left_px, 4),
                 "right_px": round(used.right_px, 4),
                 "vertical_px": round(used.vertical_px, 4) if known else None,
+                **_in_space(used.in_space),
             }
             for used in calibration.used
         ],
@@ -129,6 +130,18 @@ def _figures(calibration: Calibration) -> dict[str, Any]:
         },
         "board_spread": round(calibration.spread, 3),
         "largest_tilt_deg": round(float(calibration.tilts_deg.max()), 1),
+    }
+
+
+def _in_space(board: BoardInSpace) -> dict[str, float | None]:
+    """Return how a rig sees a view's board."""
+    bow_m, sigma_m = board.bow_m
+    return {
+        "rays_miss_sigmas": _rounded(board.miss, 3),
+        "board_size": _rounded(board.size, 6),
+        "board_size_sigma": _rounded(board.size_sigma, 6),
+        "board_bow_mm": _rounded(bow_m * 1e3, 3),
+        "board_bow_sigma_mm": _rounded(sigma_m * 1e3, 3),
     }
 
 
@@ -265,6 +278,6 @@ def _written(report: dict[str, Any], calibration: Calibration, out: Path) -> lis
     if calibration.rectification is None:
         return unwritten(report, out)
     rows = [f"written to {out} and {out.with_name('report.json')}{earlier_words(report)}", f"look at {report['page']}"]
-    if report["verdict"] == REJECTED:
+    if report["verdict"] == Verdict.REJECT.value:
         rows.append(REFUSED)
     return rows

@@ -13,10 +13,10 @@ from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason
 from phone_host.calibration.board_views import BoardViews, Mounted, look_for_boards
 from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.causes.mistakes import Finding
-from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corners
 from phone_host.calibration.out_of_step import out_of_step
-from phone_host.calibration.session_snapshot import Taken
+from phone_host.calibration.series_snapshot import Taken
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
 from phone_host.output.atomic import write_text
@@ -29,13 +29,13 @@ from phone_host.verbs.calibrate.board import Known, board_in, unseen_remedy
 from phone_host.verbs.calibrate.cause import assessed, calibrated_as_last, cause_report
 from phone_host.verbs.calibrate.earlier import (
     Asked,
-    Session,
+    Series,
     calibrated,
     every_pair,
     notes,
     require_first_sizes,
     saved_views,
-    session_of,
+    series_of,
     with_earlier_cameras,
 )
 from phone_host.verbs.calibrate.figures import (
@@ -48,7 +48,7 @@ from phone_host.verbs.calibrate.figures import (
 )
 from phone_host.verbs.calibrate.hints import arrangement_hint, out_of_step_error
 from phone_host.verbs.calibrate.importing import export_lines, write_exports
-from phone_host.verbs.calibrate.page import session_of_failure, session_of_rig, with_rectified, write_page
+from phone_host.verbs.calibrate.page import series_of_failure, series_of_rig, with_rectified, write_page
 from phone_host.verbs.calibrate.rig_file import replace_rig
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
@@ -109,10 +109,10 @@ def calibrate_pictures(
     keep_other_report(options.out.parent, "calibrate")
     claim_names(options.out.parent, options.out, "report.json", PAGE)
     beside = cameras_beside(files, mounted)
-    session, known = session_of(
+    series, known = series_of(
         options, asked, lambda named: board_in(files, named, most_pixels(None, options.max_megapixels))
     )
-    views, found, finding, pairs = _calibrated(files, session, options, mounted)
+    views, found, finding, pairs = _calibrated(files, series, options, mounted)
     may_write()
     wrong = None if finding is None else finding.misplaced
     hint = "" if wrong is None else arrangement_hint(views, mounted, wrong, is_live=options.live)
@@ -125,37 +125,37 @@ def calibrate_pictures(
     judgement = assessed(found, rejected, finding, hint)
     if live is not None and not options.pose_only and is_guessed(found.bends):
         used = {each.name for each in found.used}
-        seen = [pair for pair in every_pair(session, pairs) if pair.name in used]
-        judgement = with_corners(judgement, unseen_in(seen, session.board, found.rig.left, found.rig.right))
+        seen = [pair for pair in every_pair(series, pairs) if pair.name in used]
+        judgement = with_corners(judgement, unseen_in(seen, series.board, found.rig.left, found.rig.right))
     rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
-    rig = replace(with_earlier_cameras(session, rig), verdict=judgement.verdict.value)
+    rig = replace(with_earlier_cameras(series, rig), verdict=judgement.verdict)
     report = report_of(files, views, rejected, found, judgement) | known.as_report() | cause_report(finding, hint)
-    report |= replace_rig(options.out, rig, found.rectification, saved_views(session, found, pairs))
+    report |= replace_rig(options.out, rig, found.rectification, saved_views(series, found, pairs))
     report |= {} if live is None else live.as_report()
     exported: list[str] = []
     if found.rectification is not None:
         report |= write_exports(options, rig, found.rectification)
         exported = export_lines(report, found.rectification)
-    taken = _taken(files, views, every_pair(session, pairs), session.board)
-    page = session_of_rig(taken, found, rig, rejected, report)
+    taken = _taken(files, views, every_pair(series, pairs), series.board)
+    page = series_of_rig(taken, found, rig, rejected, report)
     limit = most_pixels(None, options.max_megapixels)
     report |= write_page(options.out, with_rectified(page, taken, files, mounted, limit))
     _write_report(options.out, report)
-    said = [*pairing_notes(files), *notes(session, pairs, views.sizes_px), known.as_line()]
+    said = [*pairing_notes(files), *notes(series, pairs, views.sizes_px), known.as_line()]
     again = [] if live is None else live.as_lines(options)
     lines = [*said, *summary(report, views, found, rejected, options.out), *exported, *again]
     return Made(judgement.verdict, report, lines)
 
 
 def _calibrated(
-    files: ViewFiles, session: Session, options: argparse.Namespace, mounted: Mounted
+    files: ViewFiles, series: Series, options: argparse.Namespace, mounted: Mounted
 ) -> tuple[BoardViews, Calibration | DataError, Finding | None, list[BoardPair]]:
     """Search all images and calibrate.
 
     Returns:
-        The views; the calibration, or why there is none; what is wrong with the session; and the pairs as they were used.
+        The views; the calibration, or why there is none; what is wrong with the series; and the pairs as they were used.
     """
-    limit, board = most_pixels(None, options.max_megapixels), session.board
+    limit, board = most_pixels(None, options.max_megapixels), series.board
     with step_bar("finding the board", len(files.pairs)) as step:
         views = look_for_boards(files, board, step, limit, mounted)
         step.say("fitting the rig")
@@ -165,18 +165,18 @@ def _calibrated(
         found: Calibration | DataError
         pairs = list(views.pairs)
         try:
-            found = calibrated(session, pairs, views.sizes_px)
+            found = calibrated(series, pairs, views.sizes_px)
         except DataError as failure:
             found = failure
         step.say("looking for mistakes")
         baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
-        taken = BoardSession(
+        taken = BoardSeries(
             pairs=views.pairs, board=board, sizes_px=views.sizes_px, looks=views.looks, baseline_m=baseline_m
         )
         finding = name_mistake(taken, found)
-        if session.rig is not None:  # the earlier pairs stood otherwise, or its lenses are kept
+        if series.rig is not None:  # the earlier pairs stood otherwise, or its lenses are kept
             return views, found, finding, pairs
-        return views, *calibrated_as_last(taken, found, finding, session.side)
+        return views, *calibrated_as_last(taken, found, finding, series.side)
 
 
 def _report_failure(
@@ -189,7 +189,7 @@ def _report_failure(
         limit = most_pixels(None, options.max_megapixels)
         error = DataError(failure.problem, unseen_remedy(files, known.board, limit))
     report = report_of_failure(files, views, error) | known.as_report() | replace_rig(options.out, None, None)
-    report |= write_page(options.out, session_of_failure(_taken(files, views, list(views.pairs), known.board), report))
+    report |= write_page(options.out, series_of_failure(_taken(files, views, list(views.pairs), known.board), report))
     _write_report(options.out, report)
     lines = [*pairing_notes(files), known.as_line(), *rejections(views.rejected), *unwritten(report, options.out)]
     return Made(error, report, lines)

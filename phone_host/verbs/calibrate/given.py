@@ -1,4 +1,4 @@
-"""Which options of phone-host calibrate were given: what fits no other one is refused, and a live session is repeated with them."""
+"""Which options of phone-host calibrate were given: what fits no other one is refused, and a live calibration is repeated with them."""
 
 import argparse
 import shlex
@@ -68,10 +68,10 @@ def require_import_alone(options: argparse.Namespace) -> None:
 
 
 def command_again(options: argparse.Namespace, left: str, right: str) -> str:
-    """Return the command that calibrates from the pictures of a live session as it was done; empty: the earlier calibration holds them now.
+    """Return the command that calibrates from the pictures of a live calibration as it was done; empty: the earlier calibration holds them now.
 
     Args:
-        options: of the live session.
+        options: of the live calibration.
         left: folder of its left pictures.
         right: folder of the right ones.
     """

@@ -19,7 +19,7 @@ from phone_host.model import Rectification, Rig, Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import Imported, RigKind, export_texts, import_rig
-from phone_host.output.rig_yaml import REJECTED, is_rig, read_rig_views
+from phone_host.output.rig_yaml import is_rig, read_rig_views
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.verbs.calibrate.given import require_import_alone
@@ -134,7 +134,7 @@ def _report(found: Imported) -> dict[str, Any]:
         "focal_px": {side: [round(float(model.matrix[i, i]), 3) for i in (0, 1)] for side, model in cameras.items()},
         "sizes": {side: f"{model.width_px}x{model.height_px}" for side, model in cameras.items()},
         "board_side": rig.board_side.value,
-        "verdict": rig.verdict or None,
+        "verdict": None if rig.verdict is None else rig.verdict.value,
     }
 
 
@@ -148,7 +148,7 @@ def _lines(found: Imported, report: dict[str, Any]) -> list[str]:
         f"baseline {report['baseline_mm']:.2f} mm",
         "         compare it with a ruler: it shows a wrong unit",
         *([f"verdict  {report['verdict']}"] if report["verdict"] else []),
-        *([REFUSED] if report["verdict"] == REJECTED else []),
+        *([REFUSED] if found.rig.is_rejected else []),
     ]
 
 

@@ -3,6 +3,7 @@
 import argparse
 import logging
 import math
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
@@ -25,10 +26,10 @@ from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.board_views import BoardViews, Size
 from phone_host.calibration.causes.looks import SeenLook
 from phone_host.calibration.causes.mistakes import Mistake
-from phone_host.calibration.causes.name import BoardSession, name_mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.earlier_views import board_of, pairs_of
 from phone_host.calibration.guide.guide import View
-from phone_host.calibration.guide.progress import Progress, lessons
+from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.unseen import unseen_in
 from phone_host.calibration.guide.wants import CORNERS, Want
@@ -44,7 +45,7 @@ from phone_host.run.host_settings import HostSettings
 from phone_host.settings import key_folder, most_pixels
 from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.cause import assessed
-from phone_host.verbs.calibrate.earlier import Asked, Session, calibrated
+from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated
 from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.hints import arrangement_hint
 from phone_host.verbs.orientation_arguments import orientations
@@ -53,7 +54,10 @@ from phone_host.verbs.units import baseline_mm
 
 _LOG = logging.getLogger(__name__)
 
-_LEAST_VIEWS, _MOST_VIEWS = 3, 99
+_MOST_VIEWS: Final = 99
+_LEAST_ADDED: Final = 3
+"""So few views may be added to those of an earlier calibration."""
+
 _WAITED_NS: Final = 1_000_000_000
 """A board that is there is met within a fifth of this; then there is nothing to say."""
 
@@ -102,7 +106,12 @@ class Live:
         """Return it for the summary: where the pictures are, and how they are calibrated again."""
         taken = f"live     {counted(self.last.views, 'view')} in {self.last.seconds:.0f} s"
         command = command_again(options, *self.folders)
-        return [f"{taken}; to calibrate from them again:", f"         {command}"] if command else [taken]
+        again = [f"{taken}; to calibrate from them again:", f"         {command}"] if command else [taken]
+        if self.last.verdict != Verdict.GOOD.value:
+            return again
+        links = [word for uri in options.link or () for word in ("--link", uri)]
+        run = ["phone-host", "run", *links, "--camera", options.camera, "--calibration", str(options.out)]
+        return [*again, f"next     {shlex.join(run)}"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,12 +123,14 @@ class PreparedViews:
         named: addresses of the board.
         left: folder of the left pictures.
         right: folder of the right ones.
+        least: fewer views give no rig.
     """
 
     live: LiveCalibration
     named: tuple[str, ...]
     left: Path
     right: Path
+    least: int
 
     @property
     def note(self) -> str:
@@ -164,8 +175,8 @@ class PreparedViews:
             DataError: too few views were taken to calibrate from.
         """
         last = self.live.snapshot()
-        if last.views < _LEAST_VIEWS:
-            raise _too_few(last)
+        if last.views < self.least:
+            raise _too_few(last, self.least)
         return Live(last, self.left, self.right, signals)
 
 
@@ -188,14 +199,14 @@ def prepare_views(options: argparse.Namespace, asked: Asked) -> PreparedViews:
     baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
 
     def grow(views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size]) -> Progress:
-        session = Session(
+        series = Series(
             board=board,
             side=settings.host.board_side,
             path=options.earlier or Path(),
             rig=asked.rig,
             views=None if options.pose_only else asked.views,
         )
-        return grown(views, session, sizes_px, baseline_m)
+        return grown(views, series, sizes_px, baseline_m)
 
     with ExitStack() as opened:  # what cannot be had closes what was
         camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels)
@@ -213,7 +224,7 @@ def prepare_views(options: argparse.Namespace, asked: Asked) -> PreparedViews:
         except OSError as error:
             raise unwritable(settings.left, error, "LEFT or --snapshots") from error
         opened.pop_all()
-    return PreparedViews(live, named, settings.left, settings.right)
+    return PreparedViews(live, named, settings.left, settings.right, _least_views(options))
 
 
 def take_views(options: argparse.Namespace, asked: Asked) -> Live:
@@ -232,21 +243,23 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
     prepared = prepare_views(options, asked)
     signals = StopSignals()
     _run(prepared, options, signals)
-    views = prepared.live.snapshot().views
-    if 0 < views < _LEAST_VIEWS:
-        kept = f"{counted(views, 'view')} kept in {prepared.left} and {prepared.right}"
-        say(f"phone-host: {kept}; the next --live replaces them", sys.stderr, flush=True)
-    if views < _LEAST_VIEWS and signals.interrupted:
-        raise KeyboardInterrupt
-    return prepared.taken(signals)
+    try:
+        return prepared.taken(signals)
+    except DataError as reason:
+        if not signals.interrupted:
+            raise
+        views = prepared.live.snapshot().views
+        kept = f", kept in {prepared.left} and {prepared.right} until the next --live" if views else ""
+        say(f"phone-host: no rig: {reason.problem}{kept}", sys.stderr, flush=True)
+        raise KeyboardInterrupt from None
 
 
-def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:
+def grown(views: tuple[View, ...], series: Series, sizes_px: tuple[Size, Size], baseline_m: float) -> Progress:
     """Calibrate from the views so far and judge, as the command does at the end.
 
     Args:
         views: the views.
-        session: the board, and what an earlier calibration gives.
+        series: the board, and what an earlier calibration gives.
         sizes_px: of the left and of the right images.
         baseline_m: as the user measured it, m; NaN: not told.
     """
@@ -256,11 +269,11 @@ def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size]
     )
     found: Calibration | DataError
     try:
-        found = calibrated(session, pairs, sizes_px)
+        found = calibrated(series, pairs, sizes_px)
     except DataError as error:
         found = error
-    board = session.board
-    shown = BoardSession(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
+    board = series.board
+    shown = BoardSeries(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
     finding = name_mistake(shown, found)
     wrong = None if finding is None else finding.misplaced
     seen = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=sizes_px, looks=looks)
@@ -283,8 +296,9 @@ def grown(views: tuple[View, ...], session: Session, sizes_px: tuple[Size, Size]
 def _check(options: argparse.Namespace) -> None:
     if not options.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
-    if not _LEAST_VIEWS <= options.views <= _MOST_VIEWS:
-        raise SettingsError(f"--views is {options.views}", f"give {_LEAST_VIEWS} to {_MOST_VIEWS}")
+    least = _least_views(options)
+    if not least <= options.views <= _MOST_VIEWS:
+        raise SettingsError(f"--views is {options.views}", f"give {least} to {_MOST_VIEWS}")
     if len(options.images) not in {0, 2}:
         raise SettingsError(
             f"--live with {counted(len(options.images), 'folder')}",
@@ -295,6 +309,11 @@ def _check(options: argparse.Namespace) -> None:
             "--live does not take --rotate-left, --rotate-right, --flip-left or --flip-right",
             "add rotate= or flip= to the camera's address",
         )
+
+
+def _least_views(options: argparse.Namespace) -> int:
+    """Return how many views there must be for a rig to know how exact it is."""
+    return LEAST_STATED if options.earlier is None else _LEAST_ADDED
 
 
 def _settings(options: argparse.Namespace, asked: Asked) -> LiveSettings:
@@ -360,10 +379,10 @@ def ring_instead(picture: Picture, program: str, reason: OSError) -> None:
     _LOG.error(logs.event("voice_off", program=program, reason=reason.strerror, remedy=remedy))
 
 
-def _too_few(last: GuideSnapshot) -> DataError:
+def _too_few(last: GuideSnapshot, least: int) -> DataError:
     refused = max(last.refused, key=lambda each: each[1], default=None)
     reason = "" if refused is None else f"; most looks were refused: {refused[0].value}"
     return DataError(
         f"only {counted(last.views, 'view')} taken{reason}",
-        f"show the board as it is told; {_LEAST_VIEWS} are the least",
+        f"show the board as it is told; {least} are the least",
     )

@@ -7,10 +7,10 @@ from typing import Any
 from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import Mounted
 from phone_host.calibration.rectified_view import fullest, rectified_view
-from phone_host.calibration.session_snapshot import Taken, session_rig, session_views
+from phone_host.calibration.series_snapshot import Taken, series_rig, series_views
 from phone_host.calibration.view_turns import view_turns
-from phone_host.model import Rig
-from phone_host.model.calibration_session import CalibrationSession, Verdict
+from phone_host.model import Rig, Verdict
+from phone_host.model.calibration_series import CalibrationSeries
 from phone_host.output.atomic import write_text
 from phone_host.report.calibration_page import calibration_page
 from phone_host.stereo.view_files import ViewFiles
@@ -18,61 +18,61 @@ from phone_host.verbs.calibrate.figures import depth_limit_m
 from phone_host.verbs.output_folders import PAGE, unwritable
 
 
-def session_of_failure(taken: Taken, report: dict[str, Any]) -> CalibrationSession:
+def series_of_failure(taken: Taken, report: dict[str, Any]) -> CalibrationSeries:
     """Return what the page shows if there is no rig."""
-    return CalibrationSession(
+    return CalibrationSeries(
         verdict=Verdict.REJECT,
         problem=report["problem"],
         remedy=report["remedy"],
         board=_board_words(report),
         sizes_px=taken.views.sizes_px,
-        views=session_views(taken, None, taken.views.rejected),
+        views=series_views(taken, None, taken.views.rejected),
     )
 
 
-def session_of_rig(
+def series_of_rig(
     taken: Taken, found: Calibration, rig: Rig, rejected: tuple[Rejected, ...], report: dict[str, Any]
-) -> CalibrationSession:
+) -> CalibrationSeries:
     """Return what the page shows of a rig, but for what is read from files again."""
     cause = report["cause"]
     used = {each.name for each in found.used}
     kept = [taken.as_seen(pair) for pair in taken.pairs if pair.name in used]
-    return CalibrationSession(
+    return CalibrationSeries(
         verdict=Verdict(report["verdict"]),
         remedy=report["remedy"],
         cause="" if cause is None else cause["name"],
         cause_words="" if cause is None else cause["sentence"],
         board=_board_words(report),
         sizes_px=taken.views.sizes_px,
-        views=session_views(taken, found, rejected),
-        found=session_rig(found, rig, depth_limit_m(found)),
+        views=series_views(taken, found, rejected),
+        found=series_rig(found, rig, depth_limit_m(found)),
         turns=view_turns(kept, found.poses, taken.board.points_m(), found.rig),
         is_straightened=taken.is_straightened,
     )
 
 
 def with_rectified(
-    session: CalibrationSession, taken: Taken, files: ViewFiles, mounted: Mounted, most_pixels: int
-) -> CalibrationSession:
+    series: CalibrationSeries, taken: Taken, files: ViewFiles, mounted: Mounted, most_pixels: int
+) -> CalibrationSeries:
     """Add one pair after rectification: the last one of a rig that turned, because it is as it stood then; else the one whose board is largest."""
-    if session.found is None or session.found.rectification is None:
-        return session
-    rig, rectification = session.found.rig, session.found.rectification
-    used = {view.name for view in session.views if view.is_used}
+    if series.found is None or series.found.rectification is None:
+        return series
+    rig, rectification = series.found.rig, series.found.rectification
+    used = {view.name for view in series.views if view.is_used}
     paths = {name: (left, right) for name, left, right in files.pairs}
     shown = [own for pair in taken.pairs if pair.name in used and (own := taken.own(pair)) is not None]
     if not shown:
-        return session
-    one = shown[-1] if session.is_straightened else fullest(shown, rig, rectification)
-    return replace(session, rectified=rectified_view(paths[one.name], one, rig, mounted, most_pixels))
+        return series
+    one = shown[-1] if series.is_straightened else fullest(shown, rig, rectification)
+    return replace(series, rectified=rectified_view(paths[one.name], one, rig, mounted, most_pixels))
 
 
-def write_page(out: Path, session: CalibrationSession) -> dict[str, str]:
+def write_page(out: Path, series: CalibrationSeries) -> dict[str, str]:
     """Write the page beside the rig.
 
     Args:
         out: the rig's file.
-        session: what the page shows.
+        series: what the page shows.
 
     Returns:
         For the report: where it is.
@@ -80,10 +80,10 @@ def write_page(out: Path, session: CalibrationSession) -> dict[str, str]:
     Raises:
         UnavailableError: it cannot be written.
     """
-    is_written = session.found is not None and session.found.rectification is not None
+    is_written = series.found is not None and series.found.rectification is not None
     page = out.with_name(PAGE)
     try:
-        write_text(page, calibration_page(replace(session, rig_file=out.name if is_written else "")))
+        write_text(page, calibration_page(replace(series, rig_file=out.name if is_written else "")))
     except OSError as error:
         raise unwritable(out, error) from error
     return {"page": str(page)}

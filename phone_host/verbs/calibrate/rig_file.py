@@ -8,7 +8,7 @@ from common.places import Kind, kind_of, make_folder
 from phone_host.calibration.earlier_views import new_ones, pairs_of
 from phone_host.model import Rectification, Rig
 from phone_host.output.rig_views import RigViews
-from phone_host.output.rig_yaml import REJECTED, read_rig, read_rig_views, write_rig
+from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
 from phone_host.verbs.output_folders import unwritable
 
 
@@ -29,7 +29,7 @@ def replace_rig(
     Raises:
         UnavailableError: a file cannot be written or moved.
     """
-    is_of_use = rig is not None and rig.verdict != REJECTED
+    is_of_use = rig is not None and not rig.is_rejected
     moved: dict[str, str] = {}
     try:
         make_folder(out.parent)
@@ -54,7 +54,7 @@ def earlier_words(report: dict[str, Any]) -> str:
 def _is_rejected(path: Path) -> bool:
     """Return whether an earlier rig was rejected itself: it may be replaced, and does not take the place of a good one in rig.yaml.old."""
     try:
-        return read_rig(path).verdict == REJECTED
+        return read_rig(path).is_rejected
     except DataError:
         return False
 

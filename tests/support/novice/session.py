@@ -97,8 +97,9 @@ class Setting:
     """What a session is run with.
 
     Attributes:
-        fps: of both cameras.
+        fps: of the left camera.
         patience_s: longest time, s; then the session is ended as failed.
+        other_fps: of the right camera; None: as of the left one. If they differ, exposures drift through each other.
         is_free: whether the cameras cannot be steered, so that their exposures stay apart.
         kind: of board.
         more: further options of phone-host.
@@ -106,6 +107,7 @@ class Setting:
 
     fps: int = 15
     patience_s: float = 300.0
+    other_fps: int | None = None
     is_free: bool = False
     kind: str = "chessboard"
     more: tuple[str, ...] = ()
@@ -124,7 +126,9 @@ def run_session(seed: int, folder: Path, setting: Setting) -> Session:
     novice = Novice(np.random.default_rng([16, seed]), between_m(truth), time.monotonic())
     write_plan(folder / PLAN, novice.plan)
     more = registered(folder / "site")
-    camera = f"novice:{folder}?seed={seed}&fps={setting.fps}&board={setting.kind}&steered={0 if setting.is_free else 1}"
+    camera = f"novice:{folder}?seed={seed}&board={setting.kind}&steered={0 if setting.is_free else 1}"
+    theirs = f"{camera}&side=left&fps={setting.fps}"
+    ours = f"{camera}&side=right&fps={setting.other_fps or setting.fps}"
     link = f"ipc://{folder}/link"
     live = [
         "calibrate",
@@ -132,7 +136,7 @@ def run_session(seed: int, folder: Path, setting: Setting) -> Session:
         "--link",
         link,
         "--camera",
-        f"{camera}&side=right",
+        ours,
         "--no-sound",
         "--json",
         "--snapshots",
@@ -141,7 +145,7 @@ def run_session(seed: int, folder: Path, setting: Setting) -> Session:
     live += ["--board", BOARDS[setting.kind]] if setting.kind != "chessboard" else []
     live += ["--square", f"{BOARD.square_m * 1e3:g}mm"] if setting.kind == "chessboard" else []
     live += ["--out", str(folder / "rig.yaml"), *setting.more]
-    with board(["run", "--camera", f"{camera}&side=left", "--link", link], folder, more=more) as agent:
+    with board(["run", "--camera", theirs, "--link", link], folder, more=more) as agent:
         until(lambda: "serving" in agent.stderr or agent.process.poll() is not None, "board-agent serves")
         with host(live, folder, more=more) as guide:
             began_s = time.monotonic()

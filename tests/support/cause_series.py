@@ -1,6 +1,6 @@
-"""Sessions of board views with one mistake each, by the corners that two cameras would see: exact geometry, noise, and the mistake.
+"""Series of board views with one mistake each, by the corners that two cameras would see: exact geometry, noise, and the mistake.
 
-Good sessions have what good sessions have: noise, a board that is not quite flat, corners that glare has moved a little, and
+Good series have what good series have: noise, a board that is not quite flat, corners that glare has moved a little, and
 now and then a pair in which the board moved.
 """
 
@@ -32,16 +32,16 @@ _MARGIN_PX: Final = 12.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Made:
-    """A session as a program sees it.
+    """A series as a program sees it.
 
     Attributes:
         pairs: the corners.
         board: the board as the user names it.
         sizes_px: of the images.
-        rig: the true cameras, the right one as it stands in the last view; of a real session: as it is calibrated.
+        rig: the true cameras, the right one as it stands in the last view; of a real series: as it is calibrated.
         baseline_m: what the user measured; NaN: nothing.
-        images: of sessions whose mistake shows in pixels only; otherwise none.
-        truth: what the session was made with, in words.
+        images: of series whose mistake shows in pixels only; otherwise none.
+        truth: what the series was made with, in words.
     """
 
     pairs: list[BoardPair]
@@ -164,10 +164,13 @@ def _moved(points: Vector, motion: Vector) -> Vector:
     return np.asarray((points - middle) @ np.asarray(cv2.Rodrigues(motion[:3])[0]).T + middle + motion[3:], np.float64)
 
 
-def _session(
-    random: np.random.Generator, motions: Callable[[int], list[_Motion]] | None = None, stretch: float = 1.0
+def _series(
+    random: np.random.Generator,
+    motions: Callable[[int], list[_Motion]] | None = None,
+    stretch: float = 1.0,
+    bend: tuple[float, float] = (0.0, 0.0),
 ) -> Made:
-    """A session with a motion in each view."""
+    """A series with a motion in each view; the board is bent along its rows and along its columns by a share of their length."""
     rig, board = random_rig(random), _BOARDS[random.integers(len(_BOARDS))]
     count = int(random.integers(10, 22))
     noise_px = random.uniform(0.05, 0.18) * max(1.0, rig.left.width_px / 1280)
@@ -176,6 +179,9 @@ def _session(
     middle = flat.mean(axis=0)
     away = np.linalg.norm(flat - middle, axis=1)
     flat[:, 2] += bow_m * (away / away.max()) ** 2
+    flat[:, 2] += (2 * (flat - middle) / np.ptp(flat, axis=0).clip(1e-9))[:, :2] ** 2 @ (
+        bend * np.ptp(flat[:, :2], axis=0)
+    )
     own = motions(count) if motions is not None else [_STILL] * count
     pairs = []
     for index, (pose, motion) in enumerate(zip(random_poses(rig, board, count, random), own, strict=True)):
@@ -197,7 +203,7 @@ def good(random: np.random.Generator) -> Made:
             own[int(random.integers(count))] = replace(_STILL, board=_jolt(random, 0.01, 2.0))
         return own
 
-    made = _session(random, motions)
+    made = _series(random, motions)
     measured = float(np.linalg.norm(made.rig.t_right_left_m)) * random.uniform(0.99, 1.01)
     return replace(
         made, baseline_m=measured if random.random() < 0.5 else math.nan, truth="one pair moved" if spoiled else ""
@@ -214,13 +220,13 @@ def _jolt(random: np.random.Generator, metres: float, degrees: float) -> Vector:
 
 def swapped(random: np.random.Generator) -> Made:
     """LEFT and RIGHT are exchanged."""
-    made = _session(random)
+    made = _series(random)
     pairs = [BoardPair(pair.name, pair.right_px, agree(pair.right_px, pair.left_px, made.board)) for pair in made.pairs]
     return replace(made, pairs=pairs, sizes_px=(made.sizes_px[1], made.sizes_px[0]))
 
 
 def _placed(random: np.random.Generator, turn: Orientation) -> Made:
-    made, index = _session(random), int(random.integers(2))
+    made, index = _series(random), int(random.integers(2))
     sizes = list(made.sizes_px)
     sizes[index] = turn.turned_size(sizes[index])
     pairs = []
@@ -250,7 +256,7 @@ def upside_down(random: np.random.Generator) -> Made:
 
 def partners(random: np.random.Generator) -> Made:
     """Some right images belong to other left ones: two exchanged, all shifted from one on, or in another order."""
-    made = _session(random)
+    made = _series(random)
     count = len(made.pairs)
     order = list(range(count))
     kind = int(random.integers(3))
@@ -273,8 +279,8 @@ def square(random: np.random.Generator) -> Made:
     """--square is wrong and the baseline was measured, or wrong by ten; or the print is stretched."""
     kind = int(random.integers(3))
     if kind == 2:
-        return replace(_session(random, stretch=1 + random.uniform(0.02, 0.06)), truth="stretched")
-    made = _session(random)
+        return replace(_series(random, stretch=1 + random.uniform(0.02, 0.06)), truth="stretched")
+    made = _series(random)
     factor = (
         (10.0 if random.random() < 0.5 else 0.1)
         if kind == 1
@@ -293,7 +299,7 @@ def skew(random: np.random.Generator) -> Made:
         scales = random.uniform(0.3, 1.7, count)
         return [replace(_STILL, board=_jolt(random, metres * scale, degrees * scale)) for scale in scales]
 
-    return replace(_session(random, motions), truth=f"{metres * 1e3:.1f} mm")
+    return replace(_series(random, motions), truth=f"{metres * 1e3:.1f} mm")
 
 
 def rows(random: np.random.Generator) -> Made:
@@ -304,7 +310,7 @@ def rows(random: np.random.Generator) -> Made:
         scales = random.uniform(0.3, 1.7, count)
         return [replace(_STILL, speed=_jolt(random, metres * scale, degrees * scale)) for scale in scales]
 
-    return replace(_session(random, motions), truth=f"{metres * 1e3:.1f} mm")
+    return replace(_series(random, motions), truth=f"{metres * 1e3:.1f} mm")
 
 
 def focus(random: np.random.Generator) -> Made:
@@ -318,7 +324,7 @@ def focus(random: np.random.Generator) -> Made:
         factors = 1 + change * np.asarray(shares, float)
         return [replace(_STILL, focus=(1.0, f) if side else (f, 1.0)) for f in factors]
 
-    return replace(_session(random, motions), truth=f"side {side} {change:+.1%} {'at once' if at_once else 'slowly'}")
+    return replace(_series(random, motions), truth=f"side {side} {change:+.1%} {'at once' if at_once else 'slowly'}")
 
 
 def unstiff(random: np.random.Generator) -> Made:
@@ -335,11 +341,20 @@ def unstiff(random: np.random.Generator) -> Made:
         shares = np.linspace(0, 1, count) if kind == 0 else (np.arange(count) >= first).astype(float)
         return [replace(_STILL, turn=turn * share) for share in shares]
 
-    return replace(_session(random, motions), truth=f"{('drift', 'knock', 'loose')[kind]} {degrees:.2f} degrees")
+    return replace(_series(random, motions), truth=f"{('drift', 'knock', 'loose')[kind]} {degrees:.2f} degrees")
+
+
+def bent(random: np.random.Generator) -> Made:
+    """The board is bent by 1 to 3 % of its length, as paper that is not glued down: along its rows, its columns, or both."""
+    share = random.uniform(0.01, 0.03) * random.choice([-1, 1])
+    kind = int(random.integers(3))
+    bend = ((share, 0.0), (0.0, share), (share, share))[kind]
+    truth = f"{share:+.1%} along its {('rows', 'columns', 'rows and columns')[kind]}"
+    return replace(_series(random, bend=bend), truth=truth)
 
 
 def _pictured(random: np.random.Generator, spoil: Callable[[Image], Image], spoiled: float) -> Made:
-    """A session of images, of which a share is spoiled."""
+    """A series of images, of which a share is spoiled."""
     rig, board = _small(random_rig(random)), _BOARDS[random.integers(len(_BOARDS))]
     images = []
     for pose in random_poses(rig, board, 5, random):
@@ -393,4 +408,5 @@ MAKERS: Final[dict[Mistake, Callable[[np.random.Generator], Made]]] = {
     Mistake.ROWS: rows,
     Mistake.FOCUS: focus,
     Mistake.UNSTIFF: unstiff,
+    Mistake.BENT: bent,
 }

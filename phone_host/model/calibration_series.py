@@ -1,12 +1,11 @@
-"""What a calibration's page shows: copied values of a session of board views and of the rig that came of it. No behaviour."""
+"""What a calibration's page shows: copied values of a series of board views and of the rig that came of it. No behaviour."""
 
 from dataclasses import dataclass, field
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model.rig import Rectification, Rig
+from phone_host.model.rig import Rectification, Rig, Verdict
 
 Size = tuple[int, int]
 """Width and height, px."""
@@ -16,14 +15,6 @@ Floats = NDArray[np.float64]
 
 def _none(*shape: int) -> Floats:
     return np.empty(shape)
-
-
-class Verdict(Enum):
-    """What the calibration is good for."""
-
-    GOOD = "good"
-    USABLE = "usable"
-    REJECT = "reject"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -42,7 +33,33 @@ class SeenBoard:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SessionView:
+class BoardInSpace:
+    """A board as a rig sees it in one view; NaN where fewer than twelve corners are seen by both cameras.
+
+    Attributes:
+        miss: by how much the two rays of a corner miss each other, in standard deviations; root mean square: 1 is noise.
+        size: its size, as a share of the true one.
+        size_sigma: standard deviation of that by the corners' noise.
+        bows_m: (2,) how far its middle stands out from its ends along the rows and along the columns, m; positive: away from
+            the cameras.
+        bow_sigmas_m: (2,) standard deviations of these, m.
+    """
+
+    miss: float
+    size: float
+    size_sigma: float
+    bows_m: Floats
+    bow_sigmas_m: Floats
+
+    @property
+    def bow_m(self) -> tuple[float, float]:
+        """The larger of both bows and its standard deviation, m; NaN: not known."""
+        axis = int(abs(self.bows_m[1]) > abs(self.bows_m[0]))
+        return float(self.bows_m[axis]), float(self.bow_sigmas_m[axis])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SeriesView:
     """One pair of images.
 
     Attributes:
@@ -54,6 +71,7 @@ class SessionView:
         outline_m: (4, 3) the board's outer corners in turn, in the left camera's axes, m; (0, 3): the view is not used.
         vertical_px: (M,) left minus right across the rows after rectification, px; empty: not known.
         as_seen_px: (M,) the same before a drift of the cameras was taken out of the corners.
+        in_space: the board as the rig sees it; None: the view is not used.
     """
 
     name: str
@@ -64,6 +82,7 @@ class SessionView:
     outline_m: Floats = field(default_factory=lambda: _none(0, 3))
     vertical_px: Floats = field(default_factory=lambda: _none(0))
     as_seen_px: Floats = field(default_factory=lambda: _none(0))
+    in_space: BoardInSpace | None = None
 
     @property
     def is_used(self) -> bool:
@@ -136,7 +155,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SessionRig:
+class SeriesRig:
     """The rig that came of it, and its figures.
 
     Attributes:
@@ -167,8 +186,8 @@ class SessionRig:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class CalibrationSession:
-    """A session.
+class CalibrationSeries:
+    """A series.
 
     Attributes:
         verdict: what the rig is good for.
@@ -190,11 +209,11 @@ class CalibrationSession:
     remedy: str
     board: str
     sizes_px: tuple[Size, Size]
-    views: tuple[SessionView, ...]
+    views: tuple[SeriesView, ...]
     problem: str = ""
     cause: str = ""
     cause_words: str = ""
-    found: SessionRig | None = None
+    found: SeriesRig | None = None
     turns: ViewTurns | None = None
     rectified: RectifiedView | None = None
     is_straightened: bool = False

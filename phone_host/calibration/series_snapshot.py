@@ -16,7 +16,7 @@ from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import limits_of
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Rig
-from phone_host.model.calibration_session import LensTried, SeenBoard, SessionRig, SessionView
+from phone_host.model.calibration_series import LensTried, SeenBoard, SeriesRig, SeriesView
 
 _UNUSED: Final = "no rig came of the views"
 """Why a view is not used whose board was found, if no rig came of any."""
@@ -24,7 +24,7 @@ _UNUSED: Final = "no rig came of the views"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Taken:
-    """What a session took.
+    """What a series took.
 
     Attributes:
         order: names of the pairs in the order in which they were taken.
@@ -40,7 +40,7 @@ class Taken:
     board: Board
 
     def own(self, pair: BoardPair) -> BoardPair | None:
-        """Return a pair as it was found in this session's images, where it may have another name; None: it is of an earlier calibration."""
+        """Return a pair as it was found in the images, where it may have another name; None: it is of an earlier calibration."""
         return next((each for each in self.views.pairs if each.left_px is pair.left_px), None)
 
     def as_seen(self, pair: BoardPair) -> BoardPair:
@@ -53,11 +53,11 @@ class Taken:
         return any(self.as_seen(pair).right_px is not pair.right_px for pair in self.pairs)
 
 
-def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejected, ...]) -> tuple[SessionView, ...]:
-    """Return all views of a session, used or not.
+def series_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejected, ...]) -> tuple[SeriesView, ...]:
+    """Return all views of a series, used or not.
 
     Args:
-        taken: what the session took.
+        taken: what the series took.
         found: what came of it; None: no rig.
         rejected: the pairs that are not used, with the reasons.
 
@@ -66,7 +66,7 @@ def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejec
     """
     reasons = {each.name: each for each in rejected}
     pictures = {each.name: each for each in taken.views.pictures}
-    made = list[tuple[int, SessionView]]()
+    made = list[tuple[int, SeriesView]]()
     order = {name: index for index, name in enumerate(taken.order)}
     used = set() if found is None else {each.name for each in found.used}
     for pair in taken.pairs:
@@ -79,12 +79,12 @@ def session_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejec
     for name, reason in reasons.items():
         picture = pictures.get(name)
         left, right = (SeenBoard(), SeenBoard()) if picture is None else _seen(picture)
-        view = SessionView(name=name, left=left, right=right, reason=reason.reason.value, detail=reason.detail)
+        view = SeriesView(name=name, left=left, right=right, reason=reason.reason.value, detail=reason.detail)
         made.append((order.get(name, len(order)), view))
     return tuple(view for _, view in sorted(made, key=lambda each: each[0]))
 
 
-def session_rig(found: Calibration, rig: Rig, far_m: float) -> SessionRig:
+def series_rig(found: Calibration, rig: Rig, far_m: float) -> SeriesRig:
     """Return the rig with its figures.
 
     Args:
@@ -93,7 +93,7 @@ def session_rig(found: Calibration, rig: Rig, far_m: float) -> SessionRig:
         far_m: depth beyond which it is a guess, m.
     """
     left, right = (_tried(trials, bend) for trials, bend in zip(found.trials, found.bends, strict=True))
-    return SessionRig(
+    return SeriesRig(
         rig=rig,
         rectification=found.rectification,
         vertical_px=found.vertical_px,
@@ -129,13 +129,13 @@ def _view(
     found: Calibration | None,
     why: Rejected | None,
     board: Board,
-) -> SessionView:
+) -> SeriesView:
     """Return a view whose board was found in both images, from its corners as they were used and as they were seen."""
     pair, seen = both
     place = None if found is None else next((i for i, each in enumerate(found.used) if each.name == pair.name), None)
     left, right = (b"", b"") if picture is None else (picture.left, picture.right)
     if found is None or place is None:
-        return SessionView(
+        return SeriesView(
             name=pair.name,
             left=SeenBoard(picture=left, corners_px=seen.left_px),
             right=SeenBoard(picture=right, corners_px=seen.right_px),
@@ -145,13 +145,14 @@ def _view(
     vertical = as_seen = np.empty(0)
     if found.rectification is not None:
         vertical, as_seen = (vertical_errors_px(each, found.rig, found.rectification) for each in both)
-    return SessionView(
+    return SeriesView(
         name=pair.name,
         left=SeenBoard(picture=left, corners_px=seen.left_px, residuals_px=found.left_errors_px[place]),
         right=SeenBoard(picture=right, corners_px=seen.right_px, residuals_px=found.right_errors_px[place]),
         outline_m=SE3.of(found.poses[place]).apply(_outline_m(board)),
         vertical_px=vertical,
         as_seen_px=as_seen,
+        in_space=found.used[place].in_space,
     )
 
 

@@ -1,4 +1,4 @@
-"""Sessions of board views for the page of `calibrate`, from exact corners with noise: no image is rendered."""
+"""Series of board views for the page of `calibrate`, from exact corners with noise: no image is rendered."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,10 +9,11 @@ import numpy as np
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.board_views import BoardViews, ViewPictures
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.session_snapshot import Taken, session_rig, session_views
+from phone_host.calibration.series_snapshot import Taken, series_rig, series_views
 from phone_host.calibration.small_picture import small_jpeg
 from phone_host.calibration.view_turns import view_turns
-from phone_host.model.calibration_session import CalibrationSession, RectifiedView, Verdict
+from phone_host.model import Verdict
+from phone_host.model.calibration_series import CalibrationSeries, RectifiedView
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 
@@ -46,16 +47,16 @@ def taken(used: list[BoardPair] | None = None) -> Taken:
     return Taken(order=names, views=views, pairs=list(pairs()) if used is None else used, board=BOARD)
 
 
-def session() -> CalibrationSession:
+def series() -> CalibrationSeries:
     """A usable one."""
     found = calibration()
-    return CalibrationSession(
+    return CalibrationSeries(
         verdict=Verdict.USABLE,
         remedy="take pairs with the board in the corners of both images",
         board="board of 9x6 corners",
         sizes_px=SIZES,
-        views=session_views(taken(), found, REJECTED),
-        found=session_rig(found, found.rig, 12.3),
+        views=series_views(taken(), found, REJECTED),
+        found=series_rig(found, found.rig, 12.3),
         turns=view_turns(list(pairs()), found.poses, BOARD.points_m(), found.rig),
         rectified=rectified(),
         rig_file="rig.yaml",
