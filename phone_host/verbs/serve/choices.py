@@ -1,7 +1,7 @@
 """The page's choices are options of `phone-host run` by name. They become a command line, and are read by what reads command lines."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Final, NoReturn
 
@@ -32,9 +32,9 @@ class _Strict(ExamplesFirstParser):
         )
 
 
-def _parser(arguments: type | object) -> _Strict:
+def _parser(add_arguments: Callable[[argparse.ArgumentParser], None]) -> _Strict:
     made = _Strict("phone-host", add_help=False)
-    arguments.add_arguments(made)  # type: ignore[union-attr]
+    add_arguments(made)
     made.add_argument("--json", action="store_true")
     made.add_argument("--debug", action="store_true")
     return made
@@ -43,7 +43,7 @@ def _parser(arguments: type | object) -> _Strict:
 @cache
 def _declared() -> dict[str, argparse.Action]:
     """Return the options of `run`: the state asks for them several times a second."""
-    return _parser(run_arguments).declared
+    return _parser(run_arguments.add_arguments).declared
 
 
 def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict[str, str]:
@@ -105,7 +105,7 @@ def run_options(words: Sequence[str]) -> argparse.Namespace:
     Raises:
         SettingsError: they are not valid.
     """
-    return argparse.Namespace(**vars(_parser(run_arguments).parse_args(list(words))))
+    return argparse.Namespace(**vars(_parser(run_arguments.add_arguments).parse_args(list(words))))
 
 
 def calibrate_options(words: Sequence[str]) -> argparse.Namespace:
@@ -114,7 +114,7 @@ def calibrate_options(words: Sequence[str]) -> argparse.Namespace:
     Raises:
         SettingsError: they are not valid.
     """
-    return _parser(calibrate_arguments).parse_args(list(words))
+    return _parser(calibrate_arguments.add_arguments).parse_args(list(words))
 
 
 def without_depth(choices: Mapping[str, str]) -> dict[str, str]:

@@ -77,11 +77,10 @@ class Commands:
         shown = self.shown(choices)
         new = with_changes(choices, {name: value for name, value in changes.items() if value != shown.get(name)})
         options = self._options(new)
-        found = checked(options)
+        checked(options)
         rig = changes.get("calibration")
         if rig and "rectified" not in new:
             refuse_rejected(read_own_rig(Path(rig)), rig, allowed=options.use_rejected_rig)
-        del found
         return new
 
     def shown(self, choices: Choices) -> Choices:
