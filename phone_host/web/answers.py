@@ -146,7 +146,7 @@ class Answers:
         return _json(whole_text(self._hub.state, self._hub.samples_since(-1)))
 
     async def _report(self, _request: web.Request) -> web.StreamResponse:
-        await self._hub.refresh()
+        await self._hub.refresh(report_s=0)
         return problem(404, _NOT_YET) if self._hub.report == "null" else _json(self._hub.report)
 
     async def _openapi(self, _request: web.Request) -> web.StreamResponse:

@@ -44,13 +44,17 @@ class Hub:
         """Return the samples behind a number, oldest first."""
         return [item for item in list(self._samples) if item.number > number]
 
-    async def refresh(self) -> None:
-        """Bring the state up to date, unless it is a moment old."""
+    async def refresh(self, report_s: float = _REPORT_S) -> None:
+        """Bring the state up to date, unless it is a moment old, and the report, if it is older than asked.
+
+        Args:
+            report_s: greatest age of the report, s; a moment, at least.
+        """
         async with self._building:
             now_s = self._loop.time()
-            if now_s - self._built_s < _STATE_S:
+            with_report, commands = now_s - self._reported_s >= max(report_s, _STATE_S), self._commands
+            if now_s - self._built_s < _STATE_S and not (with_report and report_s < _REPORT_S):
                 return
-            with_report, commands = now_s - self._reported_s >= _REPORT_S, self._commands
             state, report = await self.encoder.run(lambda: self._built(with_report=with_report))
             self._built_s = self._loop.time() if commands == self._commands else float("-inf")
             if state != self.state:

@@ -205,7 +205,9 @@ def test_the_newest_pair_as_files(start: Start, tmp_path: Path) -> None:
     assert json.loads(served.get("/api/state")[2])["matchers"] == ["tandem", "sgbm"]
     assert served.get("/api/report.json")[0] == 404
     served.source.start_run(4)
-    assert json.loads(served.get("/api/report.json")[2])["pairs"] == 4
+    while (answer := served.get("/api/report.json"))[0] == 404:  # it may be a moment old
+        pass
+    assert json.loads(answer[2])["pairs"] == 4
 
 
 def test_saved_pairs(start: Start, tmp_path: Path) -> None:
