@@ -5,12 +5,14 @@ has been idle longest makes room: strangers who hold connections open do not kee
 """
 
 import asyncio
+import ssl
 from collections.abc import Callable
 from typing import Final, cast
 
 from phone_host.web.settings import Limits
 
 _SWEEP_S: Final = 1.0
+_HANDSHAKE_S: Final = 10.0
 
 
 class Connection(asyncio.Protocol):
@@ -34,9 +36,10 @@ class Connection(asyncio.Protocol):
         self._all.begun(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End."""
-        self._all.ended(self)
-        self._inner.connection_lost(exc)
+        """End, unless TLS never began."""
+        if self.transport is not None:
+            self._all.ended(self)
+            self._inner.connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
         """Pass bytes on."""
@@ -60,35 +63,84 @@ class Connection(asyncio.Protocol):
             self.transport.abort()
 
 
+class Handshake(asyncio.Protocol):
+    """Counts a connection from its first moment, while TLS is agreed; asyncio's own server would count it only afterwards.
+
+    Args:
+        tls: what to agree.
+        all_of_them: makes the connection that follows.
+    """
+
+    def __init__(self, tls: ssl.SSLContext, all_of_them: "Connections") -> None:
+        self._tls, self._all = tls, all_of_them
+        self.transport: asyncio.Transport | None = None
+        self.answering = 0
+        self.idle_since_s = asyncio.get_running_loop().time()
+        self._task: asyncio.Task[None] | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Begin, if there is room."""
+        self.transport = cast("asyncio.Transport", transport)
+        self.transport.pause_reading()  # the first bytes are for TLS
+        self._all.begun(self)
+        self._task = asyncio.ensure_future(self._agree(self.transport))
+
+    def abort(self) -> None:
+        """Cut the connection."""
+        if self.transport is not None:
+            self.transport.abort()
+
+    async def _agree(self, plain: asyncio.Transport) -> None:
+        connection = self._all.connection()
+        try:
+            secure = await asyncio.get_running_loop().start_tls(
+                plain, connection, self._tls, server_side=True, ssl_handshake_timeout=_HANDSHAKE_S
+            )
+        except (OSError, RuntimeError):  # no TLS, another version, gone, or too slow
+            secure = None
+            plain.abort()
+        finally:
+            self._all.ended(self)
+        if secure is not None:
+            connection.connection_made(secure)
+
+
 class Connections:
     """All connections of the server.
 
     Args:
         limits: how many, and how long they may be idle.
         serve: makes the HTTP protocol of a new one.
+        tls: for https; None: http.
     """
 
-    def __init__(self, limits: Limits, serve: Callable[[], asyncio.Protocol]) -> None:
-        self._limits, self._serve = limits, serve
-        self._open: dict[asyncio.Transport, Connection] = {}
+    def __init__(self, limits: Limits, serve: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None) -> None:
+        self._limits, self._serve, self._tls = limits, serve, tls
+        self._open: dict[asyncio.Transport, Connection | Handshake] = {}
 
     def __call__(self) -> asyncio.Protocol:
         """Make the protocol of a new connection."""
+        return self.connection() if self._tls is None else Handshake(self._tls, self)
+
+    def connection(self) -> Connection:
+        """Make a connection that speaks HTTP."""
         return Connection(self._serve(), self)
 
     def __len__(self) -> int:
         """Return how many are open."""
         return len(self._open)
 
-    def begun(self, connection: Connection) -> None:
+    def begun(self, connection: Connection | Handshake) -> None:
         """Take a new connection in, at the cost of the one that is idle longest, or of itself."""
         assert connection.transport is not None
         self._open[connection.transport] = connection
         if len(self._open) > self._limits.connections:
             idle = [each for each in self._open.values() if not each.answering]
-            min(idle, key=lambda each: each.idle_since_s).abort()
+            longest = min(idle, key=lambda each: each.idle_since_s)
+            self.ended(longest)  # at once: many may come before the loop closes it
+            longest.abort()
 
-    def ended(self, connection: Connection) -> None:
+    def ended(self, connection: Connection | Handshake) -> None:
         """Forget a connection."""
         assert connection.transport is not None
         self._open.pop(connection.transport, None)

@@ -131,8 +131,8 @@ class PageServer:
         self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()
         known_as, credentials = self._settings.known_as, self._settings.credentials
         gate = Gate(known_as, self._token, is_https=credentials is not None, port=self.port)
-        served = serving(self._source, self._settings, self._limits, gate)
-        await served.start(listener, self._tls())
+        served = serving(self._source, self._settings, self._limits, gate, self._tls())
+        await served.start(listener)
         self._listens.set()
         try:
             await self._ended.wait()

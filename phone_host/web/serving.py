@@ -18,7 +18,6 @@ from phone_host.web.source import Source
 from phone_host.web.static_files import INDEX, PACKAGE_PAGE, read_files, script_hashes
 from phone_host.web.viewers import Viewers
 
-_HANDSHAKE_S: Final = 10.0
 _LINGER_S: Final = 1.0
 """How long a refused body is read on, so that the refusal is not lost."""
 _LINE_BYTES: Final = 4096
@@ -33,14 +32,17 @@ class Serving:
         settings: where, and for whom.
         limits: what strangers may use up.
         gate: judges requests.
+        tls: for https; None: http.
     """
 
-    def __init__(self, source: Source, settings: PageSettings, limits: Limits, gate: Gate) -> None:
+    def __init__(
+        self, source: Source, settings: PageSettings, limits: Limits, gate: Gate, tls: ssl.SSLContext | None
+    ) -> None:
         files = read_files(settings.page or PACKAGE_PAGE)
         page = files[INDEX].content["identity"] if INDEX in files else b""
         self._hub = Hub(source)
         self._viewers = Viewers(self._hub, limits)
-        self._connections = Connections(limits, self._protocol)
+        self._connections = Connections(limits, self._protocol, tls)
         door = Door(gate, limits, self._connections, content_policy(script_hashes(page)))
         authority = b"" if settings.credentials is None else settings.credentials.authority
         self._answers = Answers(
@@ -64,19 +66,15 @@ class Serving:
         self._tasks: list[asyncio.Task[None]] = []
         self._server: asyncio.Server | None = None
 
-    async def start(self, listener: socket.socket, tls: ssl.SSLContext | None) -> None:
+    async def start(self, listener: socket.socket) -> None:
         """Begin to serve.
 
         Args:
             listener: a listening socket.
-            tls: for https; None: http.
         """
         await self._runner.setup()
         loop = asyncio.get_running_loop()
-        patience_s = None if tls is None else _HANDSHAKE_S
-        self._server = await loop.create_server(
-            self._connections, sock=listener, ssl=tls, ssl_handshake_timeout=patience_s
-        )
+        self._server = await loop.create_server(self._connections, sock=listener)
         self._tasks = [asyncio.ensure_future(each) for each in (self._connections.sweep(), self._hub.watch())]
 
     async def stop(self) -> None:

@@ -360,6 +360,26 @@ def test_a_hundred_connections(start: Start) -> None:
         line.close()
 
 
+def test_connections_count_before_tls_is_agreed(start: Start, tmp_path: Path) -> None:
+    """Strangers that connect and never begin TLS, or speak something else, take no more descriptors than others."""
+    credentials = kept_credentials(tmp_path / "keys", (), dt.datetime.now(dt.UTC))
+    served = start(limits=Limits(connections=20), credentials=credentials)
+    held = len(list(Path("/proc/self/fd").iterdir()))
+    lines = [socket.create_connection(("127.0.0.1", served.port)) for _ in range(100)]
+    for line in lines[::2]:
+        with suppress(OSError):
+            line.sendall(b"GET / HTTP/1.1\r\n\r\n")
+    trusted = ssl.create_default_context(cadata=credentials.authority.decode())
+    assert served.get("/api/state", ssl=trusted)[0] == 200
+    assert len(list(Path("/proc/self/fd").iterdir())) - held - len(lines) <= 25
+    for line in lines[:40]:  # those that were idle longest
+        line.settimeout(60)
+        with suppress(ConnectionError):
+            assert line.recv(1) in {b"", b"\x15"}  # 0x15: a TLS alert
+    for line in lines:
+        line.close()
+
+
 def test_viewers_without_the_token_leave_room_for_those_with_it(start: Start) -> None:
     """Beyond their number strangers are refused in words; the user's own have places of their own."""
     served = start(limits=Limits(viewers=2))
