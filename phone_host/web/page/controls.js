@@ -1,0 +1,107 @@
+// What steers a run: start and stop, snapshot, matcher, near and far, crop.
+
+import { command } from './connection.js';
+import { byId, data, follow, onPress, options, show, tell, text } from './dom.js';
+
+/** @typedef {import('./pointing.js').Spot} Spot */
+
+/** The least crop, px: smaller is a slip of the finger. */
+const LEAST_PX = 16;
+
+const NAMES = ['near', 'far', 'crop'];
+
+/** @param {Spot} from @param {Spot} to @returns {[number, number, number, number]} x, y, width, height, px */
+export function boxOf(from, to) {
+  const [left, top] = [Math.round(Math.min(from.x, to.x) + 0.5), Math.round(Math.min(from.y, to.y) + 0.5)];
+  return [left, top, Math.round(Math.abs(from.x - to.x)), Math.round(Math.abs(from.y - to.y))];
+}
+
+/** @param {string} words - X,Y,W,H @returns {?[number, number, number, number]} null: it is none */
+export function parsedCrop(words) {
+  const numbers = words.split(',').map(Number);
+  return numbers.length === 4 && numbers.every((v) => Number.isFinite(v)) ? /** @type {any} */ (numbers) : null;
+}
+
+export class Controls {
+  /** @param {() => any} state @param {() => ?{width: number, height: number}} size - of the left image */
+  constructor(state, size) {
+    this.state = state;
+    this.size = size;
+    this.drawing = false;
+    this.answer = byId('run-answer');
+    onPress(byId('go'), () => command(this.isRunning() ? 'stop' : 'run'), this.answer);
+    onPress(byId('snapshot'), () => command('snapshot'), this.answer);
+    byId('matcher').addEventListener('change', (event) => this.set('matcher', /** @type {HTMLSelectElement} */ (event.target).value));
+    for (const name of NAMES) this.field(name);
+    byId('crop-draw').addEventListener('click', () => this.draw(!this.drawing));
+    byId('crop-clear').addEventListener('click', () => this.set('crop', ''));
+  }
+
+  isRunning() {
+    return this.state()?.activity === 'running' || this.state()?.activity === 'ending';
+  }
+
+  /** @param {string} name */
+  field(name) {
+    const input = /** @type {HTMLInputElement} */ (byId(name));
+    input.addEventListener('input', () => data(input, 'dirty', 'yes'));
+    input.addEventListener('change', () => this.set(name, input.value.trim()));
+    input.addEventListener('keydown', (event) => event.key === 'Enter' && input.blur());
+  }
+
+  /** @param {string} name @param {string} value */
+  async set(name, value) {
+    const answer = await command('set', { [name]: value });
+    data(byId(name), 'dirty', 'no');
+    byId(name).setAttribute('aria-invalid', String(!!answer.problem));
+    tell(this.answer, answer);
+    if (this.state()) this.show(this.state());
+  }
+
+  /** @param {boolean} on */
+  draw(on) {
+    this.drawing = on;
+    byId('crop-draw').setAttribute('aria-pressed', String(on));
+    data(byId('views'), 'drawing', on ? 'yes' : 'no');
+    if (on) tell(this.answer, { words: 'Draw a rectangle on the depth or the left picture' });
+  }
+
+  /** @param {Spot} from @param {Spot} to @param {boolean} done @returns {boolean} whether the pointer draws now */
+  drag(from, to, done) {
+    if (!this.drawing) return false;
+    const box = boxOf(from, to);
+    this.outline(box);
+    if (done && box[2] >= LEAST_PX && box[3] >= LEAST_PX) {
+      this.draw(false);
+      /** @type {HTMLInputElement} */ (byId('crop')).value = box.join(',');
+      this.set('crop', box.join(','));
+    }
+    return true;
+  }
+
+  /** @param {?[number, number, number, number]} box - px */
+  outline(box) {
+    const size = this.size();
+    for (const mark of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('.cropped'))) {
+      show(mark, !!box && !!size);
+      if (!box || !size) continue;
+      const percent = (/** @type {number} */ v, /** @type {number} */ whole) => `${(100 * v) / whole}%`;
+      Object.assign(mark.style, {
+        left: percent(box[0], size.width), top: percent(box[1], size.height), width: percent(box[2], size.width), height: percent(box[3], size.height),
+      });
+    }
+  }
+
+  /** @param {any} state */
+  show(state) {
+    const running = this.isRunning();
+    text(byId('go'), running ? 'Stop' : 'Start');
+    data(byId('go'), 'running', running ? 'yes' : 'no');
+    byId('snapshot').setAttribute('aria-disabled', String(!running));
+    const names = state.matchers.map((/** @type {string} */ name) => ({ value: name, words: name }));
+    options(byId('matcher'), [{ value: '', words: 'the default' }, ...names], state.settings.matcher ?? '');
+    for (const name of NAMES) follow(byId(name), state.settings[name] ?? '');
+    show(byId('crop-clear'), !!state.settings.crop);
+    if (!this.drawing) this.outline(parsedCrop(state.settings.crop ?? ''));
+  }
+}

@@ -1,0 +1,53 @@
+// The run in figures: rate, density, delay, skew, link, clock; what was dropped and why. Values keep their width.
+
+import { byId, data, keep, make, show, text } from './dom.js';
+
+const NO = '\u2013';
+
+/** @param {?number | undefined} value @param {number} n - digits after the point */
+const number = (value, n) => (value === null || value === undefined || Number.isNaN(value) ? NO : value.toFixed(n));
+
+/** @typedef {{name: string, value: string, unit: string, note: string, level?: string}} Figure */
+
+/** @param {?number} us @returns {string} */
+const uncertainty = (us) => (us === null || us === undefined ? NO : us < 1000 ? `\u00b1 ${us.toFixed(0)} \u00b5s` : `\u00b1 ${(us / 1000).toFixed(1)} ms`);
+
+/** @param {any} live @returns {Figure[]} */
+export function figuresOf(live) {
+  const newest = live.samples?.[live.samples.length - 1];
+  const { clock, link } = live;
+  return [
+    { name: 'pairs', value: number(live.pairs_per_s, 1), unit: '/s', note: `${live.pairs} in all` },
+    { name: 'density', value: number(live.density === null ? null : 100 * live.density, 0), unit: '%', note: 'pixels with depth' },
+    { name: 'from light to depth', value: number(newest?.[7], 0), unit: 'ms', note: 'newest pair' },
+    { name: 'time skew', value: number(live.time_skew_ms, 1), unit: 'ms', note: 'of the two exposures' },
+    { name: 'link', value: link.up ? 'up' : 'down', unit: '', note: link.name, level: link.up ? 'good' : 'bad' },
+    { name: 'clock', value: clock.known ? 'known' : 'waiting', unit: '', note: clock.known ? uncertainty(clock.uncertainty_us) : 'of the board', level: clock.known ? 'good' : 'warning' },
+  ];
+}
+
+/** @param {any} live */
+export function showFigures(live) {
+  show(byId('figures'), !!live);
+  show(byId('drops-box'), !!live);
+  if (!live) return;
+  keep(
+    byId('figures'), figuresOf(live), (one) => one.name,
+    () => make('div', '', make('dt'), make('dd', '', make('span', 'value'), make('small')), make('dd', 'note')),
+    (item, one) => {
+      const [name, value, note] = /** @type {HTMLElement[]} */ ([...item.children]);
+      text(name, one.name);
+      // A newest sample comes with most states, not with all.
+      if (one.value !== NO || !value.children[0].textContent) text(value.children[0], one.value);
+      text(value.children[1], one.unit);
+      text(note, one.note);
+      data(value, 'level', one.level ?? '');
+    },
+  );
+  const drops = Object.entries(live.drops).filter(([, count]) => Number(count) > 0);
+  show(byId('drops-none'), drops.length === 0);
+  keep(byId('drops'), drops, ([reason]) => reason, () => make('div', '', make('dt'), make('dd')), (item, [reason, count]) => {
+    text(item.children[0], reason);
+    text(item.children[1], String(count));
+  });
+}

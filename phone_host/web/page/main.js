@@ -1,0 +1,90 @@
+// Puts the page together: one newest state and one newest pair; every part shows them in place.
+
+import { Charts } from './charts.js';
+import { Connection } from './connection.js';
+import { Controls } from './controls.js';
+import { byId, data, say, show, text } from './dom.js';
+import { showFigures } from './figures.js';
+import { showGuide } from './guide.js';
+import { Live } from './live.js';
+import { connectSetup, showSetup } from './setup.js';
+import { showSteps, stepOf } from './steps.js';
+import { takeToken } from './token.js';
+import { showTrust } from './trust.js';
+
+takeToken();
+
+const HZ = 10;
+/** Widths that pictures are asked in: few, so that the server makes each only once for several viewers. */
+const WIDTHS_PX = [320, 480, 640, 960, 1280];
+const WIDE = matchMedia('(min-width: 900px)');
+const LINES = /** @type {Record<import('./connection.js').Line, string>} */ ({
+  connecting: 'connecting', open: 'connected', lost: 'connection lost, trying again', refused: 'not allowed',
+});
+
+/** @type {any} */
+let state = null;
+
+const controls = new Controls(() => state, () => live.pair?.head ?? null);
+const live = new Live((from, to, done) => controls.drag(from, to, done));
+const charts = new Charts({ delays: byId('chart-delays'), rate: byId('chart-rate'), skew: byId('chart-skew') });
+
+const connection = new Connection({
+  line: (line) => {
+    data(document.body, 'line', line);
+    text(byId('online'), LINES[line]);
+    show(byId('refused'), line === 'refused');
+    if (line === 'lost') say('Connection lost, trying again.');
+  },
+  state: (told) => {
+    state = told;
+    charts.add(told.live?.samples ?? []);
+    draw();
+  },
+  pair: (pair) => {
+    live.show(pair);
+    data(document.body, 'ready', 'yes');
+  },
+});
+
+/** Show the newest state. */
+function draw() {
+  if (!state) return;
+  showSteps(state, stepOf(state, location.hash.slice(1)));
+  showTrust(state);
+  showSetup(state);
+  showGuide(state);
+  showFigures(state.live);
+  controls.show(state);
+  text(byId('activity'), state.activity);
+  data(document.body, 'activity', state.activity);
+  want();
+}
+
+/** Ask for what is looked at, no more. */
+function want() {
+  const isShown = document.visibilityState === 'visible' && document.body.dataset.step === 'run';
+  const view = byId('views').dataset.shown;
+  const views = !isShown ? [] : WIDE.matches ? ['left', 'right', 'disparity'] : view === 'pictures' ? ['left', 'right'] : view === 'cloud' ? ['left', 'disparity'] : ['disparity'];
+  const frame = byId(view === 'pictures' || WIDE.matches ? 'left-frame' : 'map-frame');
+  const width = Math.max(320, frame.clientWidth * Math.min(2, window.devicePixelRatio));
+  connection.want(views, WIDTHS_PX.find((each) => each >= width) ?? 1280, HZ);
+}
+
+window.addEventListener('hashchange', () => {
+  draw();
+  byId('main').focus({ preventScroll: true });
+  window.scrollTo(0, 0);
+});
+document.addEventListener('visibilitychange', want);
+WIDE.addEventListener('change', want);
+for (const input of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll('input[name=shown]')))
+  input.addEventListener('change', () => {
+    data(byId('views'), 'shown', input.value);
+    want();
+  });
+for (const input of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll('input[name=kind]')))
+  input.addEventListener('change', () => live.as(/** @type {any} */ (input.value)));
+byId('lines').addEventListener('change', (event) => data(byId('views'), 'withLines', /** @type {HTMLInputElement} */ (event.target).checked ? 'yes' : 'no'));
+byId('stacked').addEventListener('change', (event) => charts.stack(/** @type {HTMLInputElement} */ (event.target).checked));
+connectSetup(() => state);

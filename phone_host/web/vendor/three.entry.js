@@ -1,0 +1,21 @@
+// What the page uses of three.js. esbuild leaves the rest out.
+export {
+  BufferGeometry,
+  DataTexture,
+  GLSL3,
+  LinearFilter,
+  MOUSE,
+  NearestFilter,
+  NoColorSpace,
+  PerspectiveCamera,
+  Points,
+  RedIntegerFormat,
+  Scene,
+  ShaderMaterial,
+  TOUCH,
+  Texture,
+  UnsignedShortType,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
+export { OrbitControls } from 'three/addons/controls/OrbitControls.js';
