@@ -9,7 +9,7 @@ import { execFileSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
 import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { dirname, join, resolve } from 'node:path';
+import { basename, dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { brotliCompressSync, constants, gzipSync } from 'node:zlib';
 
@@ -18,7 +18,7 @@ const HERE = resolve(dirname(fileURLToPath(import.meta.url)), '..');
 const SOURCES = join(HERE, 'phone_host/web/vendor');
 const PINS = join(SOURCES, 'versions.json');
 
-/** Files taken from each tarball: where they lie there, the same place here. */
+/** Files taken from each tarball: where they lie there. Here they lie side by side. */
 const TAKEN = {
   three: ['LICENSE', 'package.json', 'build/three.core.js', 'build/three.module.js', 'examples/jsm/controls/OrbitControls.js'],
   uplot: ['LICENSE', 'package.json', 'dist/uPlot.esm.js', 'dist/uPlot.min.css'],
@@ -27,14 +27,14 @@ const TAKEN = {
 /** Modules made: from which entry, in which form, where to. The page's own modules are shipped as they are written. */
 const MADE = [
   { entry: 'phone_host/web/vendor/three.entry.js', format: 'esm', to: 'phone_host/web/page/vendor/three.js' },
-  { entry: 'phone_host/web/vendor/uplot/dist/uPlot.esm.js', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
+  { entry: 'phone_host/web/vendor/uplot/uPlot.esm.js', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
   { entry: 'phone_host/web/page/static_depth.js', format: 'iife', to: 'phone_host/report/page_depth.js' },
   { entry: 'phone_host/web/page/static_charts.js', format: 'iife', to: 'phone_host/report/page_charts.js' },
 ];
 
 /** Files that go to the page unchanged. */
 const COPIED = [
-  ['phone_host/web/vendor/uplot/dist/uPlot.min.css', 'phone_host/web/page/vendor/uplot.css'],
+  ['phone_host/web/vendor/uplot/uPlot.min.css', 'phone_host/web/page/vendor/uplot.css'],
   ['phone_host/web/vendor/three/LICENSE', 'phone_host/web/page/vendor/LICENSE.three'],
   ['phone_host/web/vendor/uplot/LICENSE', 'phone_host/web/page/vendor/LICENSE.uplot'],
 ];
@@ -58,8 +58,8 @@ function fetch() {
     noted.packages[name] = { version: noted.packages[name].version, tarball_sha256: sha256(readFileSync(tarball)), files: {} };
     rmSync(join(SOURCES, name), { recursive: true, force: true });
     for (const file of files) {
-      cpSync(join(folder, 'package', file), join(SOURCES, name, file));
-      noted.packages[name].files[file] = sha256(readFileSync(join(SOURCES, name, file)));
+      cpSync(join(folder, 'package', file), join(SOURCES, name, basename(file)));
+      noted.packages[name].files[file] = sha256(readFileSync(join(SOURCES, name, basename(file))));
     }
     rmSync(folder, { recursive: true });
   }
@@ -73,8 +73,8 @@ function bundle({ entry, format, to }, root) {
   const words = [
     '--yes', ESBUILD, join(HERE, entry), '--bundle', '--minify', `--format=${format}`, '--target=es2022', '--charset=ascii',
     '--legal-comments=none', `--banner:js=${license}`, `--outfile=${out}`, '--log-level=warning',
-    `--alias:three=${join(SOURCES, 'three/build/three.module.js')}`,
-    `--alias:three/addons/controls/OrbitControls.js=${join(SOURCES, 'three/examples/jsm/controls/OrbitControls.js')}`,
+    `--alias:three=${join(SOURCES, 'three/three.module.js')}`,
+    `--alias:three/addons/controls/OrbitControls.js=${join(SOURCES, 'three/OrbitControls.js')}`,
   ];
   npm('npx', ...words);
 }

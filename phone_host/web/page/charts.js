@@ -37,7 +37,6 @@ const shown = (value, unit) => (value === null || value === undefined || Number.
 class Chart {
   /** @param {HTMLElement} place @param {string} unit @param {() => any[]} series */
   constructor(place, unit, series) {
-    Object.assign(this, { place, unit, series });
     this.place = place;
     this.unit = unit;
     this.series = series;
@@ -84,6 +83,7 @@ export class Charts {
     /** @type {Sample[]} */
     this.samples = [];
     this.isStacked = true;
+    this.start = 0;
     this.delays = new Chart(places.delays, 'ms', () => this.delaySeries());
     const one = (/** @type {string} */ label, /** @type {string} */ hue, /** @type {string} */ unit) => () => [
       { label, stroke: colour(hue), width: 1.5, points: { show: false }, value: (/** @type {any} */ _, /** @type {?number} */ v) => shown(v, unit) },
@@ -116,17 +116,20 @@ export class Charts {
   add(samples) {
     if (!samples.length) return;
     // A run that starts over starts its time over.
-    if (this.samples.length && samples[0][0] < this.samples[this.samples.length - 1][0]) this.samples = [];
+    if (!this.samples.length || samples[0][0] < this.samples[this.samples.length - 1][0]) {
+      this.samples = [];
+      this.start = samples[0][0];
+    }
     this.samples = [...this.samples, ...samples].slice(-KEPT);
     this.draw();
   }
 
   draw() {
     const column = (/** @type {number} */ k) => this.samples.map((sample) => sample[k] ?? null);
-    const done = column(0);
+    const done = this.samples.map((sample) => sample[0] - this.start);
     const parts = PARTS.map((_, k) => column(k + 1));
     this.delays.set([done, ...(this.isStacked ? stacked(parts) : parts).reverse()]);
-    this.rate.set([done, rates(/** @type {number[]} */ (done))]);
+    this.rate.set([done, rates(done)]);
     this.skew.set([done, column(8)]);
   }
 }

@@ -229,7 +229,9 @@ function put(uniform, grid) {
  */
 function paint(uniform, picture) {
   const old = uniform.value;
-  if (old && old.image.width === picture.width && old.image.height === picture.height) old.image = picture;
+  // A canvas changes its size under the texture: the size is kept beside it.
+  const size = `${picture.width}x${picture.height}`;
+  if (old && old.userData.size === size) old.image = picture;
   else {
     old?.dispose();
     const made = new three.Texture(picture);
@@ -237,6 +239,7 @@ function paint(uniform, picture) {
     made.flipY = false;
     made.generateMipmaps = false;
     made.magFilter = made.minFilter = three.LinearFilter;
+    made.userData.size = size;
     uniform.value = made;
   }
   uniform.value.needsUpdate = true;

@@ -74,7 +74,7 @@ export class Live {
     this.range = steadyRange(this.range, head.range);
     this.map.show(grid, head.geometry, limits, head.geometry ? this.kind : 'disparity', this.range);
     show(byId('cloud-wait'), !head.geometry);
-    if (head.geometry && this.cloud) this.cloud.show(grid, head.geometry, limits, /** @type {HTMLCanvasElement} */ (byId('left')), this.range);
+    if (head.geometry && this.cloud) this.cloud.show(grid, head.geometry, limits, pair.left && /** @type {HTMLCanvasElement} */ (byId('left')), this.range);
   }
 
   /** @param {import('./map.js').Kind} kind */
