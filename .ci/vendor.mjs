@@ -7,7 +7,7 @@
 // sha256 of each file made. One esbuild version, pinned here, so that the same sources give the same bytes.
 import { execFileSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
-import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { basename, dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -26,10 +26,10 @@ const TAKEN = {
 
 /** Modules made: from which entry, in which form, where to. The page's own modules are shipped as they are written. */
 const MADE = [
-  { entry: 'phone_host/web/vendor/three.entry.js', format: 'esm', to: 'phone_host/web/page/vendor/three.js' },
-  { entry: 'phone_host/web/vendor/uplot/uPlot.esm.js', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
-  { entry: 'phone_host/web/page/static_depth.js', format: 'iife', to: 'phone_host/report/page_depth.js' },
-  { entry: 'phone_host/web/page/static_charts.js', format: 'iife', to: 'phone_host/report/page_charts.js' },
+  { entry: 'phone_host/web/vendor/three.entry.js', of: 'three', format: 'esm', to: 'phone_host/web/page/vendor/three.js' },
+  { entry: 'phone_host/web/vendor/uplot/uPlot.esm.js', of: 'uplot', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
+  { entry: 'phone_host/web/page/static_depth.js', of: 'three', format: 'iife', to: 'phone_host/report/page_depth.js' },
+  { entry: 'phone_host/web/page/static_copy.js', of: '', format: 'iife', to: 'phone_host/report/page_copy.js' },
 ];
 
 /** Files that go to the page unchanged. */
@@ -66,13 +66,14 @@ function fetch() {
   keep(noted);
 }
 
-/** Bundle one entry. */
-function bundle({ entry, format, to }, root) {
+/** Bundle one entry. The licence's notice stays in it. */
+function bundle({ entry, of, format, to }, root) {
   const out = join(root, to);
-  const license = '/* three.js and uPlot are under the MIT License: https://github.com/mrdoob/three.js, https://github.com/leeoniya/uPlot */';
+  const holder = of && readFileSync(join(SOURCES, of, 'LICENSE'), 'utf8').match(/Copyright.*/)[0].replace(/ ?[^ -~]+/g, '');
+  const notice = of && `/* ${of} ${pins().packages[of].version}, MIT License, ${holder} */`;
   const words = [
     '--yes', ESBUILD, join(HERE, entry), '--bundle', '--minify', `--format=${format}`, '--target=es2022', '--charset=ascii',
-    '--legal-comments=none', `--banner:js=${license}`, `--outfile=${out}`, '--log-level=warning',
+    '--legal-comments=none', ...(notice ? [`--banner:js=${notice}`] : []), `--outfile=${out}`, '--log-level=warning',
     `--alias:three=${join(SOURCES, 'three/three.module.js')}`,
     `--alias:three/addons/controls/OrbitControls.js=${join(SOURCES, 'three/OrbitControls.js')}`,
   ];
@@ -84,7 +85,6 @@ function build(root) {
   const made = {};
   const note = (path) => (made[path] = sha256(readFileSync(join(root, path))));
   for (const each of MADE) {
-    if (!existsSync(join(HERE, each.entry))) continue;
     bundle(each, root);
     note(each.to);
   }

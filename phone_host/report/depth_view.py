@@ -1,6 +1,6 @@
 """The parts of a page that show depth: both views with row lines, disparity and depth with scales, a cloud that can be turned. Pure.
 
-Without the page's script (`depth_script`) they are plain pictures.
+Without the page's script (`page_script`) they are plain pictures. The cloud is drawn from the grid of disparities and the left picture.
 """
 
 import base64
@@ -13,11 +13,10 @@ from typing import Final
 import cv2
 import numpy as np
 
-from common.words import counted
 from phone_host.model import Processed
 from phone_host.output.preview import colour_disparity, colour_range_px, depth_range_m
 from phone_host.report import depth_data
-from phone_host.report.depth_data import Grid, Points
+from phone_host.report.depth_data import Grid
 from phone_host.svg.plot_scale import ticks
 
 STYLE: Final = """
@@ -39,12 +38,15 @@ font-variant-numeric:tabular-nums;font-weight:600}
 .ticks{position:relative;height:1.5rem;font-size:.75rem;color:var(--ink2);font-variant-numeric:tabular-nums;line-height:1}
 .ticks span{position:absolute;transform:translateX(-50%);white-space:nowrap;padding-top:6px}
 .ticks span::before{content:"";position:absolute;left:50%;top:0;height:4px;border-left:1px solid var(--ink2)}
-.views+.clouds,.depthview+.clouds{margin-top:1.25rem}.clouds figure{margin:0}.clouds canvas{display:block;width:100%;height:min(62vh,560px);touch-action:none;cursor:grab;background:var(--bg);
-color:var(--ink2);border-radius:8px;border:1px solid var(--line)}
-.clouds canvas:active{cursor:grabbing}.clouds canvas:focus-visible,.view:focus-visible{outline:2px solid var(--c5);outline-offset:2px}
+.views+.clouds,.depthview+.clouds{margin-top:1.25rem}.clouds figure{margin:0}
+.clouds .turn{position:relative;height:min(62vh,560px);background:#12161c;border-radius:8px;overflow:hidden}
+.clouds canvas{position:absolute;inset:0;width:100%;height:100%;touch-action:none;cursor:grab;border-radius:8px}
+.clouds canvas+canvas{pointer-events:none;color:#c9d1d9;--ground:#12161c}
+.nocloud{position:absolute;inset:0;margin:0;padding:1rem;display:grid;place-items:center;color:#c9d1d9}.nocloud[hidden]{display:none}
+.clouds canvas:active{cursor:grabbing}.clouds canvas:focus-visible{outline:2px solid var(--c5);outline-offset:-2px}.view:focus-visible{outline:2px solid var(--c5);outline-offset:2px}
 button{font:inherit;font-size:.85rem;color:var(--ink);background:var(--bg);border:1px solid var(--line);border-radius:6px;padding:.35rem .8rem;cursor:pointer}
 .buttons{display:flex;flex-wrap:wrap;gap:.5rem;margin:.6rem 0 0}
-@media (max-width:700px){.views.maps{grid-template-columns:1fr}.clouds canvas{height:min(56vh,120vw)}.readout{font-size:.9rem}}
+@media (max-width:700px){.views.maps{grid-template-columns:1fr}.clouds .turn{height:min(56vh,120vw)}.readout{font-size:.9rem}}
 """
 
 THIN: Final = "\u202f"
@@ -98,9 +100,11 @@ def cloud_view(processed: Processed) -> str:
     """
     if processed.cloud is None or processed.geometry is None:
         return ""
-    few = depth_data.points(processed.cloud, processed.pair.left, processed.limits)
-    if few is None:
+    assert processed.disparity is not None
+    total = int(np.isfinite(processed.cloud[..., 2]).sum())
+    if not total:
         return ""
+    shown = depth_data.grid(processed.disparity, processed.cloud).points
     buttons = "".join(
         f'<button type="button" data-to="{name}">{words}</button>'
         for name, words in (
@@ -111,10 +115,11 @@ def cloud_view(processed: Processed) -> str:
         )
     )
     return (
-        f'<div class="clouds cloudview" data-view="{escape(json.dumps(_cloud_values(processed, few)))}" '
-        f'data-places="{depth_data.text_of(few.places)}" data-colours="{depth_data.text_of(few.colours)}"><figure>'
-        '<canvas tabindex="0" role="img" aria-label="the point cloud; arrow keys turn it, plus and minus zoom"></canvas>'
-        f"<figcaption>{escape(_cloud_words(few))}</figcaption></figure>"
+        '<div class="clouds cloudview"><figure><div class="turn">'
+        '<canvas tabindex="0" role="application" aria-label="the point cloud; arrow keys turn it, plus and minus zoom, Home goes back"></canvas>'
+        '<canvas aria-hidden="true"></canvas>'
+        '<p class="nocloud" hidden>This browser cannot draw the cloud (no WebGL 2); cloud.ply holds it.</p></div>'
+        f"<figcaption>{escape(_cloud_words(shown, total))}</figcaption></figure>"
         f'<div class="buttons">{buttons}</div>'
         "<noscript><p>The cloud needs a browser that runs the script in this page.</p></noscript></div>"
     )
@@ -122,6 +127,7 @@ def cloud_view(processed: Processed) -> str:
 
 def _view(processed: Processed, small: Grid) -> dict[str, object]:
     """Return what the script needs to know, as a JSON object."""
+    assert processed.disparity is not None
     height, width = processed.pair.left.shape[:2]
     geometry, limits = processed.geometry, processed.limits
     rows, columns = small.cells.shape
@@ -131,12 +137,12 @@ def _view(processed: Processed, small: Grid) -> dict[str, object]:
         "rows": rows,
         "columns": columns,
         "step": small.step_px,
-        "low": small.low,
-        "high": small.high,
-        "metric": small.metric,
+        "low": small.low_px,
+        "high": small.high_px,
+        "range": colour_range_px(processed.disparity),
         "way": processed.pair.epipolar.way,
     }
-    if geometry is not None:
+    if geometry is not None and processed.cloud is not None:
         values |= {
             "focal": geometry.focal_px,
             "baseline": geometry.baseline_m,
@@ -154,23 +160,8 @@ def _hint(processed: Processed) -> str:
     return "Point at the left picture, disparity or depth: metres."
 
 
-def _cloud_values(processed: Processed, few: Points) -> dict[str, object]:
-    assert processed.geometry is not None
-    height, width = processed.pair.left.shape[:2]
-    return {
-        "width": width,
-        "height": height,
-        "focal": processed.geometry.focal_px,
-        "step": few.step_px,
-        "low": few.low_m.tolist(),
-        "high": few.high_m.tolist(),
-        "pivot": few.pivot_m.tolist(),
-    }
-
-
-def _cloud_words(few: Points) -> str:
-    shown = len(few.places)
-    number = f"{shown:,} of {few.total:,} points" if shown < few.total else counted(shown, "point")
+def _cloud_words(shown: int, total: int) -> str:
+    number = f"{shown:,} of {total:,} points" if shown < total else f"{total:,} {'point' if total == 1 else 'points'}"
     return (
         f"{number.replace(',', THIN)}, metres; drawn in the left camera's axes: X right, Y down, Z forward. Drag turns, two fingers or the wheel "
         "(after a click) zoom, shift and drag move, a double click goes back."

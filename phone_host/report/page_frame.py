@@ -1,7 +1,7 @@
 """The frame of every HTML page: document, cards, tables, plots in two widths, one style. Pure: values in, text out.
 
 A page loads nothing from outside itself, so it opens offline, years later, from any folder, in light and dark mode and on
-a phone. Pages with depth run one script of ours (`depth_script`), the others none; a policy in the page's head makes the
+a phone. Pages with depth or commands run one script of ours (`page_script`), the others none; a policy in the page's head makes the
 browser refuse everything else. All text that comes from outside is escaped.
 """
 
@@ -10,7 +10,8 @@ from html import escape
 from typing import Final
 
 from common.plain_text import printable_page
-from phone_host.report import depth_script, depth_view
+from phone_host.report import depth_view
+from phone_host.report.page_script import Script, script, script_hash
 from phone_host.svg.plot_parts import STYLE
 
 WIDE_PX: Final = 960
@@ -25,22 +26,22 @@ _POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; 
 """What the browser may load (Content Security Policy, level 3): pictures inside the page and its own styles."""
 
 
-def document(title: str, body: str, *, shows_depth: bool = False) -> str:
+def document(title: str, body: str, runs: Script | None = None) -> str:
     """Make an HTML document in the style of all our pages from a body that is already HTML.
 
     Args:
         title: plain text.
         body: HTML, escaped where it has to be.
-        shows_depth: whether the body has parts of `depth_view` or commands to copy, which need the script.
+        runs: DEPTH if the body has parts of `depth_view`, COPY if it only has commands to copy.
     """
-    policy = f"{_POLICY}; script-src '{depth_script.HASH}'" if shows_depth else _POLICY
-    script = f"<script>{depth_script.SCRIPT}</script>" if shows_depth else ""
-    style = f"{_PAGE_STYLE}{STYLE}{depth_view.STYLE if shows_depth else ''}"
+    policy = _POLICY if runs is None else f"{_POLICY}; script-src '{script_hash(runs)}'"
+    text = "" if runs is None else f"<script>{script(runs)}</script>"
+    style = f"{_PAGE_STYLE}{STYLE}{'' if runs is None else depth_view.STYLE}"
     return printable_page(
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width,initial-scale=1"><meta name="color-scheme" content="light dark">'
-        f"<title>{escape(title)}</title><style>{style}</style></head><body><main>{body}</main>{script}</body></html>\n"
+        f"<title>{escape(title)}</title><style>{style}</style></head><body><main>{body}</main>{text}</body></html>\n"
     )
 
 

@@ -19,6 +19,7 @@ from common.words import counted
 from phone_host.measure.delays import IDLE_STAGE_NS, DelayStatistics
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
+from phone_host.report.page_script import Script
 from phone_host.svg.plot_parts import legend
 from phone_host.svg.plots import (
     Budget,
@@ -266,7 +267,13 @@ def page(data: PageData) -> str:
         list_section("Remarks", data.notes),
         files_section(data.files),
     ]
-    return document(data.title, "".join(parts), shows_depth=bool(data.depth or data.commands))
+    return document(data.title, "".join(parts), _script(data))
+
+
+def _script(data: PageData) -> Script | None:
+    if data.depth:
+        return Script.DEPTH
+    return Script.COPY if data.commands else None
 
 
 def heading(title: str, subtitle: str, verdict: Headline, sentence: str) -> str:

@@ -20,6 +20,7 @@ from phone_host.report.cut_words import cut_rows, pixels_text, searched_from_m, 
 from phone_host.report.depth_view import THIN, cloud_view, depth_view
 from phone_host.report.page_frame import document, section, table
 from phone_host.report.page_links import FileLink, NextCommand, address, files_section, list_section, next_section
+from phone_host.report.page_script import Script
 from phone_host.report.report_page import Figure, Headline, Picture, figures_row, heading, picture_uri
 from phone_host.svg.plot_scale import duration_text
 
@@ -130,7 +131,7 @@ def stereo_page(data: StereoPageData) -> str:
         files_section(data.files),
         _settings(data.settings, data.times),
     ]
-    return document(data.title, "".join(parts), shows_depth=True)
+    return document(data.title, "".join(parts), Script.DEPTH)
 
 
 def stereo_index(data: StereoIndexData) -> str:
@@ -150,7 +151,7 @@ def stereo_index(data: StereoIndexData) -> str:
         next_section((), data.commands),
         files_section(data.files),
     ]
-    return document(data.title, "".join(parts), shows_depth=True)
+    return document(data.title, "".join(parts), Script.COPY)
 
 
 def thumbnail(processed: Processed) -> Picture | None:

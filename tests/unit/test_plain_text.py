@@ -16,6 +16,7 @@ from common.program.terminal import folded, say
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text, json_value
 from phone_host.report.page_frame import document
+from phone_host.report.page_script import Script
 
 HOSTILE = "\x1b[31m\a\b\x7f\x9b\u202e\u2028\udcff"
 SHOWN = r"\x1b[31m\x07\x08\x7f\x9b\u202e\u2028\xff"
@@ -47,7 +48,7 @@ def test_said_lines_stay_lines(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_page_holds_no_control_character() -> None:
     """Neither title nor body of a page carries a name's controls; the ends of its lines stay."""
-    page = document(HOSTILE, f"<p>{HOSTILE}</p>\n<p>b</p>", shows_depth=True)
+    page = document(HOSTILE, f"<p>{HOSTILE}</p>\n<p>b</p>", Script.COPY)
     assert f"<title>{SHOWN}</title>" in page
     assert f"<p>{SHOWN}</p>\n<p>b</p>" in page
 

@@ -12,7 +12,7 @@ from common.ledger import StageTimes
 from phone_host.measure.budget_words import budget_lines
 from phone_host.measure.headline import Answer, Grade
 from phone_host.measure.image_trust import ImageFigures
-from phone_host.model import CutCounts, DepthLimits, MatchReport, Processed, RectifiedPair
+from phone_host.model import CutCounts, MatchReport, Processed, RectifiedPair
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report import depth_data
@@ -171,17 +171,3 @@ def test_depths_over_many_decades_have_few_round_marks(decades: int, marks: set[
     view = depth_view(replace(processed(), cloud=np.dstack([depth, depth, depth])), ("left", "right"))
     shown = Page(view).words.split("the scale is in metres")[1].split("depth Z")[0]
     assert set(shown.removesuffix(" m").split(" m")) == marks
-
-
-def test_points_between_the_chosen_rows_are_found_all_the_same() -> None:
-    """240000 points in the second of two rows: every second row would hold none, so 60000 points of that row are taken."""
-    width = 4 * depth_data.MOST_POINTS
-    cloud = np.full((2, width, 3), np.nan, np.float32)
-    cloud[1] = np.stack([np.linspace(-1, 1, width), np.zeros(width), np.full(width, 2.0)], axis=1)
-    limits = DepthLimits(near_m=0.1, far_m=9.0, disparity_error_px=0.25, from_rig=True)
-    found = depth_data.points(cloud, np.zeros((2, width), np.uint8), limits)
-    assert found is not None
-    assert found.total == width
-    assert len(found.places) == depth_data.MOST_POINTS
-    assert found.low_m == pytest.approx([-1, 0, 2])
-    assert found.high_m == pytest.approx([1, 0, 2], abs=1e-6)

@@ -216,8 +216,16 @@ class Played:
         )
         account = LinkAccount([], links=(LinkTally("usb", frames=count, is_up=True),))
         estimate = ClockEstimate(
-            reference_ns=0, offset_ns=1_500_000, skew=1e-6, skew_uncertainty=1e-7, uncertainty_ns=85_000,
-            round_trip_ns=400_000, low_ns=1_400_000, high_ns=1_600_000, skew_low=-1e-4, skew_high=1e-4,
+            reference_ns=0,
+            offset_ns=1_500_000,
+            skew=1e-6,
+            skew_uncertainty=1e-7,
+            uncertainty_ns=85_000,
+            round_trip_ns=400_000,
+            low_ns=1_400_000,
+            high_ns=1_600_000,
+            skew_low=-1e-4,
+            skew_high=1e-4,
         )
         base = snapshot(min(count, 200))
         limits = None if newest is None else newest.processed.limits

@@ -165,6 +165,7 @@ export class Cloud {
   frame() {
     this.asked = 0;
     if (!this.data || !this.canvas.clientWidth) return;
+    const { controls } = this;
     const { grid, geometry } = this.data;
     const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
@@ -175,15 +176,15 @@ export class Cloud {
     this.camera.aspect = w / h;
     this.camera.fov = (2 * Math.atan(h / 2 / zoom) * 180) / Math.PI;
     this.camera.updateProjectionMatrix();
-    this.controls.update();
+    controls.update();
     const { uniforms } = this.material;
     uniforms.thin.value = this.thin;
     uniforms.pixels.value = zoom * ratio;
     const count = Math.ceil(grid.columns / this.thin) * Math.ceil(grid.rows / this.thin);
     this.points.geometry.setDrawRange(0, count);
     this.renderer.render(this.scene, this.camera);
-    this.legend.draw(this.camera, this.controls.target, zoom, ratio);
-    this.canvas.dataset.drawn = String(Number(this.canvas.dataset.drawn ?? 0) + 1);
+    this.legend.draw(this.camera, controls.target, zoom, ratio);
+    this.canvas.dataset.drawn = [controls.getAzimuthalAngle(), controls.getPolarAngle(), controls.getDistance()].map((v) => v.toFixed(3)).join(' ');
   }
 }
 
