@@ -132,6 +132,10 @@ export class Cloud {
     // The front view starts from where the camera stood; turns are about the thing.
     const bearing = [Math.atan2(-x, z) + yaw, Math.asin(y / lengthOf(this.pivot)) + pitch];
     const flat = Math.cos(bearing[1]) * away;
+    // An orbit that still swings ends here: an update without damping takes all that is left of it.
+    const { enableDamping } = this.controls;
+    this.controls.enableDamping = false;
+    this.controls.update();
     this.controls.target.set(x, -y, -z);
     this.camera.position.set(x + flat * Math.sin(bearing[0]), -y + away * Math.sin(bearing[1]), -z + flat * Math.cos(bearing[0]));
     this.camera.near = z * 0.02;
@@ -139,6 +143,7 @@ export class Cloud {
     this.controls.minDistance = z * 0.06;
     this.controls.maxDistance = z * 12;
     this.controls.update();
+    this.controls.enableDamping = enableDamping;
     this.draw();
   }
 

@@ -61,7 +61,8 @@ export function showGuide(state) {
   const guide = state.guide;
   show(byId('guide'), !!guide);
   if (!guide) return;
-  text(byId('guide-words'), sentence(guide.words || 'show the board to both cameras'));
+  text(byId('guide-words'), sentence(guide.result || guide.words || 'show the board to both cameras'));
+  text(byId('guide-note'), sentence(guide.note ?? ''));
   if (state.activity === 'calibrating' && guide.words) say(guide.words);
   const verdict = byId('guide-verdict');
   data(verdict, 'level', VERDICTS[guide.verdict ?? ''] ?? 'unknown');

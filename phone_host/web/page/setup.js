@@ -1,7 +1,7 @@
 // The steps before a run: board, camera, check, calibration. Choices become options of the command line (`set`), shown below to copy.
 
 import { command } from './connection.js';
-import { byId, follow, keep, make, onPress, show, tell, text } from './dom.js';
+import { byId, data, follow, keep, make, onPress, sentence, show, tell, text } from './dom.js';
 
 /** @typedef {{uri: string, name: string, note: string, needs_code: boolean}} Choice */
 
@@ -35,6 +35,29 @@ function showChoices(option, choices, chosen) {
   follow(byId(`${option}-typed`), choices.some((one) => one.uri === chosen) ? '' : chosen);
 }
 
+/** @typedef {{what: string, grade: 'ok' | 'warn' | 'fail', words: string, remedy: string}} Checked */
+
+const SIGNS = { ok: '\u2713', warn: '!', fail: '\u2715' };
+const LEVELS = { ok: 'good', warn: 'warning', fail: 'bad' };
+
+/** @param {Checked[]} checks - what was looked at so far */
+function showChecks(checks) {
+  keep(
+    byId('checks'), checks, (one) => one.what,
+    () => make('li', '', make('i'), make('b'), ' ', make('span'), make('span', 'remedy')),
+    (item, one) => {
+      const [sign, what, words, remedy] = /** @type {HTMLElement[]} */ ([...item.children]);
+      data(item, 'level', LEVELS[one.grade]);
+      text(sign, SIGNS[one.grade]);
+      sign.setAttribute('aria-label', one.grade);
+      sign.setAttribute('role', 'img');
+      text(what, one.what);
+      text(words, one.words);
+      text(remedy, one.grade === 'ok' ? '' : sentence(one.remedy));
+    },
+  );
+}
+
 /** @param {any} state */
 export function showSetup(state) {
   showChoices('link', state.boards, state.settings.link ?? '');
@@ -42,6 +65,7 @@ export function showSetup(state) {
   const board = state.boards.find((/** @type {Choice} */ one) => one.uri === state.settings.link);
   show(byId('enrol'), !!board?.needs_code);
   text(byId('check-words'), state.activity === 'checking' ? 'Looking at the machine, the board and both cameras \u2026' : '');
+  showChecks(state.checks ?? []);
   text(byId('calibrate-go'), state.activity === 'calibrating' ? 'Stop' : 'Start live calibration');
   follow(byId('calibration-typed'), state.settings.calibration ?? '');
   text(byId('command'), state.command || 'not enough is chosen yet');

@@ -9,6 +9,7 @@ const SIGNS = /** @type {Record<string, string>} */ ({ good: '\u2713', warning: 
 
 /** What is said before there is a run. @param {any} state @returns {Trust} */
 export function before(state) {
+  if (state.activity === 'running') return { level: 'unknown', headline: 'No pair has been processed yet', concerns: [] };
   const next = state.steps.find((/** @type {any} */ step) => !step.done);
   return { level: 'unknown', headline: next ? `No depth yet. Next: ${next.words}` : 'No depth yet. Everything is set: start a run', concerns: [] };
 }

@@ -1,0 +1,152 @@
+"""The way from nothing to a run on the page: each step does what the command line would, and leads on. Everybody can use it."""
+
+import hashlib
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from phone_host.measure.trouble import Trouble
+from phone_host.web.source import Activity, Answer, Do, StepName
+from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
+from tests.web.played import BOARDS, CAMERAS, Played, guide_snapshot
+
+AXE = "axe-core@4.14.1"
+AXE_SHA256 = "e6b0ce02b84d892e2e33e403485e7f3d6c29e2be6df65daf44d89ba564139745"
+EXPECTED_STEPS = ["board", "camera", "check", "calibration", "run"]
+
+
+def asked(program: Played) -> list[tuple[Do, dict[str, str]]]:
+    """What the page has asked for."""
+    return [(command.do, dict(command.values)) for command in program.commands]
+
+
+def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, complaints: Complaints) -> None:
+    """Board with its code, camera, check, calibration, run: every press is one command, done steps are ticked, the next one is offered."""
+    page = opened()
+    page.wait_for_selector("#panel-board:not([hidden])")
+    assert "Choose the board" in page.text_content("#panel-board .words")
+    assert page.get_attribute("#command-copy", "aria-disabled") == "true"
+    page.check(f"input[value='{BOARDS[0].uri}']")
+    page.fill("#enrol-code", "K7QP-22MX")
+    page.press("#enrol-code", "Enter")
+    page.wait_for_function("() => document.querySelector('#link-answer').textContent === 'Enrol: done.'")
+    assert asked(program) == [
+        (Do.SET, {"link": BOARDS[0].uri}),
+        (Do.ENROL, {"link": BOARDS[0].uri, "code": "K7QP-22MX"}),
+    ]
+    program.change(done={StepName.BOARD})
+    page.click("#panel-board a.next")
+    page.check(f"input[value='{CAMERAS[1].uri}']")
+    page.wait_for_function("() => document.querySelector('#command').textContent.startsWith('phone-host run')")
+    assert f"--camera {CAMERAS[1].uri}" in page.text_content("#command")
+    program.change(done={StepName.BOARD, StepName.CAMERA})
+    page.click("#panel-camera a.next")
+    page.click("#check-go")
+    page.wait_for_function("() => document.querySelector('#check-answer').textContent === 'Check: done.'")
+    program.change(done={StepName.BOARD, StepName.CAMERA, StepName.CHECK})
+    page.click("#panel-check a.next")
+    page.fill("#board-square", "30mm")
+    page.click("#calibrate-go")
+    program.change(guide=guide_snapshot())
+    page.wait_for_selector("#guide:not([hidden])")
+    assert page.text_content("#guide-words") == "Tilt the board: bottom edge away."
+    assert "usable" in page.text_content("#guide-verdict")
+    assert "2.10 mm" in page.text_content("#guide-figures")
+    assert page.locator("#guide-wanted .now").text_content() == "tilt the board: bottom edge away"
+    assert "percent of it covered" in page.get_attribute("#guide-left", "aria-label")
+    program.change(done=set(StepName), activity=Activity.IDLE)
+    page.click("#panel-calibration a.next")
+    page.click("#go")
+    page.wait_for_selector("#go[data-running=yes]")
+    assert asked(program)[2:] == [
+        (Do.SET, {"camera": CAMERAS[1].uri}),
+        (Do.CHECK, {}),
+        (Do.CALIBRATE, {"board": "auto", "square": "30mm"}),
+        (Do.RUN, {}),
+    ]
+    assert [page.get_attribute(f"#step-{name}", "data-done") for name in EXPECTED_STEPS] == ["yes"] * 5
+    assert complaints == []
+
+
+def test_what_went_wrong_is_said_with_what_to_do(program: Played, opened: Opener) -> None:
+    """A refused command is answered beside its button, trouble of the program stands on top; both in words with a remedy."""
+    program.answers[Do.CHECK] = Answer(trouble=Trouble("the board is silent", "see whether its lamp blinks"))
+    page = opened("check")
+    page.click("#check-go")
+    page.wait_for_selector("#check-answer.bad")
+    assert page.text_content("#check-answer") == "The board is silent. See whether its lamp blinks."
+    program.change(trouble=Trouble("the camera has gone", "plug it in again"))
+    page.wait_for_selector("#trouble:not([hidden])")
+    assert page.text_content("#trouble") == "The camera has gone. Plug it in again."
+
+
+def test_every_control_is_reached_by_keys_and_shows_that(program: Played, opened: Opener) -> None:
+    """Tab reaches every visible control of the live page once, in the order of the page, and each shows the focus."""
+    program.change(activity=Activity.RUNNING, done=set(StepName))
+    program.emit()
+    page = opened("run")
+    page.wait_for_selector("#views[data-pair]")
+    wanted = page.evaluate(
+        """() => [...document.querySelectorAll('a[href],button,input,select,[tabindex="0"]')].filter(one => one.checkVisibility() && !(one.type === 'radio' && !one.checked)).map(one => one.id || one.name || one.textContent)"""
+    )
+    reached, unseen = [], []
+    for _ in range(len(wanted) + 5):
+        page.keyboard.press("Tab")
+        name, outline = page.evaluate(
+            """() => { const one = document.activeElement, around = one.closest('.segments label') ?? one;
+            return [one.id || one.name || one.textContent, getComputedStyle(around).outlineStyle]; }"""
+        )
+        if name in reached:
+            break
+        reached.append(name)
+        if outline == "none" and name in wanted:
+            unseen.append(name)
+    assert [name for name in wanted if name not in reached] == []
+    assert unseen == []
+
+
+@pytest.fixture(scope="session")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """axe-core's script, from npm: for tests only, the package never holds it."""
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("needs npm for axe-core")
+    folder = tmp_path_factory.mktemp("axe")
+    done = subprocess.run(
+        [npm, "pack", "--silent", AXE], cwd=folder, capture_output=True, text=True, check=False, timeout=90
+    )
+    if done.returncode:
+        pytest.skip(f"npm has no {AXE}: {done.stderr.strip().splitlines()[-1:]}")
+    tarball = folder / done.stdout.strip()
+    assert hashlib.sha256(tarball.read_bytes()).hexdigest() == AXE_SHA256
+    subprocess.run(["tar", "xzf", tarball], cwd=folder, check=True)
+    return (folder / "package" / "axe.min.js").read_text()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [PHONE, LAPTOP], ids=["phone", "laptop"])
+def test_axe_finds_no_violation(program: Played, opened: Opener, axe: str, size: dict[str, int], scheme: str) -> None:
+    """On every step, on a phone and a laptop, light and dark, axe-core's rules (WCAG 2.2 AA and best practices) find nothing."""
+    program.change(activity=Activity.RUNNING, guide=guide_snapshot(), settings={"link": BOARDS[0].uri})
+    program.emit()
+    page = opened("run", size, color_scheme=scheme, bypass_csp=True)
+    page.evaluate(axe)
+    found: dict[str, Any] = {}
+    for step in EXPECTED_STEPS:
+        page.evaluate("step => { location.hash = step; }", step)
+        page.wait_for_selector(f"#panel-{step}:not([hidden])")
+        if step == "run":
+            page.wait_for_selector("#views[data-pair]")
+        said = page.evaluate("() => axe.run()")
+        for one in said["violations"]:
+            found[f"{step}: {one['id']}"] = [node["html"][:120] for node in one["nodes"]]
+    assert found == {}
+
+
+def test_axe_is_not_in_the_package() -> None:
+    """Only tests use it."""
+    folder = Path(__file__).resolve().parents[2] / "phone_host"
+    assert not [path for path in folder.rglob("*axe*") if path.suffix == ".js"]
