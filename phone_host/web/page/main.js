@@ -37,6 +37,8 @@ const connection = new Connection({
     if (line === 'lost') say('Connection lost, trying again.');
   },
   state: (told) => {
+    // The step that is right at the start stays until the person goes on: nothing is torn away.
+    if (!state && !location.hash) history.replaceState(null, '', `#${stepOf(told, '')}`);
     state = told;
     charts.add(told.live?.samples ?? []);
     draw();
