@@ -142,7 +142,7 @@ def test_the_doctor_tells_an_unusable_choice() -> None:
 
 
 def test_sdist_and_wheel_hold_what_they_must(tmp_path: Path) -> None:
-    """The sdist holds all sources and no library; a wheel made from it holds one library for every Python 3, and no C source."""
+    """The sdist holds all sources and no library; a wheel made from it holds one library for every Python 3 and the whole page, and no source of either."""
     make = "import setuptools.build_meta as b, sys; print(b.build_sdist(sys.argv[1]))"
     copy = tmp_path / "tree"
     files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout.decode()
@@ -163,6 +163,10 @@ def test_sdist_and_wheel_hold_what_they_must(tmp_path: Path) -> None:
     assert not wheel.name.endswith("-any.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
+    pages = (ROOT / "phone_host" / "web" / "page").rglob("*")
+    page = {path.relative_to(ROOT).as_posix() for path in pages if path.is_file()}
+    assert page | {"phone_host/report/page_copy.js", "phone_host/report/page_depth.js"} <= set(names)
+    assert not [name for name in names if name.startswith("phone_host/web/vendor/")]
         archive.extractall(tmp_path / "wheel")
     assert [name for name in names if name.startswith(NATIVE) and not name.endswith(".py")] == [
         f"{NATIVE}/{LIBRARY_FILE}"
