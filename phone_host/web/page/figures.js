@@ -18,9 +18,9 @@ export function figuresOf(live) {
   const { clock, link } = live;
   return [
     { name: 'pairs', value: number(live.pairs_per_s, 1), unit: '/s', note: `${live.pairs} in all` },
-    { name: 'density', value: number(live.density === null ? null : 100 * live.density, 0), unit: '%', note: 'pixels with depth' },
-    { name: 'from light to depth', value: number(newest?.[7], 0), unit: 'ms', note: 'newest pair' },
-    { name: 'time skew', value: number(live.time_skew_ms, 1), unit: 'ms', note: 'of the two exposures' },
+    { name: 'density', value: number(live.density === null ? null : 100 * live.density, 0), unit: '%', note: 'have depth' },
+    { name: 'delay', value: number(newest?.[7], 0), unit: 'ms', note: 'light to depth' },
+    { name: 'time skew', value: number(live.time_skew_ms, 1), unit: 'ms', note: 'of exposures' },
     { name: 'link', value: link.up ? 'up' : 'down', unit: '', note: link.name, level: link.up ? 'good' : 'bad' },
     { name: 'clock', value: clock.known ? 'known' : 'waiting', unit: '', note: clock.known ? uncertainty(clock.uncertainty_us) : 'of the board', level: clock.known ? 'good' : 'warning' },
   ];
