@@ -163,11 +163,11 @@ def test_sdist_and_wheel_hold_what_they_must(tmp_path: Path) -> None:
     assert not wheel.name.endswith("-any.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
+        archive.extractall(tmp_path / "wheel")
     pages = (ROOT / "phone_host" / "web" / "page").rglob("*")
     page = {path.relative_to(ROOT).as_posix() for path in pages if path.is_file()}
     assert page | {"phone_host/report/page_copy.js", "phone_host/report/page_depth.js"} <= set(names)
     assert not [name for name in names if name.startswith("phone_host/web/vendor/")]
-        archive.extractall(tmp_path / "wheel")
     assert [name for name in names if name.startswith(NATIVE) and not name.endswith(".py")] == [
         f"{NATIVE}/{LIBRARY_FILE}"
     ]

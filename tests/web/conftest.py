@@ -65,8 +65,8 @@ class Complaints(list[str]):
 
 
 def _own(url: str, address: str) -> bool:
-    host = address.split("//")[1].split("/")[0]
-    return url.startswith(("blob:", "data:")) or url.split("//")[1].split("/")[0] == host
+    host = address.split("//")[1].split("/", maxsplit=1)[0]
+    return url.startswith(("blob:", "data:")) or url.split("//")[1].split("/", maxsplit=1)[0] == host
 
 
 Opener = Callable[..., Any]

@@ -40,7 +40,7 @@ def main() -> None:
     server = PageServer(program, PageSettings(port=0))
     server.start()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
+        browser: Any = playwright.chromium.launch(
             executable_path=CHROMIUM, args=["--no-sandbox", "--enable-unsafe-swiftshader", "--hide-scrollbars"]
         )
         laptop = browser.new_page(viewport=LAPTOP)

@@ -91,7 +91,8 @@ def test_a_tap_shows_the_true_distance_and_two_taps_a_length(running: Played, op
     assert page.locator("#map-frame .spot:visible").count() == 2
 
 
-def test_the_depth_picture_has_the_colours_of_the_true_depth(running: Played, opened: Opener) -> None:
+@pytest.mark.usefixtures("running")
+def test_the_depth_picture_has_the_colours_of_the_true_depth(opened: Opener) -> None:
     """Where both cameras see a point, nearer is brighter: the picture's colours, read back, sort as the rendered truth does."""
     page = opened("run")
     shows(page, 0)
@@ -221,8 +222,9 @@ def test_range_and_crop_are_set_typed_or_drawn(running: Played, opened: Opener) 
     assert "crop" not in running.settings
 
 
+@pytest.mark.usefixtures("running")
 def test_the_cloud_turns_by_keys_and_without_webgl_a_sentence_stands_there(
-    running: Played, opened: Opener, browser: Any, server: PageServer
+    opened: Opener, browser: Any, server: PageServer
 ) -> None:
     """Arrow keys and plus change the view and Home undoes it; a browser without WebGL 2 says so and shows all else."""
     page = opened("run", {"width": 1000, "height": 700})
@@ -264,7 +266,8 @@ def test_nothing_jumps_and_nothing_is_wider_than_the_window(
     assert complaints == []
 
 
-def test_the_page_is_light_and_asks_nobody_else(running: Played, opened: Opener, complaints: Complaints) -> None:
+@pytest.mark.usefixtures("running")
+def test_the_page_is_light_and_asks_nobody_else(opened: Opener, complaints: Complaints) -> None:
     """To the first depth and cloud at most 450 KB are transferred, all from the server itself; over 100 KB/s it still comes."""
     page = opened()
     session = page.context.new_cdp_session(page)

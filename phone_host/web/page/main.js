@@ -25,7 +25,9 @@ const LINES = /** @type {Record<import('./connection.js').Line, string>} */ ({
 /** @type {any} */
 let state = null;
 
+/** @type {Controls} */
 const controls = new Controls(() => state, () => live.pair?.head ?? null);
+/** @type {Live} */
 const live = new Live((from, to, done) => controls.drag(from, to, done));
 const charts = new Charts({ delays: byId('chart-delays'), rate: byId('chart-rate'), skew: byId('chart-skew') });
 

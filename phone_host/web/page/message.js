@@ -46,7 +46,7 @@ export function split(buffer) {
 
 /** @param {Uint8Array} bytes @returns {Promise<Uint8Array>} */
 export async function inflate(bytes) {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
+  const stream = new Blob([/** @type {BlobPart} */ (bytes)]).stream().pipeThrough(new DecompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
@@ -73,7 +73,7 @@ export async function decode(buffer) {
   /** @param {string} name */
   const picture = (name) => {
     const at = head.parts.findIndex((part) => part.name === name);
-    return at < 0 ? null : createImageBitmap(new Blob([bodies[at]], { type: head.parts[at].type }), { colorSpaceConversion: 'none' });
+    return at < 0 ? null : createImageBitmap(new Blob([/** @type {BlobPart} */ (bodies[at])], { type: head.parts[at].type }), { colorSpaceConversion: 'none' });
   };
   const at = head.parts.findIndex((part) => part.name === 'disparity');
   const grid = at < 0 ? null : gridOf(head, head.parts[at], bodies[at]);
