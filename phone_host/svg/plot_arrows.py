@@ -1,4 +1,7 @@
-"""Small errors over an image as arrows, enlarged, with their scale. Pure: values in, SVG out."""
+"""Small errors over an image as arrows, enlarged, with their scale. Pure: values in, SVG out.
+
+It stays SVG: arrows have places in an image; uPlot draws series over an axis.
+"""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Where corners were seen in an image, and where none was. Pure: values in, SVG out."""
+"""Where corners were seen in an image, and where none was. Pure: values in, SVG out.
+
+It stays SVG: cells and pictures have places in an image; uPlot draws series over an axis.
+"""
 
 from typing import Final
 

@@ -1,4 +1,7 @@
-"""Cameras and boards in space, seen from a direction. Pure: values in, SVG out."""
+"""Cameras and boards in space, seen from a direction. Pure: values in, SVG out.
+
+It stays SVG: a drawing in space has no axis to zoom; uPlot draws series over one.
+"""
 
 import math
 from collections.abc import Sequence

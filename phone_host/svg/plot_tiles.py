@@ -1,4 +1,7 @@
-"""A grid of tiles with a number in each, coloured by it. Pure: values in, SVG out."""
+"""A grid of tiles with a number in each, coloured by it. Pure: values in, SVG out.
+
+It stays SVG: a table in colours is read cell by cell; uPlot draws series over an axis.
+"""
 
 from collections.abc import Callable
 from html import escape

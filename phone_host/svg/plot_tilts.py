@@ -1,4 +1,7 @@
-"""How far and which way boards were tilted: a disc whose middle is a board that faces the camera. Pure: values in, SVG out."""
+"""How far and which way boards were tilted: a disc whose middle is a board that faces the camera. Pure: values in, SVG out.
+
+It stays SVG: a disc of directions; uPlot draws series over an axis.
+"""
 
 import math
 from collections.abc import Sequence
