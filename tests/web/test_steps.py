@@ -83,6 +83,19 @@ def test_what_went_wrong_is_said_with_what_to_do(program: Played, opened: Opener
     assert page.text_content("#trouble") == "The camera has gone. Plug it in again."
 
 
+def test_the_skip_link_changes_no_step(opened: Opener) -> None:
+    """It leads to the content of the step that is shown; only the steps' own links go on."""
+    page = opened("check")
+    page.wait_for_selector("#panel-check:not([hidden])")
+    page.focus("a.skip")
+    page.keyboard.press("Enter")
+    page.wait_for_timeout(300)
+    assert page.is_visible("#panel-check")
+    assert page.evaluate("() => document.activeElement.id") == "main"
+    page.click("#step-camera")
+    page.wait_for_selector("#panel-camera:not([hidden])")
+
+
 def test_every_control_is_reached_by_keys_and_shows_that(program: Played, opened: Opener) -> None:
     """Tab reaches every visible control of the live page once, in the order of the page, and each shows the focus."""
     program.change(activity=Activity.RUNNING, done=set(StepName))

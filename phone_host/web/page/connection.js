@@ -1,12 +1,16 @@
 // The one connection to the server: what it tells goes to listeners, what the page wants goes back. Comes back by itself.
 
-import { decode } from './message.js';
+import { decode, split } from './message.js';
 import { token } from './token.js';
 
 /** @typedef {'connecting' | 'open' | 'lost' | 'refused'} Line */
 
 const FIRST_WAIT_MS = 400;
 const MOST_WAIT_MS = 4000;
+const UNSEEN_MS = 250;
+
+/** Until the next frame is drawn; a page that nobody sees draws none, and goes on all the same. @returns {Promise<unknown>} */
+const nextFrame = () => Promise.race([new Promise((drawn) => requestAnimationFrame(drawn)), new Promise((over) => setTimeout(over, UNSEEN_MS))]);
 
 export class Connection {
   /**
@@ -48,10 +52,15 @@ export class Connection {
   /** A pair is acknowledged once it is shown; until then the server sends no other. @param {ArrayBuffer} buffer */
   async pair(buffer) {
     const socket = this.socket;
-    const pair = await decode(buffer);
-    await new Promise((drawn) => requestAnimationFrame(drawn));
-    this.told.pair(pair);
-    if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ kind: 'ack', number: pair.head.number }));
+    const { number } = split(buffer).head;
+    try {
+      const pair = await decode(buffer);
+      await nextFrame();
+      this.told.pair(pair);
+    } finally {
+      // One pair that cannot be shown must not be the last.
+      if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ kind: 'ack', number }));
+    }
   }
 
   /** Say which pictures are looked at. @param {string[]} views @param {number} width - px @param {number} hz */

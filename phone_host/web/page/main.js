@@ -8,7 +8,7 @@ import { showFigures } from './figures.js';
 import { showGuide } from './guide.js';
 import { Live } from './live.js';
 import { connectSetup, showSetup } from './setup.js';
-import { showSteps, stepOf } from './steps.js';
+import { STEPS, showSteps, stepOf } from './steps.js';
 import { takeToken } from './token.js';
 import { showTrust } from './trust.js';
 
@@ -24,6 +24,8 @@ const LINES = /** @type {Record<import('./connection.js').Line, string>} */ ({
 
 /** @type {any} */
 let state = null;
+/** The step that was asked for; other fragments, such as that of the skip link, change nothing. */
+let asked = '';
 
 /** @type {Controls} */
 const controls = new Controls(() => state, () => live.pair?.head ?? null);
@@ -40,7 +42,7 @@ const connection = new Connection({
   },
   state: (told) => {
     // The step that is right at the start stays until the person goes on: nothing is torn away.
-    if (!state && !location.hash) history.replaceState(null, '', `#${stepOf(told, '')}`);
+    if (!state && !asked) asked = stepOf(told, '');
     state = told;
     charts.add(told.live?.samples ?? []);
     draw();
@@ -54,7 +56,7 @@ const connection = new Connection({
 /** Show the newest state. */
 function draw() {
   if (!state) return;
-  showSteps(state, stepOf(state, location.hash.slice(1)));
+  showSteps(state, stepOf(state, asked));
   showTrust(state);
   showSetup(state);
   showGuide(state);
@@ -75,7 +77,17 @@ function want() {
   connection.want(views, WIDTHS_PX.find((each) => each >= width) ?? 1280, HZ);
 }
 
+/** @returns {boolean} whether the address asks for another step */
+function readAddress() {
+  const name = location.hash.slice(1);
+  if (name === asked || !STEPS.some((step) => step === name)) return false;
+  asked = name;
+  return true;
+}
+
+readAddress();
 window.addEventListener('hashchange', () => {
+  if (!readAddress()) return;
   draw();
   byId('main').focus({ preventScroll: true });
   window.scrollTo(0, 0);
