@@ -1,8 +1,9 @@
 """Finds out which chessboard the images show: how many inner corners, by a vote of some of them.
 
 The detector grows a lattice from its strongest corners as far as it goes. Glare, a hand or a cut edge end it early in some
-images; what many images agree on, weighted by its corners, is the board. Sizes are compared without regard to which count
-comes first, because a board may be held either way.
+images; what many images agree on, weighted by its corners, is a board or a part of one. So the detector that looks for a size
+is asked whether it fits, and whether a larger one does (`board_fits`). Sizes are compared without regard to which count comes first,
+because a board may be held either way.
 """
 
 from collections import Counter
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, TandemError
 from common.imagesize.head import MOST_PIXELS
+from phone_host.calibration.board_fits import ENOUGH, Fits, Size
 from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
 from phone_host.calibration.small_picture import shrunk
 from phone_host.calibration.target import Board, Corners
@@ -56,8 +58,13 @@ _LEAST_VOTES: Final = 2
 _LEAST_SHARE: Final = 0.5
 """Below, the images do not agree. Of a real rig with a small, dark board the right size has three quarters."""
 
-Size = tuple[int, int]
-"""Inner corners: the larger count first."""
+_TRIED: Final = 4
+"""So many of the sizes that images show are looked for, if they do not agree."""
+
+_ANY_SIDE_M: Final = 0.01
+
+_USUAL_SIZES: Final[tuple[Size, ...]] = ((9, 6), (8, 6), (7, 6), (7, 5), (8, 5), (9, 7), (10, 7), (8, 7), (11, 8))
+"""Of the boards that OpenCV, ROS, MATLAB and Kalibr give away and describe, and of the boards of chess."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +84,7 @@ class Vote:
         """The size on which the images agree; None if they do not."""
         if not self.sizes:
             return None
-        best = max(self.sizes, key=self._weight)
+        best = self.ranked[0]
         is_clear = self.sizes[best] >= min(_LEAST_VOTES, self.asked) and self._share(best) >= _LEAST_SHARE
         return best if is_clear else None
 
@@ -87,8 +94,13 @@ class Vote:
         best = self.leader
         return best is not None and self.sizes[best] >= _CLEAR_VOTES and self._share(best) >= _CLEAR_SHARE
 
+    @property
+    def ranked(self) -> list[Size]:
+        """All sizes, the one that most corners show first."""
+        return sorted(self.sizes, key=self._weight, reverse=True)
+
     def _weight(self, size: Size) -> int:
-        return self.sizes[size] * size[0] * size[1]
+        return self.sizes[size] * _area(size)
 
     def _share(self, size: Size) -> float:
         return self._weight(size) / sum(map(self._weight, self.sizes))
@@ -179,21 +191,73 @@ def _levels(grey: Image, points: Corners) -> NDArray[np.float64]:
     return np.where(inside, grey[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)], 0).astype(np.float64)
 
 
-def vote(images: Iterator[Path], look: Callable[[Path], Size | None]) -> Vote:
-    """Ask images until the answer is clear.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """An image, small, and which lattice it shows."""
+
+    image: Image
+    size: Size
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Decided:
+    """What some images show, and which board that is; None: it cannot be told."""
+
+    vote: Vote
+    size: Size | None
+    fits: Fits
+
+
+def _asked(images: Iterator[Path], look: Callable[[Path], _Seen | None]) -> tuple[Vote, list[_Seen]]:
+    """Ask images, the most different first, until the answer is clear."""
+    result, every = Vote(0, Counter()), list[_Seen]()
+    for batch in _batches(images):
+        every += [each for each in side_by_side(look, batch) if each is not None]
+        result = Vote(result.asked + len(batch), Counter(each.size for each in every))
+        if result.is_over:
+            break
+    return result, every
+
+
+def _decided(files: ViewFiles, most_pixels: int, given: Size | None = None) -> _Decided:
+    """Ask the images; if they show boards and do not agree, ask them again another way; then try what most boards have.
 
     Args:
-        images: which, the most different first.
-        look: what an image shows.
+        files: the pairs of files.
+        most_pixels: an image that claims more is passed over.
+        given: a size that is tried, too.
     """
-    sizes, asked = Counter[Size](), 0
-    for batch in _batches(images):
-        found = side_by_side(look, batch)
-        asked += len(batch)
-        sizes.update(size for size in found if size is not None)
-        if Vote(asked, sizes).is_over:
-            break
-    return Vote(asked, sizes)
+    result, seen = _asked(_sample(files), lambda path: _seen_in(path, most_pixels, _USUAL_WAY))
+    fits = _fits_of(seen)
+    size = _fitting(result, fits, given)
+    if size is not None or result.sizes.total() < _LEAST_SHARE * result.asked:
+        return _Decided(result, size, fits)
+    other, other_seen = _asked(_sample(files), lambda path: _seen_in(path, most_pixels, _OTHER_WAY))
+    size = _fitting(other, _fits_of(other_seen), given)
+    if size is None:
+        held = [each for each in _USUAL_SIZES if fits.holds(each)]
+        size = fits.grown(max(held, key=_area)) if held else None
+    return _Decided(result, size, fits)
+
+
+def _fits_of(seen: list[_Seen]) -> Fits:
+    best = sorted(seen, key=lambda each: -_area(each.size))
+    return Fits([each.image for each in best[:ENOUGH]])
+
+
+def _fitting(result: Vote, fits: Fits, given: Size | None) -> Size | None:
+    """Return the largest size that fits most images, of those that images show; else the one on which they agree."""
+    leader = result.leader
+    shown = [leader] if leader is not None and fits.holds(leader) else result.ranked[:_TRIED]
+    held = [size for size in (*shown, *([given] if given is not None else [])) if fits.holds(size)]
+    held = [size for size in held if size == leader or fits.count(size) >= min(_LEAST_VOTES, result.asked)]
+    if held:
+        return fits.grown(max(held, key=_area))
+    return None if leader is None else fits.grown(leader)
+
+
+def _area(size: Size) -> int:
+    return size[0] * size[1]
 
 
 def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
@@ -215,19 +279,21 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
         raise DataError(
             f"these images show no chessboard, but {marks.words}", "name that board with --board; see --help"
         )
-    result = _vote_of(files, most_pixels)
-    if result.leader is not None:
-        return result.leader
+    decided = _decided(files, most_pixels)
+    if decided.size is not None:
+        return decided.size
+    result = decided.vote
     if not result.sizes:
         _require_an_image(list(_sample(files)), most_pixels)
         raise DataError(
             f"no chessboard is seen in {result.asked} images",
             "take pictures with the whole board sharp and evenly lit, with a white margin around it",
         )
-    seen = " ".join(f"{size_text(size)} ({count})" for size, count in result.sizes.most_common(3))
+    likely = result.ranked[:3]
+    seen = " ".join(f"{size_text(size)} ({result.sizes[size]})" for size in likely)
     raise DataError(
         f"the images do not agree on the board's size: inner corners {seen}",
-        f"name it with --board, such as --board {size_text(max(result.sizes))}, and show the whole board in each picture",
+        f"count them and name them, such as --board {size_text(likely[0])}, and show the whole board in each picture",
     )
 
 
@@ -243,15 +309,18 @@ def require_size(files: ViewFiles, given: Size, most_pixels: int = MOST_PIXELS) 
         SettingsError: the images show another board.
     """
     wanted = max(given), min(given)
-    result = _vote_of(files, most_pixels)
-    seen = result.leader
-    if seen is None or seen == wanted or result.sizes[wanted] * _CLEAR_VOTES >= result.sizes[seen]:
+    decided = _decided(files, most_pixels, wanted)
+    shown, fits = decided.size, decided.fits
+    if shown is None or shown == wanted:
         return
-    if result.sizes[seen] <= result.asked / _CLEAR_VOTES:
+    if decided.vote.sizes.total() <= decided.vote.asked / _CLEAR_VOTES:
         return  # most images show nothing: a few may be wrong
+    is_part = wanted[0] <= shown[0] and wanted[1] <= shown[1]  # it is found, too, and that proves nothing
+    if not is_part and fits.shows(Board(*given, _ANY_SIDE_M)):
+        return
     raise SettingsError(
-        f"these boards have {size_text(seen)} inner corners, --board says {size_text(given)}",
-        f"give --board {size_text(seen)}, or leave --board out",
+        f"these boards have {size_text(shown)} inner corners, --board says {size_text(given)}",
+        f"give --board {size_text(shown)}, or leave --board out",
     )
 
 
@@ -278,18 +347,13 @@ def size_text(size: Size) -> str:
     return f"{size[0]}x{size[1]}"
 
 
-def _vote_of(files: ViewFiles, most_pixels: int) -> Vote:
-    """Ask the images; if they show boards and do not agree, ask them again another way."""
-    result = vote(_sample(files), lambda path: _size_in(path, most_pixels, _USUAL_WAY))
-    if result.leader is not None or result.sizes.total() < _LEAST_SHARE * result.asked:
-        return result
-    other = vote(_sample(files), lambda path: _size_in(path, most_pixels, _OTHER_WAY))
-    return result if other.leader is None else other
-
-
-def _size_in(path: Path, most_pixels: int, way: int) -> Size | None:
+def _seen_in(path: Path, most_pixels: int, way: int) -> _Seen | None:
     image = _small(path, most_pixels)
-    return None if image is None else _size_of(_lattice(_searched(image), way))
+    if image is None:
+        return None
+    small = _searched(image)
+    size = _size_of(_lattice(small, way))
+    return None if size is None else _Seen(small, size)
 
 
 def _small(path: Path, most_pixels: int) -> Image | None:

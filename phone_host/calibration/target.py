@@ -184,12 +184,9 @@ def _search(grey: Image, board: Board) -> Corners:
     is_photo = largest > _LARGEST_SEARCHED_PX
     size = board.columns, board.rows
     for scale in [each / largest for each in (800, 1600)] if is_photo else [1.0]:
-        searched, factors = shrunk(grey, scale)
-        found, rough = cv2.findChessboardCorners(searched, size, flags=_OUTLINES)
-        if found:
-            fitted = _fitted(grey, searched, factors, _as_corners(rough), board)
-            if _is_chessboard(fitted, board):
-                return fitted.px
+        corners = _by_outlines(grey, *shrunk(grey, scale), board)
+        if len(corners):
+            return corners
     ways = [(side / largest, way) for side, way in _PHOTO_SECTORS]
     for scale, way in ways if is_photo else [(scale, way) for scale in (1.0, _SMALLER) for way in _SECTORS]:
         searched, factors = shrunk(grey, scale)
@@ -198,6 +195,24 @@ def _search(grey: Image, board: Board) -> Corners:
             fitted = _fitted(grey, searched, factors, _as_corners(rough), board)
             return np.where(np.isfinite(fitted.px), fitted.px, _enlarged(_as_corners(rough), factors))
     return np.empty((0, 2))
+
+
+def is_outlined(grey: Image, board: Board) -> bool:
+    """Return whether the quick search finds a chessboard; it may be a part of a larger one.
+
+    Args:
+        grey: (H, W) uint8, searched at its own size.
+        board: what to look for.
+    """
+    return len(_by_outlines(grey, grey, np.ones(2), board)) > 0
+
+
+def _by_outlines(grey: Image, searched: Image, factors: NDArray[np.float64], board: Board) -> Corners:
+    found, rough = cv2.findChessboardCorners(searched, (board.columns, board.rows), flags=_OUTLINES)
+    if not found:
+        return np.empty((0, 2))
+    fitted = _fitted(grey, searched, factors, _as_corners(rough), board)
+    return fitted.px if _is_chessboard(fitted, board) else np.empty((0, 2))
 
 
 def _as_corners(found: object) -> Corners:

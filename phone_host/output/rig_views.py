@@ -98,7 +98,10 @@ def read_views(storage: cv2.FileStorage, problem: Problem) -> RigViews | None:
     corners = []
     for key in ("left", "right"):
         found = node.getNode(key)
-        values = found.mat() if found.isMap() else None
+        try:
+            values = found.mat() if found.isMap() else None
+        except cv2.error:  # its counts and its data differ
+            values = None
         if values is None or values.shape != (len(names), 2 * counts[0] * counts[1]) or np.isinf(values).any():
             raise problem(f"{KEY}.{key}", "does not hold the corners of each pair", _REMEDY)
         corners.append(np.asarray(values, np.float64).reshape(len(names), -1, 2))

@@ -8,7 +8,8 @@ rms_right rms_stereo (px, .Nan = unknown); zero_sigma (standard uncertainty of t
 absent or .Nan: not measured); verdict (good, usable, reject; absent: not stated); left_camera, right_camera (see
 `rig_cameras`); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's;
 absent: not measured); how well all of it is known (see `rig_sigmas`); views (see `rig_views`). This program reads only the rig and computes the rectification from it. R1 to Q are there for
-other programs.
+other programs; a rig that they contradict is refused. Of a file from format 2 on nothing may be missing but verdict, cameras,
+uncertainties and views: one that was cut off would lose its verdict without a word.
 """
 
 import math
@@ -24,6 +25,7 @@ from common.files import read_whole
 from common.versions import RIG_FORMAT
 from phone_host.model import CameraModel, Rectification, Rig, Side, TimeOffset, Verdict
 from phone_host.output.atomic import write_text
+from phone_host.output.rig_agreement import KeptRectification, require_agreement, require_own_focal
 from phone_host.output.rig_cameras import read_camera, write_camera
 from phone_host.output.rig_lenses import known_lens, lens_of, require_count, usual_lens
 from phone_host.output.rig_sigmas import read_covariance, write_sigmas
@@ -35,7 +37,6 @@ _ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits
 # The two cameras of a scanner never stand farther apart; a larger number is a T in millimetres.
 _LARGEST_BASELINE_M = 10.0
 _LEAST_BASELINE_M = 1e-3  # as for --baseline and calib.txt
-_BASELINE_TOLERANCE = 1e-3  # files typed with four digits
 _LARGEST_OFFSET_NS = 2e9  # no camera with its driver is seconds behind another one
 _LARGEST_NUMBER = 1e9  # ten thousand times the width of the largest image; beyond it sums of squares may overflow
 _FOCAL_WIDTHS = (0.05, 50.0)  # focal length / image width: views of 169 degrees and of 1 degree
@@ -133,17 +134,22 @@ def read_rig(path: Path) -> Rig:
     """
     reader = _Reader(path)
     reader.require_known_format()
+    reader.require_all_keys()
     baseline_m = reader.baseline("T")
-    reader.require_same_baseline("P2", baseline_m)
     left = reader.camera_model("left", "1")
     right = reader.camera_model("right", "2")
     side = reader.text("board_side", Side.LEFT.value)
     if side not in {choice.value for choice in Side}:
         raise reader.problem("board_side", f"is {side!r}", "write left or right")
+    rotation = reader.rotation("R")
+    kept = reader.rectification()
+    require_agreement(kept, rotation, baseline_m, reader.problem)
+    if reader.version >= _WHOLE_FROM:
+        require_own_focal(kept, left, right, reader.problem)
     return Rig(
         left=left,
         right=right,
-        R_right_left=reader.rotation("R"),
+        R_right_left=rotation,
         t_right_left_m=baseline_m,
         board_side=Side(side),
         rms_left_px=reader.error_px("rms_left"),
@@ -185,12 +191,20 @@ def is_rig(path: Path) -> bool:
 _MOST_BYTES = 16 << 20
 """Limit for a rig.yaml: some pages, and 5 kB for each pair of views."""
 
+_WHOLE_FROM = 2
+_ALWAYS = (
+    *("board_side", "lens1", "lens2", "R1", "R2", "P1", "P2", "Q", "rectified_image_width", "rectified_image_height"),
+    *("rms_left", "rms_right", "rms_stereo", "zero_sigma", "time_offset_ns", "time_offset_uncertainty_ns"),
+)
+"""What each file from format 2 on holds beside the rig itself."""
+
 
 class _Reader:
     """A FileStorage whose values are checked one by one; every error names file and key."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self.version = 1
         try:
             text = read_whole(path, _MOST_BYTES).decode("utf-8")
         except OSError as error:
@@ -199,11 +213,12 @@ class _Reader:
             ) from error
         except UnicodeDecodeError as error:
             raise self._no_storage() from error
-        if not text.lstrip("\ufeff").startswith("%YAML"):
-            # OpenCV would also accept JSON and XML, and abort on other text with a message of its own.
+        # OpenCV would also accept JSON and XML, and abort on other text with a message of its own.
+        if not text.lstrip("\ufeff").startswith("%YAML") or is_too_deep(text):
             raise self._no_storage()
-        if is_too_deep(text):
-            raise self._no_storage()
+        if "\0" in text:  # OpenCV's text would end there, without a word
+            raise DataError(f"{path} holds a NUL character", "it is damaged: copy it again, or calibrate again")
+        self._is_ended = text.endswith("\n")
         try:
             self._storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         except (cv2.error, SystemError) as error:
@@ -237,6 +252,24 @@ class _Reader:
         if value > RIG_FORMAT:
             known = f"is {value:.0f}, this program reads up to {RIG_FORMAT}"
             raise self.problem("format_version", known, "update tandemscan, or calibrate again")
+        self.version = int(value)
+
+    def require_all_keys(self) -> None:
+        """Check that a file of ours was not cut off."""
+        if self.version < _WHOLE_FROM:
+            return
+        has_sigmas = not self._storage.getNode("sigma_M1").empty()
+        for key in (*_ALWAYS, *(("covariance",) if has_sigmas else ())):
+            if self._storage.getNode(key).empty():
+                raise self.problem(key, "is missing", "the file was cut off: copy it again, or calibrate again")
+        if not self._is_ended:
+            raise DataError(f"{self._path} ends within a line", "it was cut off: copy it again, or calibrate again")
+
+    def rectification(self) -> KeptRectification:
+        """Read the rectification, as far as it is there."""
+        shapes = {"R1": (3, 3), "R2": (3, 3), "P1": (3, 4), "P2": (3, 4), "Q": (4, 4)}
+        there = {key: not self._storage.getNode(key).empty() for key in shapes}
+        return KeptRectification(**{key: self._shaped(key, shapes[key]) if there[key] else None for key in shapes})
 
     def matrix(self, key: str) -> NDArray[np.float64]:
         """Read any matrix of finite numbers, as float64."""
@@ -269,6 +302,8 @@ class _Reader:
             raise self.problem(
                 matrix_key, "is no camera matrix", "its focal lengths are positive, its last row is 0 0 1"
             )
+        if matrix[0, 1] != 0 or matrix[1, 0] != 0:  # OpenCV's formulas leave them out, without a word
+            raise self.problem(matrix_key, "is skewed", "calibrate again: the pixels of cameras are not")
         width_px = self.size(width_key)
         for focal_px in (matrix[0, 0], matrix[1, 1]):
             if not _FOCAL_WIDTHS[0] <= focal_px / width_px <= _FOCAL_WIDTHS[1]:
@@ -330,18 +365,6 @@ class _Reader:
         if length_m > _LARGEST_BASELINE_M:
             raise self.problem(key, f"is {length_m:g} m long", "T is in metres; divide millimetres by 1000")
         return matrix.reshape(3)
-
-    def require_same_baseline(self, key: str, baseline_m: NDArray[np.float64]) -> None:
-        """Check that the projection which other programs use, if there is one, has the same baseline as T."""
-        if self._storage.getNode(key).empty():
-            return
-        projection = self._shaped(key, (3, 4))
-        length_m = float(np.linalg.norm(baseline_m))
-        focal_px = projection[0, 0]
-        projected_m = float(np.abs(projection[:2, 3]).max()) / focal_px if focal_px >= 1 else math.nan
-        if not abs(projected_m - length_m) <= _BASELINE_TOLERANCE * length_m:
-            differ = f"has a baseline of {projected_m * 1e3:.2f} mm, but T one of {length_m * 1e3:.2f} mm"
-            raise self.problem(key, differ, "calibrate again, or remove the wrong one of the two")
 
     def number(self, key: str) -> float:
         """Read a figure that may be missing (NaN)."""

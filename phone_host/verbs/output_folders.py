@@ -171,6 +171,21 @@ def require_file(out: Path, option: str = "--out") -> None:
         raise UnavailableError(f"{out} is {kind.value}, not a file", remedy)
 
 
+def spare_names(out: Path, *names: str, option: str = "--out") -> None:
+    """Refuse an output under a name that a verb writes beside it: one of the two would replace the other.
+
+    Args:
+        out: the path that the user gave.
+        names: of what is written beside it.
+        option: the option with which it was given.
+
+    Raises:
+        SettingsError: it has one of them.
+    """
+    if out.name.lower() in {name.lower() for name in names}:
+        raise SettingsError(f"{option} {out} has the name of what is written beside it", f"name another {option}")
+
+
 def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
     """Make the error for results that cannot be written.
 

@@ -53,6 +53,9 @@ _STRETCHED: Final = 0.01
 _ALIKE: Final = 0.3
 """Two cameras before one stretched print err alike to this share."""
 
+_LEAST_SHIFTED, _SHIFTED_SHARE = 3, 0.8
+"""Exchanged pictures are some among many; where numbers are shifted, only those at the ends fit otherwise."""
+
 _EXPLAINED_SHARE: Final = 0.35
 """Of the squares of each view alone: a good series's cannot be explained so."""
 
@@ -156,12 +159,29 @@ def _exchanged(series: BoardSeries, found: Calibration | DataError) -> Finding |
     wrong = wrong_partners(list(series.pairs), series.board, series.sizes_px)
     if not wrong:
         return None
+    shift = _numbers_apart(wrong)
+    if shift:
+        which = f"{abs(shift)} {'higher' if shift > 0 else 'lower'}"
+        return Finding(
+            mistake=Mistake.PARTNERS,
+            sentence=f"the folders' numbers are shifted: each left picture belongs to the right one whose number is {which}",
+            remedy="give both images of a pair the same number",
+        )
     shown = ", ".join(f"left {left} with right {right}" for left, right in wrong[:4]) + (", ..." if wrong[4:] else "")
     return Finding(
         mistake=Mistake.PARTNERS,
         sentence=f"{counted(len(wrong), 'left picture has', 'left pictures have')} the wrong partner: {shown} belong together",
         remedy="give both images of a pair the same number",
     )
+
+
+def _numbers_apart(wrong: list[tuple[str, str]]) -> int:
+    """Return by how much the numbers of partners differ, right minus left, where nearly all differ alike; else 0."""
+    apart = [int(right) - int(left) for left, right in wrong if left.isdecimal() and right.isdecimal()]
+    if len(apart) < _LEAST_SHIFTED:
+        return 0
+    usual = max(set(apart), key=apart.count)
+    return usual if apart.count(usual) >= _SHIFTED_SHARE * len(wrong) else 0
 
 
 def _placed(series: BoardSeries, found: Calibration | DataError) -> Finding | None:

@@ -97,12 +97,15 @@ def files_of(given: tuple[Path, ...]) -> tuple[Path, ...]:
     """
     if len(given) > 2:
         raise SettingsError(f"--import has {len(given)} files", "give one or two: left before right")
-    if len(given) != 1 or kind_of(given[0]) is not Kind.FOLDER:
-        return given
-    for names in _IN_FOLDERS:
-        paths = tuple(given[0] / name for name in names)
-        if all(kind_of(path) is Kind.FILE for path in paths):
-            return paths
+    try:
+        if len(given) != 1 or kind_of(given[0]) is not Kind.FOLDER:
+            return given
+        for names in _IN_FOLDERS:
+            paths = tuple(given[0] / name for name in names)
+            if all(kind_of(path) is Kind.FILE for path in paths):
+                return paths
+    except OSError as error:  # a circle of links, a name that is too long, a folder that may not be searched
+        raise DataError(f"{given[0]} cannot be read ({error.strerror})", _REMEDY) from error
     raise DataError(f"{given[0]} holds no calibration with a usual name", _REMEDY)
 
 

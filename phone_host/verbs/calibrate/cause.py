@@ -7,7 +7,7 @@ from common.errors import DataError
 from phone_host.calibration.arrangement import is_contradicted
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Rejected
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.causes.mistakes import Course, Finding
+from phone_host.calibration.causes.mistakes import Course, Finding, Mistake
 from phone_host.calibration.causes.name import BoardSeries
 from phone_host.calibration.causes.unturned import unturned
 from phone_host.calibration.verdict import Assessment, Verdict, judge
@@ -59,7 +59,8 @@ def assessed(found: Calibration, rejected: tuple[Rejected, ...], finding: Findin
         return judgement
     wrong = finding.misplaced
     if wrong is None:
-        return judgement if found.obstacle is not None else with_cause(judgement, finding)
+        is_cause = found.obstacle is None or finding.mistake is Mistake.PARTNERS  # of which no rig can come
+        return with_cause(judgement, finding) if is_cause else judgement
     if found.obstacle is not None or wrong.is_mirrored or is_contradicted(found):
         return Assessment(Verdict.REJECT, hint)  # all else follows from it
     return judgement if judgement.verdict is Verdict.GOOD else Assessment(judgement.verdict, hint)

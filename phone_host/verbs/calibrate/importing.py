@@ -24,13 +24,21 @@ from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.verbs.calibrate.given import require_import_alone
 from phone_host.verbs.calibrate.rig_file import earlier_words, replace_rig
-from phone_host.verbs.output_folders import claim_names, drop_page, keep_other_report, require_file, unwritable
+from phone_host.verbs.output_folders import (
+    PAGE,
+    REPORT,
+    claim_names,
+    drop_page,
+    keep_other_report,
+    require_file,
+    spare_names,
+    unwritable,
+)
 from phone_host.verbs.units import baseline_mm, length_mm
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 
 _SIZE: Final = re.compile(r"([1-9]\d{0,5})x([1-9]\d{0,5})", re.ASCII)
-_REPORT: Final = "report.json"
 _OF_RECTIFIED: Final = frozenset({RigKind.MIDDLEBURY.value, RigKind.KITTI.value})
 
 REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
@@ -40,6 +48,7 @@ def import_calibration(options: argparse.Namespace) -> int:
     """Read, check and write a calibration of another program."""
     require_import_alone(options)
     require_file(options.out)
+    spare_names(options.out, REPORT, PAGE, *options.exports)
     found = import_rig(tuple(options.imported), _unit_m(options.unit), _sizes_px(options.size))
     _require_baseline(found.rig, options.baseline)
     side = Side(options.board_side or found.rig.board_side.value)
@@ -55,13 +64,13 @@ def import_calibration(options: argparse.Namespace) -> int:
         _require_own(options.out)
         keep_other_report(options.out.parent, "calibrate")
         drop_page(options.out.parent, "calibrate")
-        claim_names(options.out.parent, options.out, options.out.name, _REPORT)
+        claim_names(options.out.parent, options.out, options.out.name, REPORT)
     report |= write_exports(options, found.rig, rectification, found.files)
     if not same:
         try:
             views = read_rig_views(found.files[0]) if found.kind is RigKind.RIG else None
             report |= replace_rig(options.out, found.rig, rectification, views)
-            write_text(options.out.with_name(_REPORT), json_text(report, indent=2) + "\n")
+            write_text(options.out.with_name(REPORT), json_text(report, indent=2) + "\n")
         except OSError as error:
             raise unwritable(options.out, error) from error
     if options.json:

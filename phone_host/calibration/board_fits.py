@@ -1,0 +1,72 @@
+"""Checks in some images which size of chessboard fits them: what was seen of a board may be a part of it.
+
+A detector that grows a lattice ends early at glare, a hand or a narrow margin, and in many images at the same row. The detector that
+looks for a size finds it there nevertheless. It finds parts of a board, too; so the largest size that fits is the board's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from phone_host.calibration.target import Board, find_corners, is_outlined
+from phone_host.calibration.threads import side_by_side
+from phone_host.model import Image
+
+Size = tuple[int, int]
+"""Inner corners: the larger count first."""
+
+ENOUGH: Final = 4
+"""So many images tell. Of 174 images of four real rigs the quick search finds the right size in all, a larger one in one."""
+
+_FIRST: Final = 2
+"""A size that fits none of so many is given up: 30 ms each, where it is not found."""
+
+_ANY_SIDE_M: Final = 0.01
+_LEAST, _MOST = 3, 100
+
+
+@dataclass(frozen=True, slots=True)
+class Fits:
+    """Some images, and what fits them.
+
+    Attributes:
+        images: (H, W) uint8 each, small, in which a part of a board was seen; the best first.
+    """
+
+    images: Sequence[Image]
+    _counts: dict[Size, int] = field(default_factory=dict)
+
+    def count(self, size: Size) -> int:
+        """Return how many images a size fits; 0 if the first ones show none."""
+        if size not in self._counts:
+            self._counts[size] = self._counted(size)
+        return self._counts[size]
+
+    def holds(self, size: Size) -> bool:
+        """Return whether a size fits more than half of the images."""
+        return 2 * self.count(size) > len(self.images)
+
+    def grown(self, size: Size) -> Size:
+        """Return the largest size that holds and of which the given one is a part; the given one, if there is none."""
+        while True:
+            columns, rows = size
+            larger = (_sized(columns + 1, rows), _sized(columns, rows + 1), _sized(columns + 1, rows + 1))
+            best = max(larger, key=self.count)  # of equals the first: one step at a time
+            if not self.holds(best):
+                return size
+            size = best
+
+    def shows(self, board: Board) -> bool:
+        """Return whether the full search finds a board in any of the images."""
+        return any(side_by_side(lambda image: len(find_corners(image, board)) > 0, self.images))
+
+    def _counted(self, size: Size) -> int:
+        if not _LEAST <= min(size) <= max(size) <= _MOST:
+            return 0
+        board = Board(*size, _ANY_SIDE_M)
+        first = sum(side_by_side(lambda image: is_outlined(image, board), self.images[:_FIRST]))
+        return first and first + sum(side_by_side(lambda image: is_outlined(image, board), self.images[_FIRST:]))
+
+
+def _sized(columns: int, rows: int) -> Size:
+    return max(columns, rows), min(columns, rows)
