@@ -1,9 +1,11 @@
-"""Ctrl-C ends a command within a second, wherever it comes: exit code 130, one line, no traceback, nothing half written.
+"""Ctrl-C and SIGTERM end a command within a second, wherever they come: exit code 130 or 143, one line, no traceback, nothing half written.
 
 Three phases. While a command is being imported there is nothing to tidy up: `leave_at_once` ends the process in the
 signal handler. While it runs, Python raises KeyboardInterrupt, but only once native code returns, and OpenCV may
 compute for a minute. So under `interruptible(native=True)` a thread waits for the signal too. It ends the process if
 the main thread has not left within `_GRACE_S`. Once the command is done, its results count and Ctrl-C is ignored.
+
+SIGTERM ends a command that computes in the same way, at once: nothing of it is of use yet, so its exit code is not 0.
 
 Commands that end in their own way (StopSignals) replace the handler while they run. Light: a command's first import.
 """
@@ -19,6 +21,11 @@ from typing import Final, NoReturn
 
 INTERRUPTED: Final = 130
 """128 + SIGINT, as shells report it."""
+
+TERMINATED: Final = 143
+"""128 + SIGTERM."""
+
+_SAID: Final = {signal.SIGINT: (b"interrupted\n", INTERRUPTED), signal.SIGTERM: (b"terminated\n", TERMINATED)}
 
 _STDERR: Final = 2
 
@@ -49,6 +56,9 @@ def interruptible(*, native: bool = False) -> Iterator[None]:
         yield
         return
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    is_default = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    if is_default:
+        signal.signal(signal.SIGTERM, lambda number, _: leave(number))
     watcher = _Watcher() if native else None
     try:
         yield
@@ -57,15 +67,21 @@ def interruptible(*, native: bool = False) -> Iterator[None]:
             watcher.stop()
         # A process that began with `leave_at_once` has only its exit left, which a signal must not disturb.
         signal.signal(signal.SIGINT, signal.SIG_IGN if handler is _leave else handler)
+        if is_default:
+            signal.signal(signal.SIGTERM, signal.SIG_IGN if handler is _leave else signal.SIG_DFL)
 
 
-def leave() -> NoReturn:
-    """End this process now with 130 and one line. What it had begun to write is removed."""
+def leave(number: int = signal.SIGINT) -> NoReturn:
+    """End this process now with one line and the exit code of a signal. What it had begun to write is removed.
+
+    Args:
+        number: SIGINT or SIGTERM.
+    """
     from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
 
     remove_unfinished()
-    _say_so()
-    os._exit(INTERRUPTED)
+    _say_so(number)
+    os._exit(_SAID[signal.Signals(number)][1])
 
 
 def is_heard() -> bool:
@@ -75,16 +91,16 @@ def is_heard() -> bool:
     return True  # closed: writing to it fails at once
 
 
-def _say_so() -> None:
+def _say_so(number: int) -> None:
     """Write the one line, in a terminal in place of a progress bar."""
     if is_heard():
         with suppress(OSError):  # closed: the exit code must suffice
-            os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + b"interrupted\n")
+            os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + _SAID[signal.Signals(number)][0])
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
-    del number, frame
-    _say_so()
+    del frame
+    _say_so(number)
     os._exit(INTERRUPTED)
 
 
@@ -110,8 +126,8 @@ class _Watcher:
 
     def _watch(self) -> None:
         while number := os.read(self._reader, 1):
-            if number[0] == signal.SIGINT:
+            if number[0] in _SAID:
                 break
         if not number or self._stopped.wait(_GRACE_S):
             return
-        leave()
+        leave(number[0])

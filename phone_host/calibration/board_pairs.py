@@ -28,6 +28,7 @@ class Reason(Enum):
     CORNERS_LEFT = "corners jump left"
     CORNERS_RIGHT = "corners jump right"
     MOVED = "not the same moment"
+    REPEATED = "the same pictures again"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

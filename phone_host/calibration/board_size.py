@@ -284,7 +284,7 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
         return decided.size
     result = decided.vote
     if not result.sizes:
-        _require_an_image(list(_sample(files)), most_pixels)
+        _require_an_image(list(_sample(files))[:_SAMPLE], most_pixels)
         raise DataError(
             f"no chessboard is seen in {result.asked} images",
             "take pictures with the whole board sharp and evenly lit, with a white margin around it",

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from phone_host.calibration.threads import side_by_side
 from phone_host.model import Side
 from phone_host.stereo.images import decode_file, open_image, to_grey
 from phone_host.stereo.view_files import ViewFiles
+
+_FIRST: Final = 50
+"""If so many pairs cannot be read, none is searched any more: their folder holds something else."""
 
 Size = tuple[int, int]
 Mounted = tuple[Orientation, Orientation]
@@ -105,7 +109,12 @@ def look_for_boards(
             return error
         return one, other
 
-    for (name, _, _), found in zip(files.pairs, side_by_side(look, files.pairs, advance), strict=True):
+    looked = side_by_side(look, files.pairs[:_FIRST], advance)
+    failures = [each for each in looked if isinstance(each, DataError)]
+    if len(failures) == _FIRST < len(files.pairs):
+        raise DataError(f"none of the first {_FIRST} pairs can be read: {failures[0].problem}", failures[0].remedy)
+    looked += side_by_side(look, files.pairs[_FIRST:], advance)
+    for (name, _, _), found in zip(files.pairs, looked, strict=True):
         if isinstance(found, DataError):
             first_problem = first_problem or found
             rejected.append(Rejected(name, Reason.UNREADABLE, found.problem))
@@ -116,10 +125,12 @@ def look_for_boards(
         raise first_problem or DataError(
             "no image has a partner on the other side", "give both images of a pair the same number"
         )
+    known: dict[bytes, str] = {}
     usual = _usual([left for _, left, _ in seen]), _usual([right for _, _, right in seen])
     pairs = []
     for name, left_seen, right_seen in seen:
         problem = _problem(name, (left_seen, right_seen), usual, board)
+        problem = problem or _repeated(name, (left_seen, right_seen), known)
         if problem is None:
             pairs.append(BoardPair(name, left_seen.corners, agree(left_seen.corners, right_seen.corners, board)))
         else:
@@ -189,6 +200,12 @@ def _problem(name: str, pair: tuple[_Seen, _Seen], usual: tuple[_Seen, _Seen], b
             return Rejected(name, Reason.NOT_FOUND_RIGHT, f"{lacking} in the right image")
         case _:
             return Rejected(name, Reason.NOT_FOUND_BOTH, f"{lacking} in either image")
+
+
+def _repeated(name: str, pair: tuple[_Seen, _Seen], known: dict[bytes, str]) -> Rejected | None:
+    """Say which pair before showed the board in exactly these places; None if none did: then it is remembered."""
+    first = known.setdefault(pair[0].corners.tobytes() + pair[1].corners.tobytes(), name)
+    return None if first == name else Rejected(name, Reason.REPEATED, f"its images are those of {first}")
 
 
 def _unlike(seen: _Seen, others: _Seen, side: str) -> tuple[Reason, str] | None:

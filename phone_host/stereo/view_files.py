@@ -2,6 +2,7 @@
 
 import glob
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,6 +15,9 @@ from common.words import counted
 SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".pnm", ".ppm", ".tif", ".tiff", ".webp"})
 _UNREAD: Final = frozenset({".heic", ".heif", ".avif"})
 """Photographs of phones that are not read."""
+
+_OTHERS: Final = frozenset({"", ".db", ".html", ".ini", ".json", ".md", ".txt", ".xml", ".yaml", ".yml"})
+"""Files beside images that nobody takes for some; folders, too, have no suffix."""
 
 _FILMS: Final = frozenset({".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".3gp"})
 _FROM_FILMS: Final = (
@@ -79,10 +83,14 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
     shared = sorted(left_numbers.keys() & right_numbers.keys())
     return ViewFiles(
         pairs=tuple((str(number), left_numbers[number], right_numbers[number]) for number in shared),
-        left_alone=tuple(path for path in left_files if path not in {left_numbers[n] for n in shared}),
-        right_alone=tuple(path for path in right_files if path not in {right_numbers[n] for n in shared}),
+        left_alone=_others(left_files, {left_numbers[n] for n in shared}),
+        right_alone=_others(right_files, {right_numbers[n] for n in shared}),
         by_number=True,
     )
+
+
+def _others(files: list[Path], paired: set[Path]) -> tuple[Path, ...]:
+    return tuple(path for path in files if path not in paired)
 
 
 def _named(left: list[Path], right: list[Path]) -> ViewFiles | None:
@@ -167,18 +175,59 @@ def _inside(folder: str, side: str) -> list[Path]:
         entries = [entry for entry in Path(folder).iterdir() if not entry.name.startswith(".")]
     except OSError as error:
         raise _unreadable(folder, side, error) from None
-    inside = [entry for entry in entries if _kind(entry, side) is Kind.FILE]
+    kinds_of = {entry: _kind_or_error(entry) for entry in entries}
+    failure = next((kind for kind in kinds_of.values() if isinstance(kind, OSError)), None)
+    inside = [entry for entry, kind in kinds_of.items() if kind is Kind.FILE]
+    if not inside and failure is not None:  # a folder that may be listed, and not searched
+        raise _unreadable(folder, side, failure)
     files = [entry for entry in inside if entry.suffix.lower() in SUFFIXES]
     # A folder of nothing else: whoever opens one says how to convert it.
     files = files or [entry for entry in inside if entry.suffix.lower() in _UNREAD]
     if files:
         return files
+    if not entries:
+        raise DataError(f"{side} {folder!r} is empty", _REMEDY)
     if not inside:
-        raise DataError(f"{side} {folder!r} names no image", _REMEDY)
+        folders = sorted(entry.name for entry, kind in kinds_of.items() if kind is Kind.FOLDER)
+        if not folders:
+            raise DataError(f"{side} {folder!r} names no image", _REMEDY)
+        some = " and ".join(folders[:2]) + (" ..." if folders[2:] else "")
+        raise DataError(f"{side} {folder!r} holds only folders ({some})", "give the folder of one camera's images")
     kinds = sorted({entry.suffix.lower() or "no suffix" for entry in inside})
     shown = ", ".join(kinds[:_MOST_KINDS])
     remedy = _REMEDY if _FILMS.isdisjoint(kinds) else _FROM_FILMS
     raise DataError(f"{side} {folder!r} names no image, only {counted(len(inside), 'other file')} ({shown})", remedy)
+
+
+def _kind_or_error(path: Path) -> Kind | OSError:
+    try:
+        return kind_of(path)
+    except OSError as error:
+        return error
+
+
+def passed_over(given: Sequence[str]) -> tuple[Path, ...]:
+    """Return what lies in folders among the images, could be one by its name, and is not read.
+
+    Args:
+        given: as `pair_files` takes a side; folders count.
+    """
+    found = []
+    for folder in map(Path, given):
+        if _kind_or_error(folder) is not Kind.FOLDER:
+            continue
+        with suppress(OSError):
+            for entry in folder.iterdir():
+                is_file = _kind_or_error(entry) is Kind.FILE
+                is_image = entry.suffix.lower() in SUFFIXES
+                if not entry.name.startswith(".") and (is_image != is_file) and entry.suffix.lower() not in _OTHERS:
+                    found.append(entry)
+    return tuple(sorted(found, key=name_order))
+
+
+def is_unread_photograph(path: Path) -> bool:
+    """Return whether a name is that of a photograph of a kind that is not read."""
+    return path.suffix.lower() in _UNREAD
 
 
 def _matching(pattern: str, side: str) -> list[Path]:

@@ -186,19 +186,23 @@ def spare_names(out: Path, *names: str, option: str = "--out") -> None:
         raise SettingsError(f"{option} {out} has the name of what is written beside it", f"name another {option}")
 
 
-def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
+def unwritable(
+    out: Path, error: OSError, option: str = "--out", *, beside: Path | None = None
+) -> UnavailableError:
     """Make the error for results that cannot be written.
 
     Args:
-        out: the path that the user gave.
+        out: the path that the user gave, or that of one result.
         error: the operating system's error.
         option: the option with which the path was given.
+        beside: what was written already.
 
     Returns:
         The error to raise.
     """
+    but = "" if beside is None or kind_of(beside) is Kind.MISSING else f"; {beside} is written"
     return UnavailableError(
-        f"{out} cannot be written ({error.strerror})",
+        f"{out} cannot be written ({error.strerror}){but}",
         f"check that the folder exists, that you may write to it and that the disk has room, or name another {option}",
     )
 

@@ -132,7 +132,7 @@ def test_the_table_names_every_pair(few: Path, tmp_path: Path) -> None:
 
 
 def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(few: Path, tmp_path: Path) -> None:
-    """LEFT and RIGHT swapped: verdict reject, the remedy says so, and no rig.yaml remains that could be used by mistake; the old one is moved aside."""
+    """LEFT and RIGHT swapped: verdict reject, the remedy says so, and no new rig.yaml is written; the old one, which has no part in it, stays."""
     (tmp_path / "rig.yaml").write_text("%YAML:1.0\n# of an earlier run")
     done = _phone_host(
         "calibrate", few / "right", few / "left", "--board", "9x6", "--square", "25mm",
@@ -143,13 +143,12 @@ def test_swapped_sides_are_exit_4_with_the_remedy_and_a_report(few: Path, tmp_pa
     assert report["verdict"] == "reject"
     assert "swap LEFT and RIGHT" in report["remedy"]
     assert (tmp_path / "report.json").exists()
-    assert not (tmp_path / "rig.yaml").exists()
-    assert report["earlier_rig"] == "rig.yaml.old"
-    assert "of an earlier run" in (tmp_path / "rig.yaml.old").read_text()
+    assert report["earlier_rig"] == "rig.yaml"
+    assert "of an earlier run" in (tmp_path / "rig.yaml").read_text()
 
 
 def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> None:
-    """No pair shows a board: one line on stderr, the reasons as JSON on stdout and in report.json, and an old rig is moved aside."""
+    """No pair shows a board: one line on stderr, the reasons as JSON on stdout and in report.json, and an old rig stays where it is."""
     for side, name in (("left", "left{}.png"), ("right", "right{:02d}.png")):
         (tmp_path / side).mkdir()
         for number in range(4):
@@ -169,9 +168,8 @@ def test_too_few_pairs_are_exit_4_with_a_report(small: Path, tmp_path: Path) -> 
     assert "inner corners" in report["remedy"]
     assert len(report["pairs"]["rejected"]) == 4
     assert report == json.loads((tmp_path / "report.json").read_text())
-    assert not (tmp_path / "rig.yaml").exists()
-    assert report["earlier_rig"] == "rig.yaml.old"
-    assert "of an earlier run" in (tmp_path / "rig.yaml.old").read_text()
+    assert report["earlier_rig"] == "rig.yaml"
+    assert "of an earlier run" in (tmp_path / "rig.yaml").read_text()
 
 
 @pytest.mark.parametrize("board", ["10x7", "5x4"])

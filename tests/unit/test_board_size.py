@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
+from phone_host.calibration.board_fits import Fits
 from phone_host.calibration.board_size import Vote, inner_lattice, require_size, size_in_files, size_seen
 from phone_host.calibration.target import Board
 from phone_host.calibration.threads import side_by_side
@@ -50,6 +51,44 @@ def test_a_board_of_many_squares_is_found_the_other_way(tmp_path: Path) -> None:
     assert size_in_files(files) == (14, 10)
     with pytest.raises(SettingsError, match="have 14x10 inner corners, --board says 13x9"):
         require_size(files, (13, 9))
+
+
+def _shaded(folder: Path, count: int) -> ViewFiles:
+    """Pictures of a board of 8x5 whose last column of black squares shines so that only 7x5 corners pass for inner ones."""
+    squares = np.kron((np.indices((6, 9)).sum(axis=0) % 2) * 255, np.ones((40, 40)))
+    squares[:, -40:] = np.maximum(squares[:, -40:], 175)
+    image = np.pad(squares, 60, constant_values=255).astype(np.uint8)
+    for side in ("left", "right"):
+        (folder / side).mkdir()
+        for number in range(count):
+            (folder / side / f"{number}.png").write_bytes(encoded(".png", np.roll(image, 3 * number, axis=1)))
+    return pair_files(str(folder / "left"), str(folder / "right"))
+
+
+def test_a_part_of_a_board_that_all_images_show_is_not_the_board(tmp_path: Path) -> None:
+    """Glare ends the lattice at one row in all of three pairs: the right size fits nevertheless, is found, and is not refused when it is named."""
+    files = _shaded(tmp_path, 3)
+    assert size_seen(np.asarray(cv2.imread(str(files.pairs[0][1]), 0), np.uint8)) == (7, 5)
+    assert size_in_files(files) == (8, 5)
+    require_size(files, (8, 5))
+    require_size(files, (5, 8))
+    for wrong in ((7, 5), (9, 6), (8, 6)):
+        with pytest.raises(SettingsError, match="have 8x5 inner corners, --board says"):
+            require_size(files, wrong)
+
+
+def test_the_largest_size_that_fits_is_the_boards() -> None:
+    """Parts of a board may fit, too; nothing larger does, nor what no board has; a size that fits one image of three holds not."""
+    images = [render_pair(small_rig(), pose, _BOARD)[0] for pose in _POSES]
+    fits = Fits(images)
+    assert (fits.count((8, 5)), fits.count((9, 6)), fits.count((3, 2)), fits.count((101, 5))) == (3, 0, 0, 0)
+    assert fits.grown((7, 4)) == fits.grown((8, 5)) == (8, 5)
+    assert fits.shows(_BOARD)
+    nothing = np.full_like(images[0], 99)
+    assert not Fits([images[0], nothing, nothing]).holds((8, 5))
+    assert not Fits([]).holds((8, 5))
+    assert Fits([nothing]).grown((7, 4)) == (7, 4)
+    assert not Fits([nothing]).shows(_BOARD)
 
 
 def test_images_without_a_board_name_no_size(tmp_path: Path) -> None:

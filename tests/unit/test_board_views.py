@@ -89,3 +89,28 @@ def test_a_folder_of_heic_says_how_to_convert_it(tmp_path: Path) -> None:
     files = pair_files(str(tmp_path / "left"), str(tmp_path / "right"))
     with pytest.raises(DataError, match=r"IMG_1.HEIC is a HEIC image.*convert it"):
         look_for_boards(files, BOARD, lambda: None)
+
+
+def test_a_view_given_twice_counts_once(tmp_path: Path) -> None:
+    """Two pairs of the very same pictures: the second is rejected, and named with the first."""
+    for side, images in zip(("left", "right"), zip(*_PAIRS, strict=True), strict=True):
+        (tmp_path / side).mkdir()
+        for number, index in enumerate((0, 1, 0)):
+            (tmp_path / side / f"{number}.png").write_bytes(encoded(".png", images[index]))
+    views = look_for_boards(pair_files(str(tmp_path / "left"), str(tmp_path / "right")), BOARD, lambda: None)
+    assert [pair.name for pair in views.pairs] == ["0", "1"]
+    (rejected,) = views.rejected
+    assert (rejected.name, rejected.reason, rejected.detail) == ("2", Reason.REPEATED, "its images are those of 0")
+
+
+def test_a_folder_of_what_cannot_be_read_is_given_up_early(tmp_path: Path) -> None:
+    """Of 60 empty pairs 50 are read; the first cause is told, and the bar has moved as far."""
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        for number in range(60):
+            (tmp_path / side / f"{number}.png").touch()
+    steps: list[int] = []
+    files = pair_files(str(tmp_path / "left"), str(tmp_path / "right"))
+    with pytest.raises(DataError, match=r"none of the first 50 pairs can be read: .*0\.png is empty"):
+        look_for_boards(files, BOARD, lambda: steps.append(1))
+    assert len(steps) == 50

@@ -252,11 +252,15 @@ def test_no_views_are_lost(tmp_path: Path) -> None:
     assert replace_rig(out, rig, made, views) == {}
     assert replace_rig(out, rig, made) == {"earlier_rig": "rig.yaml.old"}
     assert replace_rig(out, rig, made) == {}
-    assert replace_rig(out, None, None) == {"earlier_rig": "rig.yaml.old2"}
+    assert replace_rig(out, rig, made, views) == {}
+    rejected = replace(rig, verdict=Verdict.REJECT)
+    out.write_text(out.read_text().partition("# what the rig was")[0])  # it loses its views
+    assert replace_rig(out, rejected, made) == {"earlier_rig": "rig.yaml.old2"}
+    assert replace_rig(out, rig, None) == replace_rig(out, None, None) == {"earlier_rig": "rig.yaml"}
+    assert read_rig(out).is_rejected
     kept = read_rig_views(tmp_path / "rig.yaml.old")
     assert kept is not None
     assert kept.names == ("1", "2", "3")
-    assert not out.exists()
 
 
 def test_unlike_lenses_are_chosen_by_views_that_were_held_out() -> None:

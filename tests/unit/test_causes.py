@@ -9,11 +9,13 @@ import cv2
 import numpy as np
 import pytest
 
+from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.looks import look_at
 from phone_host.calibration.causes.mistakes import Course, Finding, Mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.causes.partners import wrong_partners
 from phone_host.calibration.causes.unturned import unturned
 from phone_host.calibration.target import find_corners
@@ -134,6 +136,23 @@ def test_the_true_partners_are_named() -> None:
     found = wrong_partners(made.pairs, made.board, made.sizes_px)
     assert len(found) == 2
     assert found[0] == found[1][::-1]
+
+
+@pytest.mark.parametrize("shift", [1, -1])
+def test_shifted_numbers_are_told_as_such(shift: int) -> None:
+    """All right pictures carry the number of their neighbour: one sentence says by how much, not 13 pairs of names."""
+    made = good(_random(3))
+    count = len(made.pairs)
+    pairs = [
+        BoardPair(str(number), pair.left_px, made.pairs[(number + shift) % count].right_px)
+        for number, pair in enumerate(made.pairs)
+    ]
+    series = BoardSeries(pairs=tuple(pairs), board=made.board, sizes_px=made.sizes_px)
+    found = name_mistake(series, DataError("no lens explains the views", ""))
+    assert found is not None
+    assert found.mistake is Mistake.PARTNERS
+    way = "1 higher" if shift > 0 else "1 lower"
+    assert found.sentence.endswith(f"each left picture belongs to the right one whose number is {way}")
 
 
 def test_a_blurred_edge_is_as_wide_as_its_blur() -> None:

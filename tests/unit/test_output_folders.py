@@ -12,7 +12,7 @@ from phone_host.model import CameraModel, Rig
 from phone_host.output.listed import claim
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.output_folders import drop_page, keep_other_report
+from phone_host.verbs.output_folders import drop_page, keep_other_report, unwritable
 from tests.support.planes import noise
 
 CALIB = (
@@ -140,3 +140,23 @@ def test_pages_offer_the_same_rig_live_only_for_a_rig(tmp_path: Path, sides: lis
         )
     pages = [(tmp_path / name / "index.html").read_text() for name in "ab"]
     assert [" run --link" in page for page in pages] == [False, True]
+
+
+def test_a_rig_is_not_named_like_what_lies_beside_it(sides: list[str], tmp_path: Path) -> None:
+    """The report or the page would take its place: exit 2, and nothing is written."""
+    for name in ("report.json", "index.html", "Report.JSON"):
+        out = tmp_path / "new" / name
+        assert main(["calibrate", *sides, "--square", "25mm", "--out", str(out)]) == 2
+        assert main(["calibrate", "--import", str(tmp_path / "rig.yaml"), "--out", str(out)]) == 2
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_full_disk_names_what_is_written_and_what_is_not(tmp_path: Path) -> None:
+    """The rig came first: the line says that it is there."""
+    rig = tmp_path / "rig.yaml"
+    error = OSError(28, "No space left on device")
+    assert "rig.yaml is written" not in str(unwritable(tmp_path / "report.json", error, beside=rig))
+    rig.touch()
+    said = str(unwritable(tmp_path / "report.json", error, beside=rig))
+    assert "report.json cannot be written (No space left on device); " in said
+    assert f"{rig} is written: " in said

@@ -85,6 +85,7 @@ def test_folders_and_files_that_are_none_are_refused(tmp_path: Path) -> None:
     (tmp_path / "some.yaml").write_text("a: 1\n")
     empty = tmp_path / "empty"
     empty.mkdir()
+    (tmp_path / "circle").symlink_to("circle")
     cases: list[tuple[tuple[Path, ...], type[TandemError], str]] = [
         ((empty,), DataError, "no calibration with a usual name"),
         ((tmp_path / "a.png",), DataError, "is no text"),
@@ -92,6 +93,8 @@ def test_folders_and_files_that_are_none_are_refused(tmp_path: Path) -> None:
         ((empty, empty, empty), SettingsError, "has 3 files"),
         ((tmp_path / "cameras.txt",), SettingsError, "half of a COLMAP model"),
         ((tmp_path / "some.yaml",), DataError, "is no calibration"),
+        ((tmp_path / "circle",), DataError, "circle cannot be read"),
+        ((tmp_path / ("a" * 5000),), DataError, "cannot be read"),
     ]
     for given, error, said in cases:
         with pytest.raises(error, match=said):

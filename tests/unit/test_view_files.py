@@ -8,7 +8,7 @@ from common.camera.image_numbers import numbers_of
 from common.camera.replay import find_images
 from common.errors import DataError, SettingsError
 from common.name_order import name_order
-from phone_host.stereo.view_files import pair_files
+from phone_host.stereo.view_files import is_unread_photograph, pair_files, passed_over
 
 
 def _touch(folder: Path, *names: str) -> Path:
@@ -82,7 +82,7 @@ def test_hidden_files_alone_are_no_images(name: str, tmp_path: Path) -> None:
     """A folder or a glob with only hidden files is refused like an empty one; the error names the side."""
     _touch(tmp_path / "hidden", ".a1.png")
     good = _touch(tmp_path / "good", "a1.png")
-    with pytest.raises(DataError, match=r"LEFT .* names no image"):
+    with pytest.raises(DataError, match=r"LEFT .* (names no image|is empty)"):
         pair_files(str(tmp_path / name), str(good))
 
 
@@ -176,3 +176,30 @@ def test_only_ascii_digits_number_a_file(tmp_path: Path) -> None:
     names = [path.name for path in find_images(str(left))]
     assert names == sorted(names, key=lambda name: name_order(Path(name)))
     assert numbers_of(["a²", "a①"]) == ()
+
+
+def test_one_file_that_cannot_be_looked_at_ends_nothing(tmp_path: Path) -> None:
+    """A link that leads in a circle is passed over, and told with all else that a picture's name promises and that is not read."""
+    left = _touch(tmp_path / "l", "1.png", "2.png", "3.heic", "4.raw", "notes.txt", ".hidden.heic")
+    (left / "5.png").symlink_to("5.png")
+    (left / "6.png").mkdir()
+    files = pair_files(str(left), str(_touch(tmp_path / "r", "1.png", "2.png")))
+    assert [name for name, _, _ in files.pairs] == ["1", "2"]
+    told = passed_over([str(left)])
+    assert [path.name for path in told] == ["3.heic", "4.raw", "5.png", "6.png"]
+    assert [is_unread_photograph(path) for path in told] == [True, False, False, False]
+    assert passed_over([str(left / "*.png"), str(left / "1.png")]) == ()
+
+
+def test_folders_without_files_are_told_apart(tmp_path: Path) -> None:
+    """An empty folder, one that holds the folders of both cameras, and one whose only entry is a circle of links."""
+    good = str(_touch(tmp_path / "good", "1.png"))
+    _touch(tmp_path / "both" / "l", "1.png")
+    _touch(tmp_path / "both" / "r", "1.png")
+    _touch(tmp_path / "circle")
+    (tmp_path / "circle" / "1.png").symlink_to("1.png")
+    for name, said in (("both", r"holds only folders \(l and r\): give the folder"), ("circle", "cannot be read")):
+        with pytest.raises(DataError, match=said):
+            pair_files(str(tmp_path / name), good)
+    with pytest.raises(DataError, match="is empty"):
+        pair_files(str(_touch(tmp_path / "empty")), good)

@@ -20,11 +20,12 @@ from phone_host.model import Rectification, Rig, Verdict
 from phone_host.model.calibration_series import BoardInSpace
 from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_error_px
 from phone_host.stereo.reproject import disparities_for_near
-from phone_host.stereo.view_files import ViewFiles
+from phone_host.stereo.view_files import ViewFiles, is_unread_photograph
 from phone_host.stereo.working import chosen_scale
 from phone_host.verbs.calibrate.importing import REFUSED
 from phone_host.verbs.calibrate.rig_file import earlier_words
 
+_SHOWN = 3
 _WHOLE_METRES = 10.0
 """From here on a limit in tenths of a metre says nothing."""
 
@@ -192,6 +193,15 @@ def rejections(rejected: tuple[Rejected, ...]) -> list[str]:
     return [f"{each.name:>8}  rejected: {each.reason.value} ({each.detail})" for each in rejected]
 
 
+def passed_over_notes(files: tuple[Path, ...]) -> list[str]:
+    """Warn of files that lie among the pictures and are not read."""
+    if not files:
+        return []
+    shown = ", ".join(path.name for path in files[:_SHOWN]) + (", ..." if files[_SHOWN:] else "")
+    remedy = ": convert them to JPEG" if any(is_unread_photograph(path) for path in files) else ""
+    return [f"warning  {counted(len(files), 'file')} among the pictures not read ({shown}){remedy}"]
+
+
 def pairing_notes(files: ViewFiles) -> list[str]:
     """Warn if the pairs were guessed from the order of names though the counts differ."""
     if files.by_number or files.by_name or not (files.left_alone or files.right_alone):
@@ -203,7 +213,8 @@ def pairing_notes(files: ViewFiles) -> list[str]:
 
 def unwritten(report: dict[str, Any], out: Path) -> list[str]:
     """Say that there is no new rig, and where the earlier one is."""
-    return [f"{out} was not written{earlier_words(report)}", f"look at {report['page']}"]
+    stays = "; the earlier one stays as it is" if "earlier_rig" in report else ""
+    return [f"{out} was not written{stays}", f"look at {report['page']}"]
 
 
 def _sigma_mm(sigma_m: float) -> str:
@@ -232,7 +243,8 @@ def summary(
     if vertical["p95"] is not None:
         rows.append(f"vertical mean {vertical['mean']:.3f}, 95 % {vertical['p95']:.3f}, max {vertical['max']:.3f} px")
     rows.append(_baseline_row(report["baseline_mm"], calibration.baseline_sigma_m))
-    rows.append("         compare it with a ruler: it shows a wrong --square")
+    if known:
+        rows.append("         compare it with a ruler: it shows a wrong --square")
     rows += _lens_rows(calibration)
     errors = ", ".join(
         f"{_sigma_mm(sigma_m)} mm at {depth_m:g} m" for depth_m, sigma_m in calibration.depths if math.isfinite(sigma_m)

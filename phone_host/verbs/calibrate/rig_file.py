@@ -17,6 +17,8 @@ def replace_rig(
 ) -> dict[str, str]:
     """Write rig.yaml. Keep an earlier one that the new one does not replace: because it is of use and the new one is not, or because its views would be lost.
 
+    If there is nothing to write, a mistake of the user's was found, not of the earlier rig: that stays where it is.
+
     Args:
         out: the file.
         rig: the new rig; None: there is none.
@@ -24,30 +26,29 @@ def replace_rig(
         views: what it was computed from; None: not known.
 
     Returns:
-        For the report: where the earlier rig is now, if it was moved.
+        For the report: where the earlier rig is now, if it was not replaced.
 
     Raises:
         UnavailableError: a file cannot be written or moved.
     """
-    is_of_use = rig is not None and not rig.is_rejected
     moved: dict[str, str] = {}
     try:
         make_folder(out.parent)
+        if rig is None or rectification is None:
+            return {} if kind_of(out) is Kind.MISSING else {"earlier_rig": out.name}
+        is_of_use = not rig.is_rejected
         if kind_of(out) is not Kind.MISSING and not _is_rejected(out) and not (is_of_use and _holds(views, out)):
             aside = _aside(out)
             out.replace(aside)
             moved = {"earlier_rig": aside.name}
-        if rig is not None and rectification is not None:
-            write_rig(out, rig, rectification, views)
-        else:
-            out.unlink(missing_ok=True)
+        write_rig(out, rig, rectification, views)
     except OSError as error:
         raise unwritable(out, error) from error
     return moved
 
 
 def earlier_words(report: dict[str, Any]) -> str:
-    """Say where the earlier rig is now, behind a sentence on the new one; empty: it was not moved."""
+    """Say where the earlier rig is now, behind a sentence on the new one that was written; empty: it was not moved."""
     return f"; the earlier one is now {report['earlier_rig']}" if "earlier_rig" in report else ""
 
 
