@@ -84,7 +84,7 @@ def require_pixels(size_px: tuple[int, int], most_pixels: int, name: str) -> Non
     if pixels > most_pixels:
         raise ImageSizeError(
             FrameFault.TOO_LARGE,
-            f"{name} is {size_text(size_px)} px ({pixels / MEGAPIXEL:.3g} MPx), the limit is {most_pixels / MEGAPIXEL:.3g} MPx",
+            f"{name} is {size_text(size_px)} px ({_megapixels(pixels)}), the limit is {_megapixels(most_pixels)}",
             "scale it down, or raise --max-megapixels if its size is right",
         )
 
@@ -140,3 +140,8 @@ def check_length(count: int, head: ImageHead, name: str) -> None:
 def size_text(size_px: tuple[int, int]) -> str:
     """Width and height as people write them, such as 640x480."""
     return f"{size_px[0]}x{size_px[1]}"
+
+
+def _megapixels(pixels: int) -> str:
+    size = pixels / MEGAPIXEL
+    return f"{size:.0f} MPx" if size >= 100 else f"{size:.3g} MPx"

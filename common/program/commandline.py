@@ -43,6 +43,10 @@ class ExamplesFirstParser(argparse.ArgumentParser):
     _words: tuple[str, ...] = ()
     """What is being parsed."""
 
+    def __init__(self, *given: Any, **options: Any) -> None:  # noqa: ANN401 - argparse's own
+        super().__init__(*given, **options)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # -25mm and -5,10 are values, too
+
     def add_argument(self, *names: str, **options: Any) -> argparse.Action:  # noqa: ANN401 - argparse's own
         """Declare an argument. What is given must not be empty: to Path, that would be the current folder, and to others as if nothing was given."""
         if options.get("action", "store") in {"store", "append"}:

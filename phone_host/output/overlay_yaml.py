@@ -81,6 +81,8 @@ def read_overlay(path: Path, rig: Rig) -> Departure:
     except UnicodeDecodeError as error:
         raise DataError(f"{path} is no overlay.yaml", _REMEDY) from error
     node = Node(str(path), "", read_yaml(text, str(path)))
+    if node.has("M1"):
+        raise DataError(f"{path} is a rig.yaml, no overlay.yaml", _REMEDY)
     version = node.child("format_version")
     if version.number() != OVERLAY_FORMAT:
         raise version.problem(f"is {version.tree}, this program reads {OVERLAY_FORMAT}", "update tandemscan")

@@ -80,7 +80,7 @@ def _baseline(found: SeriesRig) -> list[_Row]:
     baseline_m, sigma_m = float(np.linalg.norm(found.rig.t_right_left_m)), found.baseline_sigma_m
     if not math.isfinite(sigma_m):
         return [("baseline", f"{baseline_m * 1e3:.2f} mm", _DASH, _DASH)]
-    words = f"{baseline_m * 1e3:.2f} ± {sigma_m * 1e3:.2g} mm ({sigma_m / baseline_m:.2%})"
+    words = f"{baseline_m * 1e3:.2f} ± {millimetres(sigma_m)} mm ({sigma_m / baseline_m:.2%})"
     return [("baseline", words, *_shares(found))]
 
 
@@ -88,7 +88,7 @@ def _depths(found: SeriesRig) -> list[_Row]:
     return [
         (
             f"depth error at {depth_m:g} m",
-            f"± {_millimetres(sigma_m)} mm ({sigma_m / depth_m:.2%})",
+            f"± {millimetres(sigma_m)} mm ({sigma_m / depth_m:.2%})",
             *(_shares(found) if depth_m == _JUDGED_M else (_DASH, _DASH)),
         )
         for depth_m, sigma_m in found.depths
@@ -116,9 +116,10 @@ def _shares(found: SeriesRig) -> tuple[str, str]:
     return f"{found.limits.good_share:.0%}", f"{found.limits.usable_share:.0%}"
 
 
-def _millimetres(length_m: float) -> str:
-    millimetres = length_m * 1e3
-    return f"{millimetres:.0f}" if millimetres >= _WHOLE_MM else f"{millimetres:.2g}"
+def millimetres(length_m: float) -> str:
+    """Write an uncertainty: two digits, and never a power of ten for a large one."""
+    found_mm = length_m * 1e3
+    return f"{found_mm:.0f}" if found_mm >= _WHOLE_MM else f"{found_mm:.2g}"
 
 
 def camera_tables(found: SeriesRig) -> str:

@@ -9,7 +9,7 @@ from common.imagesize.head import size_text
 from common.words import counted
 from phone_host.model import Verdict
 from phone_host.model.calibration_series import CalibrationSeries, SeriesRig
-from phone_host.report.calibration_figures import camera_tables, figures_card
+from phone_host.report.calibration_figures import camera_tables, figures_card, millimetres
 from phone_host.report.calibration_space import rig_card
 from phone_host.report.calibration_views import (
     course_card,
@@ -101,7 +101,7 @@ def _figures(series: CalibrationSeries, found: SeriesRig) -> tuple[Figure, ...]:
         note = f"good up to {found.limits.good_px:.2f} px"
         figures.append(Figure(label="vertical error, 95 %", value=f"{p95_px:.3f}", unit="px", note=note))
     figures.append(Figure(label="RMS of all corners", value=f"{found.rig.rms_stereo_px:.3f}", unit="px"))
-    sigma = f"± {found.baseline_sigma_m * 1e3:.2g} mm; " if math.isfinite(found.baseline_sigma_m) else ""
+    sigma = f"± {millimetres(found.baseline_sigma_m)} mm; " if math.isfinite(found.baseline_sigma_m) else ""
     note = f"{sigma}compare it with a ruler"
     figures.append(Figure(label="baseline", value=f"{baseline_mm:.2f}", unit="mm", note=note))
     sigma_m = depths.get(_DEPTH_M, math.nan)
@@ -109,7 +109,7 @@ def _figures(series: CalibrationSeries, found: SeriesRig) -> tuple[Figure, ...]:
         figures.append(
             Figure(
                 label=f"depth at {_DEPTH_M:g} m",
-                value=f"± {sigma_m * 1e3:.2g}",
+                value=f"± {millimetres(sigma_m)}",
                 unit="mm",
                 note="by the calibration alone",
             )

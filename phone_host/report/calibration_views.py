@@ -198,7 +198,8 @@ def _view(view: SeriesView, series: CalibrationSeries, scale: Enlarged) -> str:
         for board, size, side in zip((view.left, view.right), series.sizes_px, ("left", "right"), strict=True)
     )
     if view.is_used:
-        said = f"left {_one_rms(view.left):.3f}, right {_one_rms(view.right):.3f}, vertical {_vertical(view)} px RMS"
+        vertical = f", vertical {_vertical(view)}" if len(view.vertical_px) else ""
+        said = f"left {_one_rms(view.left):.3f}, right {_one_rms(view.right):.3f}{vertical} px RMS"
     else:
         said = _why(view)
     return f'<figure><div class="both">{pictures}</div><figcaption><b>{escape(view.name)}</b>: {escape(said)}</figcaption></figure>'
@@ -234,7 +235,7 @@ def field_card(series: CalibrationSeries) -> str:
     for name, (places, errors), size in zip(("left", "right"), fields, series.sizes_px, strict=True):
         seen = SeenErrors(size_px=size, places=places, errors_px=errors)
         draw = partial(arrow_field, seen, scale, f"mean residuals of the {name} image")
-        title = f"{name} camera, enlarged {scale.times(size[0])} times"
+        title = f"{name} camera, {scale.words(size[0])}"
         drawn += f"<div><h3>{title}</h3>{two_widths(draw, HALF_PX)}</div>"
     words = (
         "Mean of the residuals of all views, tile by tile. A good lens model leaves short arrows without order; arrows that turn"
@@ -295,8 +296,8 @@ def _scale(views: list[SeriesView], share: float) -> Enlarged:
 
 
 def _times(scale: Enlarged, series: CalibrationSeries) -> str:
-    left, right = (scale.times(size[0]) for size in series.sizes_px)
-    return f", enlarged {left} times" if left == right else f", enlarged {left} times left and {right} times right"
+    left, right = (scale.words(size[0]) for size in series.sizes_px)
+    return f", {left}" if left == right else f", {left} left and {right} right"
 
 
 def _one_rms(board: SeenBoard) -> float:

@@ -55,9 +55,10 @@ class Enlarged:
     by: float
     bar_px: float
 
-    def times(self, width_px: int) -> int:
-        """By how much arrows on an image of that width are enlarged."""
-        return round(self.by * width_px)
+    def words(self, width_px: int) -> str:
+        """Say by how much arrows on an image of that width are enlarged."""
+        factor = self.by * width_px
+        return f"enlarged {factor:.0f} times" if factor >= 1.5 else f"drawn at {factor:.2g} of their length"
 
 
 def enlarged(errors_px: Points, share: float) -> Enlarged:

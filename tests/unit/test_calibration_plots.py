@@ -46,8 +46,13 @@ def test_the_scale_of_arrows_is_a_round_number_near_what_they_show(error_px: flo
     scale = enlarged(np.array([[error_px, 0.0]] * 20 + [[np.nan, np.nan]]), 0.06)
     assert error_px * scale.by == pytest.approx(0.06)
     assert scale.bar_px == bar_px
-    assert scale.times(1000) == round(60 / error_px)
+    assert scale.words(1000) == f"enlarged {60 / error_px:.0f} times"
     assert enlarged(np.empty((0, 2)), 0.06).by > 0
+
+
+def test_large_errors_are_not_enlarged_0_times() -> None:
+    """Residuals of a rig that is none are longer than their arrows."""
+    assert enlarged(np.array([[400.0, 0.0]] * 20), 0.06).words(1000) == "drawn at 0.15 of their length"
 
 
 def test_courses_show_their_limits_and_as_many_names_as_fit() -> None:

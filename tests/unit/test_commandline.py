@@ -106,6 +106,7 @@ def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
         (["run", "--count"], "--count needs a value"),
         (["run", "--count", "3", "--knid", "a"], "unknown option --knid (did you mean --kind?)"),
         (["run", "--count", "3", "left2.jpg"], "nothing takes left2.jpg (put patterns such as 'left*.jpg' in quotes)"),
+        (["run", "--count", "-3mm"], "--count is '-3mm', but must be a whole number, such as 30"),
         (["run", "--count", "3mm"], "--count is '3mm', but must be a whole number, such as 30"),
     ],
 )

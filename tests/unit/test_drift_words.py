@@ -164,6 +164,7 @@ def test_an_overlay_is_read_back_and_belongs_to_one_rig(tmp_path: Path) -> None:
     ("old", "new", "words"),
     [
         ("format_version: 1", "format_version: 2", "format_version is 2, this program reads 1"),
+        ("format_version: 1", "format_version: 2\nM1: 3", "is a rig.yaml, no overlay.yaml"),
         ("right_turn: [0.0017", "right_turn: [0.9", "right_turn is more than any rig turns"),
         ("right_turn: [0.0017", "right_turn: [nonsense", "right_turn holds 'nonsense"),
         ("right_focal: 1.0", "right_focal: 3.0", "right_focal is more than any focus changes"),

@@ -20,6 +20,7 @@ from phone_host.calibration.sheets.pdf import pdf
 from phone_host.calibration.sheets.screen import ScreenBoard, screen_board
 from phone_host.calibration.sheets.sheet import Paper, Sheet
 from phone_host.calibration.sheets.svg import svg
+from phone_host.calibration.target import Board
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.json_text import json_text
 from phone_host.verbs.output_folders import require_folder, unwritable
@@ -37,6 +38,9 @@ _MAT_MM: Final = 25.0
 _FAMILIES: Final = {"4x4": Family.ARUCO_4X4, "5x5": Family.ARUCO_5X5, "6x6": Family.ARUCO_6X6}
 _DEFAULT: Final = {"chessboard": "9x6", "charuco": "8x6", "mat": "10x8"}
 _INCH_MM: Final = 25.4
+_SCREENS_MM: Final = (50.0, 10_000.0)
+"""From a small phone's to a wall's."""
+
 _INCHES: Final = re.compile(r"\s*(\d+\.?\d*)\s*(?:in|\")\s*", re.ASCII | re.IGNORECASE)
 
 
@@ -150,7 +154,7 @@ def _on_screen(options: argparse.Namespace, columns: int, rows: int) -> _Made:
     if options.square:
         raise SettingsError("a screen's squares follow from its pixels", "leave --square out, and give --diagonal")
     diagonal_mm = _diagonal_mm(options.diagonal) if options.diagonal else math.nan
-    width, height = _counts(options.screen, "--screen", most=20_000)
+    width, height = _counts(options.screen, "--screen", most=20_000, example="1920x1080")
     board = screen_board(columns + 1, rows + 1, (width, height), diagonal_mm)
     encoded = np.asarray(cv2.imencode(".png", board.image)[1]).tobytes()
     name = f"chessboard-{columns}x{rows}-{width}x{height}.png"
@@ -174,17 +178,22 @@ def _diagonal_mm(text: str) -> float:
     if text.strip().replace(".", "", 1).isdecimal():
         raise SettingsError(f"--diagonal is {text!r}", "give its unit, such as 15.6in or 396mm")
     inches = _INCHES.fullmatch(text)
-    return float(inches[1]) * _INCH_MM if inches else length_mm(text, "--diagonal", "15.6in or 396mm")
+    found_mm = float(inches[1]) * _INCH_MM if inches else length_mm(text, "--diagonal", "15.6in or 396mm")
+    if not _SCREENS_MM[0] <= found_mm <= _SCREENS_MM[1]:
+        raise SettingsError(f"--diagonal is {text!r}, which no screen has", "give it with its unit, such as 15.6in or 396mm")
+    return found_mm
 
 
 def _side_mm(options: argparse.Namespace, paper: Paper, columns: int, rows: int) -> float:
     if options.square:
-        return square_mm(options.square)
+        side_mm = square_mm(options.square)
+        Board(_LEAST, _LEAST, side_mm / 1000)  # refuses a square that no board has
+        return side_mm
     return largest_square_mm(paper, columns, rows, _MARGIN_SQUARES)
 
 
-def _counts(text: str, option: str, most: int = _MOST) -> tuple[int, int]:
+def _counts(text: str, option: str, most: int = _MOST, example: str = "9x6") -> tuple[int, int]:
     found = re.fullmatch(r"\s*(\d{1,5})\s*[xX]\s*(\d{1,5})\s*", text)
     if found is None or not all(_LEAST <= int(each) <= most for each in found.groups()):
-        raise SettingsError(f"{option} is {text!r}", f"give columns x rows, {_LEAST} to {most} each, such as 9x6")
+        raise SettingsError(f"{option} is {text!r}", f"give columns x rows, {_LEAST} to {most} each, such as {example}")
     return int(found[1]), int(found[2])
