@@ -56,6 +56,11 @@ class Fits:
                 return size
             size = best
 
+    def any_has(self, size: Size) -> bool:
+        """Return whether a size fits one of the images."""
+        board = Board(*size, _ANY_SIDE_M)
+        return any(side_by_side(lambda image: is_outlined(image, board), self.images))
+
     def shows(self, board: Board) -> bool:
         """Return whether the full search finds a board in any of the images."""
         return any(side_by_side(lambda image: len(find_corners(image, board)) > 0, self.images))

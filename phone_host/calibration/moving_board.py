@@ -11,7 +11,8 @@ import cv2
 import numpy as np
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.board_size import Size, Vote, size_text, whole_size_seen
+from phone_host.calibration.board_fits import Size
+from phone_host.calibration.board_size import Vote, size_text, whole_size_seen
 from phone_host.calibration.marks_seen import find_marks, require_marks
 from phone_host.calibration.small_picture import shrunk
 from phone_host.calibration.target import Board, Corners, agree, find_corners, order_by_colour

@@ -78,9 +78,7 @@ def require_agreement(kept: KeptRectification, rotation: Matrix, baseline_m: Mat
             raise problem("Q", "contradicts P1", _REMEDY)
 
 
-def require_own_focal(
-    kept: KeptRectification, left: CameraModel, right: CameraModel, problem: Problem
-) -> None:
+def require_own_focal(kept: KeptRectification, left: CameraModel, right: CameraModel, problem: Problem) -> None:
     """Check the focal length of a rectification that this program computed: it is the shorter one of the two cameras'.
 
     Raises:

@@ -218,7 +218,6 @@ class _Reader:
             raise self._no_storage()
         if "\0" in text:  # OpenCV's text would end there, without a word
             raise DataError(f"{path} holds a NUL character", "it is damaged: copy it again, or calibrate again")
-        self._is_ended = text.endswith("\n")
         try:
             self._storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         except (cv2.error, SystemError) as error:
@@ -262,8 +261,6 @@ class _Reader:
         for key in (*_ALWAYS, *(("covariance",) if has_sigmas else ())):
             if self._storage.getNode(key).empty():
                 raise self.problem(key, "is missing", "the file was cut off: copy it again, or calibrate again")
-        if not self._is_ended:
-            raise DataError(f"{self._path} ends within a line", "it was cut off: copy it again, or calibrate again")
 
     def rectification(self) -> KeptRectification:
         """Read the rectification, as far as it is there."""

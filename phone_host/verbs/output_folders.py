@@ -186,9 +186,7 @@ def spare_names(out: Path, *names: str, option: str = "--out") -> None:
         raise SettingsError(f"{option} {out} has the name of what is written beside it", f"name another {option}")
 
 
-def unwritable(
-    out: Path, error: OSError, option: str = "--out", *, beside: Path | None = None
-) -> UnavailableError:
+def unwritable(out: Path, error: OSError, option: str = "--out", *, beside: Path | None = None) -> UnavailableError:
     """Make the error for results that cannot be written.
 
     Args:

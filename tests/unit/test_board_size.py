@@ -89,6 +89,8 @@ def test_the_largest_size_that_fits_is_the_boards() -> None:
     assert not Fits([]).holds((8, 5))
     assert Fits([nothing]).grown((7, 4)) == (7, 4)
     assert not Fits([nothing]).shows(_BOARD)
+    assert Fits([nothing, nothing, images[0]]).any_has((8, 5))
+    assert not fits.any_has((9, 6))
 
 
 def test_images_without_a_board_name_no_size(tmp_path: Path) -> None:

@@ -151,7 +151,7 @@ def test_shifted_numbers_are_told_as_such(shift: int) -> None:
     found = name_mistake(series, DataError("no lens explains the views", ""))
     assert found is not None
     assert found.mistake is Mistake.PARTNERS
-    way = "1 higher" if shift > 0 else "1 lower"
+    way = "1 lower" if shift > 0 else "1 higher"
     assert found.sentence.endswith(f"each left picture belongs to the right one whose number is {way}")
 
 

@@ -75,7 +75,9 @@ def test_a_full_pipe_keeps_nobody_alive(code: str) -> None:
 @pytest.mark.parametrize("code", [_STUCK.format(begun=1, said=b"begun"), _IN_PYTHON])
 def test_sigterm_ends_a_computation_with_one_line(code: str) -> None:
     """In native code and in Python: 143 within seconds, and one word on stderr."""
-    with subprocess.Popen([sys.executable, "-P", "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    with subprocess.Popen(
+        [sys.executable, "-P", "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
         assert process.stdout is not None
         assert os.read(process.stdout.fileno(), 5) == b"begun"
         process.send_signal(signal.SIGTERM)

@@ -33,13 +33,9 @@ def test_a_file_that_was_cut_off_is_refused_or_keeps_its_verdict(tmp_path: Path)
         path.write_text(text[:end])
         try:
             assert read_rig(path).is_rejected
-        except DataError as error:
+        except DataError:
             refused += 1
-            assert "\n" not in str(error)
     assert refused > 90  # what is left ends in the views, or between two of the last keys
-    path.write_text(text.rstrip("\n"))
-    with pytest.raises(DataError, match="ends within a line: it was cut off"):
-        read_rig(path)
 
 
 def test_a_nul_character_is_named(tmp_path: Path) -> None:

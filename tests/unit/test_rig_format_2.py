@@ -35,7 +35,8 @@ def test_a_file_that_does_not_name_its_lenses_has_opencvs_polynomial(tmp_path: P
     rig = replace(rig, right=replace(rig.right, distortion=eight))
     write_rig(path, rig, rectify_rig(rig))
     assert "lens2: rational" in path.read_text()
-    path.write_text(re.sub(r"^lens[12]:.*\n", "", path.read_text(), flags=re.MULTILINE))
+    text = path.read_text().replace("format_version: 2\n", "")
+    path.write_text(re.sub(r"^lens[12]:.*\n", "", text, flags=re.MULTILINE))
     back = read_rig(path)
     assert (back.left.lens, back.right.lens) == (Lens.PINHOLE, Lens.RATIONAL)
 

@@ -180,7 +180,9 @@ def _diagonal_mm(text: str) -> float:
     inches = _INCHES.fullmatch(text)
     found_mm = float(inches[1]) * _INCH_MM if inches else length_mm(text, "--diagonal", "15.6in or 396mm")
     if not _SCREENS_MM[0] <= found_mm <= _SCREENS_MM[1]:
-        raise SettingsError(f"--diagonal is {text!r}, which no screen has", "give it with its unit, such as 15.6in or 396mm")
+        raise SettingsError(
+            f"--diagonal is {text!r}, which no screen has", "give it with its unit, such as 15.6in or 396mm"
+        )
     return found_mm
 
 
