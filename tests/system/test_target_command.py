@@ -68,6 +68,9 @@ def test_the_next_command_is_told(tmp_path: Path) -> None:
         (["mat", "--screen", "1280x720"], "--screen shows chessboards"),
         (["chessboard", "--diagonal", "15in"], "--diagonal is of a screen"),
         (["chessboard", "--screen", "1280x720", "--diagonal", "15.6"], "give its unit"),
+        (["chessboard", "--screen", "1280x720", "--diagonal", "0in"], "which no screen has"),
+        (["chessboard", "--screen", "1e9x1e9"], "20000 each, such as 1920x1080"),
+        (["chessboard", "--square", "0.1mm"], "which no chessboard has"),
         (["chessboard", "--screen", "1280x720", "--square", "20mm"], "squares follow from its pixels"),
     ],
 )

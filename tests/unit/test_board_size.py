@@ -89,8 +89,10 @@ def test_the_largest_size_that_fits_is_the_boards() -> None:
     assert not Fits([]).holds((8, 5))
     assert Fits([nothing]).grown((7, 4)) == (7, 4)
     assert not Fits([nothing]).shows(_BOARD)
-    assert Fits([nothing, nothing, images[0]]).any_has((8, 5))
-    assert not fits.any_has((9, 6))
+    assert fits.rivals((7, 4), (8, 5)) == (fits.count((7, 4)) > 1)
+    assert fits.rivals((8, 5), (8, 5))
+    assert not fits.rivals((9, 6), (8, 5))
+    assert not Fits([nothing]).rivals((9, 6), (8, 5))
 
 
 def test_images_without_a_board_name_no_size(tmp_path: Path) -> None:

@@ -199,7 +199,8 @@ def passed_over_notes(files: tuple[Path, ...]) -> list[str]:
         return []
     shown = ", ".join(path.name for path in files[:_SHOWN]) + (", ..." if files[_SHOWN:] else "")
     remedy = ": convert them to JPEG" if any(is_unread_photograph(path) for path in files) else ""
-    return [f"warning  {counted(len(files), 'file')} among the pictures not read ({shown}){remedy}"]
+    what = "1 file among the pictures is" if len(files) == 1 else f"{len(files)} files among the pictures are"
+    return [f"warning  {what} not read ({shown}){remedy}"]
 
 
 def pairing_notes(files: ViewFiles) -> list[str]:
