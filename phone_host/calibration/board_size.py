@@ -317,7 +317,9 @@ def require_size(files: ViewFiles, given: Size, most_pixels: int = MOST_PIXELS) 
         return  # most images show nothing: a few may be wrong
     is_part = wanted[0] <= shown[0] and wanted[1] <= shown[1]  # it is found, too, and that proves nothing
     # The full search takes the outermost squares' own corners for inner ones: it is asked only where nothing better is known.
-    if not is_part and (fits.rivals(wanted, shown) or (not fits.holds(shown) and fits.shows(Board(*given, _ANY_SIDE_M)))):
+    if not is_part and (
+        fits.rivals(wanted, shown) or (not fits.holds(shown) and fits.shows(Board(*given, _ANY_SIDE_M)))
+    ):
         return
     raise SettingsError(
         f"these boards have {size_text(shown)} inner corners, --board says {size_text(given)}",

@@ -113,7 +113,8 @@ def look_for_boards(
     failures = [each for each in looked if isinstance(each, DataError)]
     if len(failures) == _FIRST < len(files.pairs):
         raise DataError(
-            f"none of the first {_FIRST} pairs can be read: {failures[0].problem}", "give pictures, or mend that one first"
+            f"none of the first {_FIRST} pairs can be read: {failures[0].problem}",
+            "give pictures, or mend that one first",
         )
     looked += side_by_side(look, files.pairs[_FIRST:], advance)
     for (name, _, _), found in zip(files.pairs, looked, strict=True):

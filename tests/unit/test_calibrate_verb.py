@@ -19,7 +19,7 @@ from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.cause import cause_report, with_cause
 from phone_host.verbs.calibrate.command import run
-from phone_host.verbs.calibrate.figures import report_of, summary
+from phone_host.verbs.calibrate.figures import passed_over_notes, report_of, summary
 from tests.support.boards import poses, render_pair
 from tests.support.calibration_series import calibration, taken
 from tests.support.oriented import oriented
@@ -55,6 +55,15 @@ def _calibrate(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
     code = run(parser.parse_args([*given, "--out", str(folder / "rig.yaml")]))
     report: dict[str, Any] = json.loads((folder / "report.json").read_text())
     return code, report
+
+
+def test_files_that_are_not_read_are_told_once() -> None:
+    """One, several, and photographs that need only be converted."""
+    assert passed_over_notes(()) == []
+    assert passed_over_notes((Path("l/a.raw"),)) == ["warning  1 file among the pictures is not read (a.raw)"]
+    several = tuple(Path(f"l/{name}") for name in ("1.heic", "2.heic", "3.heic", "4.heic"))
+    (told,) = passed_over_notes(several)
+    assert told.endswith("4 files among the pictures are not read (1.heic, 2.heic, 3.heic, ...): convert them to JPEG")
 
 
 def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(

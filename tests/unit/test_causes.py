@@ -20,7 +20,7 @@ from phone_host.calibration.causes.partners import wrong_partners
 from phone_host.calibration.causes.unturned import unturned
 from phone_host.calibration.target import find_corners
 from phone_host.calibration.verdict import Assessment, Verdict
-from phone_host.verbs.calibrate.cause import cause_report, with_cause
+from phone_host.verbs.calibrate.cause import assessed, cause_report, with_cause
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.cause_judge import finding_of
 from tests.support.cause_real import real_pairs, variants
@@ -136,6 +136,19 @@ def test_the_true_partners_are_named() -> None:
     found = wrong_partners(made.pairs, made.board, made.sizes_px)
     assert len(found) == 2
     assert found[0] == found[1][::-1]
+
+
+def test_wrong_partners_are_told_also_where_no_rig_can_be_rectified() -> None:
+    """What such pairs make of the cameras has no meaning: not its obstacle is told, but its cause."""
+    pairs = exact_pairs(small_rig(), poses(6, seed=8))
+    found = calibrate(pairs, BOARD, ((640, 480), (640, 480)))
+    broken = replace(found, rectification=None, obstacle=DataError("the cameras stand nowhere", "take other pictures"))
+    finding = Finding(
+        mistake=Mistake.PARTNERS, sentence="the numbers are shifted", remedy="rename them", most=Verdict.REJECT
+    )
+    assert assessed(broken, (), finding, "") == Assessment(Verdict.REJECT, "the numbers are shifted: rename them")
+    other = replace(finding, mistake=Mistake.SQUARE)
+    assert "shifted" not in assessed(broken, (), other, "").remedy
 
 
 @pytest.mark.parametrize("shift", [1, -1])
