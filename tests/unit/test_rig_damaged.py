@@ -94,6 +94,23 @@ def test_a_translation_that_points_elsewhere_is_refused(tmp_path: Path) -> None:
         read_rig(tmp_path / "rig.yaml")
 
 
+def test_files_of_other_programs_need_no_rectification(tmp_path: Path) -> None:
+    """Without a version any of R1 to Q may be missing; what is there must agree. A focal length of 0 is no division."""
+    path = _written(tmp_path)
+    text = path.read_text().replace("format_version: 2\n", "")
+    for missing in (("R1", "R2", "P1", "P2", "Q"), ("P1",), ("P2",), ("Q",), ("R1",), ("R2",)):
+        kept = text
+        for key in missing:
+            kept = kept.replace(f"\n{key}:", f"\nno_{key}:")
+        path.write_text(kept)
+        assert read_rig(path).is_rejected
+    focal = re.search(r"\nP2:.*?data: \[ (\S+),", text, re.DOTALL)
+    assert focal is not None
+    path.write_text(text[: focal.start(1)] + "0." + text[focal.end(1) :])
+    with pytest.raises(DataError, match="P2 has a baseline of nan mm"):
+        read_rig(path)
+
+
 def test_views_whose_counts_and_data_differ_are_named(tmp_path: Path) -> None:
     """OpenCV raises an error of its own for such a matrix."""
     path = _written(tmp_path)
