@@ -204,12 +204,7 @@ def is_outlined(grey: Image, board: Board) -> bool:
         grey: (H, W) uint8, searched at its own size.
         board: what to look for.
     """
-    found, rough = cv2.findChessboardCorners(grey, (board.columns, board.rows), flags=_OUTLINES)
-    if not found:
-        return False
-    # Glare may leave some corners unsure. That squares are black and white by turns suffices to tell a size.
-    fitted = _fitted(grey, grey, np.ones(2), _as_corners(rough), board)
-    return _has_colours(fitted, board)
+    return len(_by_outlines(grey, grey, np.ones(2), board)) > 0
 
 
 def _by_outlines(grey: Image, searched: Image, factors: NDArray[np.float64], board: Board) -> Corners:
@@ -241,15 +236,9 @@ def _fitted(grey: Image, searched: Image, factors: NDArray[np.float64], rough: C
 
 def _is_chessboard(fitted: FittedCorners, board: Board) -> bool:
     """Return whether edges cross at every corner, black to white and white to black by turns."""
-    return bool(fitted.are_sure().all()) and _has_colours(fitted, board)
-
-
-def _has_colours(fitted: FittedCorners, board: Board) -> bool:
-    """Return whether black and white take turns, at all corners whose contrast is known."""
     turns = (-1.0) ** np.add.outer(np.arange(board.rows), np.arange(board.columns)).ravel()
-    known = np.isfinite(fitted.contrast)
-    is_light = (fitted.contrast * turns)[known] > 0
-    return bool(is_light.all() or not is_light.any())
+    is_light = fitted.contrast * turns > 0
+    return bool(fitted.are_sure().all() and (is_light.all() or not is_light.any()))
 
 
 def _brightness(grid: Corners, column: int, grey: Image) -> float:

@@ -54,9 +54,10 @@ def test_a_board_of_many_squares_is_found_the_other_way(tmp_path: Path) -> None:
 
 
 def _shaded(folder: Path, count: int) -> ViewFiles:
-    """Pictures of a board of 8x5 whose last column of black squares shines so that only 7x5 corners pass for inner ones."""
+    """Pictures of a board of 8x5 whose last black squares mirror a lamp in their middle, so that only 7x5 corners pass for inner ones."""
     squares = np.kron((np.indices((6, 9)).sum(axis=0) % 2) * 255, np.ones((40, 40)))
-    squares[:, -40:] = np.maximum(squares[:, -40:], 140)
+    for row in range(6):
+        squares[40 * row + 14 : 40 * row + 26, -26:-14] = 255
     image = np.pad(squares, 60, constant_values=255).astype(np.uint8)
     for side in ("left", "right"):
         (folder / side).mkdir()

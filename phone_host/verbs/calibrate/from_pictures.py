@@ -24,7 +24,8 @@ from phone_host.output.json_text import json_text
 from phone_host.output.rig_yaml import is_rig
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
-from phone_host.stereo.view_files import ViewFiles, pair_files
+from phone_host.stereo.view_files import ViewFiles, pair_files, passed_over
+from phone_host.verbs.calibrate.arguments import EXPORTS
 from phone_host.verbs.calibrate.board import Known, board_in, unseen_remedy
 from phone_host.verbs.calibrate.cause import assessed, calibrated_as_last, cause_report
 from phone_host.verbs.calibrate.earlier import (
@@ -40,6 +41,7 @@ from phone_host.verbs.calibrate.earlier import (
 )
 from phone_host.verbs.calibrate.figures import (
     pairing_notes,
+    passed_over_notes,
     rejections,
     report_of,
     report_of_failure,
@@ -52,7 +54,15 @@ from phone_host.verbs.calibrate.page import series_of_failure, series_of_rig, wi
 from phone_host.verbs.calibrate.rig_file import replace_rig
 from phone_host.verbs.globs import two_lists
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import PAGE, claim_names, keep_other_report, require_file, unwritable
+from phone_host.verbs.output_folders import (
+    PAGE,
+    REPORT,
+    claim_names,
+    keep_other_report,
+    require_file,
+    spare_names,
+    unwritable,
+)
 from phone_host.verbs.units import baseline_mm
 
 if TYPE_CHECKING:  # cameras and links: 0.2 s that pictures need not wait for
@@ -81,8 +91,10 @@ def require_rig_place(out: Path) -> None:
 
     Raises:
         UnavailableError: it is no file, or one that is not a calibration.
+        SettingsError: it has the name of what is written beside it.
     """
     require_file(out)
+    spare_names(out, REPORT, PAGE, *EXPORTS)
     if kind_of(out) is not Kind.MISSING and not is_rig(out):
         raise UnavailableError(f"{out} is not a calibration, and would be replaced", "name another --out")
 
@@ -107,7 +119,7 @@ def calibrate_pictures(
     files = pair_files(*(live.folders if live is not None else two_lists(options.images)))
     require_first_sizes(files, asked, options, mounted)
     keep_other_report(options.out.parent, "calibrate")
-    claim_names(options.out.parent, options.out, "report.json", PAGE)
+    claim_names(options.out.parent, options.out, REPORT, PAGE)
     beside = cameras_beside(files, mounted)
     series, known = series_of(
         options, asked, lambda named: board_in(files, named, most_pixels(None, options.max_megapixels))
@@ -141,7 +153,7 @@ def calibrate_pictures(
     limit = most_pixels(None, options.max_megapixels)
     report |= write_page(options.out, with_rectified(page, taken, files, mounted, limit))
     _write_report(options.out, report)
-    said = [*pairing_notes(files), *notes(series, pairs, views.sizes_px), known.as_line()]
+    said = [*_file_notes(files, options), *notes(series, pairs, views.sizes_px), known.as_line()]
     again = [] if live is None else live.as_lines(options)
     lines = [*said, *summary(report, views, found, rejected, options.out), *exported, *again]
     return Made(judgement.verdict, report, lines)
@@ -191,8 +203,18 @@ def _report_failure(
     report = report_of_failure(files, views, error) | known.as_report() | replace_rig(options.out, None, None)
     report |= write_page(options.out, series_of_failure(_taken(files, views, list(views.pairs), known.board), report))
     _write_report(options.out, report)
-    lines = [*pairing_notes(files), known.as_line(), *rejections(views.rejected), *unwritten(report, options.out)]
+    lines = [
+        *_file_notes(files, options),
+        known.as_line(),
+        *rejections(views.rejected),
+        *unwritten(report, options.out),
+    ]
     return Made(error, report, lines)
+
+
+def _file_notes(files: ViewFiles, options: argparse.Namespace) -> list[str]:
+    given = () if options.live else two_lists(options.images)
+    return [*passed_over_notes(tuple(path for side in given for path in passed_over(side))), *pairing_notes(files)]
 
 
 def _taken(files: ViewFiles, views: BoardViews, pairs: list[BoardPair], board: Board) -> Taken:
@@ -201,6 +223,6 @@ def _taken(files: ViewFiles, views: BoardViews, pairs: list[BoardPair], board: B
 
 def _write_report(out: Path, report: dict[str, Any]) -> None:
     try:
-        write_text(out.with_name("report.json"), json_text(report, indent=2) + "\n")
+        write_text(out.with_name(REPORT), json_text(report, indent=2) + "\n")
     except OSError as error:
-        raise unwritable(out, error) from error
+        raise unwritable(out.with_name(REPORT), error, beside=out) from error

@@ -22,6 +22,7 @@ from phone_host.output.rig_files.imported import Imported, RigKind, export_texts
 from phone_host.output.rig_yaml import is_rig, read_rig_views
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
+from phone_host.verbs.calibrate.arguments import EXPORTS
 from phone_host.verbs.calibrate.given import require_import_alone
 from phone_host.verbs.calibrate.rig_file import earlier_words, replace_rig
 from phone_host.verbs.output_folders import (
@@ -48,7 +49,7 @@ def import_calibration(options: argparse.Namespace) -> int:
     """Read, check and write a calibration of another program."""
     require_import_alone(options)
     require_file(options.out)
-    spare_names(options.out, REPORT, PAGE, *options.exports)
+    spare_names(options.out, REPORT, PAGE, *EXPORTS)
     found = import_rig(tuple(options.imported), _unit_m(options.unit), _sizes_px(options.size))
     _require_baseline(found.rig, options.baseline)
     side = Side(options.board_side or found.rig.board_side.value)
