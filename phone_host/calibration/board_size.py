@@ -193,10 +193,10 @@ def _levels(grey: Image, points: Corners) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """An image, small, and which lattice it shows."""
+    """An image, small, and which lattice it shows; None: none."""
 
     image: Image
-    size: Size
+    size: Size | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -213,7 +213,7 @@ def _asked(images: Iterator[Path], look: Callable[[Path], _Seen | None]) -> tupl
     result, every = Vote(0, Counter()), list[_Seen]()
     for batch in _batches(images):
         every += [each for each in side_by_side(look, batch) if each is not None]
-        result = Vote(result.asked + len(batch), Counter(each.size for each in every))
+        result = Vote(result.asked + len(batch), Counter(each.size for each in every if each.size is not None))
         if result.is_over:
             break
     return result, every
@@ -241,7 +241,7 @@ def _decided(files: ViewFiles, most_pixels: int, given: Size | None = None) -> _
 
 
 def _fits_of(seen: list[_Seen]) -> Fits:
-    best = sorted(seen, key=lambda each: -_area(each.size))
+    best = sorted(seen, key=lambda each: 0 if each.size is None else -_area(each.size))
     return Fits([each.image for each in best[:ENOUGH]])
 
 
@@ -249,6 +249,8 @@ def _fitting(result: Vote, fits: Fits, given: Size | None) -> Size | None:
     """Return the largest size that fits most images, of those that images show; else the one on which they agree."""
     leader = result.leader
     shown = [leader] if leader is not None and fits.holds(leader) else result.ranked[:_TRIED]
+    if result.sizes and not result.is_over:  # what few images show may be a small part
+        shown = [*shown, *_USUAL_SIZES]
     held = [size for size in (*shown, *([given] if given is not None else [])) if fits.holds(size)]
     held = [size for size in held if size == leader or fits.count(size) >= min(_LEAST_VOTES, result.asked)]
     if held:
@@ -355,8 +357,7 @@ def _seen_in(path: Path, most_pixels: int, way: int) -> _Seen | None:
     if image is None:
         return None
     small = _searched(image)
-    size = _size_of(_lattice(small, way))
-    return None if size is None else _Seen(small, size)
+    return _Seen(small, _size_of(_lattice(small, way)))
 
 
 def _small(path: Path, most_pixels: int) -> Image | None:
