@@ -249,7 +249,7 @@ def _fitting(result: Vote, fits: Fits, given: Size | None) -> Size | None:
     """Return the largest size that fits most images, of those that images show; else the one on which they agree."""
     leader = result.leader
     shown = [leader] if leader is not None and fits.holds(leader) else result.ranked[:_TRIED]
-    if result.sizes and not result.is_over:  # what few images show may be a small part
+    if result.sizes and (len(shown) > 1 or not result.is_over):  # what few images show may be a small part
         shown = [*shown, *_USUAL_SIZES]
     held = [size for size in (*shown, *([given] if given is not None else [])) if fits.holds(size)]
     held = [size for size in held if size == leader or fits.count(size) >= min(_LEAST_VOTES, result.asked)]
