@@ -24,6 +24,7 @@ class Topic(Enum):
     CLOCK = "Clock"
     PAIRING = "Pairing"
     AGE = "Age and queues"
+    PAGE = "Page"
     BOARD = "Board"
 
 
@@ -77,6 +78,15 @@ def _number(value: float | None) -> str:
 def _verdicts(data: Data) -> Iterator[Figure]:
     for verdict in data["verdicts"]:
         yield Figure(verdict["what"], verdict["found"], "", verdict["limit"], verdict["reached"])
+
+
+def _page(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
+    for row in data["rows"]:
+        got = f"; {row['viewer_hz']:.1f} pairs/s of {row['kilobytes']:.0f} kB each" if row["viewer_hz"] else ""
+        yield Figure(
+            f"{row['phase']}: processing delay p50 / p99", f"{row['p50_ms']:.1f} / {row['p99_ms']:.1f} ms{got}"
+        )
 
 
 def _depth(data: Data) -> Iterator[Figure]:
@@ -313,6 +323,7 @@ SOURCES: Final = (
     Source("corners", Topic.CALIBRATION, "Corners of rendered chessboards. `cornerSubPix` starts where ours does; `sectors` is OpenCV's findChessboardCornersSB.", f"{_BENCH}bench_corners --json", _corners, 60),
     Source("causes", Topic.CALIBRATION, "Series of board views with one mistake each, and good ones: is the cause named?", f"{_BENCH}bench_causes --json", _verdicts, 300),
     Source("guide", Topic.CALIBRATION, "A simulated novice who follows the words of `calibrate --live`, with two painted cameras and a real link.", f"{_BENCH}bench_guide --jobs 2 --json", _verdicts, 900),
+    Source("page", Topic.PAGE, "A run with `--serve`, with nobody, with readers of 20 KB/s and with viewers that show every pair, in turn.", f"{_BENCH}bench_page --json", _page, 400),
     Source("drift", Topic.CALIBRATION, "A rig that turns while it runs, and rigs that stand.", f"{_BENCH}bench_drift --json", _verdicts, 600),
     Source("measure", Topic.DEPTH, "Points of rendered rooms, measured as `phone-host measure` does: does the truth lie within what is stated?", f"{_BENCH}bench_measure --json", _verdicts, 300),
     Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),
