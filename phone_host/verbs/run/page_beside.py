@@ -36,6 +36,6 @@ def page_beside(opened: Opened) -> Iterator[BesideRun]:
         snapshots=snapshot_folder(options.out),
         axes=Axes(options.axes),
     )
-    with served(beside, own_settings(options.serve or None, opened.keys)) as server:
+    with served(beside, own_settings(options.serve, opened.keys)) as server:
         say(f"phone-host: the page: {server.url}", sys.stderr, flush=True)
         yield beside
