@@ -47,8 +47,6 @@ def rig_file(tmp_path: Path) -> Path:
     path = tmp_path / "rig.yaml"
     rig = small_rig()
     write_rig(path, rig, rectify_rig(rig))
-    text = path.read_text().splitlines()
-    path.write_text("\n".join(line for line in text if not line.startswith("time_offset")) + "\n")
     assert read_rig(path).time_offset == TimeOffset(0, UNMEASURED_NS)
     return path
 
