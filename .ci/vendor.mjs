@@ -29,6 +29,7 @@ const MADE = [
   { entry: 'phone_host/web/vendor/three.entry.js', of: 'three', format: 'esm', to: 'phone_host/web/page/vendor/three.js' },
   { entry: 'phone_host/web/vendor/uplot/uPlot.esm.js', of: 'uplot', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
   { entry: 'phone_host/web/page/static_depth.js', of: 'three', format: 'iife', to: 'phone_host/report/page_depth.js' },
+  { entry: 'phone_host/web/page/static_charts.js', of: 'uplot', format: 'iife', to: 'phone_host/report/page_charts.js' },
   { entry: 'phone_host/web/page/static_copy.js', of: '', format: 'iife', to: 'phone_host/report/page_copy.js' },
 ];
 
@@ -73,7 +74,7 @@ function bundle({ entry, of, format, to }, root) {
   const notice = of && `/* ${of} ${pins().packages[of].version}, MIT License, ${holder} */`;
   const words = [
     '--yes', ESBUILD, join(HERE, entry), '--bundle', '--minify', `--format=${format}`, '--target=es2022', '--charset=ascii',
-    '--legal-comments=none', ...(notice ? [`--banner:js=${notice}`] : []), `--outfile=${out}`, '--log-level=warning',
+    '--legal-comments=none', ...(notice ? [`--banner:js=${notice}`] : []), `--outfile=${out}`, '--log-level=warning', '--loader:.css=text',
     `--alias:three=${join(SOURCES, 'three/three.module.js')}`,
     `--alias:three/addons/controls/OrbitControls.js=${join(SOURCES, 'three/OrbitControls.js')}`,
   ];

@@ -1,7 +1,7 @@
 """The frame of every HTML page: document, cards, tables, plots in two widths, one style. Pure: values in, text out.
 
 A page loads nothing from outside itself, so it opens offline, years later, from any folder, in light and dark mode and on
-a phone. Pages with depth or commands run one script of ours (`page_script`), the others none; a policy in the page's head makes the
+a phone. Pages with depth, charts or commands run scripts of ours (`page_script`), the others none; a policy in the page's head makes the
 browser refuse everything else. All text that comes from outside is escaped.
 """
 
@@ -26,17 +26,18 @@ _POLICY: Final = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; 
 """What the browser may load (Content Security Policy, level 3): pictures inside the page and its own styles."""
 
 
-def document(title: str, body: str, runs: Script | None = None) -> str:
+def document(title: str, body: str, *runs: Script) -> str:
     """Make an HTML document in the style of all our pages from a body that is already HTML.
 
     Args:
         title: plain text.
         body: HTML, escaped where it has to be.
-        runs: DEPTH if the body has parts of `depth_view`, COPY if it only has commands to copy.
+        runs: CHARTS if the body has parts of `chart_view`; DEPTH if it has parts of `depth_view`, COPY if it only has commands to copy.
     """
-    policy = _POLICY if runs is None else f"{_POLICY}; script-src '{script_hash(runs)}'"
-    text = "" if runs is None else f"<script>{script(runs)}</script>"
-    style = f"{_PAGE_STYLE}{STYLE}{'' if runs is None else depth_view.STYLE}"
+    hashes = " ".join(f"'{script_hash(one)}'" for one in runs)
+    policy = f"{_POLICY}; script-src {hashes}" if runs else _POLICY
+    text = "".join(f"<script>{script(one)}</script>" for one in runs)
+    style = f"{_PAGE_STYLE}{STYLE}{depth_view.STYLE if runs else ''}"
     return printable_page(
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
@@ -109,6 +110,7 @@ border:1px solid var(--line);border-radius:10px;overflow:hidden}
 .pictures figcaption{font-size:.85rem;color:var(--ink2);margin-top:.35rem}
 .views2{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,420px),1fr));gap:1rem;align-items:start;margin-top:.75rem}
 .views2 figure{margin:0;min-width:0}.views2 figcaption{font-size:.85rem;color:var(--ink2);margin-top:.3rem;overflow-wrap:anywhere}.views2 b{color:var(--ink)}
+.chart{margin:.75rem 0 0}.chart figcaption{font-size:.85rem;color:var(--ink2);margin-top:.3rem}
 .both{display:grid;grid-template-columns:1fr 1fr;gap:3px;align-items:start}
 section{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:1.1rem 1.25rem}
 .pair .sub{font-size:.85rem}

@@ -14,6 +14,7 @@ from importlib import resources
 class Script(Enum):
     """What a page needs; the value is the file beside this module."""
 
+    CHARTS = "page_charts.js"
     COPY = "page_copy.js"
     DEPTH = "page_depth.js"
 
@@ -23,7 +24,7 @@ def script(kind: Script) -> str:
     """Return the text of a script.
 
     Args:
-        kind: COPY connects buttons that copy commands; DEPTH reads depth and turns the cloud, too.
+        kind: CHARTS draws charts; COPY connects buttons that copy commands; DEPTH reads depth and turns the cloud, too.
     """
     return resources.files(__package__).joinpath(kind.value).read_text("ascii")
 

@@ -17,7 +17,8 @@ from common.errors import DataError
 from common.ledger import PairLedger, StageTimes
 from common.words import counted
 from phone_host.measure.delays import IDLE_STAGE_NS, DelayStatistics
-from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
+from phone_host.report.chart_view import dots_chart, stacked_chart
+from phone_host.report.page_frame import document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
 from phone_host.report.page_script import Script
 from phone_host.svg.plot_parts import legend
@@ -29,8 +30,6 @@ from phone_host.svg.plots import (
     budgets,
     distributions,
     mean_share,
-    over_time,
-    stacked_over_time,
 )
 
 MEANINGS: Final = (
@@ -49,6 +48,7 @@ _FROM_MIDDLE: Final = (
     " delay."
 )
 _FROM_DEMAND: Final = "From the moment at which the board had read an image to the written result."
+_CHART_WORDS: Final = "A pointer reads each pair's delays, dragging zooms, a double click shows all, a click on a name hides it; a triangle is a pair beyond the top."
 _STARVATION: Final = "how long the processor had nothing to do before this pair; no part of end-to-end"
 
 
@@ -267,13 +267,14 @@ def page(data: PageData) -> str:
         list_section("Remarks", data.notes),
         files_section(data.files),
     ]
-    return document(data.title, "".join(parts), _script(data))
+    return document(data.title, "".join(parts), *_scripts(data))
 
 
-def _script(data: PageData) -> Script | None:
+def _scripts(data: PageData) -> list[Script]:
+    charts = [Script.CHARTS] if data.delays.pairs > 1 else []
     if data.depth:
-        return Script.DEPTH
-    return Script.COPY if data.commands else None
+        return [*charts, Script.DEPTH]
+    return [*charts, Script.COPY] if data.commands else charts
 
 
 def heading(title: str, subtitle: str, verdict: Headline, sentence: str) -> str:
@@ -349,10 +350,10 @@ def _delays(series: DelaySeries) -> list[str]:
     return [
         section(
             "Where the time goes",
-            f"{_FROM_DEMAND if series.timeless else _FROM_MIDDLE} A column is one pair, or the mean of its slice of time where pairs are many.",
+            f"{_FROM_DEMAND if series.timeless else _FROM_MIDDLE} {_CHART_WORDS}",
             legend(names)
             + two_widths(lambda width: budgets([mean], width))
-            + two_widths(lambda width: stacked_over_time(series.time_s, series.delays, width)),
+            + stacked_chart("delays of the pairs over time, stacked", series.time_s, series.delays),
         ),
         section(
             "Each delay by itself",
@@ -373,7 +374,7 @@ def _delays(series: DelaySeries) -> list[str]:
         + section(
             "Clock uncertainty",
             "How well the host knows the board's clock, plus or minus.",
-            two_widths(lambda width: over_time(series.time_s, series.uncertainty, width), HALF_PX),
+            dots_chart(series.time_s, series.uncertainty),
         )
         + "</div>",
     ]
@@ -383,10 +384,7 @@ def _time_skew(series: DelaySeries) -> str:
     return section(
         "Time skew of the pairs",
         "Exposure of the board's frame minus that of the host's; the band is the clocks' uncertainty.",
-        two_widths(
-            lambda width: over_time(series.time_s, series.time_skew, width, band_ns=series.uncertainty.values_ns),
-            HALF_PX,
-        ),
+        dots_chart(series.time_s, series.time_skew, band_ns=series.uncertainty.values_ns),
     )
 
 

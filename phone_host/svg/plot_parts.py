@@ -23,7 +23,7 @@ svg.plot text.on{fill:#111;pointer-events:none}svg.plot text.on.pale{fill:#fff}
 @media (prefers-color-scheme:dark){svg.plot text.on.pale{fill:#111}}
 svg.plot .dots{stroke:#1ec8ff;stroke-width:4;stroke-linecap:round;fill:none}svg.plot .err{stroke:#ff4b1f;stroke-width:1.8;fill:none}
 svg.plot .ground{fill:#000;fill-opacity:.72}svg.plot text.bright{fill:#fff}
-svg.plot .mark{stroke:var(--ink);stroke-width:2;fill:none}svg.plot .late{fill:var(--ink)}
+svg.plot .mark{stroke:var(--ink);stroke-width:2;fill:none}
 ul.legend{display:flex;flex-wrap:wrap;gap:.25rem 1rem;margin:.5rem 0;padding:0;list-style:none;color:var(--ink2);font-size:.85rem}
 ul.legend svg{width:.85em;height:.85em;margin-right:.35em;vertical-align:-.08em}
 ul.legend i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.4em;vertical-align:-.05em}

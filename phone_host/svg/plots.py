@@ -1,29 +1,27 @@
-"""Plots as inline SVG: delays over time, their distributions, their shares. Pure: values in, text out.
+"""Plots as inline SVG: distributions of delays, and their shares. Pure: values in, text out.
+
+They stay SVG: uPlot has no bars of percentiles and no bars side by side, a SVG file is made of them, and nothing is to be zoomed.
 
 Every plot is drawn for a given width in CSS pixels and is not meant to be scaled much, so that its text stays legible.
 Colours are the CSS variables --c0 to --c7 and a few of the page's own (see `plot_parts.STYLE`), so that one SVG serves
 light and dark mode. What a mark means is in its <title>, which browsers show when the pointer rests on it.
 
-All values are durations in ns, float64, NaN = no measurement. The x axis is time in s.
+All values are durations in ns, float64, NaN = no measurement.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 
 import numpy as np
 
-from phone_host.svg.plot_parts import BOTTOM_PX, DARK_COLOURS, LEFT_PX, RIGHT_PX, TOP_PX, axes, empty, hit, point, svg
-from phone_host.svg.plot_scale import Linear, Values, duration_text, duration_unit, log_scale, number_text, span
+from phone_host.svg.plot_parts import DARK_COLOURS, empty, hit, svg
+from phone_host.svg.plot_scale import Linear, Values, duration_text, duration_unit, log_scale
 
-_LEAST_COLUMN_PX = 3
 _ROOM_FOR_MAX_PX = 440
 _LETTER_PX = 8
 """Space for a letter of 12 px text, generous."""
-
-_OUTLIER = 2.5
-"""A total this many times above the 98th percentile would flatten all others, so it is cut off and marked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,107 +97,6 @@ class Strips:
 
     heading: str
     quantities: tuple[Quantity, ...]
-
-
-def stacked_over_time(time_s: Values, layers: Sequence[Quantity], width_px: int, height_px: int = 260) -> str:
-    """Plot columns over time whose parts stack up to their sum.
-
-    Each pair is a column. If there are more pairs than room, a column is the mean of the pairs in its slice of time
-    (means add up as the parts do). A sum far beyond the rest is cut off and marked by a triangle.
-
-    Args:
-        time_s: (N,) when each pair was done, ascending, s.
-        layers: the quantities that add up, lowest first, N values each.
-        width_px: width of the picture.
-        height_px: height of the picture.
-
-    Returns:
-        An <svg> element.
-    """
-    columns = list(_columns(time_s, layers, width_px - LEFT_PX - RIGHT_PX))
-    if not columns:
-        return empty(width_px, "no pairs")
-    sums = np.array([column.values_ns.sum() for column in columns])
-    usual = float(np.percentile(sums, 98))
-    highest = float(sums.max())
-    top = max(1.0, highest if highest <= _OUTLIER * usual else 1.25 * usual)
-    x = Linear(low=columns[0].start_s, high=columns[-1].end_s, start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
-    y = Linear(low=0.0, high=top, start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
-    paths = [""] * len(layers)
-    hits, late = [], []
-    for column, total in zip(columns, sums, strict=True):
-        left, right = x.px(column.start_s), x.px(column.end_s)
-        gap = 0.8 if right - left > 4 else 0.0
-        levels = [y.px(value) for value in np.concatenate([[0.0], np.cumsum(column.values_ns)])]
-        for index in range(len(layers)):
-            paths[index] += (
-                f"M{left:.1f} {levels[index]:.1f}V{levels[index + 1]:.1f}H{right - gap:.1f}V{levels[index]:.1f}z"
-            )
-        lines = [f"{column.name}: {duration_text(total)}"]
-        lines += [
-            f"{layer.label} {duration_text(value)}" for layer, value in zip(layers, column.values_ns, strict=True)
-        ]
-        hits.append(hit(left, TOP_PX, right - left, height_px - TOP_PX - BOTTOM_PX, "\n".join(lines)))
-        if total > top:
-            middle = (left + right) / 2.0
-            late.append(
-                f'<path class="late" d="M{middle - 4:.1f} {TOP_PX - 1}l4 -7l4 7z"><title>{duration_text(total)}</title></path>'
-            )
-    body = "".join(
-        f'<path d="{path}" style="fill:var(--c{layer.colour})"/>' for path, layer in zip(paths, layers, strict=True)
-    )
-    return svg(
-        width_px,
-        height_px,
-        "delays of the pairs over time, stacked",
-        [axes(x, y, (width_px, height_px), "time, s"), body, *late, *hits],
-    )
-
-
-def over_time(
-    time_s: Values, quantity: Quantity, width_px: int, height_px: int = 190, band_ns: Values | None = None
-) -> str:
-    """Plot one quantity of every pair as dots over time; the axis includes zero.
-
-    Args:
-        time_s: (N,) s, ascending.
-        quantity: N values.
-        width_px: width of the picture.
-        height_px: height of the picture.
-        band_ns: (N,) half-width of a band around zero, drawn behind the dots, ns.
-
-    Returns:
-        An <svg> element.
-    """
-    values = quantity.values_ns
-    known = np.isfinite(values)
-    if not known.any():
-        return empty(width_px, "no pairs")
-    both = values if band_ns is None else np.concatenate([values, band_ns, -band_ns])
-    low, high = span(np.append(both[np.isfinite(both)], 0.0))
-    edge = 0.06 * (high - low)
-    first_s, last_s = span(time_s)
-    x = Linear(low=first_s, high=last_s, start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
-    y = Linear(low=low - edge if low < 0.0 else 0.0, high=high + edge, start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
-    parts = [axes(x, y, (width_px, height_px), "time, s")]
-    if band_ns is not None:
-        parts.append(_band(time_s=time_s, half_ns=band_ns, x=x, y=y, colour=quantity.colour))
-    # More than three dots per pixel add ink, not information; extremes are kept.
-    keep = np.flatnonzero(known)
-    if keep.size > 3 * width_px:
-        ends = [int(keep[np.argmin(values[keep])]), int(keep[np.argmax(values[keep])])]
-        keep = np.unique(np.append(keep[:: math.ceil(keep.size / (3 * width_px))], ends))
-    radius = 2.4 if keep.size < 200 else 1.6
-    parts.extend(
-        point(
-            quantity.colour,
-            (x.px(time_s[index]), y.px(values[index])),
-            radius,
-            f"{number_text(round(float(time_s[index]), 3))} s: {duration_text(float(values[index]))}",
-        )
-        for index in keep
-    )
-    return svg(width_px, height_px, f"{quantity.label} over time", parts)
 
 
 def distributions(groups: Sequence[Strips], width_px: int) -> str:
@@ -283,44 +180,6 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
     return svg(width_px, 56.0 * len(rows) - 6.0, "shares of the delays", parts)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Column:
-    """One column of a stacked plot: its time, what it shows, and the mean of each layer, ns."""
-
-    start_s: float
-    end_s: float
-    name: str
-    values_ns: Values
-
-
-def _columns(time_s: Values, layers: Sequence[Quantity], room_px: int) -> Iterator[_Column]:
-    """Yield pairs as columns, or slices of time if there are too many pairs; empty slices yield none, so that a gap shows."""
-    count = time_s.size
-    if not count:
-        return
-    table = np.stack([layer.values_ns for layer in layers])
-    most = max(1, room_px // _LEAST_COLUMN_PX)
-    if count <= most:
-        wide = float(np.median(np.diff(time_s))) if count > 1 else 1.0
-        ends = np.minimum(np.append(time_s[1:], math.inf), time_s + max(wide, 1e-6))
-        for index in range(count):
-            yield _Column(
-                start_s=float(time_s[index]),
-                end_s=float(ends[index]),
-                name=f"pair {index + 1}",
-                values_ns=table[:, index],
-            )
-        return
-    edges = np.linspace(time_s[0], time_s[-1], most + 1)
-    slots = np.clip(np.searchsorted(edges, time_s, side="right") - 1, 0, most - 1)
-    for slot in np.unique(slots):
-        mine = np.flatnonzero(slots == slot)
-        name = f"pair {mine[0] + 1}" if mine.size == 1 else f"mean of pairs {mine[0] + 1} to {mine[-1] + 1}"
-        yield _Column(
-            start_s=float(edges[slot]), end_s=float(edges[slot + 1]), name=name, values_ns=table[:, mine].mean(axis=1)
-        )
-
-
 def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_px: int) -> str:
     """Draw one row of `distributions`."""
     values = quantity.values_ns[np.isfinite(quantity.values_ns)]
@@ -347,16 +206,6 @@ def _strip(quantity: Quantity, px: Callable[[float], float], top: float, width_p
         f'<circle cx="{px(greatest):.1f}" cy="{middle:.1f}" r="2.5" style="fill:var(--c{quantity.colour})"/>'
         f"{hit(0.0, top, width_px, 34.0, title)}</g>"
     )
-
-
-def _band(*, time_s: Values, half_ns: Values, x: Linear, y: Linear, colour: int) -> str:
-    known = np.flatnonzero(np.isfinite(half_ns))
-    if known.size < 2:
-        return ""
-    known = known[:: max(1, known.size // 300)]
-    upper = [f"{x.px(time_s[i]):.1f} {y.px(half_ns[i]):.1f}" for i in known]
-    lower = [f"{x.px(time_s[i]):.1f} {y.px(-half_ns[i]):.1f}" for i in known[::-1]]
-    return f'<path class="band" d="M{"L".join(upper + lower)}z" style="fill:var(--c{colour});fill-opacity:.25"/>'
 
 
 def _decade(ns: float) -> str:

@@ -1,7 +1,6 @@
 """Plots: numbers are where the data put them, and nothing is invented."""
 
 import math
-import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -17,8 +16,6 @@ from phone_host.svg.plots import (
     Strips,
     budgets,
     distributions,
-    over_time,
-    stacked_over_time,
 )
 
 
@@ -49,61 +46,6 @@ def test_several_budgets_share_one_axis() -> None:
     assert [float(bar.get("width", "nan")) for bar in bars] == [400.0, 200.0]
 
 
-def test_stacked_columns_reach_their_sums() -> None:
-    """Each layer starts where the one below it ends, and heights are proportional to values."""
-    layers = [
-        Quantity(label="a", values_ns=np.array([10e6, 20e6]), colour=0),
-        Quantity(label="b", values_ns=np.array([30e6, 20e6]), colour=1),
-    ]
-    root = svg(stacked_over_time(np.array([0.0, 1.0]), layers, 500, 260))
-    lower, upper = (
-        [float(v) for v in re.findall(r"V([\d.]+)", path.get("d", ""))] for path in root.findall("path[@style]")
-    )
-    # (top, bottom) of both columns: a total of 40 ms reaches the top of the frame at y = 24; zero is at y = 260 - 34 = 226.
-    height = 226.0 - 24.0
-    assert lower == pytest.approx([226 - height / 4, 226.0, 226 - height / 2, 226.0], abs=0.06)
-    assert upper == pytest.approx([24.0, 226 - height / 4, 24.0, 226 - height / 2], abs=0.06)
-    assert titles(root)[0].replace("\u202f", " ") == "pair 1: 40.0 ms\na 10.0 ms\nb 30.0 ms"
-
-
-def test_many_pairs_become_means_that_still_add_up() -> None:
-    """With more than one pair per three pixels, columns are means over slices of time; their weighted mean is the mean of all."""
-    count = 5000
-    values = np.random.default_rng(1).uniform(1e6, 9e6, count)
-    root = svg(stacked_over_time(np.arange(count) / 30.0, [Quantity(label="a", values_ns=values, colour=0)], 500))
-    names = titles(root)
-    assert 100 <= len(names) <= 146
-    total, pairs = 0.0, 0
-    for name in names:
-        found = re.match(r"mean of pairs (\d+) to (\d+): ([\d.]+)", name)
-        assert found is not None
-        size = int(found[2]) - int(found[1]) + 1
-        total, pairs = total + size * float(found[3]), pairs + size
-    assert pairs == count
-    assert total / pairs == pytest.approx(values.mean() / 1e6, rel=0.002)
-
-
-def test_a_gap_in_time_stays_a_gap() -> None:
-    """A pause in the stream shows as a gap, not as a column stretched across it."""
-    time_s = np.concatenate([np.arange(10.0), 100.0 + np.arange(10.0)])
-    root = svg(stacked_over_time(time_s, [Quantity(label="a", values_ns=np.ones(20), colour=0)], 500))
-    widths = [float(hit.get("width", "nan")) for hit in root.findall("rect")]
-    # 438 px for 110 s: every column is one second wide.
-    assert max(widths) == pytest.approx(438.0 / 110.0, abs=0.1)
-
-
-def test_an_outlier_is_cut_off_and_marked() -> None:
-    """One pair a hundred times slower than the rest does not flatten them: it is marked with its own value."""
-    values = np.full(100, 10e6)
-    values[50] = 1000e6
-    root = svg(stacked_over_time(np.arange(100.0), [Quantity(label="a", values_ns=values, colour=0)], 500))
-    late = root.findall("path[@class='late']")
-    assert [title.text for mark in late for title in mark.iter("title")] == ["1.00\u202fs"]
-    tops = [float(v) for v in re.findall(r"V([\d.]+)H", root.findall("path[@style]")[0].get("d", ""))]
-    # The usual columns still fill 1 / 1.25 of the frame of 202 px.
-    assert tops[0] == pytest.approx(226.0 - 202.0 / 1.25, abs=0.1)
-
-
 def test_strips_show_the_percentiles() -> None:
     """Bar, median line and numbers are at the percentiles of the data on the logarithmic axis."""
     values = np.arange(0.0, 1001.0) * 1000.0  # 0 to 1 ms in steps of 1 µs: percentile p is p * 10 µs
@@ -127,35 +69,10 @@ def test_strips_show_the_percentiles() -> None:
 
 
 def test_what_was_not_measured_is_not_drawn() -> None:
-    """Only-NaN data give `not measured` or an empty plot; NaN among numbers is left out."""
+    """Only-NaN data give `not measured`, no data an empty plot."""
     nothing = Quantity(label="offset", values_ns=np.full(5, np.nan), colour=0)
     assert "not measured" in distributions([Strips("", (nothing,))], 400)
-    assert "no pairs" in over_time(np.arange(5.0), nothing, 400)
-    assert "no pairs" in stacked_over_time(np.zeros(0), [Quantity(label="a", values_ns=np.zeros(0), colour=0)], 400)
     assert "nothing measured" in budgets([], 400)
-    some = Quantity(label="offset", values_ns=np.array([1.0, np.nan, 3.0]), colour=0)
-    assert len(svg(over_time(np.arange(3.0), some, 400)).findall("circle")) == 2
-
-
-def test_signed_values_stand_on_both_sides_of_zero() -> None:
-    """Equal skews of either sign are equally far from the zero line, and later pairs are further right."""
-    skew = Quantity(label="time skew", values_ns=np.array([-2e5, 2e5, 0.0]), colour=5)
-    root = svg(over_time(np.array([0.0, 1.0, 2.0]), skew, 400, band_ns=np.full(3, 5e4)))
-    x, y = zip(
-        *((float(dot.get("cx", "nan")), float(dot.get("cy", "nan"))) for dot in root.findall("circle")), strict=True
-    )
-    assert list(x) == sorted(x)
-    assert y[0] - y[2] == pytest.approx(y[2] - y[1], abs=0.15)
-    assert root.find("path[@class='band']") is not None
-
-
-def test_extremes_survive_thinning() -> None:
-    """With more pairs than the plot can show singly, the least and the greatest value are still drawn."""
-    values = np.zeros(10_000)
-    values[1234], values[4321] = 5e6, -7e6
-    drawn = " ".join(titles(svg(over_time(np.arange(10_000.0), Quantity(label="a", values_ns=values, colour=0), 340))))
-    assert "5.00\u202fms" in drawn
-    assert "-7.00\u202fms" in drawn
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,9 @@ import pytest
 
 from common.errors import DataError
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
+from phone_host.report.chart_view import dots_chart, stacked_chart
 from phone_host.report.page_frame import document
+from phone_host.report.page_script import Script, script
 from phone_host.report.report_page import (
     DelaySeries,
     Figure,
@@ -30,8 +32,6 @@ from phone_host.svg.plots import (
     Strips,
     budgets,
     distributions,
-    over_time,
-    stacked_over_time,
 )
 from tests.support.html import Page
 from tests.support.samples import LEDGER
@@ -81,13 +81,15 @@ def data(delays: DelaySeries, **changes: object) -> PageData:
 
 @pytest.mark.parametrize("pairs", [0, 1, 2, 50, 2000])
 def test_page_is_whole_and_needs_nothing_from_outside(pairs: int) -> None:
-    """For any number of pairs every element is closed, every reference is a data URI, and there is no script."""
+    """For any number of pairs every element is closed, every reference is a data URI, and the only script is ours, where there are charts."""
     text = page(data(delay_series([ledger(k, start_ms=33 * k) for k in range(pairs)])))
     parsed = Page(text)
     assert not parsed.open
-    assert not re.search(r"https?:|//[a-z]|url\(|@import", text.replace("data:image", ""))
+    drawing = script(Script.CHARTS) if pairs > 1 else ""
+    assert parsed.script == drawing
+    assert not re.search(r"https?:|//[a-z]|url\(|@import", text.replace(drawing, "").replace("data:image", ""))
     for tag, attributes in parsed.elements:
-        assert tag not in {"script", "link", "iframe", "object"}
+        assert tag not in {"link", "iframe", "object"}
         for name in ("src", "href"):
             assert attributes.get(name, "data:") is None or str(attributes.get(name, "data:")).startswith("data:")
 
@@ -124,11 +126,11 @@ def test_all_text_is_escaped() -> None:
     quantity = Quantity(label=evil, values_ns=np.ones(3), colour=0, meaning=evil)
     for plot in (
         distributions([Strips(evil, (quantity,))], 400),
-        stacked_over_time(np.arange(3.0), [quantity], 400),
-        over_time(np.arange(3.0), quantity, 400),
         budgets([Budget(evil, (Share(evil, 1.0, 0),))], 400),
     ):
         assert ET.fromstring(plot).find(".//img") is None
+    for chart in (stacked_chart(evil, np.arange(3.0), [quantity]), dots_chart(np.arange(3.0), quantity)):
+        assert {tag for tag, _ in Page(chart).elements} == {"figure", "div", "p", "figcaption"}
 
 
 def test_pictures_are_the_bytes_given() -> None:
