@@ -1,4 +1,4 @@
-"""Plots the misfit of each time offset as a standalone SVG file. Pure: values in, text out."""
+"""Plots the misfit of each time offset as a standalone SVG file, which uPlot does not make. Pure: values in, text out."""
 
 from html import escape
 from typing import Final

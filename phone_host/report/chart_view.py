@@ -18,7 +18,7 @@ from phone_host.svg.plot_scale import Values, duration_text, duration_unit, numb
 from phone_host.svg.plots import Quantity
 
 MOST_PAIRS: Final = 4000
-"""More pairs than a wide screen has pixels add bytes, not information: of each slice of time two stay, the extremes."""
+"""More pairs than a wide screen has pixels add bytes, not information."""
 
 _GAP: Final = 5.0
 """A pause of so many usual intervals between pairs is drawn as a gap."""
@@ -104,7 +104,7 @@ def _chart(label: str, words: str, lines: Sequence[_Line], time_s: Values, *, by
     caption = f"<figcaption>{escape(words)}</figcaption>"
     if time_s.size < 2:
         return f'<figure class="chart">{caption}</figure>'
-    rows = _with_gaps(time_s, _kept(by))
+    rows = _with_gaps(time_s, _envelope(by) if lines[0].mark is _Mark.AREA else _even(by))
     at_s = np.where(rows < 0, (time_s[np.roll(rows, 1)] + time_s[np.roll(rows, -1)]) / 2.0, time_s[rows])
     unit_ns, unit = duration_unit(float(np.nanpercentile(np.abs(by), _USUAL_PERCENT)))
     columns = [[_number(line.values_ns[row] / unit_ns, gap=row < 0) for row in rows] for line in lines]
@@ -122,15 +122,21 @@ def _chart(label: str, words: str, lines: Sequence[_Line], time_s: Values, *, by
     )
 
 
-def _kept(by: Values) -> NDArray[np.intp]:
-    """Return the pairs to draw: all, or the least and the greatest of each slice."""
+def _envelope(by: Values) -> NDArray[np.intp]:
+    """Return the pairs whose areas are drawn: all, or the least and the greatest of each slice."""
     if by.size <= MOST_PAIRS:
         return np.arange(by.size)
     edges = np.linspace(0, by.size, MOST_PAIRS // 2 + 1).astype(np.intp)
-    edges = np.linspace(0, by.size, MOST_PAIRS // 2 + 1).astype(np.intp)
     slices = itertools.pairwise(edges.tolist())
-    ends = [start + at for start, end in slices for at in _extremes(np.nan_to_num(by[start:end]))]
-    return np.unique(np.array([0, *ends, by.size - 1], dtype=np.intp))
+    return np.unique([start + at for start, end in slices for at in _extremes(np.nan_to_num(by[start:end]))])
+
+
+def _even(by: Values) -> NDArray[np.intp]:
+    """Return the pairs that are drawn as dots: all, or every n-th, which shows how they lie, and the extremes."""
+    every = -(-by.size // MOST_PAIRS)
+    return np.unique(
+        np.append(np.arange(0, by.size, every), _extremes(np.nan_to_num(by)) if every > 1 else ()).astype(np.intp)
+    )
 
 
 def _extremes(values: Values) -> tuple[int, int]:

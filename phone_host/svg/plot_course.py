@@ -1,4 +1,7 @@
-"""Values of views in their order, with limits of their uncertainty. Pure: values in, SVG out."""
+"""Values of views in their order, with limits of their uncertainty. Pure: values in, SVG out.
+
+It stays SVG: a few views with names and error bars, nothing to zoom; uPlot has no error bars.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,8 @@
-"""Plots of the delay benchmark as inline SVG: delay against bytes with its line, and the lives of single pairs. Pure; see `plots` for the rules."""
+"""Plots of the delay benchmark as inline SVG: delay against bytes with its line, and the lives of single pairs. Pure; see `plots` for the rules.
+
+They stay SVG: no axis is time. Dots differ in shape as well as in colour and each has a name, lives are bars in lanes; uPlot draws
+series over an ordered axis.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

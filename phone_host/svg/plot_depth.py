@@ -1,4 +1,7 @@
-"""Values over the distance, beside curves of what theory says. Pure: values in, SVG out."""
+"""Values over the distance, beside curves of what theory says. Pure: values in, SVG out.
+
+It stays SVG: a few named measurements beside a curve with places of its own, nothing to zoom; uPlot's series share their places.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -6,12 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 from phone_host.model import Epipolar
 from phone_host.report.calibration_page import calibration_page
+from phone_host.report.chart_view import stacked_chart
+from phone_host.report.page_frame import document
 from phone_host.report.page_links import NextCommand
+from phone_host.report.page_script import Script
 from phone_host.report.stereo_page import stereo_page
+from phone_host.svg.plots import Quantity
 from tests.support import calibration_series
 from tests.support.browser import Browser, browser, needs_chromium
 from tests.support.stereo_pages import page_data, processed
@@ -125,6 +130,55 @@ def test_the_page_of_a_calibration_fits_the_window(
     assert page.ask("document.documentElement.scrollWidth") <= width_px
     assert page.ask("[...document.querySelectorAll('svg.plot image')].length") > 10
     assert page.complaints == []
+
+
+@pytest.mark.parametrize(("width_px", "dark"), [(390, True), (1280, False)])
+def test_charts_are_read_zoomed_and_hidden_by_keys(
+    shown: tuple[Browser, str], tmp_path: Path, width_px: int, *, dark: bool
+) -> None:
+    """Keys go to a pair and read its delays, zoom to the pairs around it and back; a hidden layer no longer counts; a pointer reads; nothing is refused."""
+    page, _ = shown
+    path = tmp_path / "index.html"
+    time_s = np.arange(101.0)
+    layers = [
+        Quantity(label="low", values_ns=np.full(101, 10e6), colour=0),
+        Quantity(label="high", values_ns=1e6 * (30 + time_s), colour=5),
+    ]
+    path.write_text(document("charts", stacked_chart("delays", time_s, layers), Script.CHARTS))
+    page.complaints.clear()
+    page.open(path.as_uri(), width_px, dark=dark)
+    page.wait("document.querySelector('.u-over') !== null")
+    assert page.ask("document.documentElement.scrollWidth") <= width_px
+    assert "JavaScript" not in page.ask("document.body.innerText")
+
+    def press(key: str, where: str = "[data-chart]") -> list[str]:
+        event = f"new KeyboardEvent('keydown', {{key: '{key}', bubbles: true, cancelable: true}})"
+        page.ask(f"document.querySelector('{where}').dispatchEvent({event})")
+        page.ask("new Promise(done => setTimeout(done, 60))")
+        return list(page.ask("[...document.querySelectorAll('.u-value')].map(one => one.textContent)"))
+
+    assert press("End") == ["100.0 s", "130.0 ms", "10.0 ms"]
+    assert press("ArrowLeft") == ["99.0 s", "129.0 ms", "10.0 ms"]
+    assert press("Home") == ["0.0 s", "30.0 ms", "10.0 ms"]
+    highest = page.ask(_INK)
+    press("Enter", ".u-series:nth-child(3) .u-label")
+    assert page.ask("document.querySelectorAll('.u-legend .u-off').length") == 1
+    assert page.ask(_INK) != highest
+    press("Enter", ".u-series:nth-child(3) .u-label")
+    assert page.ask(_INK) == highest
+    left, top, width, height = box(page, ".u-over")
+    page.move(left + width / 2, top + height / 2)
+    page.wait("document.querySelector('.u-value').textContent === '50.0 s'")
+    press("+")
+    page.move(left + 2, top + height / 2)
+    page.wait("document.querySelector('.u-value').textContent === '25.0 s'")
+    press("Escape")
+    page.move(left + 1, top + height / 2)
+    page.wait("document.querySelector('.u-value').textContent === '0.0 s'")
+    assert page.complaints == []
+
+
+_INK = "document.querySelector('.uplot canvas').toDataURL()"
 
 
 def box(page: Browser, selector: str) -> list[float]:
