@@ -30,6 +30,13 @@ const axis = () => ({ stroke: colour('--ink2'), grid: { stroke: colour('--line')
 /** @param {?number | undefined} value @param {string} unit @param {number} digits */
 const shown = (value, unit, digits) => (value === null || value === undefined || Number.isNaN(value) ? NONE : `${value.toFixed(digits)} ${unit}`);
 
+/** Values between two gaps, which no line shows. @param {Column} column @returns {?number[]} */
+function alone(column) {
+  const none = (/** @type {number} */ k) => (column[k] ?? null) === null;
+  const found = column.flatMap((_, k) => (!none(k) && none(k - 1) && none(k + 1) ? [k] : []));
+  return found.length ? found : null;
+}
+
 /** Made again when the colours change, otherwise only its data. */
 export class Chart {
   /** @param {HTMLElement} place @param {string} unit @param {Line[]} lines - lowest first @param {boolean} isStacked */
@@ -77,7 +84,7 @@ export class Chart {
     const [hue, dots, edge] = [colour(name), mark === 'dots', mark === 'edge'];
     return {
       label, stroke: edge ? 'transparent' : hue, width: this.isStacked ? 0.5 : 1.5, fill: this.isStacked ? hue : undefined, class: edge ? 'u-edge' : undefined,
-      ...(dots ? { paths: () => null } : {}), points: { show: dots, size: 4, fill: hue },
+      ...(dots ? { paths: () => null } : {}), points: { show: dots, size: 4, fill: hue, filter: dots ? null : (/** @type {any} */ u, /** @type {number} */ at) => alone(u.data[at]) },
       value: (/** @type {any} */ _u, /** @type {any} */ _v, /** @type {number} */ _s, /** @type {?number} */ at) => shown(at === null ? null : this.values[k + 1][at], this.unit, 1),
     };
   }
