@@ -20,14 +20,14 @@ from phone_host.svg.plots import Quantity
 MOST_PAIRS: Final = 4000
 """More pairs than a wide screen has pixels add bytes, not information."""
 
-_GAP: Final = 5.0
-"""A pause of so many usual intervals between pairs is drawn as a gap."""
+_GAP, _GAP_S = 5.0, 1.0
+"""A pause of so many usual intervals between pairs, and of so many s at least, is drawn as a gap."""
 
-_USUAL_PERCENT: Final = 98.0
-"""The unit is that of the usual values: one pair of seconds among milliseconds does not make all others 0.0 s."""
+_USUAL_PERCENT: Final = 75.0
+"""The unit is that of the usual values: a few pairs of seconds among milliseconds do not make all others 0.0 s."""
 
 _DIGITS: Final = 4
-_NO_SCRIPT: Final = "The chart itself needs JavaScript."
+_NO_SCRIPT: Final = "The chart itself needs JavaScript; delays.jsonl has all values."
 
 
 class _Mark(Enum):
@@ -146,7 +146,7 @@ def _extremes(values: Values) -> tuple[int, int]:
 def _with_gaps(time_s: Values, kept: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the pairs to draw with -1 where time passed without any."""
     steps = np.diff(time_s)
-    piece = np.append(0, np.cumsum(steps > _GAP * max(float(np.median(steps)), 1e-3)))
+    piece = np.append(0, np.cumsum(steps > max(_GAP * float(np.median(steps)), _GAP_S)))
     return np.insert(kept, np.flatnonzero(np.diff(piece[kept])) + 1, -1)
 
 

@@ -60,7 +60,7 @@ export class Chart {
   make() {
     this.plot?.destroy();
     const x = { ...axis(), values: (/** @type {any} */ _, /** @type {number[]} */ at) => at.map((s) => `${s} s`), size: 28, space: 70 };
-    const y = { ...axis(), values: (/** @type {any} */ _, /** @type {number[]} */ at) => at.map((v, k) => (k === at.length - 1 ? `${v} ${this.unit}` : `${v}`)), size: 58, space: 32 };
+    const y = { ...axis(), values: (/** @type {any} */ _, /** @type {number[]} */ at) => at.map((v, k) => (k === at.length - 1 ? `${v} ${this.unit}` : `${v}`)), size: 68, space: 32 };
     const time = { label: 'time', value: (/** @type {any} */ _, /** @type {number} */ s) => shown(s, 's', 1) };
     const lines = this.lines.map((line, k) => this.series(line, k));
     const edges = lines.flatMap((_, k) => (this.lines[k].mark === 'edge' ? [k + 1] : []));
