@@ -144,7 +144,7 @@ def main() -> int:
         print(
             json.dumps(
                 {
-                    "machine": machine(),
+                    "machine": str(machine()),
                     "rows": [asdict(row) for row in rows],
                     "loads": [asdict(load) for load in opened],
                     "verdicts": [asdict(each) for each in verdicts],
