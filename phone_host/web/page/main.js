@@ -43,6 +43,10 @@ const connection = new Connection({
   state: (told) => {
     // The step that is right at the start stays until the person goes on: nothing is torn away.
     if (!state && !asked) asked = stepOf(told, '');
+    if (told.begun !== (state?.begun ?? 0)) {
+      charts.clear();
+      live.begin(told.begun);
+    }
     state = told;
     charts.add(told.live?.samples ?? []);
     draw();
@@ -60,7 +64,7 @@ function draw() {
   showTrust(state);
   showSetup(state);
   showGuide(state);
-  showFigures(state.live);
+  showFigures(state.live, charts.delay());
   controls.show(state);
   text(byId('activity'), state.activity);
   data(document.body, 'activity', state.activity);
