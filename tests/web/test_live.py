@@ -208,10 +208,14 @@ def test_the_page_comes_back_with_the_host(running: Played, opened: Opener, serv
     server.stop()
     page.wait_for_selector("body[data-line=lost]")
     assert "trying again" in page.text_content("#online")
+    page.wait_for_selector("#trust[data-level=unknown]")
+    assert "Connection lost" in page.text_content("#headline")
+    assert page.evaluate("() => getComputedStyle(document.querySelector('.stage')).opacity") == "0.45"
     again = PageServer(running, PageSettings(port=server.port, token=TOKEN))
     again.start()
     try:
         page.wait_for_selector("body[data-line=open]")
+        page.wait_for_selector("#trust[data-level=good]")
         shows(page, running.emit())
     finally:
         again.stop()
