@@ -31,6 +31,7 @@ class Memory:
         self._checks: tuple[Checked, ...] = ()
         self._checked: tuple[Choices, str] = ({}, "")
         self._pairs = 0
+        self._begun = 0
         self._trouble: Trouble | None = None
         self._guide: Mapping[str, object] | None = None
         self._ask: Callable[[], RunSnapshot] | None = None
@@ -44,6 +45,11 @@ class Memory:
     def choices(self) -> Choices:
         """The choices now."""
         return self._choices
+
+    @property
+    def begun(self) -> int:
+        """How many activities have begun."""
+        return self._begun
 
     @property
     def trouble(self) -> Trouble | None:
@@ -96,6 +102,7 @@ class Memory:
         """Something new begins: the last run, and what went wrong, concern nobody any more."""
         with self._lock:
             self._trouble = self._run = None
+            self._begun += 1
 
     def gave_up(self, given_up: bool) -> None:  # noqa: FBT001 - the host's own value
         """Note whether native code is left behind."""
@@ -166,6 +173,7 @@ class Memory:
                 checks=self._checks,
                 trouble=self._trouble,
                 changed=self._changed,
+                begun=self._begun,
             )
 
     def _fresh(self) -> RunSnapshot | None:

@@ -47,18 +47,19 @@ class Shelf:
         self._number = 0
         self._told: dict[object, Callable[[], None]] = {}
 
-    def put(self, result: Result, core: StereoCore | None) -> None:
+    def put(self, result: Result, core: StereoCore | None, begun: int = 0) -> None:
         """Take a result.
 
         Args:
             result: of a run.
             core: what computed it.
+            begun: number of its run.
         """
         with self._lock:
             self._number += 1
             if self._kept:
                 self._kept[-1] = _lean(self._kept[-1])
-            self._kept.append(Shelved(Newest(self._number, result), core))
+            self._kept.append(Shelved(Newest(self._number, result, begun), core))
             held = sum(_bytes(each.newest.result.processed) for each in self._kept)
             while len(self._kept) > 1 and (len(self._kept) > _MOST or held > _MOST_BYTES):
                 held -= _bytes(self._kept.popleft().newest.result.processed)
@@ -101,17 +102,18 @@ class PageSink:
     Args:
         shelf: takes the results.
         core: of the run.
+        begun: number of the run.
     """
 
-    def __init__(self, shelf: Shelf, core: StereoCore | None) -> None:
-        self._shelf, self._core = shelf, core
+    def __init__(self, shelf: Shelf, core: StereoCore | None, begun: int = 0) -> None:
+        self._shelf, self._core, self._begun = shelf, core, begun
 
     def await_place(self, number: int) -> None:
         """See Sink."""
 
     def offer(self, result: Result) -> None:
         """See Sink."""
-        self._shelf.put(result, self._core)
+        self._shelf.put(result, self._core, self._begun)
 
     def finish(self) -> None:
         """See Sink."""
@@ -131,7 +133,7 @@ def _lean(shelved: Shelved) -> Shelved:
     """Leave away what measuring does not need: the cloud is the larger half."""
     newest = shelved.newest
     processed = replace(newest.result.processed, cloud=None, confidence=None, completed=None)
-    return Shelved(Newest(newest.number, replace(newest.result, processed=processed)), shelved.core)
+    return Shelved(replace(newest, result=replace(newest.result, processed=processed)), shelved.core)
 
 
 def _bytes(processed: Processed) -> int:

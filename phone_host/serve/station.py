@@ -234,7 +234,7 @@ class Station:
         return keep_newest(self._shelf, *self._program.snapshots(self._memory.choices))
 
     def _sinks(self, core: StereoCore | None) -> tuple[PageSink, ...]:
-        return (PageSink(self._shelf, core),)
+        return (PageSink(self._shelf, core, self._memory.begun),)
 
     def _both_chosen(self) -> Choices:
         choices = self._memory.choices

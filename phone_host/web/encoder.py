@@ -105,7 +105,7 @@ class Encoder:
             if key not in self._parts:
                 self._parts[key] = _part(processed, view, wanted)
             parts.append(self._parts[key])
-        return message(newest.number, processed, newest.result.ledger, tuple(parts))
+        return message(newest.number, processed, newest.result.ledger, tuple(parts), newest.begun)
 
 
 def _part(processed: Processed, view: View, wanted: Wanted) -> Part:

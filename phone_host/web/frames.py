@@ -98,7 +98,7 @@ def disparity(values: Disparity, width_px: int, *, packed: bool) -> Part:
     return Part({"name": "disparity", "type": kind, **grid}, zlib.compress(data, 1) if packed else data)
 
 
-def message(number: int, processed: Processed, ledger: PairLedger, parts: tuple[Part, ...]) -> bytes:
+def message(number: int, processed: Processed, ledger: PairLedger, parts: tuple[Part, ...], begun: int = 0) -> bytes:
     """Put a message together.
 
     Args:
@@ -106,11 +106,13 @@ def message(number: int, processed: Processed, ledger: PairLedger, parts: tuple[
         processed: the pair.
         ledger: its delays.
         parts: its encoded parts.
+        begun: number of its run.
     """
     height, width = processed.pair.left.shape[:2]
     header = {
         "kind": "pair",
         "number": number,
+        "begun": begun,
         "width": width,
         "height": height,
         "parts": [{**part.entry, "bytes": len(part.data)} for part in parts],

@@ -41,8 +41,8 @@ class Hub:
         return self.source.newest()
 
     def samples_since(self, number: int) -> list[Sample]:
-        """Return the samples behind a number, oldest first."""
-        return [item for item in list(self._samples) if item.number > number]
+        """Return the samples of the state's run behind a number, oldest first."""
+        return [item for item in list(self._samples) if item.number > number and item.begun == self.state.begun]
 
     async def refresh(self, report_s: float = _REPORT_S) -> None:
         """Bring the state up to date, unless it is a moment old, and the report, if it is older than asked.
@@ -99,7 +99,7 @@ class Hub:
         """Note the newest result. Called from threads of the run, which must not wait."""
         newest = self.source.newest()
         if newest is not None and (not self._samples or newest.number > self._samples[-1].number):
-            self._samples.append(sample(newest.number, newest.result.ledger))
+            self._samples.append(sample(newest.number, newest.result.ledger, newest.begun))
         try:
             self._loop.call_soon_threadsafe(self.wake)
         except RuntimeError:  # the loop has ended

@@ -82,6 +82,7 @@ def _schemas() -> _Json:
         guide={"type": ["object", "null"]},
         trouble={"anyOf": [_ref("Problem"), {"type": "null"}]},
         changed=_WHOLE,
+        begun=_WHOLE,
         live={"type": ["object", "null"]},
         report={"type": ["object", "null"]},
     )

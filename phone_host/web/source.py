@@ -100,6 +100,7 @@ class PageState:
         checks: what the last check has looked at, in order.
         trouble: what went wrong last; None: nothing.
         changed: grows with each change of anything but `run` and `guide`.
+        begun: grows with each activity that begins: results of an earlier one do not belong to `run`.
     """
 
     activity: Activity
@@ -114,6 +115,7 @@ class PageState:
     checks: tuple[Checked, ...] = ()
     trouble: Trouble | None = None
     changed: int = 0
+    begun: int = 0
 
 
 class Do(Enum):
@@ -179,10 +181,17 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Newest:
-    """A result with its number. Numbers grow by one with each result, over all runs of this program."""
+    """A result with its number. Numbers grow by one with each result, over all runs of this program.
+
+    Attributes:
+        number: of the result.
+        result: the result.
+        begun: `PageState.begun` of its run.
+    """
 
     number: int
     result: Result
+    begun: int = 0
 
 
 class Source(Protocol):

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.ledger import PairLedger
-from phone_host.measure.headline import headline
+from phone_host.measure.headline import Grade, headline
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.unused import unused
 from phone_host.output.json_text import json_text
 from phone_host.report.run_json import concern_values
-from phone_host.web.source import Answer, Choice, Measured, PageState
+from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
 
 MOST_SAMPLES: Final = 120
 """Samples in one message: 4 s of them at 30/s; a chart shows no more of a moment."""
@@ -32,11 +32,13 @@ class Sample:
         number: of the result.
         done_ns: when it was done, host's monotonic clock.
         text: its row, JSON.
+        begun: number of its run.
     """
 
     number: int
     done_ns: int
     text: str
+    begun: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +48,21 @@ class StateText:
     Attributes:
         before: the text up to the samples; they stand last in `live`.
         after: the text behind them; empty if there is no `live`, and so no place for samples.
+        begun: number of the run to which its samples belong.
     """
 
     before: str
     after: str
+    begun: int = 0
 
 
-def sample(number: int, ledger: PairLedger) -> Sample:
+def sample(number: int, ledger: PairLedger, begun: int = 0) -> Sample:
     """Return the row of a pair: done, s; then the delays and the time skew, ms.
 
     Args:
         number: of the result.
         ledger: its marks and delays.
+        begun: number of its run.
     """
     delays_ns = (
         ledger.capture_ns,
@@ -70,7 +75,7 @@ def sample(number: int, ledger: PairLedger) -> Sample:
         ledger.time_skew_ns,
     )
     row = [round(ledger.done_ns / 1e9, 4), *(round(value / 1e6, 3) for value in delays_ns)]
-    return Sample(number, ledger.done_ns, json_text(row))
+    return Sample(number, ledger.done_ns, json_text(row), begun)
 
 
 def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
@@ -78,7 +83,7 @@ def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
 
     Args:
         state: the state.
-        samples: the newest ones, oldest first; they tell the rate.
+        samples: the newest ones, oldest first, of any run; those of the state's run tell the rate.
     """
     values: dict[str, object] = {
         "kind": "state",
@@ -96,11 +101,13 @@ def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
         "guide": None if state.guide is None else dict(state.guide),
         "trouble": None if state.trouble is None else trouble_values(state.trouble),
         "changed": state.changed,
+        "begun": state.begun,
     }
     if state.run is None:
-        return StateText(json_text(values | {"live": None})[:-1], "")
-    live = json_text(_live(state.run, samples))
-    return StateText(f'{json_text(values)[:-1]}, "live": {live[:-1]}, "samples": [', "]}")
+        return StateText(json_text(values | {"live": None})[:-1], "", state.begun)
+    own = [item for item in samples if item.begun == state.begun]
+    live = json_text(_live(state.run, own, state.steps))
+    return StateText(f'{json_text(values)[:-1]}, "live": {live[:-1]}, "samples": [', "]}", state.begun)
 
 
 def whole_text(state: StateText, samples: Sequence[Sample], report: str = "null") -> str:
@@ -141,11 +148,11 @@ def _choice(choice: Choice) -> dict[str, object]:
     return {"uri": choice.uri, "name": choice.name, "note": choice.note, "needs_code": choice.needs_code}
 
 
-def _live(run: RunSnapshot, samples: Sequence[Sample]) -> dict[str, object]:
+def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step]) -> dict[str, object]:
     """Return what changes all the time, but for the samples."""
     skew_ns = run.delays.spread("time_skew", _RECENT).p50_ns
     return {
-        "trust": _trust(run),
+        "trust": _trust(run, steps),
         "ended": run.ended,
         "pairs": run.processed,
         "pairs_per_s": _number(_rate(run, samples)),
@@ -162,15 +169,24 @@ def _live(run: RunSnapshot, samples: Sequence[Sample]) -> dict[str, object]:
     }
 
 
-def _trust(run: RunSnapshot) -> dict[str, object]:
+def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
     if not run.processed and run.ended == "running" and run.failure is None:
         return {"level": "unknown", "headline": "No pair has been processed yet.", "concerns": []}
     said = headline(run)
+    if said.grade is Grade.GOOD and not run.images.wants_depth:
+        words = f"No depth in this run, only pairs and delays. Next: {_next(steps)}."
+        return {"level": "unknown", "headline": words, "concerns": []}
     return {
         "level": said.grade.value,
         "headline": said.sentence,
         "concerns": [concern_values(item) | {"problem": item.sentence} for item in concerns(run)],
     }
+
+
+def _next(steps: Sequence[Step]) -> str:
+    """Return what leads to depth: the calibration, else the first step that is not done."""
+    missing = sorted((step for step in steps if not step.done), key=lambda step: step.name is not StepName.CALIBRATION)
+    return missing[0].words if missing else "start a run"
 
 
 def _rate(run: RunSnapshot, samples: Sequence[Sample]) -> float:

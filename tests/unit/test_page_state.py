@@ -8,7 +8,7 @@ from phone_host.measure.trouble import Trouble
 from phone_host.model import PairCounts
 from phone_host.sync.clock import ClockEstimate
 from phone_host.web.openapi import description
-from phone_host.web.source import Activity, Answer, Measured, PageState
+from phone_host.web.source import Activity, Answer, Measured, PageState, Step, StepName
 from phone_host.web.state_json import answer_values, measured_values, sample, state_text, whole_text
 from tests.support.page_source import PageSource
 from tests.support.run_snapshots import MS, run
@@ -45,7 +45,7 @@ def test_a_run_has_its_newest_samples() -> None:
     assert live["pairs_per_s"] == 10.0
     assert live["time_skew_ms"] == 0
     assert values["report"] == {"pairs": 5}
-    assert live["trust"]["level"] in {"good", "warning", "bad"}
+    assert live["trust"]["level"] == "unknown"
     assert live["clock"] == {"known": False, "offset_ms": None, "uncertainty_us": None}
     assert live["link"] == {"name": "", "up": False}
 
@@ -69,6 +69,32 @@ def test_rate_of_an_ended_run_is_that_of_all_of_it() -> None:
     assert isinstance(live, dict)
     assert live["pairs_per_s"] == 20.0
     assert live["trust"]["concerns"] == []
+
+
+def test_samples_of_another_run_do_not_count() -> None:
+    """After a pause of 100 s the new run's pairs come 100 ms apart: that is its rate from the second pair on."""
+    later = [sample(200 + k, replace(LEDGER, done_ns=(1200 + k) * 100 * MS), begun=1) for k in range(3)]
+    state = PageState(activity=Activity.RUNNING, run=replace(run(3), ended="running"), begun=1)
+    for samples, rate in ((SAMPLES + later, 10.0), (SAMPLES, 20.0)):
+        text = state_text(state, samples)
+        assert text.begun == 1
+        assert json.loads(whole_text(text, ()))["live"]["pairs_per_s"] == rate
+
+
+def test_without_depth_there_is_no_answer_but_a_next_step() -> None:
+    """A run of pairs and delays only is no good depth: unknown, with what leads to depth; a concern is still said."""
+    flat = run(5)
+    step = Step(name=StepName.CALIBRATION, done=False, words="calibrate")
+    others = tuple(Step(name=name, done=name is not StepName.CHECK, words="x") for name in StepName)
+    for steps, words in (((*others, step), "Next: calibrate."), (others, "Next: x."), ((), "Next: start a run.")):
+        live = told(PageState(activity=Activity.IDLE, run=flat, steps=steps))["live"]
+        assert isinstance(live, dict)
+        assert live["trust"]["level"] == "unknown"
+        assert live["trust"]["headline"].endswith(words)
+    deep = replace(flat, images=replace(flat.images, wants_depth=True))
+    live = told(PageState(activity=Activity.IDLE, run=deep))["live"]
+    assert isinstance(live, dict)
+    assert live["trust"]["level"] != "unknown"
 
 
 def test_links_clock_and_drops() -> None:

@@ -91,6 +91,7 @@ class Played:
     trouble: Trouble | None = None
     concerns: tuple[Concern, ...] = ()
     folder: str = ""
+    begun: int = 0
     commands: list[Command] = field(default_factory=list)
     answers: dict[Do, Answer] = field(default_factory=dict)
 
@@ -98,7 +99,7 @@ class Played:
         """Start with no result."""
         self._lock = threading.Lock()
         self._told: list[Callable[[], None]] = []
-        self._results: list[Result] = []
+        self._results: list[Newest] = []
         self._changed = 0
         self._started_ns = now.monotonic_ns()
 
@@ -107,7 +108,8 @@ class Played:
         with self._lock:
             number = len(self._results)
             processed = self.pairs[number % len(self.pairs)]
-            self._results.append(Result(number, None, processed, _ledger(number, delays_ms)))  # type: ignore[arg-type]
+            result = Result(number, None, processed, _ledger(number, delays_ms))  # type: ignore[arg-type]
+            self._results.append(Newest(number, result, self.begun))
         self.tell()
         return number
 
@@ -126,7 +128,7 @@ class Played:
     def state(self) -> PageState:
         """Implement Source."""
         run = None
-        if self._results or self.activity is Activity.RUNNING:
+        if self._of_this_run() or self.activity is Activity.RUNNING:
             run = self._run()
         words = {
             StepName.BOARD: "choose the board that carries the left camera",
@@ -149,12 +151,13 @@ class Played:
             guide=None if self.guide is None else self.guide.as_json(),
             trouble=self.trouble,
             changed=self._changed,
+            begun=self.begun,
         )
 
     def newest(self) -> Newest | None:
         """Implement Source."""
         with self._lock:
-            return Newest(len(self._results) - 1, self._results[-1]) if self._results else None
+            return self._results[-1] if self._results else None
 
     def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
         """Implement Source."""
@@ -169,7 +172,7 @@ class Played:
                 kept = {name: value for name, value in (self.settings | dict(command.values)).items() if value}
                 self.change(settings=kept)
             case Do.RUN:
-                self.change(activity=Activity.RUNNING)
+                self.change(activity=Activity.RUNNING, begun=self.begun + 1)
             case Do.STOP:
                 self.change(activity=Activity.IDLE)
             case Do.CALIBRATE:
@@ -180,7 +183,7 @@ class Played:
 
     def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
         """Implement Source, from the result's own cloud; 1 mm uncertain each."""
-        result = self._results[-1 if number is None else number]
+        result = self._results[-1 if number is None else number].result
         cloud = result.processed.cloud
         assert cloud is not None
         places = [cloud[round(y), round(x)].astype(float) for x, y in points_px]
@@ -199,16 +202,21 @@ class Played:
         """Implement Source."""
         return self.folder
 
-    def _run(self) -> Any:
+    def _of_this_run(self) -> list[Result]:
         with self._lock:
-            count, newest = len(self._results), self._results[-1] if self._results else None
+            return [each.result for each in self._results if each.begun == self.begun]
+
+    def _run(self) -> Any:
+        own = self._of_this_run()
+        count, newest = len(own), own[-1] if own else None
+        has_depth = newest is not None and newest.processed.disparity is not None
         figures = ImageFigures(density=0.93, consistency=0.97, scattered_share=0.01, vertical_px=0.12)
         images = ImageTrust(
             judged=count,
-            wants_depth=True,
-            has_depth=count > 0,
-            start=figures,
-            now=figures,
+            wants_depth=has_depth or not count,
+            has_depth=has_depth,
+            start=figures if has_depth else ImageFigures(),
+            now=figures if has_depth else ImageFigures(),
             concerns=self.concerns,
             newest=self.concerns,
             geometry=matched_view().geometry,

@@ -1,6 +1,7 @@
 """The live page beside a run: what it shows is what was measured, and it stays so whatever comes and goes."""
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,9 @@ from common import now
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
-from phone_host.web.source import Activity, Do
+from phone_host.web.source import Activity, Command, Do
 from tests.web.conftest import LAPTOP, PHONE, TOKEN, Complaints, Opener
-from tests.web.played import Played, playing, true_depth
+from tests.web.played import Played, playing, rendered, true_depth
 
 MOST_BYTES = 450_000
 
@@ -115,6 +116,51 @@ def test_the_depth_picture_has_the_colours_of_the_true_depth(opened: Opener) -> 
     assert page.locator("#map-marks span:visible").count() >= 2
 
 
+def test_a_run_without_depth_shows_nothing_of_the_run_before(
+    running: Played, opened: Opener, complaints: Complaints
+) -> None:
+    """When a run begins, pictures, depth, cloud, figures and charts are cleared; a run without depth says so, and nothing fails."""
+    page = opened("run")
+    shows(page, 0)
+    for number in (1, 2):
+        assert running.emit() == number
+        shows(page, number)
+    page.locator("#chart-rate").scroll_into_view_if_needed()
+    page.wait_for_selector("#chart-rate canvas")
+    page.wait_for_selector("#cloud[data-drawn]")
+    assert "93%" in page.text_content("#figures")
+    inked = "id => { const c = document.getElementById(id); return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v); }"
+    assert all(page.evaluate(inked, name) for name in ("map", "left", "right", "cloud-over"))
+    running.change(activity=Activity.IDLE)
+    flat = [replace(each, disparity=None, cloud=None, geometry=None, limits=None) for each in running.pairs]
+    running.pairs = tuple(flat)
+    running.command(Command(do=Do.RUN))
+    page.wait_for_selector("#views:not([data-pair])")
+    assert page.text_content("#no-pair") == "No pair yet"
+    assert not any(page.evaluate(inked, name) for name in ("map", "left", "right", "cloud-over"))
+    assert page.locator("#cloud[data-drawn]").count() == 0
+    assert page.locator("#chart-rate canvas").count() == 0
+    number = running.emit()
+    shows(page, number)
+    assert "No depth in this run" in page.text_content("#no-pair")
+    assert page.is_visible("#no-pair")
+    assert "No depth in this run" in page.text_content("#cloud-wait")
+    assert page.is_visible("#cloud-wait")
+    until(page, "document.querySelector('#figures').textContent.includes('1 in all')")
+    assert "93%" not in page.text_content("#figures")
+    assert page.evaluate(inked, "left")
+    assert not page.evaluate(inked, "map")
+    page.wait_for_selector("#trust[data-level=unknown]")
+    assert "Next: show the printed board" in page.text_content("#headline")
+    running.pairs = rendered(3)
+    running.command(Command(do=Do.RUN))
+    shows(page, running.emit())
+    page.wait_for_selector("#cloud[data-drawn]")
+    assert page.evaluate(inked, "map")
+    assert page.locator("#no-pair").is_hidden()
+    assert complaints == []
+
+
 def test_the_newest_pair_is_shown_and_numbers_only_grow(running: Played, opened: Opener) -> None:
     """Pairs come in order, each at most once, and when they stop the last one is on the page; hidden pictures are not sent."""
     page = opened("run")
@@ -162,10 +208,14 @@ def test_the_page_comes_back_with_the_host(running: Played, opened: Opener, serv
     server.stop()
     page.wait_for_selector("body[data-line=lost]")
     assert "trying again" in page.text_content("#online")
+    page.wait_for_selector("#trust[data-level=unknown]")
+    assert "Connection lost" in page.text_content("#headline")
+    assert page.evaluate("() => getComputedStyle(document.querySelector('.stage')).opacity") == "0.45"
     again = PageServer(running, PageSettings(port=server.port, token=TOKEN))
     again.start()
     try:
         page.wait_for_selector("body[data-line=open]")
+        page.wait_for_selector("#trust[data-level=good]")
         shows(page, running.emit())
     finally:
         again.stop()

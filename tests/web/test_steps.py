@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from common.protocol.enrolment_code import read_code
 from phone_host.measure.trouble import Trouble
 from phone_host.web.source import Activity, Answer, Do, StepName
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
@@ -30,12 +31,14 @@ def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, c
     assert "Choose the board" in page.text_content("#panel-board .words")
     assert page.get_attribute("#command-copy", "aria-disabled") == "true"
     page.check(f"input[value='{BOARDS[0].uri}']")
-    page.fill("#enrol-code", "K7QP-22MX")
+    assert "sudo board-agent pair" in page.text_content("#enrol label")
+    assert page.get_attribute("#enrol-code", "inputmode") == "numeric"
+    page.fill("#enrol-code", f"{read_code('204 719'):06}")
     page.press("#enrol-code", "Enter")
     page.wait_for_function("() => document.querySelector('#link-answer').textContent === 'Enrol: done.'")
     assert asked(program) == [
         (Do.SET, {"link": BOARDS[0].uri}),
-        (Do.ENROL, {"link": BOARDS[0].uri, "code": "K7QP-22MX"}),
+        (Do.ENROL, {"link": BOARDS[0].uri, "code": "204719"}),
     ]
     program.change(done={StepName.BOARD})
     page.click("#panel-board a.next")

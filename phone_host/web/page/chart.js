@@ -177,7 +177,12 @@ export class Chart {
   }
 
   draw() {
-    if (!this.seen || !this.place.clientWidth || this.values[0].length < 2) return;
+    if (this.values[0].length < 2) {
+      this.plot?.destroy();
+      this.plot = null;
+      return;
+    }
+    if (!this.seen || !this.place.clientWidth) return;
     if (this.plot) this.plot.setData(this.data());
     else this.make();
   }

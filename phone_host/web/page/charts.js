@@ -37,12 +37,27 @@ export class Charts {
   /** @param {Sample[]} samples - new ones */
   add(samples) {
     if (!samples.length) return;
-    // A run that starts over starts its time over.
+    // A connection that comes back brings samples again.
     if (!this.samples.length || samples[0][0] < this.samples[this.samples.length - 1][0]) {
       this.samples = [];
       this.start = samples[0][0];
     }
     this.samples = [...this.samples, ...samples].slice(-KEPT);
+    this.draw();
+  }
+
+  /** Delay of the newest pair of this run, ms. @returns {?number} */
+  delay() {
+    return this.samples[this.samples.length - 1]?.[7] ?? null;
+  }
+
+  /** A run begins: nothing of the one before stays. */
+  clear() {
+    this.samples = [];
+    this.draw();
+  }
+
+  draw() {
     const column = (/** @type {number} */ k) => this.samples.map((sample) => sample[k] ?? null);
     const done = this.samples.map((sample) => sample[0] - this.start);
     this.delays.set([done, ...PARTS.map((_, k) => column(k + 1))]);

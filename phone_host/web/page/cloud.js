@@ -115,6 +115,16 @@ export class Cloud {
     this.draw();
   }
 
+  /** Show nothing; the camera stays. */
+  clear() {
+    if (!this.data) return;
+    this.points.visible = false;
+    this.renderer.render(this.scene, this.camera);
+    this.legend.clear();
+    this.data = null;
+    delete this.canvas.dataset.drawn;
+  }
+
   /** Colour points by their depth instead of by the picture. @param {boolean} on */
   colourByDepth(on) {
     this.material.uniforms.byDepth.value = on;

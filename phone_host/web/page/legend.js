@@ -45,6 +45,11 @@ export class CloudLegend {
     this.axes(camera, w, h);
   }
 
+  /** Show nothing. */
+  clear() {
+    this.pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+  }
+
   /** @param {number} away - m @param {number} zoom @param {number} h @param {string} ink */
   bar(away, zoom, h, ink) {
     const length = roundLength((LONGEST_PX * away) / zoom);

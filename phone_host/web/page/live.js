@@ -1,7 +1,7 @@
 // The pictures of the newest pair: left and right with scan lines, disparity or depth in colours, the cloud.
 
 import { steadyRange } from './depth.js';
-import { byId, data, show } from './dom.js';
+import { byId, data, show, text } from './dom.js';
 import { DepthMap } from './map.js';
 import { Measure } from './measure.js';
 import { pointing } from './pointing.js';
@@ -9,6 +9,7 @@ import { pointing } from './pointing.js';
 /** @typedef {import('./message.js').Pair} Pair */
 
 const NO_WEBGL = 'This browser cannot draw the cloud (no WebGL 2). Everything else works; the cloud can be downloaded.';
+const NO_DEPTH = 'No depth in this run: calibrate, or choose a calibration.';
 
 export class Live {
   /** @param {(from: import('./pointing.js').Spot, to: import('./pointing.js').Spot, done: boolean) => boolean} drag */
@@ -19,6 +20,8 @@ export class Live {
     this.kind = 'depth';
     /** @type {?[number, number]} */
     this.range = null;
+    /** Number of the run whose pairs are shown. */
+    this.begun = 0;
     this.map = new DepthMap(/** @type {HTMLCanvasElement} */ (byId('map')), byId('map-marks'));
     const frames = [byId('map-frame'), byId('left-frame')];
     this.measure = new Measure(byId('readout'), frames);
@@ -50,8 +53,11 @@ export class Live {
 
   /** @param {Pair} pair - its bitmaps are ours from now on */
   show(pair) {
+    if (pair.head.begun < this.begun) return;
+    this.begin(pair.head.begun);
     const old = this.pair;
-    this.pair = { ...pair, left: pair.left ?? old?.left ?? null, right: pair.right ?? old?.right ?? null, grid: pair.grid ?? old?.grid ?? null };
+    const grid = pair.head.range && (pair.grid ?? old?.grid ?? null);
+    this.pair = { ...pair, left: pair.left ?? old?.left ?? null, right: pair.right ?? old?.right ?? null, grid };
     for (const side of /** @type {const} */ (['left', 'right'])) {
       if (!pair[side]) continue;
       paint(/** @type {HTMLCanvasElement} */ (byId(side)), pair[side]);
@@ -61,19 +67,45 @@ export class Live {
     const frame = byId('views');
     data(frame, 'pair', String(pair.head.number));
     data(frame, 'lines', pair.head.way[1] ? 'columns' : 'rows');
-    show(byId('no-pair'), false);
     const aspect = `${pair.head.width} / ${pair.head.height}`;
     if (frame.style.getPropertyValue('--aspect') !== aspect) frame.style.setProperty('--aspect', aspect);
   }
 
+  /** Nothing of an earlier run stays. @param {number} begun - number of the run that is shown from now on */
+  begin(begun) {
+    if (begun === this.begun) return;
+    this.begun = begun;
+    for (const side of /** @type {const} */ (['left', 'right'])) {
+      this.pair?.[side]?.close();
+      wipe(/** @type {HTMLCanvasElement} */ (byId(side)));
+    }
+    this.pair = this.range = null;
+    this.measure.clear();
+    this.draw();
+    delete byId('views').dataset.pair;
+  }
+
+  /** What stands where there is no depth and no cloud. */
+  wait() {
+    const head = this.pair?.head;
+    const isFlat = !!head && !head.range;
+    text(byId('no-pair'), isFlat ? NO_DEPTH : 'No pair yet');
+    show(byId('no-pair'), !head?.range);
+    text(byId('cloud-wait'), isFlat ? NO_DEPTH : 'Metres need a calibration: no cloud yet');
+    show(byId('cloud-wait'), !!head && !head.geometry);
+    if (head?.range) return;
+    this.map.clear();
+    this.cloud?.clear();
+  }
+
   draw() {
     const { pair } = this;
-    if (!pair?.grid) return;
+    this.wait();
+    if (!pair?.grid || !pair.head.range) return;
     const { head, grid } = pair;
     const limits = { near: head.near, far: head.far };
     this.range = steadyRange(this.range, head.range);
     this.map.show(grid, head.geometry, limits, head.geometry ? this.kind : 'disparity', this.range);
-    show(byId('cloud-wait'), !head.geometry);
     if (head.geometry && this.cloud) this.cloud.show(grid, head.geometry, limits, pair.left && /** @type {HTMLCanvasElement} */ (byId('left')), this.range);
   }
 
@@ -82,6 +114,11 @@ export class Live {
     this.kind = kind;
     this.draw();
   }
+}
+
+/** @param {HTMLCanvasElement} canvas */
+function wipe(canvas) {
+  canvas.getContext('2d')?.clearRect(0, 0, canvas.width, canvas.height);
 }
 
 /** @param {HTMLCanvasElement} canvas @param {ImageBitmap} picture */

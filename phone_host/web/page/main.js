@@ -3,7 +3,7 @@
 import { Charts } from './charts.js';
 import { Connection } from './connection.js';
 import { Controls } from './controls.js';
-import { byId, data, say, show, text } from './dom.js';
+import { byId, data, show, text } from './dom.js';
 import { showFigures } from './figures.js';
 import { showGuide } from './guide.js';
 import { Live } from './live.js';
@@ -22,6 +22,9 @@ const LINES = /** @type {Record<import('./connection.js').Line, string>} */ ({
   connecting: 'connecting', open: 'connected', lost: 'connection lost, trying again', refused: 'not allowed',
 });
 
+/** What is shown is old then; it stays, greyed. */
+const LOST = { level: 'unknown', headline: 'Connection lost: what stands here is old. Trying again', concerns: [] };
+
 /** @type {any} */
 let state = null;
 /** The step that was asked for; other fragments, such as that of the skip link, change nothing. */
@@ -38,11 +41,16 @@ const connection = new Connection({
     data(document.body, 'line', line);
     text(byId('online'), LINES[line]);
     show(byId('refused'), line === 'refused');
-    if (line === 'lost') say('Connection lost, trying again.');
+    if (line === 'lost') showTrust({ live: { trust: LOST } });
+    else draw();
   },
   state: (told) => {
     // The step that is right at the start stays until the person goes on: nothing is torn away.
     if (!state && !asked) asked = stepOf(told, '');
+    if (told.begun !== (state?.begun ?? 0)) {
+      charts.clear();
+      live.begin(told.begun);
+    }
     state = told;
     charts.add(told.live?.samples ?? []);
     draw();
@@ -60,7 +68,7 @@ function draw() {
   showTrust(state);
   showSetup(state);
   showGuide(state);
-  showFigures(state.live);
+  showFigures(state.live, charts.delay());
   controls.show(state);
   text(byId('activity'), state.activity);
   data(document.body, 'activity', state.activity);

@@ -89,6 +89,13 @@ export class DepthMap {
     this.pen.putImageData(this.frame, 0, 0);
   }
 
+  /** Show nothing. */
+  clear() {
+    this.pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    this.key = '';
+    this.mark([]);
+  }
+
   /** @param {{at: number, words: string}[]} found */
   mark(found) {
     const labels = JSON.stringify(found);

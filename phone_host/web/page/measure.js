@@ -14,7 +14,7 @@ const HINT = 'Tap the picture: distance. Tap twice: a length.';
 /** What a place is, from the page's own data. @param {Pair} pair @param {Spot} at @returns {string} */
 export function hoverWords(pair, at) {
   const { grid, head } = pair;
-  if (!grid) return HINT;
+  if (!grid) return head.range ? HINT : 'no depth in this run';
   const { d } = cellAt(grid, at.x, at.y);
   if (Number.isNaN(d)) return 'no depth here';
   if (!head.geometry) return `${d.toFixed(2)} px disparity; metres need a calibration`;

@@ -7,13 +7,14 @@
 /**
  * @typedef {object} PairHead
  * @property {number} number
+ * @property {number} begun - number of its run
  * @property {number} width - of the full images, px
  * @property {number} height
  * @property {Part[]} parts
  * @property {?Geometry} geometry
  * @property {?number} near - m
  * @property {?number} far - m
- * @property {[number, number]} range - darkest and brightest disparity, px
+ * @property {?[number, number]} range - darkest and brightest disparity, px; null: a pair without depth
  * @property {[number, number]} way - where a point lies in the right picture, in disparities
  * @property {Record<string, number>} ledger - delays, ms
  */
