@@ -1,7 +1,7 @@
 """Shows a live calibration: on a terminal as a picture that is redrawn, elsewhere as lines that are written once."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -13,7 +13,7 @@ from common.places import make_folder
 from common.program.terminal import say
 from phone_host.calibration.guide.guide import View
 from phone_host.calibration.guide.picture import guide_svg
-from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot
 from phone_host.calibration.guide.text_picture import figure_lines, picture_lines, verdict_lines
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
@@ -89,7 +89,28 @@ class Picture(Redrawn):
         self._views = len(views)
 
 
-class SnapshotFiles:
+class SnapshotValues:
+    """Hands on what guide.json holds, at most four times a second, and at the end.
+
+    Args:
+        take: takes the snapshot and the content of its guide.json.
+    """
+
+    def __init__(self, take: Callable[[GuideSnapshot, Mapping[str, object]], None]) -> None:
+        self._take = take
+        self._due_ns = 0
+
+    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
+        """See Shows."""
+        del views
+        now_ns = now.monotonic_ns()
+        if now_ns < self._due_ns and snapshot.ended is Ended.RUNNING:
+            return
+        self._due_ns = now_ns + _EVERY_NS
+        self._take(snapshot, {**snapshot.as_json(), "note": note})
+
+
+class SnapshotFiles(SnapshotValues):
     """Writes guide.json and guide.svg whenever something has changed, for whoever renders them.
 
     Args:
@@ -100,19 +121,13 @@ class SnapshotFiles:
     """
 
     def __init__(self, folder: Path) -> None:
+        super().__init__(self._write)
         make_folder(folder)
         self._folder = folder
         self._written = ""
-        self._due_ns = 0
 
-    def show(self, snapshot: GuideSnapshot, views: tuple[View, ...], note: str) -> None:
-        """See Shows."""
-        del views
-        now_ns = now.monotonic_ns()
-        if now_ns < self._due_ns and snapshot.ended.value == "running":
-            return
-        self._due_ns = now_ns + _EVERY_NS
-        text = json_text(snapshot.as_json() | {"note": note}, indent=2) + "\n"
+    def _write(self, snapshot: GuideSnapshot, values: Mapping[str, object]) -> None:
+        text = json_text(values, indent=2) + "\n"
         if text == self._written:
             return
         self._written = text

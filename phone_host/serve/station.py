@@ -5,7 +5,7 @@ page ── Source ── Station ─┬ Activities: enrol | check | calibrate |
 └ Program: what the commands do, handed over by `serve`
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Final
 
@@ -15,12 +15,13 @@ from common.link.factory import parse_link
 from common.protocol.enrolment_code import read_code
 from common.words import counted
 from phone_host.boards.enrolment import PairingCall
+from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.doctor.host_doctor import examine
+from phone_host.live.calibration_view import SnapshotValues
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task
-from phone_host.serve.guide_keeper import GuideKeeper
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.program import Choices, Program, ReadyRun
@@ -182,9 +183,9 @@ class Station:
 
         def work(task: Task) -> None:
             ready = self._program.calibration(choices, values)
-            keeper = GuideKeeper(self._memory.guide, self._shelf.tell)
+            shown = SnapshotValues(self._show_guide)
             with task.held(), self._memory.live(ready.live.host.snapshot):
-                ready.run(task.stopped, (keeper,))
+                ready.run(task.stopped, (shown,))
             if task.stopped():
                 views = counted(ready.live.snapshot().views, "view")
                 self._memory.result(f"stopped: {views} taken and kept, nothing computed from them")
@@ -195,6 +196,10 @@ class Station:
             self._memory.calibrated(done)
 
         return self._begun(Activity.CALIBRATING, work, "the calibration begins: show the board to both cameras")
+
+    def _show_guide(self, _snapshot: GuideSnapshot, values: Mapping[str, object]) -> None:
+        self._memory.guide(values)
+        self._shelf.tell()
 
     def _run(self, values: Choices) -> Answer:
         del values
