@@ -59,7 +59,10 @@ class PageSettings:
             SettingsError: it would listen beyond loopback without https.
         """
         if self.credentials is None and not is_loopback(self.host):
-            raise SettingsError(f"{self.host} is reached from other machines", "add --lan, which makes it https")
+            raise SettingsError(
+                f"{self.host} is reached from other machines",
+                "give 127.0.0.1:PORT, or use phone-host serve --lan, which makes it https",
+            )
 
     @property
     def known_as(self) -> frozenset[str]:
