@@ -37,7 +37,8 @@ def test_the_demo_leaves_a_full_and_true_report(tmp_path: Path) -> None:
     assert np.asarray(cv2.imread(str(out / "disparity.png"))).ndim == 3
     page = (out / "index.html").read_text(encoding="utf-8")
     assert page.count("data:image/") >= 3  # left, right, disparity, and depth
-    assert page.count("<script>") == 1
+    assert page.count("<script>") == 2  # the cloud's viewer and the charts, both inlined
+    assert "<script src" not in page
     assert "http://" not in page.replace("http://www.w3.org/", "")
     assert "https://" not in page
 
