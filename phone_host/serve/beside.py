@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -65,7 +66,7 @@ class BesideRun:
         activity = Activity.RUNNING
         if self._has_ended or self._stop.is_set():
             activity = Activity.IDLE if self._has_ended else Activity.ENDING
-        return self._memory.state(activity, self._memory.choices, self._command, ())
+        return replace(self._memory.state(activity, self._memory.choices, self._command), steps=())
 
     def newest(self) -> Newest | None:
         """See Source."""

@@ -28,11 +28,24 @@ def board_choice(found: Found, peers: tuple[Peer, ...]) -> Choice:
         peers: the boards that this machine knows.
     """
     peer = peer_at(peers, found.link)
-    is_strange = needs_keys(parse_link(found.link, listens_by_default=False)) and peer is None
     name = found.name or (found.link if peer is None else peer.name)
-    return Choice(
-        uri=found.link, name=name, note="needs the code that it shows" if is_strange else "", needs_code=is_strange
-    )
+    return Choice(uri=found.link, name=name, note="needs the code that it shows" if stranger(found.link, peers) else "")
+
+
+def stranger(links: str, peers: tuple[Peer, ...]) -> str:
+    """Return the first board that has to be enrolled before this machine may talk to it; empty: there is none.
+
+    Args:
+        links: addresses, with spaces between.
+        peers: the boards that this machine knows.
+
+    Raises:
+        SettingsError: an address is none.
+    """
+    for link in links.split():
+        if needs_keys(parse_link(link, listens_by_default=False)) and peer_at(peers, link) is None:
+            return link
+    return ""
 
 
 def find_cameras() -> tuple[Choice, ...]:

@@ -26,8 +26,8 @@ class Memory:
     def __init__(self, choices: Choices) -> None:
         self._lock = threading.RLock()
         self._choices: Choices = dict(choices)
-        self._boards: tuple[Choice, ...] = ()
-        self._cameras: tuple[Choice, ...] = ()
+        self._boards: tuple[Choice, ...] | None = None
+        self._cameras: tuple[Choice, ...] | None = None
         self._checks: tuple[Checked, ...] = ()
         self._checked: tuple[Choices, str] = ({}, "")
         self._pairs = 0
@@ -66,7 +66,7 @@ class Memory:
 
     def enrolled(self, link: str, name: str) -> None:
         """A board knows this machine now."""
-        others = tuple(board for board in self._boards if board.uri != link)
+        others = tuple(board for board in self._boards or () if board.uri != link)
         self._boards = (Choice(uri=link, name=name), *others)
 
     def checking(self, checks: Sequence[Checked]) -> None:
@@ -137,7 +137,9 @@ class Memory:
         with self._lock:
             self._ask, self._run = None, snapshot
 
-    def state(self, activity: Activity, settings: Choices, command: str, matchers: tuple[str, ...]) -> PageState:
+    def state(
+        self, activity: Activity, settings: Choices, command: str, *, matchers: tuple[str, ...] = (), stranger: str = ""
+    ) -> PageState:
         """Return everything.
 
         Args:
@@ -145,19 +147,30 @@ class Memory:
             settings: the choices, as they may be shown.
             command: the command line that does the same.
             matchers: names of the matchers.
+            stranger: the chosen board that has to be enrolled first.
         """
         with self._lock:
             run = self._fresh()
             same = self._checked[0] == _cameras_of(self._choices)
             facts = Facts(
                 choices=settings,
-                boards=self._boards,
+                stranger=stranger,
                 checked=self._checked[1] if same else "",
                 pairs=self._pairs,
                 is_running=activity is Activity.RUNNING,
             )
             told = steps(facts)
-            here = (activity, told, command, settings, self._boards, self._cameras, self._checks, self._trouble)
+            here = (
+                activity,
+                told,
+                command,
+                settings,
+                self._boards,
+                self._cameras,
+                stranger,
+                self._checks,
+                self._trouble,
+            )
             if here != self._was:
                 self._was, self._changed = here, self._changed + 1
             return PageState(
@@ -167,6 +180,7 @@ class Memory:
                 settings=settings,
                 boards=self._boards,
                 cameras=self._cameras,
+                stranger=stranger,
                 matchers=matchers,
                 run=run,
                 guide=self._guide,

@@ -66,8 +66,13 @@ class Station:
     def state(self) -> PageState:
         """See Source."""
         choices = self._memory.choices
-        command = self._program.command(choices) if choices.get("camera") else ""
-        return self._memory.state(self._activities.now, self._program.shown(choices), command, self._program.matchers)
+        return self._memory.state(
+            self._activities.now,
+            self._program.shown(choices),
+            self._program.command(choices) if choices.get("camera") else "",
+            matchers=self._program.matchers,
+            stranger=self._stranger(choices.get("link", "")),
+        )
 
     def newest(self) -> Newest | None:
         """See Source."""
@@ -105,6 +110,12 @@ class Station:
         """Whether native code still computes a pair that nobody waits for. The process may have to end without it."""
         return self._memory.has_given_up
 
+    def _stranger(self, links: str) -> str:
+        try:
+            return find.stranger(links, self._program.keys.peers())
+        except TandemError:  # a run with these settings says what is wrong
+            return ""
+
     def _find(self, values: Choices) -> Answer:
         del values
         boards, cameras = find.find_boards(self._program.keys), find.find_cameras()
@@ -133,14 +144,16 @@ class Station:
                 return
             peer = call.prove(code, uri.address, lambda: None)
             self._memory.enrolled(uri.address, peer.name)
-            self._choose({"link": uri.address})
+            if uri.address not in self._memory.choices.get("link", "").split():
+                self._choose({"link": uri.address})
 
         return self._begun(Activity.ENROLLING, work, "the board is enrolled", _ANSWER_S)
 
     def _set(self, values: Choices) -> Answer:
         self._choose(values)
+        done = "set" if any(value.strip() for value in values.values()) else "taken back"
         is_busy = self._activities.now is not Activity.IDLE
-        return Answer(words="set; it counts from the next run on: stop, then run" if is_busy else "set")
+        return Answer(words=f"{done}; it counts from the next run on: stop, then run" if is_busy else done)
 
     def _choose(self, changes: Choices) -> None:
         """Change choices and keep them.

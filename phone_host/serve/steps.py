@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from common.words import counted
-from phone_host.web.source import Choice, Step, StepName
+from phone_host.web.source import Step, StepName
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,14 +13,14 @@ class Facts:
 
     Attributes:
         choices: options of `run`, by name.
-        boards: boards that were found.
+        stranger: the chosen board that has to be enrolled first; empty: there is none.
         checked: what the last check of these two cameras came to; empty: there was none, or it failed.
         pairs: how many pairs the last run processed.
         is_running: whether one goes on.
     """
 
     choices: Mapping[str, str]
-    boards: tuple[Choice, ...] = ()
+    stranger: str = ""
     checked: str = ""
     pairs: int = 0
     is_running: bool = False
@@ -31,7 +31,7 @@ def steps(facts: Facts) -> tuple[Step, ...]:
     link, camera = facts.choices.get("link", ""), facts.choices.get("camera", "")
     has_both = bool(link and camera)
     return (
-        _board(link, facts.boards),
+        _board(link, facts.stranger),
         Step(name=StepName.CAMERA, done=bool(camera), words=camera or "choose this machine's camera"),
         _step(
             StepName.CHECK,
@@ -57,9 +57,8 @@ def _step(name: StepName, come_to: str, to_do: str) -> Step:
     return Step(name=name, done=bool(come_to), words=come_to or to_do)
 
 
-def _board(link: str, boards: tuple[Choice, ...]) -> Step:
-    stranger = next((board for board in boards if board.uri in link.split() and board.needs_code), None)
-    if stranger is not None:
+def _board(link: str, stranger: str) -> Step:
+    if stranger:
         words = "run `sudo board-agent pair` on the board and type the code that it shows"
         return Step(name=StepName.BOARD, done=False, words=words)
     return _step(StepName.BOARD, link, "find the board, or type its address")

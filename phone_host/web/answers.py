@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
 from functools import partial
 from typing import BinaryIO, Final, TypeVar
 
@@ -39,7 +40,6 @@ _KINDS: Final = {
 _NOT_YET: Final = Trouble("there is no such thing yet", "start a run and wait for its first pair")
 _NO_DEPTH: Final = Trouble("this run has no depth", "give it a calibration")
 _NOT_SAVED: Final = Trouble("this file was not saved", "see /api/pairs; save pairs with --save-every")
-_BUSY: Final = Trouble("too much is asked for at once", "try again in a moment")
 _NO_COMMAND: Final = Trouble("this is no command", "send JSON as /api/openapi.json describes it")
 _NO_POINTS: Final = Trouble("these are no points", "send JSON as /api/openapi.json describes it")
 _NO_AUTHORITY: Final = Trouble("this page has no certificate", "start it with --lan")
@@ -70,7 +70,8 @@ class Answers:
         self._hub, self._viewers, self._gate, self._files, self._limits = hub, viewers, gate, files, limits
         self._authority = authority
         self._commander = ThreadPoolExecutor(limits.commands + 1, "page command")
-        self._commands = self._downloads = 0
+        self._commands = 0
+        self._downloads = {False: 0, True: 0}
 
     def routes(self) -> list[web.RouteDef]:
         """Return all addresses."""
@@ -130,7 +131,7 @@ class Answers:
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not self._viewers.has_room(is_known=request[KNOWN]):
-            return problem(503, _BUSY, {"Retry-After": "5"})
+            raise web.HTTPServiceUnavailable(headers={"Retry-After": "5"})
         if request.headers.get("Upgrade", "").lower() != "websocket":
             raise web.HTTPBadRequest
         is_near = is_loopback(request.remote or "")
@@ -138,7 +139,7 @@ class Answers:
 
     async def _events(self, request: web.Request) -> web.StreamResponse:
         if not self._viewers.has_room(is_known=request[KNOWN]):
-            return problem(503, _BUSY, {"Retry-After": "5"})
+            raise web.HTTPServiceUnavailable(headers={"Retry-After": "5"})
         return await self._viewers.events(request, is_known=request[KNOWN])
 
     async def _state(self, _request: web.Request) -> web.StreamResponse:
@@ -163,41 +164,43 @@ class Answers:
             return problem(404, _NOT_YET)
         if not has_data(name, newest.result.processed):
             return problem(404, _NO_DEPTH)
-        if self._downloads >= self._limits.downloads:
-            return problem(503, _BUSY, {"Retry-After": "1"})
-        self._downloads += 1
-        try:
+        async with self._place(request):
             data = await self._hub.encoder.file(newest, name)
             headers = _file_headers(name) | {"X-Pair-Number": str(newest.number)}
             return await _send(request, len(data), _blocks(data), headers)
-        finally:
-            self._downloads -= 1
 
-    async def _pairs(self, _request: web.Request) -> web.StreamResponse:
-        if self._downloads >= self._limits.downloads:
-            return problem(503, _BUSY, {"Retry-After": "1"})
-        self._downloads += 1
-        try:
+    async def _pairs(self, request: web.Request) -> web.StreamResponse:
+        async with self._place(request):
             found = await _aside(lambda: saved_pairs(self._hub.source.saved()))
-        finally:
-            self._downloads -= 1
         pairs = [{"number": pair.number, "files": list(pair.files)} for pair in found]
         return _json(json_text({"pairs": pairs}))
 
     async def _saved_file(self, request: web.Request) -> web.StreamResponse:
         number, name = int(request.match_info["number"]), request.match_info["name"]
-        if self._downloads >= self._limits.downloads:
-            return problem(503, _BUSY, {"Retry-After": "1"})
-        self._downloads += 1
         try:
-            file = await _aside(lambda: open_saved(self._hub.source.saved(), number, name))
-            with file:
-                size = await _aside(lambda: file.seek(0, 2))
-                return await _send(request, size, _read(file, size), _file_headers(name))
+            async with self._place(request):
+                file = await _aside(lambda: open_saved(self._hub.source.saved(), number, name))
+                with file:
+                    size = await _aside(lambda: file.seek(0, 2))
+                    return await _send(request, size, _read(file, size), _file_headers(name))
         except FileNotFoundError:
             return problem(404, _NOT_SAVED)
+
+    @asynccontextmanager
+    async def _place(self, request: web.Request) -> AsyncIterator[None]:
+        """Hold one of the places for large answers. Readers without the token never take those of the token's holder.
+
+        Raises:
+            HTTPServiceUnavailable: all are taken.
+        """
+        is_known = request[KNOWN]
+        if self._downloads[is_known] >= self._limits.downloads:
+            raise web.HTTPServiceUnavailable(headers={"Retry-After": "1"})
+        self._downloads[is_known] += 1
+        try:
+            yield
         finally:
-            self._downloads -= 1
+            self._downloads[is_known] -= 1
 
     async def _command(self, request: web.Request) -> web.StreamResponse:
         command = read_command(await _body(request))
@@ -205,7 +208,7 @@ class Answers:
             return problem(400, _NO_COMMAND)
         answer = await self._done(command)
         if answer is None:
-            return problem(503, _BUSY, {"Retry-After": "1"})
+            raise web.HTTPServiceUnavailable(headers={"Retry-After": "1"})
         self._hub.outdate()
         return _json(json_text(answer_values(answer)), 200 if answer.trouble is None else 409)
 

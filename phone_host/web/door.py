@@ -42,7 +42,9 @@ _TROUBLES: Final[Mapping[int, Trouble]] = {
     405: Trouble("this address is not asked in this way", "see /api/openapi.json"),
     408: Trouble("the request took too long", "send it faster"),
     413: Trouble("the request is too long", "send less"),
+    503: Trouble("too much is asked for at once", "try again in a moment"),
 }
+_TOLD_ALONG: Final = ("Allow", "Retry-After")
 _BAD: Final = Trouble("the request could not be read", "see /api/openapi.json")
 _OURS: Final = Trouble("the program itself failed", "see its log")
 
@@ -115,7 +117,7 @@ class Door:
         try:
             return await handler(request)
         except web.HTTPException as error:
-            headers = {"Allow": error.headers["Allow"]} if "Allow" in error.headers else None
+            headers = {name: error.headers[name] for name in _TOLD_ALONG if name in error.headers}
             return problem(error.status, _TROUBLES.get(error.status, _BAD), headers)
         except TandemError as error:
             return problem(409, trouble_of(error))

@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from typing import Final
 
+from common import now
 from phone_host.output.json_text import json_text
 from phone_host.report import run_json
 from phone_host.web.encoder import Encoder
@@ -93,7 +94,7 @@ class Hub:
     def _built(self, *, with_report: bool) -> tuple[StateText, str]:
         state: PageState = self.source.state()
         report = "null" if state.run is None or not with_report else json_text(run_json.build(state.run))
-        return state_text(state, list(self._samples)), report
+        return state_text(state, list(self._samples), now.monotonic_ns()), report
 
     def _told(self) -> None:
         """Note the newest result. Called from threads of the run, which must not wait."""

@@ -63,7 +63,8 @@ def description() -> _Json:
 
 
 def _schemas() -> _Json:
-    choice = _object(uri=_TEXT, name=_TEXT, note=_TEXT, needs_code={"type": "boolean"})
+    choice = _object(uri=_TEXT, name=_TEXT, note=_TEXT)
+    choices = {"type": ["array", "null"], "items": choice}
     step = _object(name={"enum": [each.value for each in StepName]}, done={"type": "boolean"}, words=_TEXT)
     places = {
         "type": "array",
@@ -76,8 +77,9 @@ def _schemas() -> _Json:
         steps={"type": "array", "items": step},
         command=_TEXT,
         settings={"type": "object", "additionalProperties": _TEXT},
-        boards={"type": "array", "items": choice},
-        cameras={"type": "array", "items": choice},
+        boards=choices,
+        cameras=choices,
+        stranger=_TEXT,
         matchers={"type": "array", "items": _TEXT},
         guide={"type": ["object", "null"]},
         trouble={"anyOf": [_ref("Problem"), {"type": "null"}]},

@@ -81,14 +81,14 @@ class Serving:
         """Tell viewers goodbye, and end."""
         assert self._server is not None
         self._server.close()
-        self._hub.close()
-        self._answers.close()
         await self._viewers.close()
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._connections.close()
         await self._runner.cleanup()
+        self._hub.close()  # last: an answer under way still needs it
+        self._answers.close()
 
     def _protocol(self) -> asyncio.Protocol:
         """Make the HTTP protocol of a new connection."""

@@ -85,7 +85,7 @@ class Limits:
         messages_per_s: of a viewer.
         idle_s: how long a connection may take for a request, and how long it may wait between two.
         silent_s: how long a viewer may leave a pair without acknowledgement, or take for a message.
-        downloads: large answers under way at once.
+        downloads: large answers under way at once, of those without the token; as many again for those with it.
         commands: commands under way at once, but for `stop`.
     """
 

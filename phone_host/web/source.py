@@ -57,13 +57,11 @@ class Choice:
         uri: as the command line takes it.
         name: for people.
         note: what is to be known of it, such as "needs its code"; may be empty.
-        needs_code: whether the board wants its enrolment code first.
     """
 
     uri: str
     name: str
     note: str = ""
-    needs_code: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,11 +87,12 @@ class PageState:
 
     Attributes:
         activity: what the program does now.
-        steps: the way to a run.
+        steps: the way to a run; empty: the run was started elsewhere, and nothing can be set here.
         command: the command line that does what the page's choices do; empty: not enough is chosen.
         settings: the choices, by the option's name without dashes, as the command line takes them.
-        boards: boards that were found.
-        cameras: cameras of this machine.
+        boards: boards that were found; None: nobody has looked yet.
+        cameras: cameras of this machine; None likewise.
+        stranger: the chosen board that does not know this machine yet, by its address; empty: there is none.
         matchers: names that `--matcher` takes.
         run: the run, live or the last one; None: there was none.
         guide: the live calibration, as its guide.json has it; None: there was none.
@@ -107,8 +106,9 @@ class PageState:
     steps: tuple[Step, ...] = ()
     command: str = ""
     settings: Mapping[str, str] = field(default_factory=dict)
-    boards: tuple[Choice, ...] = ()
-    cameras: tuple[Choice, ...] = ()
+    boards: tuple[Choice, ...] | None = None
+    cameras: tuple[Choice, ...] | None = None
+    stranger: str = ""
     matchers: tuple[str, ...] = ()
     run: RunSnapshot | None = None
     guide: Mapping[str, object] | None = None

@@ -24,6 +24,10 @@ _RECENT: Final = 60
 """Pairs over which rate and time skew are told while a run goes on."""
 
 
+_SILENT_STEPS: Final = 3
+"""Results that stay away for so many of their intervals are no longer a matter of jitter."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sample:
     """The delays of one pair, for the charts.
@@ -78,12 +82,13 @@ def sample(number: int, ledger: PairLedger, begun: int = 0) -> Sample:
     return Sample(number, ledger.done_ns, json_text(row), begun)
 
 
-def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
+def state_text(state: PageState, samples: Sequence[Sample], now_ns: int) -> StateText:
     """Write a state.
 
     Args:
         state: the state.
         samples: the newest ones, oldest first, of any run; those of the state's run tell the rate.
+        now_ns: the time, host's monotonic clock.
     """
     values: dict[str, object] = {
         "kind": "state",
@@ -91,8 +96,9 @@ def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
         "steps": [{"name": step.name.value, "done": step.done, "words": step.words} for step in state.steps],
         "command": state.command,
         "settings": dict(state.settings),
-        "boards": [_choice(item) for item in state.boards],
-        "cameras": [_choice(item) for item in state.cameras],
+        "boards": _choices(state.boards),
+        "cameras": _choices(state.cameras),
+        "stranger": state.stranger,
         "checks": [
             {"what": each.what, "grade": each.grade, "words": each.words, "remedy": each.remedy}
             for each in state.checks
@@ -106,7 +112,7 @@ def state_text(state: PageState, samples: Sequence[Sample]) -> StateText:
     if state.run is None:
         return StateText(json_text(values | {"live": None})[:-1], "", state.begun)
     own = [item for item in samples if item.begun == state.begun]
-    live = json_text(_live(state.run, own, state.steps))
+    live = json_text(_live(state.run, own, state.steps, now_ns))
     return StateText(f'{json_text(values)[:-1]}, "live": {live[:-1]}, "samples": [', "]}", state.begun)
 
 
@@ -144,23 +150,23 @@ def measured_values(measured: Measured) -> dict[str, object]:
     }
 
 
-def _choice(choice: Choice) -> dict[str, object]:
-    return {"uri": choice.uri, "name": choice.name, "note": choice.note, "needs_code": choice.needs_code}
+def _choices(choices: Sequence[Choice] | None) -> list[dict[str, str]] | None:
+    return None if choices is None else [{"uri": one.uri, "name": one.name, "note": one.note} for one in choices]
 
 
-def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step]) -> dict[str, object]:
+def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step], now_ns: int) -> dict[str, object]:
     """Return what changes all the time, but for the samples."""
     skew_ns = run.delays.spread("time_skew", _RECENT).p50_ns
     return {
         "trust": _trust(run, steps),
         "ended": run.ended,
         "pairs": run.processed,
-        "pairs_per_s": _number(_rate(run, samples)),
+        "pairs_per_s": _number(_rate(run, samples, now_ns)),
         "time_skew_ms": None if run.timeless else _number(skew_ns / 1e6),
         "density": _number(run.images.now.density),
         "link": _link(run),
         "clock": _clock(run),
-        "drops": {": ".join(filter(None, (item.place, item.reason))): item.count for item in unused(run)},
+        "drops": {item.words: item.count for item in unused(run)},
         "sinks": [
             {"name": sink.name, "written": sink.written, "dropped": sink.dropped, "failed": sink.failed}
             for sink in run.sinks
@@ -174,7 +180,7 @@ def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
         return {"level": "unknown", "headline": "No pair has been processed yet.", "concerns": []}
     said = headline(run)
     if said.grade is Grade.GOOD and not run.images.wants_depth:
-        words = f"No depth in this run, only pairs and delays. Next: {_next(steps)}."
+        words = f"No depth in this run, only pairs and delays. {_next(steps)}"
         return {"level": "unknown", "headline": words, "concerns": []}
     return {
         "level": said.grade.value,
@@ -185,17 +191,20 @@ def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
 
 def _next(steps: Sequence[Step]) -> str:
     """Return what leads to depth: the calibration, else the first step that is not done."""
+    if not steps:
+        return "It has no calibration."
     missing = sorted((step for step in steps if not step.done), key=lambda step: step.name is not StepName.CALIBRATION)
-    return missing[0].words if missing else "start a run"
+    return f"Next: {missing[0].words if missing else 'start a run'}."
 
 
-def _rate(run: RunSnapshot, samples: Sequence[Sample]) -> float:
-    """Return results per s: of late while the run goes on, over all of it afterwards."""
+def _rate(run: RunSnapshot, samples: Sequence[Sample], now_ns: int) -> float:
+    """Return results per s: of late while the run goes on, less once they stay away; over all of it afterwards."""
     recent = samples[-_RECENT:]
     if run.ended != "running" or len(recent) < 2 or recent[-1].done_ns <= recent[0].done_ns:
         return run.pairs_per_second
-    steps = recent[-1].number - recent[0].number
-    return steps / ((recent[-1].done_ns - recent[0].done_ns) / 1e9)
+    rate = (recent[-1].number - recent[0].number) / ((recent[-1].done_ns - recent[0].done_ns) / 1e9)
+    silent_s = (now_ns - recent[-1].done_ns) / 1e9
+    return rate if silent_s < _SILENT_STEPS / rate else 1 / silent_s
 
 
 def _link(run: RunSnapshot) -> dict[str, object]:

@@ -16,10 +16,13 @@ from tests.support.samples import LEDGER
 
 SAMPLES = [sample(number, replace(LEDGER, done_ns=number * 100 * MS, time_skew_ns=-MS)) for number in range(200)]
 
+NOW_NS = 19_950 * MS
+"""Shortly after the last sample."""
+
 
 def told(state: PageState, **texts: object) -> dict[str, object]:
     """Return the state as a browser reads it."""
-    read: dict[str, object] = json.loads(whole_text(state_text(state, SAMPLES), SAMPLES, **texts))  # type: ignore[arg-type]
+    read: dict[str, object] = json.loads(whole_text(state_text(state, SAMPLES, NOW_NS), SAMPLES, **texts))  # type: ignore[arg-type]
     return read
 
 
@@ -50,6 +53,14 @@ def test_a_run_has_its_newest_samples() -> None:
     assert live["link"] == {"name": "", "up": False}
 
 
+def test_the_rate_falls_when_pairs_stay_away() -> None:
+    """Ten a second, up to three intervals of silence; then no more than one in the time since the last."""
+    state = PageState(activity=Activity.RUNNING, run=replace(run(5), ended="running"))
+    for silent_s, rate in ((0.25, 10.0), (1.0, 1.0), (20.0, 0.05)):
+        values = json.loads(whole_text(state_text(state, SAMPLES, int((19.9 + silent_s) * 1e9)), SAMPLES))
+        assert values["live"]["pairs_per_s"] == rate
+
+
 def test_a_run_without_pairs_is_not_judged_yet() -> None:
     """Nothing can be said before the first pair; a run that ended without one is bad."""
     state = PageState(activity=Activity.RUNNING, run=replace(run(0), ended="running"))
@@ -76,7 +87,7 @@ def test_samples_of_another_run_do_not_count() -> None:
     later = [sample(200 + k, replace(LEDGER, done_ns=(1200 + k) * 100 * MS), begun=1) for k in range(3)]
     state = PageState(activity=Activity.RUNNING, run=replace(run(3), ended="running"), begun=1)
     for samples, rate in ((SAMPLES + later, 10.0), (SAMPLES, 20.0)):
-        text = state_text(state, samples)
+        text = state_text(state, samples, NOW_NS)
         assert text.begun == 1
         assert json.loads(whole_text(text, ()))["live"]["pairs_per_s"] == rate
 
@@ -86,7 +97,14 @@ def test_without_depth_there_is_no_answer_but_a_next_step() -> None:
     flat = run(5)
     step = Step(name=StepName.CALIBRATION, done=False, words="calibrate")
     others = tuple(Step(name=name, done=name is not StepName.CHECK, words="x") for name in StepName)
-    for steps, words in (((*others, step), "Next: calibrate."), (others, "Next: x."), ((), "Next: start a run.")):
+    done = tuple(replace(each, done=True) for each in others)
+    cases = (
+        ((*others, step), "Next: calibrate."),
+        (others, "Next: x."),
+        (done, "Next: start a run."),
+        ((), "no calibration."),
+    )
+    for steps, words in cases:
         live = told(PageState(activity=Activity.IDLE, run=flat, steps=steps))["live"]
         assert isinstance(live, dict)
         assert live["trust"]["level"] == "unknown"

@@ -18,7 +18,7 @@ from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Re
 from phone_host.output.axes import Axes
 from phone_host.serve import check
 from phone_host.serve.activities import Activities, Task
-from phone_host.serve.find import board_choice
+from phone_host.serve.find import board_choice, stranger
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.shelf import PageSink, Shelf
@@ -29,7 +29,7 @@ from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.page import address_of, own_settings
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import Status, told
-from phone_host.web.source import Activity, Choice, PageState, StepName
+from phone_host.web.source import Activity, PageState, StepName
 from tests.support.run_snapshots import run
 from tests.support.samples import LEDGER
 
@@ -210,8 +210,7 @@ def test_the_steps_lead_from_nothing_to_a_run() -> None:
     assert [step.name for step in nothing] == list(StepName)
     assert not any(step.done for step in nothing)
     both = {"link": "tcp://b:1", "camera": "v4l2:auto"}
-    stranger = (Choice(uri="tcp://b:1", name="b", needs_code=True),)
-    assert "board-agent pair" in steps(Facts(choices=both, boards=stranger))[0].words
+    assert "board-agent pair" in steps(Facts(choices=both, stranger="tcp://b:1"))[0].words
     chosen = steps(Facts(choices=both))
     assert [step.done for step in chosen] == [True, True, False, False, False]
     all_done = steps(Facts(choices={**both, "calibration": "rig.yaml"}, checked="seen", pairs=2))
@@ -232,6 +231,11 @@ def test_choices_are_a_command_line_and_back() -> None:
     assert with_changes(made, {"rectified": "no"}) == {"link": "tcp://a:1 tcp://b:2", "near": "300"}
     assert run_words({"crop": "-1,0,2,2"}) == ["--crop=-1,0,2,2"]
     assert without_depth(made) == {"link": "tcp://a:1 tcp://b:2"}
+    home = str(Path.home())
+    assert with_changes({}, {"calibration": "~/r.yaml", "out": " scan "}) == {
+        "calibration": f"{home}/r.yaml",
+        "out": str(Path("scan").absolute()),
+    }
 
 
 @pytest.mark.parametrize(
@@ -306,10 +310,12 @@ def test_an_address_that_is_none_or_that_others_reach_is_refused(tmp_path: Path)
 def test_a_board_across_the_network_needs_its_code_once() -> None:
     """One on this machine never does; a stranger does; a board that was enrolled has its name."""
     peer = Peer(name="bone", key="k" * 40, added="2026", address="tcp://10.0.0.2:5555")
-    assert board_choice(Found("shed", "tcp://10.0.0.3:5555"), ()).needs_code
-    assert not board_choice(Found("", "tcp://127.0.0.1:5555"), ()).needs_code
+    assert "code" in board_choice(Found("shed", "tcp://10.0.0.3:5555"), ()).note
+    assert board_choice(Found("", "tcp://127.0.0.1:5555"), ()).note == ""
     known = board_choice(Found("", peer.address), (peer,))
-    assert (known.name, known.needs_code) == ("bone", False)
+    assert (known.name, known.note) == ("bone", "")
+    assert stranger(f"ipc:///tmp/x {peer.address}", (peer,)) == ""
+    assert stranger("ipc:///tmp/x tcp://10.0.0.3:5555", ()) == "tcp://10.0.0.3:5555"
 
 
 def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
@@ -329,7 +335,7 @@ def test_the_memory_tells_a_change_once() -> None:
     memory, asked = Memory({"camera": "v4l2:auto"}), []
 
     def state() -> PageState:
-        return memory.state(Activity.IDLE, memory.choices, "", ())
+        return memory.state(Activity.IDLE, memory.choices, "")
 
     assert state().changed == state().changed == 1
     memory.fail(Trouble("a", "b"))

@@ -46,7 +46,7 @@ MS = 1_000_000
 PERIOD_S = 4.0
 
 BOARDS = (
-    Choice(uri="tcp://192.168.7.2:5555", name="beagle-4f2a", note="needs its code", needs_code=True),
+    Choice(uri="tcp://192.168.7.2:5555", name="beagle-4f2a", note="needs its code"),
     Choice(uri="tcp://192.168.1.40:5555", name="beagle-09c1"),
 )
 CAMERAS = (
@@ -85,8 +85,10 @@ class Played:
     activity: Activity = Activity.IDLE
     settings: dict[str, str] = field(default_factory=dict)
     done: set[StepName] = field(default_factory=set)
-    boards: tuple[Choice, ...] = BOARDS
-    cameras: tuple[Choice, ...] = CAMERAS
+    boards: tuple[Choice, ...] | None = BOARDS
+    cameras: tuple[Choice, ...] | None = CAMERAS
+    stranger: str = BOARDS[0].uri
+    steps: tuple[StepName, ...] = tuple(StepName)
     guide: GuideSnapshot | None = None
     trouble: Trouble | None = None
     concerns: tuple[Concern, ...] = ()
@@ -137,7 +139,7 @@ class Played:
             StepName.CALIBRATION: "show the printed board to both cameras, or choose a rig.yaml",
             StepName.RUN: "start the run",
         }
-        steps = tuple(Step(name=name, done=name in self.done, words=words[name]) for name in StepName)
+        steps = tuple(Step(name=name, done=name in self.done, words=words[name]) for name in self.steps)
         options = " ".join(f"--{name} {value}" for name, value in sorted(self.settings.items()))
         return PageState(
             activity=self.activity,
@@ -146,6 +148,7 @@ class Played:
             settings=dict(self.settings),
             boards=self.boards,
             cameras=self.cameras,
+            stranger=self.stranger if self.settings.get("link") == self.stranger else "",
             matchers=("tandem", "tandem-fast", "sgbm"),
             run=run,
             guide=None if self.guide is None else self.guide.as_json(),
@@ -170,11 +173,14 @@ class Played:
         match command.do:
             case Do.SET:
                 kept = {name: value for name, value in (self.settings | dict(command.values)).items() if value}
-                self.change(settings=kept)
+                if Do.SET not in self.answers:
+                    self.change(settings=kept)
             case Do.RUN:
                 self.change(activity=Activity.RUNNING, begun=self.begun + 1)
             case Do.STOP:
                 self.change(activity=Activity.IDLE)
+            case Do.ENROL:
+                self.change(stranger="")
             case Do.CALIBRATE:
                 self.change(activity=Activity.CALIBRATING)
             case _:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from common import now
+from phone_host.measure.trouble import Trouble
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
-from phone_host.web.source import Activity, Command, Do
+from phone_host.web.source import Activity, Answer, Command, Do
 from tests.web.conftest import LAPTOP, PHONE, TOKEN, Complaints, Opener
 from tests.web.played import Played, playing, rendered, true_depth
 
@@ -202,14 +203,13 @@ def test_a_reload_in_the_middle_and_a_second_viewer_lose_nothing(running: Played
 
 
 def test_the_page_comes_back_with_the_host(running: Played, opened: Opener, server: PageServer) -> None:
-    """When the host ends, the page says so; when it is back at the same place, pairs go on without a touch."""
+    """When the host ends, the page says that it ended; when it is back at the same place, pairs go on without a touch."""
     page = opened("run")
     shows(page, 0)
     server.stop()
-    page.wait_for_selector("body[data-line=lost]")
-    assert "trying again" in page.text_content("#online")
+    page.wait_for_selector("body[data-line=ended]")
     page.wait_for_selector("#trust[data-level=unknown]")
-    assert "Connection lost" in page.text_content("#headline")
+    assert "The program has ended" in page.text_content("#headline")
     assert page.evaluate("() => getComputedStyle(document.querySelector('.stage')).opacity") == "0.45"
     again = PageServer(running, PageSettings(port=server.port, token=TOKEN))
     again.start()
@@ -270,6 +270,39 @@ def test_range_and_crop_are_set_typed_or_drawn(running: Played, opened: Opener) 
     page.click("#crop-clear")
     page.wait_for_selector("#crop-clear", state="hidden")
     assert "crop" not in running.settings
+
+
+def test_what_is_refused_stays_to_be_mended(running: Played, opened: Opener) -> None:
+    """The field keeps what was typed and is marked; once it is right, the mark goes. Escape ends the drawing of a crop."""
+    page = opened("run")
+    shows(page, 0)
+    running.answers[Do.SET] = Answer(trouble=Trouble("--near '1 mile' is no length", "give mm, cm or m"))
+    page.fill("#near", "1 mile")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#near[aria-invalid=true]")
+    running.emit()
+    shows(page, 1)
+    assert page.input_value("#near") == "1 mile"
+    del running.answers[Do.SET]
+    page.fill("#near", "300")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#near[aria-invalid=false]")
+    page.click("#crop-draw")
+    page.wait_for_selector("#crop-draw[aria-pressed=true]")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("#crop-draw[aria-pressed=false]")
+
+
+def test_a_page_beside_a_run_has_nothing_to_set(running: Played, opened: Opener) -> None:
+    """Neither steps nor settings: only Stop and a snapshot. When the run is over, nothing offers to start another."""
+    running.change(steps=())
+    page = opened("board")
+    shows(page, 0)
+    for there in ("nav", ".settings", "#panel-board"):
+        assert page.locator(there).is_hidden()
+    assert page.text_content("#go") == "Stop"
+    running.change(activity=Activity.IDLE)
+    page.wait_for_selector("#go", state="hidden")
 
 
 @pytest.mark.usefixtures("running")

@@ -100,7 +100,7 @@ def test_from_nothing_to_true_depth_on_the_page_alone(browser: Any, wall: Path, 
             shown.click("#go")
             shown.wait_for_function("() => document.querySelector('#go').textContent === 'Start'")
         assert ours.stop() == 0
-        shown.wait_for_selector("body[data-line=lost]")
+        shown.wait_for_selector("body[data-line=ended]")
     assert errors == []
     shown.close()
 
@@ -129,5 +129,7 @@ def test_the_pairs_on_the_page_beside_a_run_are_pairs(browser: Any, tmp_path: Pa
         assert len(set(seen)) == 6
         shown.wait_for_selector("#trust[data-level=bad], #trust[data-level=warning]")  # twice the same image
         assert "same" in shown.text_content("#trust").lower()
-        assert running.stop() == 0
+        running.stop(signal.SIGKILL)
+        shown.wait_for_selector("body[data-line=lost]")
+        assert "Connection lost" in shown.text_content("#headline")
     shown.close()

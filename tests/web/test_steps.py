@@ -3,6 +3,7 @@
 import hashlib
 import shutil
 import subprocess
+import time
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,14 @@ def asked(program: Played) -> list[tuple[Do, dict[str, str]]]:
     return [(command.do, dict(command.values)) for command in program.commands]
 
 
+def until_asked(program: Played, do: Do) -> None:
+    """Wait until the page has asked for something."""
+    deadline = time.monotonic() + 30
+    while do not in [command.do for command in program.commands]:
+        assert time.monotonic() < deadline, program.commands
+        time.sleep(0.02)
+
+
 def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, complaints: Complaints) -> None:
     """Board with its code, camera, check, calibration, run: every press is one command, done steps are ticked, the next one is offered."""
     page = opened()
@@ -32,6 +41,7 @@ def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, c
     assert page.get_attribute("#command-copy", "aria-disabled") == "true"
     page.check(f"input[value='{BOARDS[0].uri}']")
     assert "sudo board-agent pair" in page.text_content("#enrol label")
+    page.wait_for_selector("#enrol[open]")  # the chosen board does not know this machine
     assert page.get_attribute("#enrol-code", "inputmode") == "numeric"
     page.fill("#enrol-code", f"{read_code('204 719'):06}")
     page.press("#enrol-code", "Enter")
@@ -40,6 +50,7 @@ def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, c
         (Do.SET, {"link": BOARDS[0].uri}),
         (Do.ENROL, {"link": BOARDS[0].uri, "code": "204719"}),
     ]
+    page.wait_for_selector("#enrol:not([open])")
     program.change(done={StepName.BOARD})
     page.click("#panel-board a.next")
     page.check(f"input[value='{CAMERAS[1].uri}']")
@@ -48,7 +59,7 @@ def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, c
     program.change(done={StepName.BOARD, StepName.CAMERA})
     page.click("#panel-camera a.next")
     page.click("#check-go")
-    page.wait_for_function("() => document.querySelector('#check-answer').textContent === 'Check: done.'")
+    until_asked(program, Do.CHECK)
     program.change(done={StepName.BOARD, StepName.CAMERA, StepName.CHECK})
     page.click("#panel-check a.next")
     page.fill("#board-square", "30mm")
@@ -84,6 +95,22 @@ def test_what_went_wrong_is_said_with_what_to_do(program: Played, opened: Opener
     program.change(trouble=Trouble("the camera has gone", "plug it in again"))
     page.wait_for_selector("#trouble:not([hidden])")
     assert page.text_content("#trouble") == "The camera has gone. Plug it in again."
+
+
+def test_nothing_is_claimed_that_nobody_looked_for(program: Played, opened: Opener) -> None:
+    """Before anybody has looked, the page says so; addresses are shown as they are typed, to be copied."""
+    program.change(boards=None, cameras=(), settings={"link": "tcp://10.0.0.9:5555"}, stranger="tcp://10.0.0.9:5555")
+    page = opened("board")
+    page.wait_for_selector("#enrol[open]")  # a typed address, too, leads to the code
+    assert page.text_content("#link-none") == "Nobody has looked yet: press Find."
+    program.answers[Do.FIND] = Answer(words="found 0 boards and 0 cameras")
+    page.click("#link-find")
+    page.wait_for_selector("#link-answer:has-text('Found 0 boards')")
+    page.click("#step-camera")
+    assert page.text_content("#camera-none").startswith("None. ")
+    program.change(trouble=Trouble("tcp://10.0.0.9:5555 does not answer", "see /etc/hosts"))
+    page.wait_for_selector("#trouble:not([hidden])")
+    assert page.text_content("#trouble") == "tcp://10.0.0.9:5555 does not answer. See /etc/hosts"
 
 
 def test_the_skip_link_changes_no_step(opened: Opener) -> None:

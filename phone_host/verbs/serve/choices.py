@@ -1,8 +1,10 @@
 """The page's choices are options of `phone-host run` by name. They become a command line, and are read by what reads command lines."""
 
 import argparse
+import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Final, NoReturn
 
 from common.errors import SettingsError
@@ -17,6 +19,9 @@ _NOT_CHOSEN: Final = frozenset(
     {"help", "version", "config", "json", "debug", "serve", "open", "keys", "log-level", "wait"}
 )
 """Options of `run` that are not the page's: what concerns this program as a whole, and what a page cannot be asked."""
+
+_PLACES: Final = frozenset({"calibration", "out"})
+"""Options that name a file or folder."""
 
 _SHORT: Final = frozenset({"link", "camera", "board-side", "tolerance", "fifo", "max-megapixels"})
 """What a run without depth needs."""
@@ -62,7 +67,7 @@ def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict
         if name not in declared or name in _NOT_CHOSEN:
             raise SettingsError(f"{name!r} is no option of a run that the page can set", "see phone-host run --help")
         made.pop(name, None)
-        kept = value.strip()
+        kept = placed(value) if name in _PLACES else value.strip()
         if _is_switch(declared[name]):
             if kept.lower() not in _YES | _NO:
                 raise SettingsError(f"{name} is {value!r}", "give yes or no")
@@ -70,6 +75,16 @@ def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict
         if kept:
             made[name] = kept
     return made
+
+
+def placed(path: str) -> str:
+    """Return a path as it stays right wherever the program is started next: absolute, with ~ for the home folder.
+
+    Args:
+        path: as it was typed; empty: none.
+    """
+    typed = path.strip()
+    return str(Path(os.path.expanduser(typed)).absolute()) if typed else ""  # noqa: PTH111 - Path's own raises without a home
 
 
 def run_words(choices: Mapping[str, str]) -> list[str]:

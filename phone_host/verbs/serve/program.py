@@ -27,7 +27,14 @@ from phone_host.verbs.calibrate.earlier import Asked, asked_of
 from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place
 from phone_host.verbs.calibrate.live import PreparedViews, prepare_views
 from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
-from phone_host.verbs.serve.choices import calibrate_options, run_options, run_words, with_changes, without_depth
+from phone_host.verbs.serve.choices import (
+    calibrate_options,
+    placed,
+    run_options,
+    run_words,
+    with_changes,
+    without_depth,
+)
 from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.places import data_folder, snapshot_folder
 from phone_host.verbs.stereo_options import refuse_rejected
@@ -78,8 +85,8 @@ class Commands:
         new = with_changes(choices, {name: value for name, value in changes.items() if value != shown.get(name)})
         options = self._options(new)
         checked(options)
-        rig = changes.get("calibration")
-        if rig and "rectified" not in new:
+        rig = new.get("calibration")
+        if rig and changes.get("calibration") and "rectified" not in new:
             refuse_rejected(read_own_rig(Path(rig)), rig, allowed=options.use_rejected_rig)
         return new
 
@@ -126,7 +133,7 @@ class Commands:
         for name, value in given.items():
             for each in value.split() if name == "link" else [value]:
                 words += [f"--{name}", each]
-        out = Path(values.get("out") or data_folder() / _RIG)
+        out = Path(placed(values.get("out", "")) or data_folder() / _RIG)
         options = calibrate_options(["--live", "--no-sound", *words, "--out", str(out)])
         asked = asked_of(options)
         require_rig_place(out)

@@ -166,8 +166,11 @@ export class Chart {
 
   /** @param {Column[]} values - times, s, then a column for each line */
   set(values) {
+    const [old] = this.values;
     this.values = values;
-    this.draw();
+    const shown = this.plot?.scales.x;
+    const isZoomed = shown && (shown.min > Number(old[0]) || shown.max < Number(old[old.length - 1])) && shown.max > Number(values[0][0]);
+    this.draw(isZoomed);
   }
 
   /** @param {boolean} on */
@@ -176,14 +179,16 @@ export class Chart {
     if (this.plot) this.make();
   }
 
-  draw() {
+  /** @param {boolean} [isZoomed] - whether a part was chosen, which stays */
+  draw(isZoomed = false) {
     if (this.values[0].length < 2) {
       this.plot?.destroy();
       this.plot = null;
       return;
     }
     if (!this.seen || !this.place.clientWidth) return;
-    if (this.plot) this.plot.setData(this.data());
-    else this.make();
+    if (!this.plot) this.make();
+    else if (isZoomed) this.renew();
+    else this.plot.setData(this.data());
   }
 }

@@ -3,7 +3,10 @@
 import { decode, split } from './message.js';
 import { token } from './token.js';
 
-/** @typedef {'connecting' | 'open' | 'lost' | 'refused'} Line */
+/** @typedef {'connecting' | 'open' | 'lost' | 'ended' | 'refused'} Line */
+
+/** What a server says that ends (RFC 6455, section 7.4.1). */
+const GOING_AWAY = 1001;
 
 const FIRST_WAIT_MS = 400;
 const MOST_WAIT_MS = 4000;
@@ -25,6 +28,7 @@ export class Connection {
     /** @type {?WebSocket} */
     this.socket = null;
     this.wanted = '';
+    this.hasEnded = false;
     this.open();
   }
 
@@ -34,6 +38,7 @@ export class Connection {
     this.socket = socket;
     socket.addEventListener('open', () => {
       this.wait = FIRST_WAIT_MS;
+      this.hasEnded = false;
       this.told.line('open');
       if (this.wanted) socket.send(this.wanted);
     });
@@ -41,7 +46,7 @@ export class Connection {
       if (typeof data === 'string') this.text(JSON.parse(data));
       else this.pair(data);
     });
-    socket.addEventListener('close', () => this.closed());
+    socket.addEventListener('close', ({ code }) => this.closed(code));
   }
 
   /** @param {any} message */
@@ -71,9 +76,10 @@ export class Connection {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(wanted);
   }
 
-  /** A socket does not say why it was closed: a plain request does. */
-  async closed() {
-    let line = /** @type {Line} */ ('lost');
+  /** A socket that was never open does not say why: a plain request does. @param {number} code */
+  async closed(code) {
+    if (code === GOING_AWAY) this.hasEnded = true;
+    let line = /** @type {Line} */ (this.hasEnded ? 'ended' : 'lost');
     try {
       const answer = await fetch('/api/state', { cache: 'no-store' });
       if (answer.status === 401 || answer.status === 403) line = 'refused';
@@ -111,3 +117,9 @@ export async function post(path, body) {
 
 /** Give a command. @param {string} name @param {Record<string, string>} [values] @returns {Promise<{words?: string, problem?: string, remedy?: string}>} */
 export const command = (name, values = {}) => post('/api/command', { do: name, values });
+
+/** Begin something. The state shows that it goes on; words would outlive it. @param {string} name @param {Record<string, string>} [values] @returns {Promise<{problem?: string, remedy?: string}>} */
+export async function begin(name, values = {}) {
+  const answer = await command(name, values);
+  return answer.problem ? answer : {};
+}

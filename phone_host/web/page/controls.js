@@ -1,6 +1,6 @@
 // What steers a run: start and stop, snapshot, matcher, near and far, crop.
 
-import { command } from './connection.js';
+import { begin, command } from './connection.js';
 import { byId, data, follow, onPress, options, show, tell, text } from './dom.js';
 
 /** @typedef {import('./pointing.js').Spot} Spot */
@@ -29,12 +29,16 @@ export class Controls {
     this.size = size;
     this.drawing = false;
     this.answer = byId('run-answer');
-    onPress(byId('go'), () => command(this.isRunning() ? 'stop' : 'run'), this.answer);
+    onPress(byId('go'), () => (this.isRunning() ? command('stop') : begin('run')), this.answer);
     onPress(byId('snapshot'), () => command('snapshot'), this.answer);
     byId('matcher').addEventListener('change', (event) => this.set('matcher', /** @type {HTMLSelectElement} */ (event.target).value));
     for (const name of NAMES) this.field(name);
     byId('crop-draw').addEventListener('click', () => this.draw(!this.drawing));
-    byId('crop-clear').addEventListener('click', () => this.set('crop', ''));
+    document.addEventListener('keydown', (event) => event.key === 'Escape' && this.drawing && this.draw(false));
+    byId('crop-clear').addEventListener('click', () => {
+      this.draw(false);
+      this.set('crop', '');
+    });
   }
 
   isRunning() {
@@ -52,7 +56,8 @@ export class Controls {
   /** @param {string} name @param {string} value */
   async set(name, value) {
     const answer = await command('set', { [name]: value });
-    data(byId(name), 'dirty', 'no');
+    // What was refused stays as it was typed, to be mended.
+    data(byId(name), 'dirty', answer.problem ? 'yes' : 'no');
     byId(name).setAttribute('aria-invalid', String(!!answer.problem));
     tell(this.answer, answer);
     if (this.state()) this.show(this.state());
@@ -63,7 +68,8 @@ export class Controls {
     this.drawing = on;
     byId('crop-draw').setAttribute('aria-pressed', String(on));
     data(byId('views'), 'drawing', on ? 'yes' : 'no');
-    if (on) tell(this.answer, { words: 'Draw a rectangle on the depth or the left picture' });
+    tell(this.answer, { words: on ? 'draw a rectangle on the depth or the left picture' : '' });
+    if (!on && this.state()) this.show(this.state());
   }
 
   /** @param {Spot} from @param {Spot} to @param {boolean} done @returns {boolean} whether the pointer draws now */
@@ -96,6 +102,7 @@ export class Controls {
   show(state) {
     const running = this.isRunning();
     text(byId('go'), running ? 'Stop' : 'Start');
+    show(byId('go'), running || state.steps.length > 0);
     data(byId('go'), 'running', running ? 'yes' : 'no');
     byId('snapshot').setAttribute('aria-disabled', String(!running));
     const names = state.matchers.map((/** @type {string} */ name) => ({ value: name, words: name }));

@@ -106,9 +106,8 @@ export function tell(place, answer) {
   if (words.trim()) say(words);
 }
 
-/** With a capital letter and a full stop. @param {string} words @returns {string} */
+/** With a capital letter and a full stop, but for addresses and file names: those stay as they are typed. @param {string} words @returns {string} */
 export function sentence(words) {
-  if (!words) return '';
-  const whole = words[0].toUpperCase() + words.slice(1);
-  return /[.!?:]$/.test(whole) ? whole : `${whole}.`;
+  const whole = words.replace(/^[a-z](?=[a-z'-]*([\s,;]|:\s|$))/, (first) => first.toUpperCase());
+  return !words || /[.!?:]$|\S[/:.\\]\S*$/.test(whole) ? whole : `${whole}.`;
 }

@@ -66,7 +66,9 @@ export class Live {
     this.draw();
     const frame = byId('views');
     data(frame, 'pair', String(pair.head.number));
-    data(frame, 'lines', pair.head.way[1] ? 'columns' : 'rows');
+    const lines = !pair.head.range ? 'none' : pair.head.way[1] ? 'columns' : 'rows';
+    data(frame, 'lines', lines);
+    text(byId('pictures-words'), lines === 'none' ? 'As the cameras see it: nothing is rectified in this run' : 'Rectified: a point lies on the same line in both');
     const aspect = `${pair.head.width} / ${pair.head.height}`;
     if (frame.style.getPropertyValue('--aspect') !== aspect) frame.style.setProperty('--aspect', aspect);
   }

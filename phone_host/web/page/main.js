@@ -19,11 +19,13 @@ const HZ = 10;
 const WIDTHS_PX = [320, 480, 640, 960, 1280];
 const WIDE = matchMedia('(min-width: 900px)');
 const LINES = /** @type {Record<import('./connection.js').Line, string>} */ ({
-  connecting: 'connecting', open: 'connected', lost: 'connection lost, trying again', refused: 'not allowed',
+  connecting: 'connecting', open: 'connected', lost: 'connection lost, trying again', ended: 'the program has ended', refused: 'not allowed',
 });
 
 /** What is shown is old then; it stays, greyed. */
-const LOST = { level: 'unknown', headline: 'Connection lost: what stands here is old. Trying again', concerns: [] };
+const OLD = /** @type {Record<string, string>} */ ({
+  lost: 'Connection lost: what stands here is old. Trying again', ended: 'The program has ended: what stands here is what it showed last',
+});
 
 /** @type {any} */
 let state = null;
@@ -41,7 +43,7 @@ const connection = new Connection({
     data(document.body, 'line', line);
     text(byId('online'), LINES[line]);
     show(byId('refused'), line === 'refused');
-    if (line === 'lost') showTrust({ live: { trust: LOST } });
+    if (OLD[line]) showTrust({ live: { trust: { level: 'unknown', headline: OLD[line], concerns: [] } } });
     else draw();
   },
   state: (told) => {

@@ -1,9 +1,15 @@
 // The steps before a run: board, camera, check, calibration. Choices become options of the command line (`set`), shown below to copy.
 
-import { command } from './connection.js';
+import { begin, command } from './connection.js';
 import { byId, data, follow, keep, make, onPress, sentence, show, tell, text } from './dom.js';
 
-/** @typedef {{uri: string, name: string, note: string, needs_code: boolean}} Choice */
+/** @typedef {{uri: string, name: string, note: string}} Choice */
+
+const NONE = {
+  link: 'None. Plug the board in, or bring it into the same network.',
+  camera: "None. A phone's camera app that serves MJPEG works by its address.",
+};
+const NOT_LOOKED = 'Nobody has looked yet: press Find.';
 
 /** Give a command and show what became of it. @param {HTMLElement} place @param {string} name @param {Record<string, string>} [values] */
 async function ask(place, name, values) {
@@ -20,8 +26,9 @@ function radio(choice, option, answer) {
   return make('label', 'choice', input, make('span', 'name'), make('code'), make('span', 'note'));
 }
 
-/** @param {string} option @param {Choice[]} choices @param {string} chosen */
-function showChoices(option, choices, chosen) {
+/** @param {'link' | 'camera'} option @param {?Choice[]} found - null: nobody has looked yet @param {string} chosen */
+function showChoices(option, found, chosen) {
+  const choices = found ?? [];
   const list = byId(`${option}-choices`);
   keep(list, choices, (one) => one.uri, (one) => radio(one, option, byId(`${option}-answer`)), (label, one) => {
     const [input, name, uri, note] = /** @type {[HTMLInputElement, Element, Element, HTMLElement]} */ ([...label.children]);
@@ -32,6 +39,7 @@ function showChoices(option, choices, chosen) {
     show(note, !!one.note);
   });
   show(byId(`${option}-none`), choices.length === 0);
+  text(byId(`${option}-none`), found ? NONE[option] : NOT_LOOKED);
   follow(byId(`${option}-typed`), choices.some((one) => one.uri === chosen) ? '' : chosen);
 }
 
@@ -58,12 +66,19 @@ function showChecks(checks) {
   );
 }
 
+/** The board that was strange when the field was last opened or closed for it. */
+let stranger = '';
+
+/** The board that takes a code: one that is reached over a network. @param {any} state @returns {string} */
+const boardOf = (state) => state.stranger || (state.settings.link ?? '').split(' ').find((/** @type {string} */ link) => link.startsWith('tcp://')) || '';
+
 /** @param {any} state */
 export function showSetup(state) {
   showChoices('link', state.boards, state.settings.link ?? '');
   showChoices('camera', state.cameras, state.settings.camera ?? '');
-  const board = state.boards.find((/** @type {Choice} */ one) => one.uri === state.settings.link);
-  show(byId('enrol'), !!board?.needs_code);
+  show(byId('enrol'), !!boardOf(state));
+  // A board that forgot this machine asks again: the field stays at hand.
+  if (state.stranger !== stranger) /** @type {HTMLDetailsElement} */ (byId('enrol')).open = !!(stranger = state.stranger);
   text(byId('check-words'), state.activity === 'checking' ? 'Looking at the machine, the board and both cameras \u2026' : '');
   showChecks(state.checks ?? []);
   text(byId('calibrate-go'), state.activity === 'calibrating' ? 'Stop' : 'Start live calibration');
@@ -82,14 +97,14 @@ export function connectSetup(current) {
       field.blur();
     });
   }
-  onPress(byId('find'), () => command('find'), byId('link-answer'));
-  byId('enrol').addEventListener('submit', (event) => {
+  for (const option of ['link', 'camera']) onPress(byId(`${option}-find`), () => command('find'), byId(`${option}-answer`));
+  byId('enrol-form').addEventListener('submit', (event) => {
     event.preventDefault();
     const code = /** @type {HTMLInputElement} */ (byId('enrol-code'));
-    ask(byId('link-answer'), 'enrol', { link: current().settings.link ?? '', code: code.value.trim() });
+    ask(byId('link-answer'), 'enrol', { link: boardOf(current()), code: code.value.trim() });
     code.value = '';
   });
-  onPress(byId('check-go'), () => command('check'), byId('check-answer'));
+  onPress(byId('check-go'), () => begin('check'), byId('check-answer'));
   onPress(byId('calibrate-go'), () => calibrate(current()), byId('calibration-answer'));
   onPress(byId('command-copy'), () => copy(byId('command').textContent ?? ''), byId('command-answer'));
 }
@@ -98,7 +113,7 @@ export function connectSetup(current) {
 function calibrate(state) {
   if (state.activity === 'calibrating') return command('stop');
   const value = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (byId(id)).value.trim();
-  return command('calibrate', { board: value('board-kind') || 'auto', square: value('board-square') });
+  return begin('calibrate', { board: value('board-kind') || 'auto', square: value('board-square') });
 }
 
 /** @param {string} words */

@@ -6,7 +6,7 @@ export const STEPS = /** @type {const} */ (['board', 'camera', 'check', 'calibra
 
 /** The step to show: the one asked for, else the run if there is one, else the first that is not done. @param {any} state @param {string} asked */
 export function stepOf(state, asked) {
-  if (STEPS.some((name) => name === asked)) return asked;
+  if (state.steps.some((/** @type {any} */ step) => step.name === asked)) return asked;
   if (state.activity === 'running' || state.activity === 'ending') return 'run';
   if (state.activity === 'calibrating') return 'calibration';
   return state.steps.find((/** @type {any} */ step) => !step.done)?.name ?? 'run';
@@ -29,6 +29,7 @@ export function showSteps(state, shown) {
     if (words && step) text(words, sentence(step.words));
   }
   data(document.body, 'step', shown);
+  data(document.body, 'beside', names.length ? 'no' : 'yes');
   const next = names[names.indexOf(shown) + 1];
   for (const link of /** @type {NodeListOf<HTMLAnchorElement>} */ (document.querySelectorAll('a.next'))) {
     show(link, !!next && !!state.steps.find((/** @type {any} */ step) => step.name === shown)?.done);

@@ -11,7 +11,8 @@ const SIGNS = /** @type {Record<string, string>} */ ({ good: '\u2713', warning: 
 export function before(state) {
   if (state.activity === 'running') return { level: 'unknown', headline: 'No pair has been processed yet', concerns: [] };
   const next = state.steps.find((/** @type {any} */ step) => !step.done);
-  return { level: 'unknown', headline: next ? `No depth yet. Next: ${next.words}` : 'No depth yet. Everything is set: start a run', concerns: [] };
+  const todo = state.trouble ? 'Read what went wrong' : next ? `Next: ${next.words}` : state.steps.length ? 'Everything is set: start a run' : 'The run has ended';
+  return { level: 'unknown', headline: `No depth yet. ${todo}`, concerns: [] };
 }
 
 /** @param {any} state */
