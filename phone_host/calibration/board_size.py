@@ -115,7 +115,7 @@ def size_seen(grey: Image) -> Size | None:
     Returns:
         The two counts, the larger first. It may be a part of the board.
     """
-    return _size_of(_lattice(_searched(grey)))
+    return _size_of(_lattice(small_for_sizes(grey)))
 
 
 def whole_size_seen(grey: Image) -> Size | None:
@@ -130,7 +130,7 @@ def whole_size_seen(grey: Image) -> Size | None:
     Returns:
         The two counts, the larger first.
     """
-    small = _searched(grey)
+    small = small_for_sizes(grey)
     grid = _lattice(small)
     size = _size_of(grid)
     if size is None:
@@ -141,7 +141,12 @@ def whole_size_seen(grey: Image) -> Size | None:
     return size if all((levels > limit).mean() >= _LEAST_MARGIN for levels in margins) else None
 
 
-def _searched(grey: Image) -> Image:
+def small_for_sizes(grey: Image) -> Image:
+    """Return an image as small as it is searched for a board of unknown size.
+
+    Args:
+        grey: (H, W) uint8.
+    """
     return shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))[0]
 
 
@@ -356,7 +361,7 @@ def _seen_in(path: Path, most_pixels: int, way: int) -> _Seen | None:
     image = _small(path, most_pixels)
     if image is None:
         return None
-    small = _searched(image)
+    small = small_for_sizes(image)
     return _Seen(small, _size_of(_lattice(small, way)))
 
 

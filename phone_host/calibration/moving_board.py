@@ -4,15 +4,15 @@ What it finds is good to half a pixel, which tells whether a view is wanted and 
 anew, as `calibrate` does it in files.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from typing import Final
 
 import cv2
 import numpy as np
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.board_fits import Size
-from phone_host.calibration.board_size import Vote, size_text, whole_size_seen
+from phone_host.calibration.board_fits import ENOUGH, Fits, Size
+from phone_host.calibration.board_size import Vote, size_text, small_for_sizes, whole_size_seen
 from phone_host.calibration.marks_seen import find_marks, require_marks
 from phone_host.calibration.small_picture import shrunk
 from phone_host.calibration.target import Board, Corners, agree, find_corners, order_by_colour
@@ -101,6 +101,7 @@ class SizeFinder:
     def __init__(self, square_m: float) -> None:
         self._square_m = square_m
         self._vote = Vote(0, Counter())
+        self._seen: deque[Image] = deque(maxlen=ENOUGH)
 
     def find(self, left: Image, right: Image) -> Board | None:
         """Look at a pair; return the board once enough of them agree.
@@ -114,9 +115,12 @@ class SizeFinder:
         """
         sizes = side_by_side(whole_size_seen, (left, right))
         self._vote = Vote(self._vote.asked + 2, self._vote.sizes + Counter(size for size in sizes if size is not None))
+        self._seen.extend(small_for_sizes(grey) for grey, size in zip((left, right), sizes, strict=True) if size)
         size = self._vote.leader if self._vote.is_over else None
         if size is None:
             return None
+        # What grows a lattice ends at glare or a hand, and in picture after picture at the same row.
+        size = Fits(tuple(self._seen)).grown(size)
         if marks := find_marks([left, right]):
             raise DataError(f"this is no chessboard: it has {marks.words}", "name that board with --board; see --help")
         return Board(*size, self._square_m)

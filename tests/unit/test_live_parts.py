@@ -12,6 +12,7 @@ import pytest
 from rich.console import Console
 
 from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.calibration import moving_board
 from phone_host.calibration.board_names import named_board
 from phone_host.calibration.guide.snapshot import before_board
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
@@ -55,6 +56,14 @@ def test_the_boards_size_is_found_and_a_wrong_one_is_named() -> None:
         check.missed(*_PAIR)
     with pytest.raises(SettingsError, match="this board has 9x6 inner corners, --board says 8x6"):
         check.missed(*_PAIR)
+
+
+def test_a_row_that_every_picture_hides_from_the_quick_look_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is counted may be a part: the board's own size is looked for before it is believed."""
+    monkeypatch.setattr(moving_board, "whole_size_seen", lambda _grey: (9, 5))
+    finder = SizeFinder(0.025)
+    found = [finder.find(*_PAIR) for _ in range(3)]
+    assert found[-1] == BOARD
 
 
 def test_a_board_of_marks_is_not_taken_for_a_chessboard() -> None:
