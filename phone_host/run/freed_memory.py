@@ -1,9 +1,10 @@
-"""Keeps freed memory for the next pair.
+"""Keeps freed memory for the next pair, until the run is over.
 
 The images, costs and clouds of a pair are some 50 MB that are freed and asked for again with every pair. glibc gives such memory back to
 the system as soon as twice the largest block is free, so that each pair pays for clearing all its pages again: at 640x480 2 ms of the 6.5 ms
 around the matcher, at 1280x720 3 ms of 14.
-Source: mallopt(3).
+Each thread has an arena of its own, and each run its own threads: what a run has freed is of no use to the next one.
+Source: mallopt(3), malloc_trim(3).
 """
 
 import ctypes
@@ -24,3 +25,9 @@ def keep_freed_memory() -> None:
     mallopt.argtypes, mallopt.restype = [ctypes.c_int, ctypes.c_int], ctypes.c_int
     mallopt(_M_MMAP_THRESHOLD, _LARGEST_BLOCK_BYTES)
     mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+
+
+def give_back_freed_memory() -> None:
+    """Give the system back what a run has freed. Other libraries than glibc are left as they are."""
+    if platform.libc_ver()[0] == "glibc":
+        ctypes.CDLL(None).malloc_trim(0)

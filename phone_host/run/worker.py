@@ -76,7 +76,8 @@ class Worker:
 
     def _work(self) -> None:
         try:
-            while (pair := self._queue.take()) is not None:
+            # Whoever is given up has nobody left to tell: what he would wake is closed by now.
+            while not self.has_given_up and (pair := self._queue.take()) is not None:
                 dequeued_ns = now.monotonic_ns()
                 self._taken()
                 if not self.finished.is_set():

@@ -1,4 +1,4 @@
-"""The newest results of all runs of this program, by number: what the page shows and measures in.
+"""The newest results of the last run, by number: what the page shows and measures in.
 
 A run hands over references: nothing is copied or encoded in its threads. Of older results only what measuring needs is kept.
 """
@@ -64,6 +64,11 @@ class Shelf:
             while len(self._kept) > 1 and (len(self._kept) > _MOST or held > _MOST_BYTES):
                 held -= _bytes(self._kept.popleft().newest.result.processed)
         self.tell()
+
+    def clear(self) -> None:
+        """Something new begins: what an earlier run left, and all that computed it, is needed no more. Numbers go on."""
+        with self._lock:
+            self._kept.clear()
 
     def newest(self) -> Shelved | None:
         """Return the newest result; None: there was none."""

@@ -20,6 +20,7 @@ from phone_host.doctor.host_doctor import examine
 from phone_host.live.calibration_view import SnapshotValues
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.run.freed_memory import give_back_freed_memory
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task
 from phone_host.serve.memory import Memory
@@ -51,7 +52,7 @@ class Station:
         self._program = program
         self._shelf = Shelf()
         self._memory = Memory(program.kept())
-        self._activities = Activities(self._memory.begin, self._shelf.tell, self._memory.fail)
+        self._activities = Activities(self._begins, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
             Do.FIND: self._find,
             Do.ENROL: self._enrol,
@@ -109,6 +110,11 @@ class Station:
     def has_given_up(self) -> bool:
         """Whether native code still computes a pair that nobody waits for. The process may have to end without it."""
         return self._memory.has_given_up
+
+    def _begins(self) -> None:
+        self._memory.begin()
+        self._shelf.clear()
+        give_back_freed_memory()
 
     def _stranger(self, links: str) -> str:
         try:
@@ -235,6 +241,7 @@ class Station:
                     self._memory.last(ready.failed(trouble_of(error)).snapshot)
                 raise
             over = ready.ended(ended)
+        give_back_freed_memory()
         self._memory.last(over.snapshot)
         self._memory.gave_up(ready.host.has_given_up)
         if over.missing:

@@ -59,6 +59,7 @@ class Receiver:
         self._corrections = Corrections()
         self._steered_session = ""
         self._standstill = now.StandstillWatch()
+        self._wake_lock = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self.failure: Exception | None = None
 
@@ -108,8 +109,9 @@ class Receiver:
 
     def wake(self) -> None:
         """Let the thread check the sink's room now. Safe from any thread."""
-        with suppress(BlockingIOError):  # the pipe is full: the thread will wake anyway
-            os.write(self._wake_write, b"\0")
+        with self._wake_lock, suppress(BlockingIOError):  # the pipe is full: the thread will wake anyway
+            if self._wake_write >= 0:
+                os.write(self._wake_write, b"\0")
 
     def steer(self, later_ns: int) -> None:
         """Ask the board's camera to expose later, in addition to earlier corrections. Safe from any thread."""
@@ -129,7 +131,9 @@ class Receiver:
         self.wake()
         self._thread.join()
         os.close(self._wake_read)
-        os.close(self._wake_write)
+        with self._wake_lock:  # a worker that was given up may still come back; its number may be another file's then
+            os.close(self._wake_write)
+            self._wake_write = -1
 
     def _run(self) -> None:
         try:

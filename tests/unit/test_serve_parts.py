@@ -43,7 +43,7 @@ def _result(number: int, size: int = 8) -> Result:
 
 
 def test_the_shelf_numbers_all_results_and_keeps_the_newest() -> None:
-    """Numbers grow by one over all runs; only the newest has its cloud; of many, the last 32 are kept, and of large ones fewer."""
+    """Numbers grow by one over all runs; only the newest has its cloud; of many, the last 32 are kept, and of large ones fewer. What begins anew has none."""
     shelf = Shelf()
     assert shelf.newest() is None
     first, second = PageSink(shelf, None), PageSink(shelf, None)
@@ -63,6 +63,10 @@ def test_the_shelf_numbers_all_results_and_keeps_the_newest() -> None:
     for number in range(3):
         second.offer(_result(number, 4000))
     assert shelf.numbered(39) is None
+    shelf.clear()
+    assert shelf.newest() is None
+    second.offer(_result(0))
+    assert shelf.numbered(44) is not None
 
 
 def test_a_viewer_that_fails_is_told_no_more_and_ends_nothing() -> None:

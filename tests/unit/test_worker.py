@@ -34,11 +34,12 @@ class HeldMatcher:
 
 
 def test_a_stopped_run_gives_up_a_pair_that_takes_long() -> None:
-    """`stop` returns while the matcher still computes; when it is done, nothing is entered in the books."""
+    """`stop` returns while the matcher still computes; when it is done, nothing is entered in the books and no waiting pair is taken."""
     matcher, books = HeldMatcher(), Ledgerer()
     queue = PairQueue(FifoSettings(), None, PERIOD_NS)
     pipeline = Pipeline(StereoCore(matcher, None, None), Side.LEFT, now.monotonic_ns)
-    worker = Worker(queue, pipeline, books, (), is_saved=lambda _: False, most_pairs=0, taken=lambda: None)
+    taken: list[int] = []
+    worker = Worker(queue, pipeline, books, (), is_saved=lambda _: False, most_pairs=0, taken=lambda: taken.append(1))
     queue.begin(camera_of(PERIOD_NS))
     at_ns, image = now.monotonic_ns(), encoded(".png", draw(1))
     worker.start()
@@ -47,10 +48,12 @@ def test_a_stopped_run_gives_up_a_pair_that_takes_long() -> None:
     queue.add_board(replace(board, message=replace(board.message, **sound)))
     queue.add_host(replace(host_frame(0, at_ns), **sound))
     assert matcher.begun.wait(60)
+    queue.add_board(replace(board_frame(1, at_ns + PERIOD_NS), message=replace(board.message, sequence=1, **sound)))
+    queue.add_host(replace(host_frame(1, at_ns + PERIOD_NS), **sound))
     queue.finish()
     worker.stop(0.01)
     assert worker.has_given_up
     matcher.may_end.set()
     worker.stop()
     assert worker.has_ended(60)
-    assert (books.processed, worker.failure) == (0, None)
+    assert (books.processed, worker.failure, taken) == (0, None, [1])
