@@ -1,8 +1,20 @@
-"""One thread for the linear algebra of each worker of the unit tests.
+"""For the unit tests: one thread for the linear algebra of each worker, and a log that no test leaves changed.
 
 There are as many workers as cores. With matrices as small as these OpenBLAS's threads mostly wait for each other, which costs a tenth of the suite's time.
 """
 
+import logging
 import os
+from collections.abc import Iterator
+
+import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is imported, which no conftest does earlier
+
+
+@pytest.fixture(autouse=True)
+def log_as_before() -> Iterator[None]:
+    """A command that sets up its log in this process leaves no level behind that hides what the next test looks for."""
+    level = logging.getLogger().level
+    yield
+    logging.getLogger().setLevel(level)
