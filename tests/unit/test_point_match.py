@@ -86,9 +86,9 @@ def test_columns_as_epipolar_lines(epipolar: Epipolar) -> None:
 
 @pytest.mark.parametrize("sigma", [2.0, 6.0])
 def test_the_truth_lies_inside_the_stated_95_per_cent(sigma: float) -> None:
-    """300 points of planes with noise of 2 and 6 levels: 90 to 99 % of the distances hold the truth, which is three standard deviations of 300 such cases."""
+    """200 points of planes with noise of 2 and 6 levels: 90 to 99.5 % of the distances hold the truth, which is three standard deviations of 200 such cases."""
     inside = []
-    for seed in range(6):
+    for seed in range(4):
         random = np.random.default_rng([seed, int(sigma)])
         seen = plane(seed=seed, shortest_px=5.0)
         pair = RectifiedPair(_noisy(seen.pair.left, sigma, random), _noisy(seen.pair.right, sigma, random))
@@ -98,7 +98,7 @@ def test_the_truth_lies_inside_the_stated_95_per_cent(sigma: float) -> None:
             z = GEOMETRY.focal_px * GEOMETRY.baseline_m / (20 + 0.03 * x + 0.01 * y)
             ray = [(x - GEOMETRY.cx_px) / GEOMETRY.focal_px, (y - GEOMETRY.cy_px) / GEOMETRY.focal_px, 1]
             inside.append(point.distance.low_m <= z * np.linalg.norm(ray) <= point.distance.high_m)
-    assert 0.9 < np.mean(inside) < 0.99
+    assert 0.9 < np.mean(inside) < 0.996
 
 
 def test_noise_makes_a_point_less_sure() -> None:

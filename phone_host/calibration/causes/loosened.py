@@ -283,13 +283,16 @@ def _linearised(
         factor = float(np.exp(given[focus][0]))
         shares = from_middle[:, 1:] / height
         own[rows, focus] = (factor * from_middle).reshape(-1, 1)
-        own[rows, displaced] = np.kron(shares, np.eye(2))
+        of_rows = own[rows, displaced]
+        of_rows[::2, 0] = of_rows[1::2, 1] = shares[:, 0]
         # What moves a corner is scaled with it; that a scaled corner lies in another row is of second order.
         jacobian[rows, : _OWN.start] *= factor
         own[rows, :6] *= factor
         errors.append((measured - lens[2:4] - factor * from_middle - shares * given[displaced]).ravel())
     for half_rows, at_column in ((slice(0, half), 2), (slice(half, None), LENS + 2)):
-        jacobian[half_rows, at_column : at_column + 2] = np.tile(np.eye(2), (len(points_m), 1))
+        of_middle = jacobian[half_rows, at_column : at_column + 2]
+        of_middle[:] = 0.0
+        of_middle[::2, 0] = of_middle[1::2, 1] = 1.0
     together = np.concatenate(errors)
     unseen = np.isnan(together)  # it says nothing about anything
     jacobian[unseen], together[unseen] = 0.0, 0.0
