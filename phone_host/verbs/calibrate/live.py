@@ -144,7 +144,7 @@ class PreparedViews:
         """
 
         def show() -> None:
-            snapshot, views, note = self.live.snapshot(), self.live.views, self.note
+            (snapshot, views), note = self.live.shown(), self.note
             for each in shows:
                 each.show(snapshot, views, note)
 
