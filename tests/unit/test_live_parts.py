@@ -290,7 +290,7 @@ def test_a_view_that_is_taken_while_it_is_shown_is_shown_later(
             looks = BoardLook(2.0, 0.0, 0.0), BoardLook(2.0, 0.0, 0.0)
             assert guide.examine(seen, looks, seen.at_ns) is Gate.TAKEN
 
-        live._lock = _EagerLock(take)  # type: ignore[assignment] - stands for the looker's thread
+        live._lock = _EagerLock(take)  # type: ignore[assignment]  # stands for the looker's thread
         shows = Lines()
         for count in (0, 1, 2):
             snapshot, views = live.shown()
