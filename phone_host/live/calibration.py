@@ -19,9 +19,10 @@ from common.link.base import Link
 from phone_host.calibration.board_views import Size
 from phone_host.calibration.causes.looks import look_at
 from phone_host.calibration.guide.gates import Gate, Glance
-from phone_host.calibration.guide.guide import Guide, View
+from phone_host.calibration.guide.guide import Guide
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
+from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import Want
 from phone_host.calibration.guide.words import Words
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder

@@ -119,7 +119,7 @@ def test_views_of_format_2_are_a_chessboards_and_those_of_format_3_name_their_bo
     path = tmp_path / "rig.yaml"
     write_rig(path, unlike_rig(), rectify_rig(unlike_rig()), _views())
     named = path.read_text()
-    assert "board: \"9x6\"" in named
+    assert 'board: "9x6"' in named
     unnamed = re.sub(r"\n +board: \"9x6\"", "", named)
     path.write_text(unnamed.replace(f"format_version: {RIG_FORMAT}", "format_version: 2"))
     views = read_rig_views(path)

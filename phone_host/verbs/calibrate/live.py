@@ -28,10 +28,10 @@ from phone_host.calibration.causes.looks import SeenLook
 from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.earlier_views import board_of, pairs_of
-from phone_host.calibration.guide.guide import View
 from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.unseen import unseen_in
+from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, Want
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
