@@ -1,7 +1,7 @@
 """Rotations and rigid motions, SO(3) and SE(3). Pure.
 
-`T_a_b` takes b-coordinates to a. Rotation vectors point along the axis; their length is the angle, rad. Small motions act
-from the left: `exp(twist) @ T_a_b` moves T_a_b in the axes of a. A twist is (rotation, translation), rad and m.
+`T_a_b` takes b-coordinates to a. Rotation vectors point along the axis; their length is the angle, rad. Small motions
+act from the left: they move T_a_b in the axes of a.
 
 Source: T. D. Barfoot, "State Estimation for Robotics", 2017, chapter 7.
 """
