@@ -70,7 +70,7 @@ _VAIN_NS: Final = 4_000_000_000
 """A view that was asked for in vain for so long gives way to any that is new: silence teaches less."""
 
 _LEAST_VIEWS: Final = 10
-"""With fewer, the next view still lowers the depth error by more than `_LEAST_GAIN`."""
+"""It does not end with fewer: from 7 on all lenses are tried (`lens_choice`), and some views are left to choose by."""
 
 _LONG_NS, _LONG_VIEWS = 90_000_000_000, 8
 """After a minute and a half these are enough, if the verdict is good: a person is to be done in two."""
