@@ -112,7 +112,7 @@ def calibrate(
     with _unexplained():
         best = _best_fit(pairs, points_m, sizes_px)
         is_hopeless = best.result.rms_px() > _HOPELESS_SHARE * max(size[0] for size in sizes_px)
-        fitted = best if is_hopeless else _with_chosen_lenses(best, pairs, points_m)
+        fitted = best if is_hopeless else _with_chosen_lenses(best, pairs, points_m, best.bends)
         return summed_up(fitted, points_m=points_m, board_side=board_side)
 
 
@@ -212,7 +212,7 @@ def _with_freer_lenses(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes
     return fitted if _both_grow(fitted.result.state) else None
 
 
-def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector) -> Fitted:
+def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector, at_least: Bends) -> Fitted:
     """Give each camera the lens that best predicts views which it was not fitted to, and adjust once more."""
     state = fitted.result.state
     relative = SE3(rotations_of(state.rotation), state.translation_m)
@@ -220,7 +220,7 @@ def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector
     found = [
         choose_lens([corners_of(pair, side) for pair in fitted.kept], points_m, model, poses, bend)
         for side, model, poses, bend in zip(
-            Side, (state.left, state.right), (state.poses, right_poses), fitted.bends, strict=True
+            Side, (state.left, state.right), (state.poses, right_poses), at_least, strict=True
         )
     ]
     bends = (found[0][0].bend, found[1][0].bend)
@@ -236,7 +236,9 @@ def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector
     if not _both_grow(result.state) or result.rms_px() > (1 + _CHANCE_LOSS) * fitted.result.rms_px():
         return fitted
     chosen = replace(fitted, result=result, bends=bends, free=free)
-    return _with_pairs_that_came_back(chosen, pairs, points_m) if fitted.rejected else chosen
+    back = _with_pairs_that_came_back(chosen, pairs, points_m) if fitted.rejected else chosen
+    # The pairs that came back may be those that show what the lens is; each turn brings at least one.
+    return _with_chosen_lenses(back, pairs, points_m, at_least) if len(back.kept) > len(fitted.kept) else back
 
 
 def _with_pairs_that_came_back(fitted: Fitted, pairs: list[BoardPair], points_m: Vector) -> Fitted:
