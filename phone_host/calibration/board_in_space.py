@@ -15,9 +15,10 @@ from typing import Final
 
 import numpy as np
 
+from phone_host.calibration.bent_board import bow_shapes
 from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.bundle import Vector
 from phone_host.calibration.board_pose import towards
+from phone_host.calibration.bundle import Vector
 from phone_host.geometry.lens import project_linearised, rays_through
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of
 from phone_host.geometry.triangulate import triangulate
@@ -137,7 +138,7 @@ def _laid_onto(points: Vector, covariances: Vector, points_m: Vector, pose: Vect
     """
     weights = np.linalg.inv(covariances)
     board = points_m - points_m.mean(axis=0)
-    shapes = _bow_shapes(board)
+    shapes = bow_shapes(board)
     turn, found = rotations_of(pose[:3]), np.concatenate([points.mean(axis=0), np.zeros(3), [1.0, 0.0, 0.0]])
     covariance = np.zeros((_FITTED, _FITTED))
     for _ in range(_STEPS):
@@ -152,13 +153,6 @@ def _laid_onto(points: Vector, covariances: Vector, points_m: Vector, pose: Vect
         step = covariance @ np.einsum("nij,nj->i", weighted, points - found[:3] - onto)
         found, turn = found + step, rotations_of(step[3:6]) @ turn
     return found, np.sqrt(np.diag(covariance))
-
-
-def _bow_shapes(board: Vector) -> Vector:
-    """Return (M, 2) depth of a board that is bent along its rows, and along its columns, so that its middle stands out by 1."""
-    halves = np.ptp(board[:, :2], axis=0) / 2
-    shapes: Vector = 1 - (board[:, :2] / halves) ** 2
-    return shapes
 
 
 def _slopes(corners: Vector, model: CameraModel, turn: Vector, sigma_px: float) -> tuple[Vector, Vector]:

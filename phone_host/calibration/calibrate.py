@@ -18,6 +18,7 @@ import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.bend import Bend
+from phone_host.calibration.bent_board import fit_bent
 from phone_host.calibration.board_in_space import boards_in_space
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected, Used
 from phone_host.calibration.board_pose import fit_pose
@@ -183,7 +184,7 @@ def _best_fit(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Fitt
 
 
 def _second_chances(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Iterator[Bends]:
-    """Yield how freely lenses may bend, after the usual way: both wide, then a fisheye where it explains a camera's views far better."""
+    """Yield how freely lenses may bend, after the usual way: both wide, then a fisheye where it explains a camera's views far better, then two."""
     if len(pairs) < _FREER_PAIRS:
         return
     yield Bend.WIDE, Bend.WIDE
@@ -193,6 +194,8 @@ def _second_chances(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -
     )
     if Bend.FISHEYE in {left, right}:
         yield left, right
+        if left is not right:
+            yield Bend.FISHEYE, Bend.FISHEYE
 
 
 def _explains_more(other: Fitted, best: Fitted) -> bool:
@@ -334,7 +337,12 @@ def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibrat
         points_m: (N, 3) corners in the board's axes.
         board_side: which camera is the board's.
     """
-    result, pairs = fitted.result, fitted.kept
+    result, pairs, flat_m = fitted.result, fitted.kept, points_m
+    boards = boards_in_space(pairs, flat_m, rig_of(result.state), result.state.poses, result.sigmas_px())
+    bent = fit_bent(result, flat_m, boards, lambda shape_m, start: adjust(fitted.views(), shape_m, start, fitted.free))
+    if bent is not None:
+        result, points_m = bent.result, bent.points_m
+        boards = boards_in_space(pairs, flat_m, rig_of(result.state), result.state.poses, result.sigmas_px())
     state = result.state
     rig = replace(
         rig_of(state),
@@ -356,7 +364,6 @@ def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibrat
         rig = replace(rig, zero_sigma_px=zero_sigma_px(rig, rectification))
         depths = tuple((depth_m, depth_sigma_m(rig, rectification, depth_m)) for depth_m in DEPTHS_M)
         advice = next_view(result, fitted.free, points_m, rectification)
-    boards = boards_in_space(pairs, points_m, rig, state.poses, result.sigmas_px())
     used = tuple(
         Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=rms(v), in_space=board)
         for pair, a, b, v, board in zip(pairs, *result.view_rms_px(), vertical, boards, strict=True)

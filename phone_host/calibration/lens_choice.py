@@ -89,7 +89,7 @@ def choose_lens(
 
 
 def is_fisheye(views: list[Corners], points_m: Vector, size_px: tuple[int, int]) -> bool:
-    """Return whether a fisheye lens explains the views of one camera far better than a wide one; views may be wrong.
+    """Return whether a fisheye lens explains the views of one camera far better than a wide one, or that one only by folding back; views may be wrong.
 
     Args:
         views: (N, 2) corners of each view.
@@ -108,7 +108,8 @@ def is_fisheye(views: list[Corners], points_m: Vector, size_px: tuple[int, int])
     as_fisheye, as_wide = (_errors_px(views, points_m, state) for state in (alone_state(model, poses), wide))
     most = _WRONG * float(np.median(as_fisheye))
     squares = [float((np.fmin(errors, most) ** 2).mean()) for errors in (as_fisheye, as_wide)]
-    return squares[0] < _FAR_BETTER * squares[1]
+    is_folded = size_px[0] > _WIDE_RAD * model.matrix[0, 0] and grows(model) and not grows(wide.left)
+    return is_folded or squares[0] < _FAR_BETTER * squares[1]
 
 
 def grows(model: CameraModel) -> bool:

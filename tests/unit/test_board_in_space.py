@@ -57,7 +57,9 @@ def test_noise_is_alike_in_pixels_at_any_angle_to_the_axis(angle_deg: float) -> 
     for pose in poses(40, seed=3):
         stands = turn @ SE3.of(pose)
         points = stands.apply(BOARD.points_m())
-        seen = [project(each, camera) + random.normal(0, _NOISE_PX, (len(points), 2)) for each in (points, points + beside)]
+        seen = [
+            project(each, camera) + random.normal(0, _NOISE_PX, (len(points), 2)) for each in (points, points + beside)
+        ]
         pairs.append(BoardPair("0", *seen))
         where.append(stands.pose())
     boards = boards_in_space(pairs, BOARD.points_m(), rig, np.array(where), (_NOISE_PX, _NOISE_PX))
