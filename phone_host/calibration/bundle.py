@@ -61,9 +61,9 @@ _LEAST_SIGMA_PX = 0.02  # no corner detector is better; with a test's exact corn
 _PRINCIPAL_POINT_SHARE = 0.1
 # Numerator and denominator of the rational lens may grow together without end; real ones' coefficients are a few units.
 _RATIONAL_SIGMA = 3.0
-# Coefficients of published fisheye calibrations are a few hundredths; where boards do not reach, a fit is not free to invent a lens
+# Coefficients of published fisheye calibrations are a few hundredths (0.1 let 1 of 20 fisheyes of 120 degrees fold back inside the image); where boards do not reach, a fit is not free to invent a lens
 # that turns back.
-_FISHEYE_SIGMA = 0.1
+_FISHEYE_SIGMA = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,10 +223,9 @@ def _with_scatter(
     """Return the covariance (30, 30) that the scatter from view to view shows, where it exceeds that of independent corners.
 
     Errors of a view's corners hang together: a board that is not flat, blur, a detector's bias, a lens that the formula does not
-    quite meet. Then views disagree by more than their corners' scatter says. How far each view pulls at the parameters shows their real
-    covariance. A view pulls less at a fit that it has a share in; what is missing is made up for exactly (R. Bell and D.
-    McCaffrey, "Bias reduction in standard errors for linear regression with multi-stage samples", 2002). The jackknife makes up for
-    twice as much: where one view of ten alone tells something, it states several times too much. Some dozen views show it but roughly: in units of the corners' covariance, in which all
+    quite meet. Then views disagree by more than their corners' scatter says. Each view in turn is left out (to first order),
+    and how far the parameters move shows their real covariance (the jackknife of B. Efron, "The Jackknife, the Bootstrap and
+    Other Resampling Plans", 1982). Some dozen views show it but roughly: in units of the corners' covariance, in which all
     directions are alike, it is averaged with its own mean over the directions (O. Ledoit and M. Wolf, "A well-conditioned estimator
     for large-dimensional covariance matrices", 2004), and no direction becomes better known than by the corners.
 
@@ -240,19 +239,19 @@ def _with_scatter(
     count = len(problem.views)
     if count < _JACKKNIFE_VIEWS or not free.any():
         return corners
+    moves = np.zeros((count, int(free.sum())))
+    for index, (pull, known) in enumerate(zip(*problem.by_view(state), strict=True)):
+        rest = information - known[np.ix_(free, free)]
+        np.fill_diagonal(rest, np.maximum(np.diag(rest), _LEAST_LEFT * np.diag(information)))
+        moves[index] = inverse_of(rest) @ pull[free]
     sigmas = np.sqrt(np.maximum(np.diag(corners)[free], np.finfo(float).tiny))
     values, axes = np.linalg.eigh(corners[np.ix_(free, free)] / np.outer(sigmas, sigmas))
-    root = axes * np.sqrt(np.maximum(values, _LEAST_LEFT**2)) * sigmas[:, np.newaxis]
-    all_know = float(np.trace(root.T @ information @ root)) / len(root)
-    moves = np.zeros((count, len(root)))
-    for index, (pull, known) in enumerate(zip(*problem.by_view(state), strict=True)):
-        shares, directions = np.linalg.eigh(root.T @ known[np.ix_(free, free)] @ root / all_know)
-        left = np.sqrt(np.clip(1 - shares, _LEAST_LEFT, 1.0))
-        moves[index] = directions @ (directions.T @ (root.T @ pull[free]) / left) / all_know
-    scatter = moves.T @ moves
+    root = axes * np.sqrt(np.maximum(values, _LEAST_LEFT**2))
+    whitened = (moves / sigmas) @ (axes / np.sqrt(np.maximum(values, _LEAST_LEFT**2)))
+    scatter = (count - 1) / count * whitened.T @ whitened
     scatter = (1 - _TO_MEAN) * scatter + _TO_MEAN * np.trace(scatter) / len(scatter) * np.eye(len(scatter))
     shares, directions = np.linalg.eigh(scatter)
-    spread = root @ directions * np.sqrt(np.maximum(shares, 1.0))
+    spread = (root @ directions * np.sqrt(np.maximum(shares, 1.0))) * sigmas[:, np.newaxis]
     result = np.zeros_like(corners)
     result[np.ix_(free, free)] = spread @ spread.T
     return result

@@ -8,56 +8,42 @@ rejected, all of them get a second chance with lenses that bend more freely. At 
 predicts views which it was not fitted to (`lens_choice.py`).
 """
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.bent_board import fit_bent
-from phone_host.calibration.board_in_space import boards_in_space
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected, Used
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import (
-    BundleResult,
     BundleState,
     BundleView,
     FreeParameters,
     Vector,
     adjust,
-    rig_of,
-    rms_px,
 )
 from phone_host.calibration.calibrate_alone import (
     LoneCamera,
     calibrate_alone,
     corners_of,
-    own_errors_px,
     require_enough,
     with_poses,
 )
-from phone_host.calibration.fit_quality import LensTrial
-from phone_host.calibration.held_out import held_out_squares
+from phone_host.calibration.fitted_rig import Bends, Fitted, summed_up
 from phone_host.calibration.lens_choice import choose_lens, grows, is_fisheye
-from phone_host.calibration.misfits import misfits, rms, vertical_errors_px
-from phone_host.calibration.next_view import next_view
+from phone_host.calibration.misfits import misfits
 from phone_host.calibration.relative_pose import prediction_errors_px, states_of
-from phone_host.calibration.rig_sigma import DEPTHS_M, depth_sigma_m, zero_sigma_px
-from phone_host.calibration.target import Board, Corners
+from phone_host.calibration.target import Board
 from phone_host.geometry.lens import PARAMETERS
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.model import CameraModel, Rig, Side
-from phone_host.stereo.rectify import rectify_rig
+from phone_host.model import Rig, Side
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 """Width and height of the left and of the right images, px."""
-
-Bends = tuple[Bend, Bend]
-"""How freely the left and the right lens may bend."""
 
 # With fewer pairs a richer lens explains wrong pairs. (Of those that fit, `lens_choice` asks views that were held out.)
 _FREER_PAIRS = 5
@@ -71,22 +57,6 @@ _CHANCE_LOSS = 0.05
 
 # Limits for the right view predicted from the left one, while the cameras are not yet adjusted to each other.
 _MOVED_FACTOR, _MOVED_FLOOR_PX = 5.0, 3.0
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Fitted:
-    """A rig fitted to the pairs that it explains: the optimum, those pairs, the others, and how freely each lens bent."""
-
-    result: BundleResult
-    kept: list[BoardPair]
-    rejected: list[Rejected]
-    bends: Bends
-    free: FreeParameters
-    trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())
-
-    def views(self) -> list[BundleView]:
-        """The pairs that are used, as the adjustment takes them."""
-        return [BundleView(pair.left_px, pair.right_px) for pair in self.kept]
 
 
 def calibrate(
@@ -327,81 +297,3 @@ def fit_of_known_lenses(pairs: list[BoardPair], points_m: Vector, rig: Rig, bend
     nothing = np.zeros(PARAMETERS, bool)
     fitted = _adjust_robustly(kept, points_m, start, bends, FreeParameters(nothing, nothing))
     return replace(fitted, rejected=[*rejected, *fitted.rejected])
-
-
-def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibration:
-    """Make a rig and its figures from the optimum.
-
-    Args:
-        fitted: the optimum.
-        points_m: (N, 3) corners in the board's axes.
-        board_side: which camera is the board's.
-    """
-    result, pairs, flat_m = fitted.result, fitted.kept, points_m
-    boards = boards_in_space(pairs, flat_m, rig_of(result.state), result.state.poses, result.sigmas_px())
-    bent = fit_bent(result, flat_m, boards, lambda shape_m, start: adjust(fitted.views(), shape_m, start, fitted.free))
-    if bent is not None:
-        result, points_m = bent.result, bent.points_m
-        boards = boards_in_space(pairs, flat_m, rig_of(result.state), result.state.poses, result.sigmas_px())
-    state = result.state
-    rig = replace(
-        rig_of(state),
-        covariance=result.covariance,
-        board_side=board_side,
-        rms_left_px=_alone_rms_px(pairs, Side.LEFT, points_m, state.left),
-        rms_right_px=_alone_rms_px(pairs, Side.RIGHT, points_m, state.right),
-        rms_stereo_px=result.rms_px(),
-    )
-    rectification, obstacle, advice = None, None, None
-    vertical = [np.full(1, np.nan)] * len(pairs)
-    depths: tuple[tuple[float, float], ...] = ()
-    try:
-        rectification = rectify_rig(rig)
-    except DataError as error:
-        obstacle = error
-    else:
-        vertical = [vertical_errors_px(pair, rig, rectification) for pair in pairs]
-        rig = replace(rig, zero_sigma_px=zero_sigma_px(rig, rectification))
-        depths = tuple((depth_m, depth_sigma_m(rig, rectification, depth_m)) for depth_m in DEPTHS_M)
-        advice = next_view(result, fitted.free, points_m, rectification)
-    used = tuple(
-        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=rms(v), in_space=board)
-        for pair, a, b, v, board in zip(pairs, *result.view_rms_px(), vertical, boards, strict=True)
-    )
-    return Calibration(
-        rig=rig,
-        rectification=rectification,
-        obstacle=obstacle,
-        used=used,
-        rejected=tuple(fitted.rejected),
-        vertical_px=np.abs(np.concatenate(vertical)),
-        baseline_sigma_m=rig.baseline_sigma_m,
-        tilts_deg=np.array([_tilt_deg(pose) for pose in state.poses]),
-        spread=min(
-            _spread([corners_of(pair, side) for pair in pairs], (model.width_px, model.height_px))
-            for side, model in ((Side.LEFT, state.left), (Side.RIGHT, state.right))
-        ),
-        bends=fitted.bends,
-        squares=held_out_squares(pairs, points_m, state, fitted.free),
-        depths=depths,
-        advice=advice,
-        trials=fitted.trials,
-        poses=state.poses,
-        left_errors_px=result.left_errors_px,
-        right_errors_px=result.right_errors_px,
-    )
-
-
-def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, model: CameraModel) -> float:
-    return rms_px(*(own_errors_px(points_m, corners_of(pair, side), model) for pair in pairs))
-
-
-def _tilt_deg(pose: Vector) -> float:
-    """Return the angle between a board and the left image plane."""
-    normal_z = abs(float(rotations_of(pose[:3])[2, 2]))
-    return math.degrees(math.acos(min(normal_z, 1.0)))
-
-
-def _spread(views: list[Corners], size_px: tuple[int, int]) -> float:
-    corners = np.concatenate(views)
-    return float(((np.nanmax(corners, axis=0) - np.nanmin(corners, axis=0)) / np.array(size_px)).min())
