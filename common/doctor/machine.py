@@ -1,7 +1,6 @@
 """Reads what the checks need from /sys, /proc, /dev and systemd. Nothing is decided here, and nothing is changed."""
 
 import ctypes
-import grp
 import os
 import pwd
 import re
@@ -20,6 +19,7 @@ from common.doctor.access import Account, Holder, Node
 from common.doctor.camera_checks import UsbBus, UsbCamera
 from common.doctor.machine_checks import Bluetooth, Clocks, Disk, KernelLog, LogLine, Supply, throttled
 from common.doctor.unit_check import Unit
+from common.groups import group_name
 from common.places import nearest
 
 _VIDEO_CLASS: Final = "0e"
@@ -64,10 +64,7 @@ def read_node(path: Path) -> Node | None:
         state = real.stat()
     except OSError:
         return None
-    try:
-        group = grp.getgrgid(state.st_gid).gr_name
-    except KeyError:
-        group = str(state.st_gid)
+    group = group_name(state.st_gid) or str(state.st_gid)
     usable = os.access(real, os.R_OK | os.W_OK)
     return Node(
         path=str(real), uid=state.st_uid, gid=state.st_gid, group=group, mode=state.st_mode & 0o777, open_to_me=usable
