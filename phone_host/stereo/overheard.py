@@ -16,13 +16,14 @@ captured and the lines go where they went before.
 
 import ctypes
 import platform
-import sys
 import threading
 from collections.abc import Callable
 from functools import cache
 from typing import Final
 
 import cv2
+
+from common.android import is_android
 
 _LOCK: Final = threading.Lock()
 """Guards the process's `stderr`; there is only one."""
@@ -92,10 +93,6 @@ def overhear(work: Callable[[], object]) -> str:
 @cache
 def _ear() -> _Ear | None:
     """Return None where `stderr` may be a constant, as in musl: setting it would crash the process."""
-    if platform.libc_ver()[0] != "glibc" and not _is_android():
+    if platform.libc_ver()[0] != "glibc" and not is_android():
         return None
     return _Ear(ctypes.CDLL(None))
-
-
-def _is_android() -> bool:
-    return sys.platform == "android" or hasattr(sys, "getandroidapilevel")
