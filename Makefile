@@ -52,8 +52,10 @@ test-slow: $(READY) ## run the tests with large samples, too slow for every day;
 coverage: $(READY) ## run the unit tests; lists branches of the pure modules that no test takes (CI requires 98 %)
 	@COVERAGE=1 .ci/test unit
 
-test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, under qemu-user
+test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, and try the phone's stand-in, under qemu-user
 	@$(BIN)/python -m tests.native.arm
+	@.ci/phone
+	@.ci/test phone
 
 test-board: $(READY) ## run the tests on booted virtual boards (the first run builds their images: needs apt and root)
 	@.ci/board

@@ -1,0 +1,15 @@
+"""Makes Debian's Python say what Android's says, and hides what that one lacks. The first module that any program here imports.
+
+`platform` goes on naming Linux, so that pip takes wheels that run here: they stand for Android's of the same version.
+"""
+
+import platform
+import socket
+import sys
+
+platform.uname()  # remembers the answer
+sys.platform = "android"
+for name in ("grp", "_posixshmem", "_multiprocessing"):
+    sys.modules[name] = None
+for name in [name for name in vars(socket) if name.startswith(("AF_BLUETOOTH", "BTPROTO", "BDADDR"))]:
+    delattr(socket, name)
