@@ -95,9 +95,9 @@ def board_outside(tmp_path: Path) -> Iterator[str]:
         yield link
 
 
-def test_pairs_from_a_board_outside(phone: Phone, board_outside: str, tmp_path: Path) -> None:
+def test_pairs_from_a_board_outside(phone: Phone, board_outside: str) -> None:
     """Five pairs come over loopback TCP, right ones, and the run ends in order."""
-    _put_film(phone, tmp_path)
+    _put_film(phone)
     done = phone.run(
         f"phone-host run --link {board_outside} --camera 'replay:../film?fps=4&loop=1' --pairs 5 --save-every 1 --out ../first --json"
     )
@@ -110,7 +110,7 @@ def test_pairs_from_a_board_outside(phone: Phone, board_outside: str, tmp_path: 
 
 def test_the_page_opens_keeps_the_phone_awake_and_pairs(phone: Phone, board_outside: str, tmp_path: Path) -> None:
     """termux-run.sh takes the wake lock, opens the page, whose run pairs with the board; Ctrl-C ends in order and gives the lock back."""
-    _put_film(phone, tmp_path)
+    _put_film(phone)
     port, log = free_port(), tmp_path / "page.log"
     before = len(phone.calls())
     with phone.running(f"{RUN} 127.0.0.1:{port}", log) as script:
@@ -128,7 +128,7 @@ def test_the_page_opens_keeps_the_phone_awake_and_pairs(phone: Phone, board_outs
     assert "Traceback" not in log.read_text()
 
 
-def _put_film(phone: Phone, tmp_path: Path) -> None:
+def _put_film(phone: Phone) -> None:
     film = phone.home / "film"
     if not film.exists():
         write_film(film, 40)
@@ -154,7 +154,7 @@ def test_the_service_serves_the_page_and_starts_with_the_phone(phone: Phone, tmp
     (phone.prefix / "var" / "runsvdir").unlink()
     before = len(phone.calls())
     with phone.running(f"~/.termux/boot/tandemscan; {wait}", log):
-        until_long(lambda: _answers(), "the page answers after a boot", log)
+        until_long(_answers, "the page answers after a boot", log)
         assert [call.strip() for call in phone.calls()[before:]][:2] == ["termux-wake-lock", "start-services"]
 
 

@@ -10,6 +10,6 @@ import sys
 platform.uname()  # remembers the answer
 sys.platform = "android"
 for name in ("grp", "_posixshmem", "_multiprocessing"):
-    sys.modules[name] = None
+    sys.modules[name] = None  # type: ignore[assignment]  # the import system's sign for "not to be found"
 for name in [name for name in vars(socket) if name.startswith(("AF_BLUETOOTH", "BTPROTO", "BDADDR"))]:
     delattr(socket, name)
