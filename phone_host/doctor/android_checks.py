@@ -33,11 +33,16 @@ def check_phone(phone: Phone) -> Finding:
     return ok("phone", f"{phone.model or 'unnamed'}, {android}, {termux}, {phone.processor}")
 
 
-def check_camera() -> Finding:
-    """Say which camera there is instead of Android's own."""
-    return ok(
-        "camera", "Android shows none to Termux: the page's browser is the camera, or an MJPEG app (--camera http:)"
-    )
+def check_camera(uri: str = "") -> Finding:
+    """Say which camera there is instead of the kernel's, which Android shows to no app.
+
+    Args:
+        uri: the V4L2 camera that is asked for; empty: none.
+    """
+    stead = "the page's browser is the camera, or an MJPEG app (--camera http:)"
+    if uri:
+        return fail("camera", f"{uri}: Android shows no camera to Termux", stead)
+    return ok("camera", f"Android shows none to Termux: {stead}")
 
 
 def check_usb(cards: Sequence[Card], serial_links: Sequence[str]) -> Finding:

@@ -96,6 +96,8 @@ def examine(question: Question) -> Iterator[Finding]:
     works = all(finding.verdict is not Grade.FAIL for finding in packages)
     if is_http(question.camera):
         yield _server(question.camera)
+    elif question.camera.startswith("v4l2:") and is_android():
+        yield check_camera(question.camera)
     elif question.camera:
         yield from examine_camera(question.camera, account, Unit("phone-host"))
     else:

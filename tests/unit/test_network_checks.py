@@ -88,6 +88,7 @@ def test_a_phone_is_told_what_android_keeps_from_it() -> None:
     assert named == "Acme One, Android 15, Termux 0.119 F_DROID, aarch64"
     assert "not in Termux" in check_phone(Phone(model="", android="", termux="", processor="armv8l")).text
     assert "browser" in check_camera().text
+    assert check_camera("v4l2:auto").verdict is FAIL
     assert "Ethernet over USB" in check_usb((), ()).text
     assert "usb0 is 192.168.7.1" in check_usb((Card("usb0", "192.168.7.1", is_up=None),), ()).text
     assert check_usb((), ("serial:/dev/ttyACM0",)).verdict is FAIL
