@@ -27,7 +27,7 @@ def _run(script: str, *options: str) -> "subprocess.CompletedProcess[str]":
 
 @pytest.mark.parametrize("reader", [("bash", "-n"), ("dash", "-n"), ("shellcheck",)], ids=" ".join)
 def test_every_shell_can_read_them(reader: tuple[str, ...]) -> None:
-    """bash and dash find no fault in the syntax, and shellcheck none at all."""
+    """Bash and dash find no fault in the syntax, and shellcheck none at all."""
     if shutil.which(reader[0]) is None:
         pytest.skip(f"{reader[0]} is not installed")
     assert len(SCRIPTS) == 2
