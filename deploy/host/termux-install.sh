@@ -46,6 +46,7 @@ mkdir -p "$(dirname "$log")"
 repair="run termux-change-repo and pkg upgrade, then this script again"
 echo "Termux's packages (some minutes when new) ..."
 quietly "pkg cannot install x11-repo, where OpenCV is" "$repair" pkg install -y x11-repo
+quietly "pkg cannot read the lists of packages" "$repair" pkg update
 # shellcheck disable=SC2086  # no compiler: no word
 quietly "pkg cannot install the packages" "$repair" pkg install -y -o Dpkg::Options::=--force-confold \
     python python-pip python-numpy python-msgpack python-cryptography opencv-python $compiler

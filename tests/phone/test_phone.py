@@ -49,8 +49,9 @@ def doctor(phone: Phone, options: str = "") -> tuple[int, dict[str, Any]]:
 
 def test_it_is_installed_from_termux_and_pins_and_a_second_run_updates(phone: Phone) -> None:
     """Termux's packages come from pkg, without clang; a second run works on what is there and says what to do next."""
-    assert [call for call in phone.calls() if call.startswith("pkg")][:2] == [
+    assert [call for call in phone.calls() if call.startswith("pkg")][:3] == [
         "pkg install -y x11-repo",
+        "pkg update",
         f"pkg install -y -o Dpkg::Options::=--force-confold {PACKAGES}",
     ]
     again = phone.run(f"{INSTALL} --no-compiler")
