@@ -236,6 +236,8 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
         board = ask_board(uri, wait_s, keys)
     except TandemError as error:
         return [*findings, Finding(what="board", verdict=Grade.FAIL, text=error.problem, remedy=error.remedy)]
+    if board.answer is Answer.BOARD:  # whatever way it came
+        findings = [finding for finding in findings if finding.verdict is not Grade.FAIL]
     if board.answer is Answer.SILENT:
         board = BoardReadings(uri=board.uri, answer=_way(address), waited_s=board.waited_s)
     return [*findings, check_board(board)]
