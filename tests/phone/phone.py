@@ -92,7 +92,7 @@ class Phone:
     def _lay_out(self, tree: Path) -> None:
         """Termux's folders. All programs but compilers and services are there from the start, as links into the system."""
         version = (tree / "etc" / "python-version").read_text().strip()
-        for folder in ("bin", "lib", "tmp", "var/log", "etc/tls"):
+        for folder in ("bin", "lib", "tmp", "var/log"):
             (self.prefix / folder).mkdir(parents=True)
         later = ("clang", "gcc", "cc", "c++", "sv", "runsv")
         for program in (tree / "usr" / "bin").iterdir():
@@ -105,8 +105,6 @@ class Phone:
             (self.prefix / "bin" / program.name).unlink(missing_ok=True)
             shutil.copy(program, self.prefix / "bin")
         shutil.copytree(_HERE / "termux" / "services", self.prefix / "stand-in")
-        authorities = os.environ.get("PIP_CERT", "/etc/ssl/certs/ca-certificates.crt")
-        shutil.copy(authorities, self.prefix / "etc" / "tls" / "cert.pem")
 
 
 def interrupt(process: "subprocess.Popen[bytes]", *words: str) -> None:

@@ -3,6 +3,7 @@
 `platform` goes on naming Linux, so that pip takes wheels that run here: they stand for Android's of the same version.
 """
 
+import ctypes  # noqa: F401 - on Android it would look for libpython, which Debian's interpreter has inside
 import platform
 import socket
 import sys
