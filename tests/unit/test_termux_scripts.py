@@ -21,7 +21,7 @@ ALL = [
 
 def _run(script: str, *options: str) -> "subprocess.CompletedProcess[str]":
     environment = {name: text for name, text in os.environ.items() if name != "PREFIX"}
-    command = ["sh", HERE / "deploy" / "host" / script, *options]
+    command = ["sh", str(HERE / "deploy" / "host" / script), *options]
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
 
 
