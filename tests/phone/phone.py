@@ -5,21 +5,33 @@ a real phone.
 """
 
 import os
+import re
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
+
+from packaging.requirements import Requirement
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 _HERE: Final = Path(__file__).resolve().parent
 _UID: Final = 10123
 """An app's user on Android: u0_a123."""
 
-PATIENCE_S: Final = 480.0
-"""Compiling takes longest: some minutes, emulated."""
+_ANDROID: Final = {
+    "sys_platform": "android",
+    "platform_system": "Android",
+    "platform_machine": "aarch64",
+    "python_version": "3.14",
+    "python_full_version": "3.14.0",
+}
+
+PATIENCE_S: Final = 1200.0
+"""Installing and compiling take minutes each, emulated, and more on a busy machine."""
 
 
 def image() -> Path:
@@ -49,6 +61,7 @@ class Phone:
             packing.stdin.write(listed)
             packing.stdin.close()
             subprocess.run(["tar", "--extract", "--no-same-owner"], cwd=self.checkout, stdin=packing.stdout, check=True)
+        _fetch_wheels(files / "wheels")
         for path in [files, *files.rglob("*")]:
             os.chown(path, _UID, _UID, follow_symlinks=False)
 
@@ -105,6 +118,36 @@ class Phone:
             (self.prefix / "bin" / program.name).unlink(missing_ok=True)
             shutil.copy(program, self.prefix / "bin")
         shutil.copytree(_HERE / "termux" / "services", self.prefix / "stand-in")
+
+
+def _fetch_wheels(folder: Path) -> None:
+    """Fetch what Termux's pip would: the pinned packages that Android needs, as wheels for glibc. In the emulator, TLS alone would take minutes."""
+    text = (ROOT / "requirements" / "run.txt").read_text()
+    blocks = re.split(r"\n(?=[a-z])", text.strip())
+    needed = [block for block in blocks if _is_for_android(block.partition(" \\")[0])]
+    folder.mkdir()
+    pins = folder / "pins.txt"
+    pins.write_text("\n".join(re.sub(r" ;.*", " \\\\", block, count=1) for block in needed) + "\n")
+    tags = [
+        word
+        for tag in ("manylinux_2_28", "manylinux_2_17", "manylinux2014")
+        for word in ("--platform", f"{tag}_aarch64")
+    ]
+    wanted = [
+        "--require-hashes",
+        "--no-deps",
+        "--only-binary=:all:",
+        "--python-version=3.14",
+        *tags,
+        "--requirement",
+        str(pins),
+    ]
+    subprocess.run([sys.executable, "-m", "pip", "download", "--quiet", *wanted, "--dest", str(folder)], check=True)
+
+
+def _is_for_android(requirement: str) -> bool:
+    marker = Requirement(requirement).marker
+    return marker is None or marker.evaluate({**_ANDROID, "extra": ""})
 
 
 def interrupt(process: "subprocess.Popen[bytes]", *words: str) -> None:

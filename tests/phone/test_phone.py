@@ -14,7 +14,7 @@ from tests.support.numbered import saved_numbers, write_film
 from tests.support.page_client import PageClient
 from tests.support.programs import board, free_port, until
 
-pytestmark = pytest.mark.timeout(1200)  # everything is emulated
+pytestmark = pytest.mark.timeout(3600)  # everything is emulated
 
 INSTALL = "sh deploy/host/termux-install.sh"
 RUN = "sh deploy/host/termux-run.sh"
