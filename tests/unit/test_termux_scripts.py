@@ -1,6 +1,7 @@
 """Termux's scripts as far as any machine can tell: shells read them, and elsewhere they end in one line. `make test-arm` runs them to their end."""
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -58,3 +59,10 @@ def test_help_names_every_option() -> None:
     """--help says what the script does and lists its options."""
     shown = _run("termux-install.sh", "--help").stdout
     assert all(option in shown for option in ("--no-compiler", "--service", "--no-service"))
+
+
+def test_opencvs_types_are_for_the_type_checker_alone() -> None:
+    """`cv2.typing` comes with OpenCV's wheels only; Termux's package lacks it, so every mention is a quoted one."""
+    files = [file for top in ("board_agent", "common", "phone_host") for file in (HERE / top).rglob("*.py")]
+    bare = [file.name for file in files if re.search(r"(?<![\"`])\bcv2\.typing", file.read_text(encoding="utf-8"))]
+    assert bare == []
