@@ -29,6 +29,8 @@ _LOCK: Final = threading.Lock()
 """Guards the process's `stderr`; there is only one."""
 
 _FROM_START: Final = 0
+_SILENT: Final = 0
+"""LOG_LEVEL_SILENT of opencv2/core/utils/logger.defines.hpp."""
 
 
 class _Ear:
@@ -79,7 +81,7 @@ def overhear(work: Callable[[], object]) -> str:
         Exception: whatever the work raises.
     """
     with _LOCK:
-        log_level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        log_level = _log_level(_SILENT)
         try:
             ear = _ear()
             if ear is not None:
@@ -87,7 +89,18 @@ def overhear(work: Callable[[], object]) -> str:
             work()
             return ""
         finally:
-            cv2.utils.logging.setLogLevel(log_level)
+            _log_level(log_level)
+
+
+def _log_level(level: int) -> int:
+    """Set the level of OpenCV's own log; return the one before. Its wheels and the packages of Termux and Debian put it in different places."""
+    if hasattr(cv2.utils, "logging"):
+        return cv2.utils.logging.setLogLevel(level)
+    reading, setting = getattr(cv2, "getLogLevel", None), getattr(cv2, "setLogLevel", None)
+    before = reading() if reading else level
+    if setting:
+        setting(level)
+    return int(before)
 
 
 @cache
