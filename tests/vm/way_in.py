@@ -18,24 +18,30 @@ def carry(source: socket.socket, target: socket.socket) -> None:
             end.shutdown(socket.SHUT_RDWR)
 
 
+def serve(listening: socket.socket, target: tuple[str, int]) -> None:
+    """Carry every connection on to the target."""
+    while True:
+        near, _ = listening.accept()
+        try:
+            far = socket.create_connection(target, 5)
+        except OSError:
+            near.close()
+            continue
+        far.settimeout(None)
+        for ends in ((near, far), (far, near)):
+            threading.Thread(target=carry, args=ends, daemon=True).start()
+
+
 def main() -> None:
-    """Serve until killed. A socket stays in the namespace in which it was made, so the listening one is made before the change."""
+    """Serve until stdin ends. A socket stays in the namespace in which it was made, so the listening one is made before the change."""
     name, port, host, there = sys.argv[1:]
     with socket.create_server(("127.0.0.1", int(port))) as listening:
         with Path("/run/netns", name).open("rb") as namespace:
             if ctypes.CDLL(None, use_errno=True).setns(namespace.fileno(), 0):
                 raise OSError(ctypes.get_errno(), "setns")
+        threading.Thread(target=serve, args=(listening, (host, int(there))), daemon=True).start()
         print("ready", flush=True)
-        while True:
-            near, _ = listening.accept()
-            try:
-                far = socket.create_connection((host, int(there)), 5)
-            except OSError:
-                near.close()
-                continue
-            far.settimeout(None)
-            for ends in ((near, far), (far, near)):
-                threading.Thread(target=carry, args=ends, daemon=True).start()
+        sys.stdin.read()  # ends with the ssh that started this; the namespace must not outlive the test
 
 
 if __name__ == "__main__":
