@@ -19,7 +19,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board deb lint types bench fuzz lock clean
+.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -60,6 +60,10 @@ test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and ol
 test-board: $(READY) ## run the tests on booted virtual boards (the first run builds their images: needs apt and root)
 	@.ci/board
 	@.ci/test vm
+
+walk: $(READY) ## walk the ways between board and phone on the booted virtual board, as docs/phone.md says (two minutes)
+	@.ci/board
+	@WALK=1 $(BIN)/python -m pytest -q tests/vm/test_gadget.py -k each_way
 
 deb: ## build the board's Debian package in dist
 	@deploy/board/build-deb dist
