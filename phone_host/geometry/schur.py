@@ -62,9 +62,13 @@ class NormalEquations:
             np.linalg.LinAlgError: a block is singular.
         """
         blocks = self.blocks + damping * self.blocks * np.eye(self.blocks.shape[1])
-        taken, taken_right, inverse = eliminated(self.coupling[:, free], blocks, self.blocks_right)
+        coupling = self.coupling[:, free]
+        inverse = np.asarray(np.linalg.inv(blocks), np.float64)
+        # One product of two wide matrices instead of a small one for each block: with many blocks those fill the memory.
+        wide = coupling.shape[1], blocks.shape[0] * blocks.shape[1]
+        through, coupled = (np.swapaxes(each, 0, 1).reshape(wide) for each in (coupling @ inverse, coupling))
         matrix = self.shared[np.ix_(free, free)] + damping * np.diag(np.diag(self.shared)[free])
-        return matrix - taken.sum(axis=0), self.shared_right[free] - taken_right.sum(axis=0), inverse
+        return matrix - through @ coupled.T, self.shared_right[free] - through @ self.blocks_right.ravel(), inverse
 
     def step(self, damping: float, free: Flags) -> tuple[Floats, Floats]:
         """Return the damped step: shared parameters (G,), 0 for those that are not free, and blocks (V, B).
