@@ -114,14 +114,13 @@ def lens_of(take: Take) -> CameraModel:
     return CameraModel(width_px=take.width_px, height_px=take.height_px, matrix=matrix, distortion=distortion)
 
 
-def _sensor(take: Take) -> tuple[CameraModel, Floats]:
-    """Return the whole sensor's camera, and where the film's corner lies in its image."""
+def _sensor(take: Take) -> CameraModel:
+    """Return the whole sensor's camera; the film shows the middle of its image."""
     model = lens_of(take)
     size = np.array([2 * round(length / CROP / 2) for length in (take.width_px, take.height_px)])
-    corner = (size - np.array([take.width_px, take.height_px])) / 2
     matrix = model.matrix.copy()
-    matrix[:2, 2] += corner
-    return replace(model, width_px=int(size[0]), height_px=int(size[1]), matrix=matrix), corner
+    matrix[:2, 2] += (size - np.array([take.width_px, take.height_px])) / 2
+    return replace(model, width_px=int(size[0]), height_px=int(size[1]), matrix=matrix)
 
 
 class Hand:
@@ -184,7 +183,9 @@ def _noise(random: np.random.Generator, contrast: float) -> NDArray[np.float32]:
 def _boards(take: Take) -> list[_Board]:
     random = np.random.default_rng([take.seed, 3])
 
-    def board(z: float, x: float, y: float, half: float, *, tilt: float = 0.0, lean: float = 0.0, contrast: float = 0.6) -> _Board:
+    def board(
+        z: float, x: float, y: float, half: float, *, tilt: float = 0.0, lean: float = 0.0, contrast: float = 0.6
+    ) -> _Board:
         turn = rotations_of(np.array([lean, tilt, random.normal(0, 0.1)]))
         return _Board(np.array([x, y, z]), turn[:, 0] * half, turn[:, 1] * half, _noise(random, contrast))
 
@@ -194,31 +195,58 @@ def _boards(take: Take) -> list[_Board]:
         case Place.FAR:
             return [board(9.0, 0, 0, 11.0), board(7.0, 2.0, 0.5, 1.6), board(6.0, -2.4, -0.6, 1.4, tilt=0.3)]
         case Place.PLAIN:
-            wall = _Board(np.array([0, 0, 2.0]), np.array([3.0, 0, 0]), np.array([0, 3.0, 0]), np.full((_TEXTURE_PX,) * 2, 150, np.float32))
+            wall = _Board(
+                np.array([0, 0, 2.0]),
+                np.array([3.0, 0, 0]),
+                np.array([0, 3.0, 0]),
+                np.full((_TEXTURE_PX,) * 2, 150, np.float32),
+            )
             return [wall, board(1.5, 0.1, 0.05, 0.09)]
         case Place.DESK:
-            things = [board(random.uniform(0.5, 0.8), random.uniform(-0.4, 0.4), random.uniform(-0.25, 0.2), 0.1, tilt=random.normal(0, 0.4)) for _ in range(5)]
+            things = [
+                board(
+                    random.uniform(0.5, 0.8),
+                    random.uniform(-0.4, 0.4),
+                    random.uniform(-0.25, 0.2),
+                    0.1,
+                    tilt=random.normal(0, 0.4),
+                )
+                for _ in range(5)
+            ]
             return [board(1.0, 0, 0.3, 1.6, lean=-0.9), board(2.2, 0, 0, 3.0), *things]
         case Place.ROOM:
-            things = [board(random.uniform(1.0, 2.3), random.uniform(-0.9, 0.9), random.uniform(-0.6, 0.6), random.uniform(0.15, 0.3), tilt=random.normal(0, 0.5)) for _ in range(6)]
+            things = [
+                board(
+                    random.uniform(1.0, 2.3),
+                    random.uniform(-0.9, 0.9),
+                    random.uniform(-0.6, 0.6),
+                    random.uniform(0.15, 0.3),
+                    tilt=random.normal(0, 0.5),
+                )
+                for _ in range(6)
+            ]
             return [board(3.0, 0, 0, 3.6, tilt=0.15), board(2.0, -1.6, 0, 1.8, tilt=1.1), *things]
 
 
 def film(take: Take) -> Iterator[tuple[float, Image]]:
     """Render a film: moment of the middle row, s, and grey image, (H, W) uint8."""
-    sensor, corner = _sensor(take)
+    sensor = _sensor(take)
     boards, hand = _boards(take), Hand(take)
     smooth, random = _Smooth(take, hand), np.random.default_rng([take.seed, 4])
     if take.walker:
         cloth = _noise(random, 0.6)
-        boards.append(_Board(np.array([0.25, 0.1, 0.9]), np.array([0.16, 0, 0]), np.array([0, 0.5, 0]), cloth, swing=0.25))
+        boards.append(
+            _Board(np.array([0.25, 0.1, 0.9]), np.array([0.16, 0, 0]), np.array([0, 0.5, 0]), cloth, swing=0.25)
+        )
     grid = np.stack(np.meshgrid(np.arange(sensor.width_px), np.arange(sensor.height_px)), -1).reshape(-1, 2)
-    rays = rays_through(grid.astype(np.float64), sensor).astype(np.float32).reshape(sensor.height_px, sensor.width_px, 3)
+    rays = (
+        rays_through(grid.astype(np.float64), sensor).astype(np.float32).reshape(sensor.height_px, sensor.width_px, 3)
+    )
     rows = (np.arange(sensor.height_px) / sensor.height_px - 0.5) * take.readout / take.fps
     for number in range(round(take.seconds * take.fps)):
         t_s = number / take.fps
         whole = _painted(boards, rays, hand.at(t_s + rows), t_s)
-        image = _stabilised(take, sensor, corner, whole, hand, smooth, t_s)
+        image = _stabilised(take, sensor, whole, hand, smooth, t_s)
         gain = 1 + take.exposure * math.sin(math.tau * t_s / 2.3)
         levels = gain * image + random.normal(0, take.noise, image.shape)
         yield t_s, _sent(np.clip(levels, 0, 255).astype(np.uint8), take.jpeg)
@@ -238,23 +266,26 @@ def _painted(boards: list[_Board], rays: NDArray[np.float32], motion: Floats, t_
         facing = towards @ normal
         depth = ((middle - eye) @ normal)[:, np.newaxis] / np.where(facing == 0, np.float32(1e-9), facing)
         half = float(np.linalg.norm(board.across)), float(np.linalg.norm(board.down))
-        axes = [(side / length**2).astype(np.float32) for side, length in zip((board.across, board.down), half, strict=True)]
+        axes = [
+            (side / length**2).astype(np.float32) for side, length in zip((board.across, board.down), half, strict=True)
+        ]
         u, v = (((eye - middle) @ axis)[:, np.newaxis] + depth * (towards @ axis) for axis in axes)
         hit = (depth > 0) & (depth < nearest) & (np.abs(u) < 1) & (np.abs(v) < 1)
         scale = (_TEXTURE_PX - 1) / 2
         seen = cv2.remap(board.texture, (u + 1) * scale, (v + 1) * scale, cv2.INTER_LINEAR)
         nearest, image = np.where(hit, depth, nearest), np.where(hit, seen, image)
-    return cv2.GaussianBlur(image, (0, 0), 0.6)
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), 0.6), np.float32)
 
 
-def _stabilised(
-    take: Take, sensor: CameraModel, corner: Floats, whole: NDArray[np.float32], hand: Hand, smooth: _Smooth, t_s: float
+def _stabilised(  # noqa: PLR0917 - what makes up a moment of the film
+    take: Take, sensor: CameraModel, whole: NDArray[np.float32], hand: Hand, smooth: _Smooth, t_s: float
 ) -> NDArray[np.float32]:
     """Return the film's part of the sensor's image."""
     width, height = take.width_px, take.height_px
-    x, y = np.meshgrid(np.arange(width) + corner[0], np.arange(height) + corner[1])
+    left, top = (sensor.width_px - width) / 2, (sensor.height_px - height) / 2
+    x, y = np.meshgrid(np.arange(width) + left, np.arange(height) + top)
     if take.stabiliser is Stabiliser.OFF:
-        return cv2.remap(whole, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
+        return np.asarray(cv2.remap(whole, x.astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR), np.float32)
     k, now = sensor.matrix, np.array([t_s])
     wanted, real = smooth.at(now)[0], hand.at(now)[0, :3]
     off = real - wanted
@@ -270,13 +301,16 @@ def _stabilised(
             source = places @ np.array([[cosine, sine], [-sine, cosine]]) + aside
         case _:
             whole_rows = take.stabiliser is Stabiliser.ROWS
-            rows = (np.arange(height) / height - 0.5) * take.readout / take.fps * CROP if whole_rows else np.zeros(height)
+            rows = (
+                (np.arange(height) / height - 0.5) * take.readout / take.fps * CROP if whole_rows else np.zeros(height)
+            )
             turns = rotations_of(hand.at(t_s + rows)[:, :3]) @ rotations_of(wanted).T
             rays = np.concatenate([places / np.array([k[0, 0], k[1, 1]]), np.ones((height, width, 1))], -1)
             turned = rays @ np.swapaxes(turns, 1, 2)
             source = turned[..., :2] / turned[..., 2:] * np.array([k[0, 0], k[1, 1]])
     at = (source + k[:2, 2]).astype(np.float32)
-    return cv2.remap(whole, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    made = cv2.remap(whole, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(made, np.float32)
 
 
 def _sent(image: Image, quality: int) -> Image:

@@ -14,8 +14,9 @@ import numpy as np
 
 from phone_host.calibration.capture.look import FRAMES, Reading, Window
 from phone_host.calibration.capture.pace import Shot, pace_of
-from phone_host.model import CameraModel, Image
+from phone_host.model import CameraModel, Image, Side
 from phone_host.model.capture import CaptureReport, CaptureSource, Rigidity, Unseen, Warping
+from phone_host.stereo.scaled_rig import scaled_camera
 
 _WIDTH_PX: Final = 640
 """Wider images are reduced: points are followed to a thirtieth of a pixel, and a stabiliser's warp is larger than one."""
@@ -89,10 +90,10 @@ class CaptureCheck:
         self._source, self._asked_hz, self._plan = source, asked_hz, plan
         self._by = min(1.0, _WIDTH_PX / source.width_px)
         self._size = (round(source.width_px * self._by), round(source.height_px * self._by))
-        self._lens = None if lens is None else _reduced_lens(lens, self._size)
+        self._lens = None if lens is None else scaled_camera(lens, self._size, Side.RIGHT)
         self._shots: list[Shot] = []
         self._frames: list[Image] = []
-        self._last_ns, self._skipped = 0, 0
+        self._skipped = 0
         self._readings: list[Reading] = []
         self._is_looking = False
 
@@ -115,7 +116,7 @@ class CaptureCheck:
         if self._is_looking or self.progress.stage is not Stage.MOVE or before is None or not is_usual:
             self._frames.clear()
             return None
-        return self._collected(luma, captured_ns, captured_ns - before)
+        return self._collected(luma, captured_ns - before)
 
     def take(self, reading: Reading) -> None:
         """Take what was seen in the last stretch."""
@@ -146,7 +147,7 @@ class CaptureCheck:
         rigidity = replace(rigidity_of(self._readings), knows_lens=self._lens is not None)
         return CaptureReport(source=self._source, pace=pace_of(self._shots, self._asked_hz), rigidity=rigidity)
 
-    def _collected(self, luma: Image, captured_ns: int, step_ns: int) -> Window | None:
+    def _collected(self, luma: Image, step_ns: int) -> Window | None:
         """Add a frame to the stretch; return it when it is complete."""
         usual_ns = self._usual_ns
         if not 0 < step_ns < _GAP * usual_ns:
@@ -169,13 +170,6 @@ class CaptureCheck:
         """The usual interval, by the newest frames."""
         newest = [shot.captured_ns for shot in self._shots[-2 * FRAMES :]]
         return max(float(np.median(np.diff(newest))), 1.0)
-
-
-def _reduced_lens(lens: CameraModel, size_px: tuple[int, int]) -> CameraModel:
-    scale_x, scale_y = size_px[0] / lens.width_px, size_px[1] / lens.height_px
-    # Pixel centres are integers, so an image begins at -0.5.
-    reduce = np.array([[scale_x, 0, (scale_x - 1) / 2], [0, scale_y, (scale_y - 1) / 2], [0, 0, 1]])
-    return replace(lens, width_px=size_px[0], height_px=size_px[1], matrix=reduce @ lens.matrix)
 
 
 def rigidity_of(readings: list[Reading]) -> Rigidity:

@@ -97,11 +97,15 @@ def look(window: Window) -> Reading:
     return _judged(compared, tracks.seen, window.period_ms, along, across)
 
 
+def excess_of(compared: Compared) -> float:
+    """Return by how much warps explain more than noise does, in standard deviations of the noise."""
+    counted = int((compared.trust > _COUNTS).sum())
+    return math.sqrt(max(compared.rigid.cost - compared.warped.cost, 0.0) / max(2 * counted, 1))
+
+
 def _judged(compared: Compared, seen: Flags, period_ms: float, along: float, across: float) -> Reading:
-    counted = compared.trust > _COUNTS
-    excess = math.sqrt(max(compared.rigid.cost - compared.warped.cost, 0.0) / max(2 * int(counted.sum()), 1))
-    unseen = None
-    if counted[seen].mean() < _LEAST_SHARE:
+    excess, unseen = excess_of(compared), None
+    if (compared.trust > _COUNTS)[seen].mean() < _LEAST_SHARE:
         unseen = Unseen.LIVELY
     elif excess < WARPED:
         if along < _MOTION or across < _ACROSS:

@@ -49,6 +49,9 @@ _SIDE: Final = 3
 _SLOPE: Final = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
 """Speed from three frames on either side, to sixth order: right to 9 % for a hand that trembles with 8 Hz, seen at 30 frames/s."""
 
+_COARSE: Final = np.array([0.0, 1.0, -8.0, 0.0, 8.0, -1.0, 0.0]) / 12
+"""The same to fourth order, right to 19 %."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracks:
@@ -131,16 +134,24 @@ class _Problem:
         self._values = parameters_of(model)
         width = model.width_px
         self._warp_prior = np.full(5, 0.05 * width)
-        lens = [0.3, 0.005 * width, 0.005 * width, 1e-4] if knows_lens else [0.3, 0.01 * width, 0.01 * width, 0.2]
+        lens = [0.3, 0.005 * width, 0.005 * width, 0.005] if knows_lens else [0.3, 0.01 * width, 0.01 * width, 0.2]
         self._common_prior = np.array([*lens, 0.5])
         self.point_prior = np.array([0.0, 0.0, 1.0])
 
     def prior(self, state: _State, *, warped: bool) -> Floats:
-        """Return one over the variance of each parameter, which is about 0."""
-        speed = float(np.sqrt((self.speeds(state)[:, :3] ** 2).sum(axis=1).mean())) + 1e-4
+        """Return one over the variance of each parameter, which is about 0.
+
+        How a rigid camera turns while its rows are read follows from how it turns from frame to frame, as far as that is known: the
+        difference of two formulas for its speed tells. At both ends of the window it is not known.
+        """
+        speeds, coarse = self.speeds(state)[:, :3], self.speeds(state, _COARSE)[:, :3]
+        speed = float(np.sqrt((speeds**2).sum(axis=1).mean())) + 1e-4
+        rows = np.full(self.frames, speed)
+        if not warped:
+            rows[_SIDE:-_SIDE] = np.linalg.norm(speeds - coarse, axis=1)[_SIDE:-_SIDE] / 2 + 1e-6
         frame = np.empty((self.frames, OF_FRAME))
         frame[:, POSE] = 1.0
-        frame[:, ROWS] = speed
+        frame[:, ROWS] = rows[:, np.newaxis]
         frame[:, WARP] = self._warp_prior
         return np.concatenate([frame.ravel(), self._common_prior]) ** -2.0
 
@@ -149,7 +160,6 @@ class _Problem:
         frame = np.ones((self.frames, OF_FRAME), bool)
         frame[self._tracks.home, POSE] = False
         frame[:, WARP] = warped
-        frame[_SIDE:-_SIDE, ROWS] = warped
         common = np.ones(OF_ALL, bool)
         common[0] = warped or not self._knows_lens
         return np.concatenate([frame.ravel(), common])
@@ -161,7 +171,7 @@ class _Problem:
         still, none = np.tile(np.eye(3), (self.frames, 1, 1)), np.zeros((self.frames, 3))
         return _State(still, none, none, np.zeros((self.frames, 5)), _LIKELY.copy(), points)
 
-    def speeds(self, state: _State) -> Floats:
+    def speeds(self, state: _State, formula: Floats = _SLOPE) -> Floats:
         """Return how each frame moves, (F, 6): turn and translation per frame period, in its own axes."""
         found = np.zeros((self.frames, 6))
         for at in range(self.frames):
@@ -169,7 +179,7 @@ class _Problem:
             near = slice(first, first + len(_SLOPE))
             turns = state.turns[near] @ state.turns[at].T
             shifts = state.shifts[near] - turns @ state.shifts[at]
-            slope = _SLOPE if first == at - _SIDE else _SLOPES[at - first]
+            slope = formula if first == at - _SIDE else _SLOPES[at - first]
             found[at] = slope @ np.column_stack([vectors_of(turns), shifts])
         return found
 
@@ -281,11 +291,15 @@ def _moved(state: _State, shared: Floats, points: Floats) -> _State:
 def _trusted(rest: Floats, seen: Flags) -> tuple[Floats, float]:
     """Return Tukey's weights (F, N) and the standard deviation of the residuals, px."""
     off = np.linalg.norm(rest, axis=2)
-    sigma = max(float(np.median(off[seen])) / 1.177, _NOISE_PX / 4)  # the median length of two normal numbers is 1.177 of them
+    sigma = max(
+        float(np.median(off[seen])) / 1.177, _NOISE_PX / 4
+    )  # the median length of two normal numbers is 1.177 of them
     return np.where(seen, np.clip(1 - (off / (_TUKEY * sigma)) ** 2, 0, None) ** 2, 0.0), sigma
 
 
-def _fit(problem: _Problem, state: _State, seen: Flags, weights: Floats | None, *, warped: bool) -> tuple[_State, Floats]:
+def _fit(
+    problem: _Problem, state: _State, seen: Flags, weights: Floats | None, *, warped: bool
+) -> tuple[_State, Floats]:
     """Minimise (Levenberg and Marquardt), with given weights or with those of Tukey, found on the way."""
     free, damping, small = problem.free(warped=warped), 1e-3, 0
     parts = problem.residuals(state)

@@ -89,7 +89,7 @@ def _followed(
     off = np.linalg.norm(back - start, axis=1)
     size = np.array([here.shape[1], here.shape[0]])
     inside = (np.minimum(ahead, size - 1 - ahead) >= _EDGE_PX / 2).all(axis=1)
-    return ahead, (found.ravel() == 1) & (again.ravel() == 1) & (off <= _BACK_PX) & inside
+    return np.asarray(ahead, np.float32), (found.ravel() == 1) & (again.ravel() == 1) & (off <= _BACK_PX) & inside
 
 
 def motion_px(tracks: Tracks) -> tuple[float, float]:
@@ -114,4 +114,4 @@ def filled_cells(tracks: Tracks, size_px: tuple[int, int]) -> int:
     """Return how many of 24 cells of the image hold points."""
     share = (tracks.points_px[tracks.home] + 0.5) / np.array(size_px)
     column, row = np.clip(share * np.array(_CELLS), 0, np.array(_CELLS) - 1).astype(int).T
-    return int(len(np.unique(row * _CELLS[0] + column)))
+    return len(np.unique(row * _CELLS[0] + column))
