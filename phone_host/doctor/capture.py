@@ -3,7 +3,7 @@
 import math
 import queue
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Final
 
 from common import now
@@ -26,6 +26,8 @@ _WAITING: Final = 90
 
 _SILENCE_S: Final = 8.0
 """Webcams start within 2 s, servers in the network within 5."""
+
+_TICK_S: Final = 0.2
 
 
 def source_of(camera: CameraDescription) -> CaptureSource:
@@ -87,22 +89,31 @@ class _Filming:
         self._said, self._check = camera.description, check
         self._frames: queue.Queue[tuple[Frame, int]] = queue.Queue(_WAITING)
         self._own = OwnCamera(camera, self._put, DemandClock(self._said.pacing))
-        self._looking: Future[Reading] | None = None
+        self._looking: list[Future[Reading]] = []
 
     def run(self, stopped: Callable[[], bool], tell: Callable[[Progress], None]) -> CaptureReport:
         """Film until all is done or somebody stops it."""
-        self._own.start()
-        try:
-            with ThreadPoolExecutor(1, "look") as looks:
+        with ThreadPoolExecutor(1, "look") as looks:
+            self._own.start()
+            try:
                 while not stopped() and self._check.progress.stage is not Stage.DONE and self._step(looks):
                     tell(self._check.progress)
-        finally:
-            self._own.stop()
+            finally:
+                self._own.stop()
+            while self._looking and not stopped():
+                self._take(_TICK_S)
+                tell(self._check.progress)
+            looks.shutdown(wait=False, cancel_futures=True)
         if self._own.failure is not None:
             raise self._own.failure
-        if self._looking is not None:
-            self._check.take(self._looking.result())
         return self._check.report
+
+    def _take(self, patience_s: float) -> None:
+        """Take what was seen meanwhile."""
+        done, waiting = wait(self._looking, patience_s, FIRST_COMPLETED)
+        self._looking = [each for each in self._looking if each in waiting]
+        for each in done:
+            self._check.take(each.result())
 
     def _put(self, frame: Frame) -> None:
         if not self._frames.full():
@@ -121,10 +132,9 @@ class _Filming:
         if (luma := _luma(frame, self._said)) is not None:
             arrived_ns = max(arrived_ns, frame.grabbed.ns)
             window = self._check.add(luma, frame.exposed.ns, arrived_ns, frame.exposure_ns)
-            self._looking = looks.submit(look, window) if window is not None else self._looking
-        if self._looking is not None and self._looking.done():
-            self._check.take(self._looking.result())
-            self._looking = None
+            if window is not None:
+                self._looking.append(looks.submit(look, window))
+        self._take(0.0)
         return True
 
 

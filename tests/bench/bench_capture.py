@@ -217,7 +217,12 @@ def main() -> int:
         told, unseen, without = list(pairs), list(blind), list(guessed)
     verdicts = _verdicts(told, unseen, without)
     if options.json:
-        tables = {"pairs": _flat(told), "blind": unseen, "guessed": _flat(without), "verdicts": verdicts}
+        tables: dict[str, Sequence[Row | Verdict]] = {
+            "pairs": _flat(told),
+            "blind": unseen,
+            "guessed": _flat(without),
+            "verdicts": verdicts,
+        }
         shown = {name: [asdict(row) for row in rows] for name, rows in tables.items()}
         print(json.dumps({"machine": str(machine()), **shown}))
         return exit_code(verdicts)

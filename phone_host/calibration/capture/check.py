@@ -1,7 +1,7 @@
 """Checks a camera while it films: hold it still, move it a little, then leave it. Pure: frames in, what to do next and verdicts out.
 
-A look at a stretch of film takes about a second. So this hands the stretches out, and takes what was seen in them; whoever
-drives it looks in another thread, or frames would seem to be missing.
+A look at a stretch of film takes seconds. So this hands the stretches out, no more at a time than it needs, and takes what was
+seen in them; whoever drives it looks in another thread, or frames would seem to be missing.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.capture.look import FRAMES, Reading, Window
+from phone_host.calibration.capture.look import FRAMES, Reading, Window, may_tell
 from phone_host.calibration.capture.pace import Shot, pace_of
 from phone_host.model import CameraModel, Image, Side
 from phone_host.model.capture import CaptureReport, CaptureSource, Rigidity, Unseen, Warping
@@ -30,7 +30,6 @@ ENOUGH: Final = 6
 _FEWEST: Final = 3
 _WARPED_SHARE: Final = 0.5
 _RIGID_SHARE: Final = 0.75
-_MOST_READINGS: Final = 24
 _GAP: Final = 1.5
 _BRIGHTNESS_STEP: Final = 8
 
@@ -95,7 +94,7 @@ class CaptureCheck:
         self._frames: list[Image] = []
         self._skipped = 0
         self._readings: list[Reading] = []
-        self._is_looking = False
+        self._looks = 0
 
     def add(self, luma: Image, captured_ns: int, arrived_ns: int, exposure_ns: int | None) -> Window | None:
         """Take a frame.
@@ -107,20 +106,20 @@ class CaptureCheck:
             exposure_ns: exposure time; None: the camera does not say.
 
         Returns:
-            A stretch of film to look at; `take` must follow before there is another.
+            A stretch of film to look at, whose reading `take` must be given.
         """
         brightness = float(luma[::_BRIGHTNESS_STEP, ::_BRIGHTNESS_STEP].mean())
         before = self._shots[-1].captured_ns if self._shots else None
         self._shots.append(Shot(captured_ns, arrived_ns, exposure_ns, brightness))
         is_usual = luma.shape == (self._source.height_px, self._source.width_px)
-        if self._is_looking or self.progress.stage is not Stage.MOVE or before is None or not is_usual:
+        if self.progress.stage is not Stage.MOVE or before is None or not is_usual:
             self._frames.clear()
             return None
         return self._collected(luma, captured_ns - before)
 
     def take(self, reading: Reading) -> None:
         """Take what was seen in the last stretch."""
-        self._is_looking = False
+        self._looks -= 1
         self._readings.append(reading)
 
     @property
@@ -132,7 +131,7 @@ class CaptureCheck:
             return Progress(Stage.STILL, 0.0, told, last)
         plan, at_s = self._plan, (self._shots[-1].captured_ns - self._shots[0].captured_ns) / 1e9
         share = min(max(at_s / plan.whole_s, 0.0), 1.0)
-        is_enough = told >= ENOUGH or len(self._readings) >= _MOST_READINGS
+        is_enough = told + self._looks >= ENOUGH
         if at_s >= plan.whole_s:
             stage = Stage.DONE
         elif at_s < plan.still_s:
@@ -162,8 +161,11 @@ class CaptureCheck:
             return None
         window = Window(tuple(self._frames), stride * usual_ns / 1e6, self._lens)
         self._frames.clear()
-        self._is_looking = True
-        return window
+        self._looks += 1
+        if may_tell(window):
+            return window
+        self.take(Reading(Unseen.STILL))
+        return None
 
     @property
     def _usual_ns(self) -> float:

@@ -1,9 +1,10 @@
-"""Looks at one stretch of film: could a rigid camera have made it? Pure, and slow: about a second."""
+"""Looks at one stretch of film: could a rigid camera have made it? Pure, and slow: some seconds."""
 
 import math
 from dataclasses import dataclass
 from typing import Final
 
+import cv2
 import numpy as np
 
 from phone_host.calibration.capture.rigid import Compared, Flags, compare
@@ -27,6 +28,7 @@ WARPED: Final = 0.75
 """Excess of a warp over noise. Rendered films of rigid cameras leave 0.02 to 0.4, stabilised ones 0.6 to 9 (bench_capture)."""
 
 _COUNTS: Final = 0.3
+_GLANCE_PX: Final = 160
 _GUESSED_VIEW: Final = 64.0
 """Horizontal angle of view of phones' main cameras in video, degrees."""
 
@@ -72,6 +74,17 @@ class Reading:
     def is_warped(self) -> bool:
         """Whether no rigid camera made it."""
         return self.excess >= WARPED
+
+
+def may_tell(window: Window) -> bool:
+    """Tell, quickly, whether the picture moves enough in a window for a look."""
+    by = min(1.0, _GLANCE_PX / window.frames[0].shape[1])
+    some = [
+        cv2.resize(frame, None, fx=by, fy=by, interpolation=cv2.INTER_AREA).astype(np.float32)
+        for frame in window.frames[:: FRAMES // 4]
+    ]
+    moved = [np.hypot(*cv2.phaseCorrelate(some[0], other)[0]) for other in some[1:]]
+    return max(moved) >= _LEAST_MOTION * some[0].shape[1] / 2
 
 
 def look(window: Window) -> Reading:

@@ -173,15 +173,16 @@ class _Problem:
 
     def speeds(self, state: _State, formula: Floats = _SLOPE) -> Floats:
         """Return how each frame moves, (F, 6): turn and translation per frame period, in its own axes."""
-        found = np.zeros((self.frames, 6))
-        for at in range(self.frames):
-            first = min(max(at - _SIDE, 0), self.frames - len(_SLOPE))
-            near = slice(first, first + len(_SLOPE))
-            turns = state.turns[near] @ state.turns[at].T
-            shifts = state.shifts[near] - turns @ state.shifts[at]
-            slope = formula if first == at - _SIDE else _SLOPES[at - first]
-            found[at] = slope @ np.column_stack([vectors_of(turns), shifts])
-        return found
+        at = np.arange(self.frames)
+        first = np.clip(at - _SIDE, 0, self.frames - len(_SLOPE))
+        near = first[:, np.newaxis] + np.arange(len(_SLOPE))
+        turns = state.turns[near] @ np.swapaxes(state.turns, 1, 2)[:, np.newaxis]
+        shifts = state.shifts[near] - (turns @ state.shifts[:, np.newaxis, :, np.newaxis])[..., 0]
+        inside = (first == at - _SIDE)[:, np.newaxis]
+        slopes = np.where(inside, formula, _SLOPES[at - first])
+        return np.asarray(
+            np.einsum("fk,fkj->fj", slopes, np.concatenate([vectors_of(turns), shifts], axis=2)), np.float64
+        )
 
     def residuals(self, state: _State) -> tuple[Floats, Floats, Floats]:
         """Return what is left, (F, N, 2) px, and the derivatives by frame and all (F, N, 2, 14 + 5) and by point (F, N, 2, 3)."""
