@@ -15,6 +15,7 @@ from phone_host.calibration.capture.check import ENOUGH, CaptureCheck, Plan, Sta
 from phone_host.calibration.capture.look import FRAMES, Reading, Window, guessed_lens, look
 from phone_host.calibration.capture.pace import Shot, pace_of
 from phone_host.calibration.capture.words import findings_of, holds_for, stage_words, stored_finding, warp_finding
+from phone_host.model import Image
 from phone_host.model.capture import CaptureReport, CaptureSource, Pace, Rigidity, Unseen, Warping
 from phone_host.output.capture_json import capture_path, capture_text, read_capture
 
@@ -110,10 +111,15 @@ def test_few_frames_say_little_and_break_nothing(times: list[float]) -> None:
         assert grades(pace) == {"rate": Grade.WARN}
 
 
+def passing(number: int) -> Image:
+    """A picture that moves by a pixel with each frame."""
+    return np.asarray(np.roll(np.random.default_rng(4).integers(0, 255, (48, 64), np.uint8), number, axis=1))
+
+
 def fed(check: CaptureCheck, first: int, count: int, hz: float = 30) -> list[Window]:
     """The stretches that a check hands out for so many frames."""
     windows = [
-        check.add(GREY, round(number * 1e9 / hz), round(number * 1e9 / hz), None)
+        check.add(passing(number), round(number * 1e9 / hz), round(number * 1e9 / hz), None)
         for number in range(first, first + count)
     ]
     return [window for window in windows if window is not None]
@@ -130,16 +136,18 @@ def test_a_check_leads_from_still_over_moving_to_its_end() -> None:
     assert stage(check) is Stage.STILL
     assert not fed(check, 0, 60)
     assert stage(check) is Stage.STILL
-    (window,) = fed(check, 60, FRAMES + 40)
-    assert stage(check) is Stage.MOVE
-    assert len(window.frames) == FRAMES
+    windows = fed(check, 60, 8 * FRAMES)
+    assert [len(window.frames) for window in windows] == [FRAMES] * ENOUGH
+    assert stage(check) is Stage.WATCH  # unless they tell nothing
     check.take(Reading(Unseen.STILL))
+    assert stage(check) is Stage.MOVE
     assert "too little" in stage_words(check.progress)
+    (_,) = fed(check, 220, FRAMES + 1)
     for _ in range(ENOUGH):
         check.take(RIGID)
-    assert not fed(check, 120, 60)
+    assert not fed(check, 241, 60)
     assert stage(check) is Stage.WATCH
-    fed(check, 180, 425)
+    fed(check, 301, 310)
     assert stage(check) is Stage.DONE
     assert check.progress.share == 1.0
     report = check.report
