@@ -4,17 +4,24 @@ import math
 import queue
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from common import now
 from common.camera.base import Camera
+from common.doctor.finding import Finding, ok, warn
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame
 from common.protocol.message import CameraDescription
 from phone_host.calibration.capture.check import CaptureCheck, Plan, Progress, Stage
 from phone_host.calibration.capture.look import Reading, look
+from phone_host.calibration.capture.words import findings_of
 from phone_host.model import CameraModel, Image, Rig, Side
 from phone_host.model.capture import CaptureReport, CaptureSource
+from phone_host.output.atomic import write_text
+from phone_host.output.capture_json import capture_path, capture_text
+from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.stereo.images import to_grey
 from phone_host.stereo.raw_images import EncodedImage, decode_frame
 from phone_host.stereo.scaled_rig import fits_rig, scaled_camera
@@ -80,6 +87,60 @@ def film_capture(
     asked_hz = 1e9 / said.period_ns if said.period_ns else math.nan
     filming = _Filming(camera, CaptureCheck(source, asked_hz, lens_for(rig, source), plan))
     return filming.run(stopped, tell)
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedCapture:
+    """What a check came to.
+
+    Attributes:
+        report: the figures.
+        findings: the same in words, and where it is kept.
+    """
+
+    report: CaptureReport
+    findings: list[Finding]
+
+
+def check_capture(
+    camera: Camera,
+    calibration: Path | None,
+    whole_s: float,
+    stopped: Callable[[], bool],
+    tell: Callable[[Progress], None],
+) -> CheckedCapture:
+    """Film, check, and keep the report beside the calibration.
+
+    Args:
+        camera: the open camera; this function closes it.
+        calibration: rig.yaml; None: there is none, and nothing is kept.
+        whole_s: how long it takes, s.
+        stopped: asked often; True ends it early, and nothing is kept.
+        tell: called with each frame.
+
+    Raises:
+        TandemError: the camera failed, or the calibration cannot be read.
+    """
+    try:
+        rig = None if calibration is None else read_own_rig(calibration)
+    except TandemError:
+        camera.close()
+        raise
+    plan = Plan(whole_s, min(8.0, whole_s / 6), whole_s * 2 / 3)
+    report = film_capture(camera, rig, plan, stopped, tell)
+    findings = findings_of(report)
+    if calibration is not None and not stopped():
+        findings.append(_kept(report, capture_path(calibration)))
+    return CheckedCapture(report, findings)
+
+
+def _kept(report: CaptureReport, path: Path) -> Finding:
+    try:
+        write_text(path, capture_text(report))
+    except OSError as error:
+        problem = f"{path} cannot be written ({error.strerror or error})"
+        return warn("capture", problem, "choose a calibration in a folder of your own")
+    return ok("capture", f"kept in {path}")
 
 
 class _Filming:

@@ -85,7 +85,6 @@ class Rigidity:
         warped: how many of them no rigid camera can have made.
         excess: by how much a warp of each frame explains more than noise, in standard deviations of the noise; median.
         noise_px: by how much followed points scatter about the best warp, px; median.
-        zoom: focal length divided by the calibrated one that fits best, minus 1; NaN: not estimated.
         knows_lens: whether the calibrated lens was used.
         readout_ms: from the first row to the last, rolling shutter; NaN: not told.
         readout_sigma_ms: its standard uncertainty.
@@ -97,7 +96,6 @@ class Rigidity:
     warped: int = 0
     excess: float = math.nan
     noise_px: float = math.nan
-    zoom: float = math.nan
     knows_lens: bool = False
     readout_ms: float = math.nan
     readout_sigma_ms: float = math.nan

@@ -22,8 +22,8 @@ from phone_host.output.capture_json import capture_path, capture_text, read_capt
 MS = 1_000_000
 PHONE = CaptureSource(camera=CameraIdentity("browser", "back"), software="Chrome 140", width_px=64, height_px=48)
 GREY = np.full((48, 64), 100, np.uint8)
-RIGID = Reading(None, 0.2, 0.03, 0.001, 15.0, 0.2, 0.1)
-WARPED = Reading(None, 3.0, 0.03, 0.1, 15.0, 0.2, 0.1)
+RIGID = Reading(None, 0.2, 0.03, 15.0, 0.2, 0.1)
+WARPED = Reading(None, 3.0, 0.03, 15.0, 0.2, 0.1)
 
 
 def shots(times_ms: list[float], delay_ms: float = 30.0, **given: float) -> list[Shot]:
@@ -198,9 +198,8 @@ def test_all_stretches_together_give_the_verdict(
     assert warp_finding(found).verdict is grade
 
 
-def test_a_lens_that_seems_longer_is_named_and_a_missing_calibration_too() -> None:
-    """Of a stabilised film the words say by how much it is cropped; a good one without a lens says what is missing."""
-    assert "10 % longer" in warp_finding(replace(rigidity_of([WARPED] * 3), knows_lens=True)).text
+def test_a_missing_calibration_and_a_global_shutter_are_named() -> None:
+    """A good film without a lens says what is missing; rows that are read at once are called so."""
     assert "--calibration" in warp_finding(rigidity_of([RIGID] * 3)).text
     assert (
         "global"

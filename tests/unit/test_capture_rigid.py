@@ -84,7 +84,7 @@ def test_a_rolling_shutter_and_a_trembling_hand_are_no_warp() -> None:
     found = told(filmed())
     assert excess_of(found) < RIGID
     assert found.noise_px == pytest.approx(_NOISE_PX, rel=0.3)
-    assert found.rigid.common[4] == pytest.approx(_READOUT, abs=0.06)
+    assert found.common[4] == pytest.approx(_READOUT, abs=0.06)
 
 
 def test_what_moves_by_itself_is_no_warp() -> None:

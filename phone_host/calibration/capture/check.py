@@ -204,7 +204,6 @@ def rigidity_of(readings: list[Reading]) -> Rigidity:
         warped=len(warped),
         excess=float(np.median([each.excess for each in told])),
         noise_px=float(np.median([each.noise_px for each in told])),
-        zoom=float(np.median([each.zoom for each in told])),
         readout_ms=readout_ms,
         readout_sigma_ms=readout_sigma_ms,
     )

@@ -56,7 +56,6 @@ class Reading:
         unseen: why it tells nothing; None: it does.
         excess: by how much a warp explains more than noise, in standard deviations of it; NaN: not computed.
         noise_px: standard deviation of the noise.
-        zoom: best focal length divided by the lens's, minus 1.
         readout_ms: rolling shutter, first to last row.
         readout_sigma_ms: its standard uncertainty.
         along: share of the width by which the picture moved.
@@ -65,7 +64,6 @@ class Reading:
     unseen: Unseen | None
     excess: float = math.nan
     noise_px: float = math.nan
-    zoom: float = math.nan
     readout_ms: float = math.nan
     readout_sigma_ms: float = math.nan
     along: float = 0.0
@@ -83,8 +81,8 @@ def may_tell(window: Window) -> bool:
         cv2.resize(frame, None, fx=by, fy=by, interpolation=cv2.INTER_AREA).astype(np.float32)
         for frame in window.frames[:: FRAMES // 4]
     ]
-    moved = [np.hypot(*cv2.phaseCorrelate(some[0], other)[0]) for other in some[1:]]
-    return max(moved) >= _LEAST_MOTION * some[0].shape[1] / 2
+    moved = [math.hypot(*cv2.phaseCorrelate(some[0], other)[0]) for other in some[1:]]
+    return bool(max(moved) >= _LEAST_MOTION * some[0].shape[1] / 2)
 
 
 def look(window: Window) -> Reading:
@@ -113,7 +111,7 @@ def look(window: Window) -> Reading:
 def excess_of(compared: Compared) -> float:
     """Return by how much warps explain more than noise does, in standard deviations of the noise."""
     counted = int((compared.trust > _COUNTS).sum())
-    return math.sqrt(max(compared.rigid.cost - compared.warped.cost, 0.0) / max(2 * counted, 1))
+    return math.sqrt(max(compared.rigid - compared.warped, 0.0) / max(2 * counted, 1))
 
 
 def _judged(compared: Compared, seen: Flags, period_ms: float, along: float, across: float) -> Reading:
@@ -129,9 +127,8 @@ def _judged(compared: Compared, seen: Flags, period_ms: float, along: float, acr
         unseen,
         excess,
         compared.noise_px,
-        math.expm1(compared.rigid.common[0]),
-        compared.rigid.common[4] * period_ms,
-        compared.rigid.common_sigma[4] * period_ms,
+        compared.common[4] * period_ms,
+        compared.readout_sigma * period_ms,
         along,
     )
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.lens import parameters_of, project_linearised, rays_through, with_parameters
-from phone_host.geometry.schur import NormalEquations
+from phone_host.geometry.schur import NormalEquations, solved
 from phone_host.geometry.se3 import cross_matrices, rotations_of, vectors_of
 from phone_host.model import CameraModel
 
@@ -81,43 +81,22 @@ class _State:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bundle:
-    """What a bundle leaves.
-
-    Attributes:
-        cost: weighted sum of squared residuals, in units of the noise found.
-        turns: (F, 3, 3) rotation of each frame.
-        shifts: (F, 3) translation of each, in units of the scene's mean distance.
-        rows: (F, 3) more turn over the rows than the motion between frames and the readout explain, rad.
-        warps: (F, 5) shift x, y (px), keystone x, y, zoom.
-        warp_sigma: (F, 5).
-        common: (5,).
-        common_sigma: (5,).
-    """
-
-    cost: float
-    turns: Floats
-    shifts: Floats
-    rows: Floats
-    warps: Floats
-    warp_sigma: Floats
-    common: Floats
-    common_sigma: Floats
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Compared:
     """The bundle without warps and the one with them.
 
     Attributes:
-        rigid: without.
-        warped: with.
+        rigid: what the one without leaves: weighted sum of squared residuals, in units of the noise.
+        warped: what the other one leaves.
+        common: (5,) of the rigid one: focal length (logarithm), middle (x, y; px), k1, readout (frame periods).
+        readout_sigma: standard uncertainty of the readout, frame periods.
         trust: (F, N), 0 to 1: how much each sighting is trusted.
         noise_px: standard deviation of what the warped bundle leaves.
     """
 
-    rigid: Bundle
-    warped: Bundle
+    rigid: float
+    warped: float
+    common: Floats
+    readout_sigma: float
     trust: Floats
     noise_px: float
 
@@ -365,7 +344,12 @@ def compare(tracks: Tracks, model: CameraModel, *, knows_lens: bool) -> Compared
     both = [_fit(problem, start, seen, weights, warped=False)[0] for start in (rigid, straight)]
     rigid = min(both, key=lambda each: _left(problem, each, weights))
     return Compared(
-        _bundle(problem, rigid, weights, warped=False), _bundle(problem, warped, weights, warped=True), trust, sigma
+        _left(problem, rigid, weights),
+        _left(problem, warped, weights),
+        rigid.common,
+        _readout_sigma(problem, rigid, weights),
+        trust,
+        sigma,
     )
 
 
@@ -373,16 +357,9 @@ def _left(problem: _Problem, state: _State, weights: Floats) -> float:
     return float((weights[..., np.newaxis] * problem.residuals(state)[0] ** 2).sum())
 
 
-def _bundle(problem: _Problem, state: _State, weights: Floats, *, warped: bool) -> Bundle:
-    parts, prior = problem.residuals(state), problem.prior(state, warped=warped)
-    sigma = np.sqrt(np.diag(problem.equations(state, parts, weights, prior).covariance(problem.free(warped=warped))))
-    return Bundle(
-        _left(problem, state, weights),
-        state.turns,
-        state.shifts,
-        state.rows,
-        state.warps,
-        sigma[:-OF_ALL].reshape(problem.frames, OF_FRAME)[:, WARP],
-        state.common,
-        sigma[-OF_ALL:],
-    )
+def _readout_sigma(problem: _Problem, state: _State, weights: Floats) -> float:
+    free, prior = problem.free(warped=False), problem.prior(state, warped=False)
+    matrix = problem.equations(state, problem.residuals(state), weights, prior).reduced(0.0, free)[0]
+    unit = np.zeros(len(matrix))
+    unit[-1] = 1.0
+    return float(np.sqrt(solved(matrix, unit)[-1]))

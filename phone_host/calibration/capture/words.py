@@ -23,8 +23,6 @@ _LATER_MS: Final = 20.0
 _JITTER: Final = 0.15
 """Share of the frame period by which stamps of a sensor never scatter; arrivals do."""
 
-_ZOOMED: Final = 0.03
-
 
 def findings_of(report: CaptureReport) -> list[Finding]:
     """Judge a report.
@@ -132,13 +130,7 @@ def warp_finding(rigidity: Rigidity) -> Finding:
             lens = "" if rigidity.knows_lens else _UNCALIBRATED
             return ok("stabilisation", f"none seen: the images move as one rigid camera's{lens}")
         case Warping.STABILISED:
-            zoomed = (
-                f"; they move like those of a lens that is {abs(100 * rigidity.zoom):.0f} %"
-                f" {'longer' if rigidity.zoom > 0 else 'shorter'} than calibrated"
-                if rigidity.knows_lens and abs(rigidity.zoom) > _ZOOMED
-                else ""
-            )
-            text = f"the images are warped or cropped: no rigid camera made {of}{zoomed}"
+            text = f"the images are warped or cropped: no rigid camera with this lens made {of}"
             return warn(
                 "stabilisation",
                 text,

@@ -37,11 +37,12 @@ def run(options: argparse.Namespace) -> int:
     findings = [settings_finding(str(options.config or ""), wrong), *examine(question, keeps=options.capture is None)]
     found = values(findings)
     if options.capture is not None and all(each.verdict is not Grade.FAIL for each in findings):
-        from phone_host.verbs.doctor.capture import checked_capture  # noqa: PLC0415 - numpy and OpenCV, seen to work
+        from phone_host.output.capture_json import capture_values  # noqa: PLC0415 - numpy and OpenCV, seen to work
+        from phone_host.verbs.doctor.capture import guided_capture  # noqa: PLC0415 - the same
 
-        capture = checked_capture(question, options.capture)
+        capture = guided_capture(question, options.capture)
         findings += capture.findings
-        found = {**values(findings), "capture": capture.values}
+        found = {**values(findings), "capture": capture_values(capture.report)}
     print(json_text(found) if options.json else fitted(table(findings)))
     return exit_code(findings, wrong)
 
