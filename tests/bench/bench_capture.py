@@ -3,7 +3,7 @@
 Rendered films of four kinds of places, filmed by hand with a rolling shutter, each twice: as the sensor saw it, and as one of
 five stabilisers made it smoother, weakly or strongly. Lens, angle of view, readout, size, rate, noise, JPEG quality and motion are
 drawn anew; somebody walks by, automatic exposure swings, the light is low. The lens that the check is given is off as a calibration
-is. Beside them films that tell nothing: a plain wall, a camera on a table. Exit 4 when a figure is missed.
+is. Beside them films that tell nothing: a plain wall, a poster, a camera on a table. Exit 4 when a figure is missed.
 """
 
 import argparse
@@ -69,7 +69,7 @@ def takes(seed: int) -> list[Take]:
         seed: of everything that is drawn.
     """
     random = np.random.default_rng([seed, 17])
-    places = (Place.ROOM, Place.DESK, Place.POSTER, Place.FAR)
+    places = (Place.ROOM, Place.DESK, Place.SHELF, Place.FAR)
     kinds = [kind for kind in Stabiliser if kind is not Stabiliser.OFF]
     found = []
     for number, (place, kind) in enumerate(product(places, kinds)):
@@ -108,7 +108,12 @@ def takes(seed: int) -> list[Take]:
 def _blind(seed: int) -> list[Take]:
     """Films that tell nothing."""
     still = Take(seed=seed, sway_deg=0.02, tremor_deg=0.005, slide_m=0.0002)
-    return [Take(seed=seed, place=Place.PLAIN), still, replace(still, stabiliser=Stabiliser.TURN)]
+    return [
+        Take(seed=seed, place=Place.PLAIN),
+        Take(seed=seed, place=Place.POSTER, slide_m=0.05),
+        still,
+        replace(still, stabiliser=Stabiliser.TURN),
+    ]
 
 
 def _calibrated(take: Take) -> CameraModel:

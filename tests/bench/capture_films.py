@@ -47,6 +47,7 @@ class Place(Enum):
     ROOM = "room"
     DESK = "desk"
     POSTER = "poster"
+    SHELF = "shelf"
     FAR = "far"
     PLAIN = "plain"
 
@@ -192,6 +193,10 @@ def _boards(take: Take) -> list[_Board]:
     match take.place:
         case Place.POSTER:
             return [board(1.1, 0, 0, 1.4, tilt=random.uniform(-0.4, 0.4), lean=random.uniform(-0.2, 0.2))]
+        case Place.SHELF:
+            rows = [(x, y) for x in (-0.7, -0.2, 0.3, 0.8) for y in (-0.45, 0.05, 0.5)]
+            things = [board(random.uniform(1.0, 1.7), x, y, 0.16, tilt=random.normal(0, 0.4)) for x, y in rows]
+            return [board(1.9, 0, 0, 2.4, tilt=random.uniform(-0.3, 0.3)), *things]
         case Place.FAR:
             return [board(9.0, 0, 0, 11.0), board(7.0, 2.0, 0.5, 1.6), board(6.0, -2.4, -0.6, 1.4, tilt=0.3)]
         case Place.PLAIN:

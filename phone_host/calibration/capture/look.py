@@ -23,9 +23,14 @@ _MOTION: Final = 0.03
 _ACROSS: Final = 0.004
 """Shares of the width by which the picture must move to say anything, and to be called rigid: along and across."""
 
-RIGID: Final = 0.5
-WARPED: Final = 0.75
-"""Excess of a warp over noise. Rendered films of rigid cameras leave 0.02 to 0.4, stabilised ones 0.6 to 9 (bench_capture)."""
+RIGID: Final = 0.42
+WARPED: Final = 0.48
+"""Excess of a warp over noise. Rendered films of rigid cameras leave 0.1 to 0.4, stabilised ones 0.5 to 17 (bench_capture)."""
+
+_FLAT_PX: Final = 3.0
+_FLAT: Final = 0.05
+"""Of a scene that moves by more than so many pixels and leaves a plane by less than this share of it, nothing is told: a plane's film fits
+many cameras."""
 
 _COUNTS: Final = 0.3
 _GLANCE_PX: Final = 160
@@ -118,6 +123,8 @@ def _judged(compared: Compared, seen: Flags, period_ms: float, along: float, acr
     excess, unseen = excess_of(compared), None
     if (compared.trust > _COUNTS)[seen].mean() < _LEAST_SHARE:
         unseen = Unseen.LIVELY
+    elif compared.parallax_px > _FLAT_PX and compared.off_plane_px < _FLAT * compared.parallax_px:
+        unseen = Unseen.FLAT
     elif excess < WARPED:
         if along < _MOTION or across < _ACROSS:
             unseen = Unseen.STILL

@@ -91,6 +91,8 @@ class Compared:
         readout_sigma: standard uncertainty of the readout, frame periods.
         trust: (F, N), 0 to 1: how much each sighting is trusted.
         noise_px: standard deviation of what the warped bundle leaves.
+        parallax_px: by how much the camera's way moves the points, at most.
+        off_plane_px: by how much of that they leave a plane: the median.
     """
 
     rigid: float
@@ -99,6 +101,8 @@ class Compared:
     readout_sigma: float
     trust: Floats
     noise_px: float
+    parallax_px: float
+    off_plane_px: float
 
 
 class _Problem:
@@ -350,7 +354,18 @@ def compare(tracks: Tracks, model: CameraModel, *, knows_lens: bool) -> Compared
         _readout_sigma(problem, rigid, weights),
         trust,
         sigma,
+        *_parallax(rigid, model, trust),
     )
+
+
+def _parallax(state: _State, model: CameraModel, trust: Floats) -> tuple[float, float]:
+    """Return by how much the camera's way moves the points, and by how much they leave a plane, px."""
+    points = state.points[trust.mean(axis=0) >= np.median(trust.mean(axis=0)) / 2]
+    places = np.column_stack([np.ones(len(points)), points[:, :2]])
+    plane = np.linalg.lstsq(places, points[:, 2], rcond=None)[0]
+    way_px = model.mean_focal_px * float(np.linalg.norm(state.shifts, axis=1).max())
+    off = float(np.median(np.abs(points[:, 2] - places @ plane)))
+    return way_px * float(np.median(points[:, 2])), way_px * off
 
 
 def _left(problem: _Problem, state: _State, weights: Floats) -> float:

@@ -112,6 +112,7 @@ _REASONS: Final = {
         "turn the camera by some degrees, to and fro, up and down, for 20 seconds",
     ),
     Unseen.PLAIN: ("too few details in the picture", "film a shelf, a poster or a desk with things on it"),
+    Unseen.FLAT: ("the scene is flat", "film a shelf or a desk with things on it, near and far"),
     Unseen.LIVELY: ("too much in the picture moves by itself", "film something that stands still"),
     Unseen.VAGUE: (
         "the stretches of film contradict each other",
