@@ -74,11 +74,12 @@ class Question:
     keys: KeyFolder
 
 
-def examine(question: Question) -> Iterator[Finding]:
+def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
     """Check this machine for a run.
 
     Args:
         question: what the run would use.
+        keeps: whether to look for an earlier check of the camera's images.
 
     Yields:
         The findings, in the order in which problems arise.
@@ -108,9 +109,11 @@ def examine(question: Question) -> Iterator[Finding]:
     for uri in question.links:
         yield from _examine_board(uri, question.wait_s, question.keys, works=works)
     if question.calibration and works:
-        from phone_host.doctor.vision_checks import read_rig_readings  # noqa: PLC0415 - numpy and OpenCV, seen to work
+        from phone_host.doctor import vision_checks  # noqa: PLC0415 - numpy and OpenCV, seen to work
 
-        yield check_rig(read_rig_readings(question.calibration, question.camera))
+        yield check_rig(vision_checks.read_rig_readings(question.calibration, question.camera))
+        if keeps and question.camera:
+            yield from vision_checks.check_kept_capture(question.calibration, question.camera)
     yield from check_clocks(machine.read_clocks(Path(__file__).parent))
     yield from examine_out(question.out)
     if not is_android():  # which shows the kernel's log to nobody

@@ -6,13 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from common import now
+from common.doctor.finding import Finding
 from common.errors import DataError
 from common.keys import KeyFolder
 from common.program.extensions import registered_names
 from common.program.invocation import command_line
 from common.program.settings import log_level
+from common.stamp import HOST_CLOCK
+from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.verdict import Verdict
+from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
+from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
@@ -44,6 +50,9 @@ _TRIAL_S: Final = 2.5
 
 _BOARD_S: Final = 4.0
 _RIG: Final = Path("rig") / "rig.yaml"
+_CAPTURE_S: Final = 60.0
+"""So long a phone is watched for growing hot; half a minute tells about its film."""
+
 _OF_CALIBRATION: Final = ("board", "square", "baseline", "views")
 
 
@@ -124,6 +133,15 @@ class Commands:
             wait_s=_BOARD_S,
             keys=self.keys,
         )
+
+    def capture(
+        self, choices: Choices, stopped: Callable[[], bool], tell: Callable[[Progress], None]
+    ) -> Sequence[Finding]:
+        """See Program."""
+        question = self.question(choices)
+        camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns())
+        calibration = Path(question.calibration) if question.calibration else None
+        return check_capture(camera, calibration, _CAPTURE_S, stopped, tell).findings
 
     def calibration(self, choices: Choices, values: Choices) -> "Calibration":
         """See Program."""
