@@ -99,6 +99,13 @@ class StampOrigin:
     bound_ns: int | None = None
 
 
+def origin_words(origin: StampOrigin) -> str:
+    """Say how a camera's stamps came onto this machine's clock."""
+    if not origin.epoch or origin.uncertainty_ns is None:
+        return "on which clock its stamps count is not known yet"
+    return f"its stamps count on {origin.epoch}, known to +-{origin.uncertainty_ns / 1e6:.2f} ms"
+
+
 @dataclass(frozen=True, slots=True)
 class CameraHealth:
     """How a camera has performed since it was opened.

@@ -14,7 +14,7 @@ from common.camera.base import CameraHealth, Grab, Mode, Offers, Spoiled, StampO
 from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import UnavailableError
-from common.frame import Frame, FrameFault, PixelFormat
+from common.frame import Frame, FrameFault
 from common.imagesize.head import size_text
 from common.program.logs import event
 from common.protocol.message import CameraDescription, Locks, Pacing
@@ -72,7 +72,7 @@ class BrowserCamera:
         self._border = BrowserBorder(settings.size_px)
         self._life = Life(_LIFE, now_ns)
         self._rate = RateMeter()
-        self._sequence = self._missed = 0
+        self._sequence = self._missed = self._believed = self._unplugged_before = 0
         self._faults: Counter[FrameFault] = Counter()
         self._newest: Frame | None = None
         self._first_ns = 0
@@ -146,7 +146,7 @@ class BrowserCamera:
                 missed=self._missed,
                 faults=tuple(self._faults.items()),
                 stalls=counts.lost[Loss.STALLED],
-                unplugged=counts.lost[Loss.UNPLUGGED],
+                unplugged=counts.lost[Loss.UNPLUGGED] - self._unplugged_before,
                 returned=counts.returned,
                 held=tuple((lock.value, value) for lock, value in self.held_locks),
                 period_ns=self._rate.period_ns,
@@ -230,15 +230,17 @@ class BrowserCamera:
             now_ns = now.monotonic_ns()
             self._tick(now_ns)
             newest, seat = self._newest, feed.seat
-            slow = self._sequence >= 2 and now_ns - self._first_ns >= _MEASURE_NS
-            if newest is not None and seat is not None and (self._sequence >= _MEASURE_FRAMES or slow):
+            slow = self._believed >= 2 and now_ns - self._first_ns >= _MEASURE_NS
+            if newest is not None and seat is not None and (self._believed >= _MEASURE_FRAMES or slow):
                 break
             if feed.has_ended or (feed.patience_ns is not None and now_ns - began_ns > feed.patience_ns):
                 raise self._absent()
             self._grant()
             self._lock.wait(_STEP_S)
-        period_ns = self._rate.period_ns or (newest.exposed.ns - self._first_ns) // max(1, self._sequence - 1)
+        period_ns = self._rate.period_ns or (newest.exposed.ns - self._first_ns) // (self._believed - 1)
         self._sequence = self._missed = 0
+        # A browser that opens its camera anew for what is wanted leaves once.
+        self._unplugged_before = self._life.counts.lost[Loss.UNPLUGGED]
         self._faults.clear()
         self._waiting.clear()
         self._life.accept()
@@ -310,7 +312,7 @@ class BrowserCamera:
             _LOG.info(event("camera_back", camera=self.description.name))
         self._tell("")
         sequence, self._sequence = self._sequence, self._sequence + 1
-        self._first_ns = self._first_ns or exposed.ns
+        self._first_ns, self._believed = self._first_ns or exposed.ns, self._believed + 1
         self._rate.add(exposed.ns, sequence)
         self._newest = Frame(
             sequence=sequence,

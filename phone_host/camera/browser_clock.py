@@ -66,7 +66,7 @@ class BrowserClock:
         if asked is None or asked.t0_us != echo.t0_us:
             return Heard.NOTHING
         t0_ns, t3_ns = round(echo.t0_us * 1000) - self._resolution_ns, round(echo.t3_us * 1000) + self._resolution_ns
-        return self._estimator.add(Echo(echo.number, t0_ns, t1_ns, t2_ns, t3_ns))
+        return self._estimator.add(Echo(wave=echo.number, t0_ns=t0_ns, t1_ns=t1_ns, t2_ns=t2_ns, t3_ns=t3_ns))
 
     def to_host(self, browser_ns: int) -> HostTime | None:
         """Convert a moment of the browser's clock, ns, to the host's; None while the relation is unknown."""

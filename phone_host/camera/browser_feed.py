@@ -162,7 +162,9 @@ class BrowserFeed:
                 line.say(refused_text("another browser gives its camera", "stop it there, or close that page"))
                 line.close()
                 return None
-            known = self._last if self._last is not None and said.track and said.track == self._last.hello.track else None
+            known = (
+                self._last if self._last is not None and said.track and said.track == self._last.hello.track else None
+            )
             clock = BrowserClock(said.resolution_ns) if known is None else known.clock
             wanted = BrowserSettings() if self._user is None else self._user.settings
             seat = Seat(line, said, clock, now_ns, wanted)
@@ -306,7 +308,7 @@ class BrowserFeed:
 
     def _word(self, seat: Seat, text: str, now_ns: int) -> None:
         match read_word(text):
-            case TrackState(is_live, words):
+            case TrackState(is_live=is_live, words=words):
                 was_live, seat.is_live, seat.words = seat.is_live, is_live, words
                 if self._user is not None and was_live != is_live:
                     (self._user.came(seat, now_ns) if is_live else self._user.left(now_ns))

@@ -8,7 +8,9 @@ from typing import Final
 
 from common.camera.options import OptionReader, rate
 from common.errors import SettingsError
-from common.protocol.wire_fields import MAX_SIZE_PX
+
+_MOST_PX: Final = 16_384
+"""As on a board's wire; the protocol itself is not imported for `--help`."""
 
 SCHEME: Final = "browser:"
 EXAMPLE: Final = "browser:[?w=640&h=480&fps=30&encoding=luma|jpeg&quality=0.9]"
@@ -95,7 +97,7 @@ def _options(uri: str, query: str) -> Mapping[str, str]:
 
 
 def _side(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and len(text) <= 5 and 16 <= int(text) <= MAX_SIZE_PX):
+    if not (text.isascii() and text.isdecimal() and len(text) <= 5 and 16 <= int(text) <= _MOST_PX):
         raise ValueError(text)
     return int(text)
 

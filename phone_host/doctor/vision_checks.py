@@ -14,6 +14,7 @@ from common.camera.v4l2_stream import V4l2Settings
 from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, TandemError
 from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
+from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import camera_orientation
 from phone_host.camera.http_uri import is_http
 from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
@@ -91,7 +92,8 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
     except TandemError as error:
         return RigReadings(calibration, error.problem, error.remedy)
     own = rig.right if rig.board_side is Side.LEFT else rig.left
-    asked = parse_camera(camera, "") if camera and not is_http(camera) else None
+    is_ours = is_http(camera) or is_browser(camera)
+    asked = parse_camera(camera, "") if camera and not is_ours else None
     asked_px = asked.wanted.size_px if isinstance(asked, V4l2Settings) else None
     return RigReadings(
         path=calibration,

@@ -12,6 +12,7 @@ from common.program.extensions import registered_names
 from common.program.invocation import command_line
 from common.program.settings import log_level
 from phone_host.calibration.verdict import Verdict
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.http_uri import without_password
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
@@ -43,6 +44,9 @@ _TRIAL_S: Final = 2.5
 """Two seconds show the rate of both cameras; a clock is known after less than one."""
 
 _BOARD_S: Final = 4.0
+_BROWSER_NS: Final = 10_000_000_000
+"""Whoever begins something on the page has started the phone's camera before, or is told to."""
+
 _RIG: Final = Path("rig") / "rig.yaml"
 _OF_CALIBRATION: Final = ("board", "square", "baseline", "views")
 
@@ -61,6 +65,7 @@ class Commands:
 
     def __init__(self, file: Path, keys: str | None, tell: Callable[[str], None]) -> None:
         self._file, self._tell = file, tell
+        self.feed: Final = BrowserFeed(_BROWSER_NS)
         self._kept, others = kept(file)
         self._fixed = [*others, *(("--keys", keys) if keys else ())]
         self.keys: KeyFolder = chosen_keys(file if file.exists() else None, keys)
@@ -102,14 +107,14 @@ class Commands:
         """See Program."""
         words = [*self._fixed, *run_words(choices)]
         options = run_options(words)
-        opened = open_run(options, checked(options), self._tell)
+        opened = open_run(options, checked(options), self._tell, self.feed)
         return opened.prepared(["phone-host", "run", *words], sinks_of(opened.core))
 
     def trial(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
         """See Program."""
         short = {**without_depth(choices), "seconds": str(_TRIAL_S)}
         options = run_options([*self._fixed, *run_words(short), "--wait", str(_BOARD_S)])
-        opened = open_run(options, checked(options), lambda _: None)
+        opened = open_run(options, checked(options), lambda _: None, self.feed)
         return opened.prepared((), sinks_of(None))
 
     def question(self, choices: Choices) -> Question:
@@ -123,6 +128,7 @@ class Commands:
             out=options.out or data_folder(),
             wait_s=_BOARD_S,
             keys=self.keys,
+            feed=self.feed,
         )
 
     def calibration(self, choices: Choices, values: Choices) -> "Calibration":
@@ -137,7 +143,7 @@ class Commands:
         options = calibrate_options(["--live", "--no-sound", *words, "--out", str(out)])
         asked = asked_of(options)
         require_rig_place(out)
-        return Calibration(options, asked, prepare_views(options, asked))
+        return Calibration(options, asked, prepare_views(options, asked, self.feed))
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """See Program."""
