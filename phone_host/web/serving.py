@@ -89,13 +89,7 @@ class Serving:
         """Tell viewers goodbye, and end."""
         assert self._server is not None
         self._server.close()
-<<<<<<< HEAD
-        await self._viewers.close()
-=======
-        self._hub.close()
-        self._answers.close()
         await asyncio.gather(self._viewers.close(), self._cameras.close())
->>>>>>> f1ffb75 (A browser feeds the page's server, and its camera is opened like any other)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
