@@ -75,7 +75,7 @@ class BrowserCamera:
         self._sequence = self._missed = self._believed = self._unplugged_before = 0
         self._faults: Counter[FrameFault] = Counter()
         self._newest: Frame | None = None
-        self._first_ns = 0
+        self._first_ns = self._asleep_ns = 0
         self._told = ""
         self._is_told_lost = False
         self._held: Locks = ()
@@ -213,7 +213,8 @@ class BrowserCamera:
         if not is_asked:
             self._spoil(FrameFault.UNASKED, arrived_ns)
             return
-        judged = self._border.judge(data, arrived_ns, seat.clock, now.asleep_ns())
+        self._asleep_ns = max(self._asleep_ns, now.asleep_ns())  # a delay between its two readings makes one too small
+        judged = self._border.judge(data, arrived_ns, seat.clock, self._asleep_ns)
         self._missed += judged.missed
         self._sequence += judged.missed
         if isinstance(judged, Believed):

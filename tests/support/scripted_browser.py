@@ -101,7 +101,7 @@ class ScriptedBrowser:
         self.heard: list[dict[str, Any]] = []
         self.sent = self.dropped = self.sequence = 0
         self.up_to = 0
-        self.is_away = False
+        self.is_away = self.is_still = False
         self.locks: dict[str, dict[str, object]] = {}
         self._loop = asyncio.new_event_loop()
         self._socket: aiohttp.ClientWebSocketResponse | None = None
@@ -205,25 +205,27 @@ class ScriptedBrowser:
             "capabilities": {},
         }
 
-    def shot(self, number: int) -> Shot:
-        """The next image, handed over now."""
-        script, now_us = self.script, self.now_us()
-        shown = script.shots[number % len(script.shots)]
-        exposed_us = time.monotonic_ns() / 1000 - script.late_s * 1e6
-        return script.spoil(number, replace(shown, stamp_us=exposed_us - script.epoch_us, callback_us=now_us))
+    def shot(self, index: int) -> Shot:
+        """Image `index` of its film, exposed at index / fps of CLOCK_MONOTONIC and handed over now."""
+        script = self.script
+        shown = script.shots[index % len(script.shots)]
+        stamp_us = index / script.fps * 1e6 - script.epoch_us
+        return script.spoil(self.sequence, replace(shown, stamp_us=stamp_us, callback_us=self.now_us()))
 
     async def _film(self, socket: aiohttp.ClientWebSocketResponse) -> None:
-        began_s, first = time.monotonic(), self.sequence
+        index = int(time.monotonic() * self.script.fps)
         while True:
+            index = max(index + 1, int((time.monotonic() - self.script.late_s) * self.script.fps))
+            await asyncio.sleep(max(0.0, index / self.script.fps + self.script.late_s - time.monotonic()))
+            if self.is_still:
+                continue
+            shot = self.shot(index)
             number, self.sequence = self.sequence, self.sequence + 1
-            shot = self.shot(number)
             if self.sent < self.up_to:
                 self.sent += 1
                 await socket.send_bytes(shot.packed(number, self.dropped, self.now_us()))
             else:
                 self.dropped += 1
-            due_s = began_s + (self.sequence - first) / self.script.fps
-            await asyncio.sleep(max(0.0, due_s - time.monotonic()))
 
     async def _clock(self, client: aiohttp.ClientSession, session: str) -> None:
         async with client.ws_connect("/ws/camera/clock") as socket:

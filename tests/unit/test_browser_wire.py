@@ -200,7 +200,10 @@ def test_locks_are_constraints_and_back() -> None:
         "zoom": {"zoom": 1.5},
     }
     assert locks_of(groups) == locks
-    automatic = {"focus": {"focusMode": "continuous", "focusDistance": 0.35}, "zoom": {"zoom": math.nan}}
+    automatic: dict[str, dict[str, object]] = {
+        "focus": {"focusMode": "continuous", "focusDistance": 0.35},
+        "zoom": {"zoom": math.nan},
+    }
     assert locks_of(automatic | {"exposure": {"exposureMode": "manual", "exposureTime": True}}) == ()
 
 
