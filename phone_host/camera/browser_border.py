@@ -55,6 +55,7 @@ class BrowserBorder:
         self._sequence = -1
         self._dropped = 0
         self._changes = 0
+        self._newest_ns = -(2**63)
 
     @property
     def epoch(self) -> Epoch | None:
@@ -131,6 +132,8 @@ class BrowserBorder:
             return FrameFault.CLOCK_UNKNOWN if self._stamps.epoch is None else FrameFault.IMPLAUSIBLE_TIME
         if self._is_phone and image.exposure_ns is not None:
             found = HostTime(found.ns + image.exposure_ns // 2, found.uncertainty_ns, found.bound_ns)
-        if found.ns > arrived_ns or not self._intervals.fits(found.ns):
+        fits = self._intervals.fits(found.ns)
+        if not fits or not self._newest_ns < found.ns <= arrived_ns:
             return FrameFault.IMPLAUSIBLE_TIME
+        self._newest_ns = found.ns
         return found
