@@ -11,7 +11,7 @@ from common.frame import FrameFault
 from phone_host.camera.browser_clock import BrowserClock
 from phone_host.camera.browser_epoch import Epoch, Handed, Stamps
 from phone_host.camera.browser_wire import BrowserFrame, Hello, read_frame
-from phone_host.camera.intervals import Intervals
+from phone_host.camera.intervals import COARSE, EVEN, Intervals
 from phone_host.sync.clock import HostTime
 
 
@@ -132,8 +132,12 @@ class BrowserBorder:
             return FrameFault.CLOCK_UNKNOWN if self._stamps.epoch is None else FrameFault.IMPLAUSIBLE_TIME
         if self._is_phone and image.exposure_ns is not None:
             found = HostTime(found.ns + image.exposure_ns // 2, found.uncertainty_ns, found.bound_ns)
-        fits = self._intervals.fits(found.ns)
+        is_free = self._stamps.epoch is Epoch.FREE
+        fits = self._intervals.fits(found.ns, COARSE if is_free else EVEN)
         if not fits or not self._newest_ns < found.ns <= arrived_ns:
             return FrameFault.IMPLAUSIBLE_TIME
+        if is_free:
+            coarse_ns = self._intervals.unevenness_ns
+            found = HostTime(found.ns, found.uncertainty_ns + coarse_ns, found.bound_ns + coarse_ns)
         self._newest_ns = found.ns
         return found

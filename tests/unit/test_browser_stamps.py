@@ -284,6 +284,18 @@ def test_single_late_stamps_are_found() -> None:
     assert Intervals().period_ns is None
 
 
+def test_coarse_stamps_without_a_clock_are_believed_and_their_step_is_told() -> None:
+    """Firefox stamps in steps of 11.6 ms: nothing is dropped for it, and the uncertainty contains it."""
+    step = 11_609_977
+    film = Film(lambda ns: (ns - START) // step * step)
+    shown = film.show(200)[20:]
+    assert film.border.epoch is Epoch.FREE
+    for exposed_ns, judged in shown:
+        assert isinstance(judged, Believed)
+        assert abs(judged.exposed.ns - exposed_ns) <= judged.exposed.uncertainty_ns + 3 * MS
+        assert step <= judged.exposed.uncertainty_ns <= 2 * step + 2 * MS
+
+
 def test_a_shifted_grid_is_believed_at_the_third_image() -> None:
     """A camera that was restarted keeps its rate on another grid."""
     stamps = [n * PERIOD for n in range(30)]
