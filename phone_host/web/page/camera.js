@@ -31,7 +31,7 @@ function keepIn(storage, value) {
 }
 
 /** @param {CameraFeed} feed @returns {{name: string, value: string, unit: string}[]} */
-export function figuresOf({ figures, rate }) {
+export function figuresOf({ seen: { figures, rate } }) {
   const isSending = figures.sent > 0;
   const kb = figures.bytes / 1000;
   return [

@@ -17,10 +17,19 @@ const LOOPBACK = ['localhost', '127.0.0.1', '[::1]'];
 /** Groups that are held from the start: what moves them moves the lens, or the light. */
 const HELD = /** @type {const} */ (['focus', 'exposure', 'white_balance', 'zoom']);
 
-const NO_FIGURES = { delivered: 0, dropped: 0, sent: 0, encoding: '', encodeMs: 0, bytes: 0, leastUs: Number.NaN };
-
 /** @typedef {import('./camera_locks.js').Group} Group */
 /** @typedef {import('./camera_track.js').Choice & {free?: Group[]}} Chosen - free: groups that stay automatic */
+
+/** What is known once the camera was opened anew: nothing. */
+const fresh = () => ({
+  line: /** @type {import('./camera_link.js').Line} */ ('connecting'),
+  refusal: { problem: '', remedy: '' },
+  /** What the program has to say of the frames. */
+  told: '',
+  figures: { delivered: 0, dropped: 0, sent: 0, encoding: '', encodeMs: 0, bytes: 0, leastUs: Number.NaN },
+  /** Frames that went out in the last second; seconds since the last one did; seconds without one from the camera. */
+  rate: 0, sinceSent: Number.POSITIVE_INFINITY, stillFor: 0,
+});
 
 export class CameraFeed {
   /** @param {Chosen} chosen @param {() => void} changed - called after each change */
@@ -45,24 +54,9 @@ export class CameraFeed {
     this.wanted = {};
     this.endWatch = () => {};
     this.rotation = rotation();
-    this.line = /** @type {import('./camera_link.js').Line} */ ('connecting');
-    this.refusal = { problem: '', remedy: '' };
-    this.told = '';
-    this.figures = NO_FIGURES;
-    this.rate = this.stillFor = 0;
-    this.sinceSent = Number.POSITIVE_INFINITY;
+    this.seen = fresh();
     document.addEventListener('visibilitychange', () => this.turned());
     screen.orientation?.addEventListener('change', () => this.turned());
-  }
-
-  /** What is known of one connection. */
-  forget() {
-    this.line = 'connecting';
-    this.refusal = { problem: '', remedy: '' };
-    this.told = '';
-    this.figures = NO_FIGURES;
-    this.rate = this.stillFor = 0;
-    this.sinceSent = Number.POSITIVE_INFINITY;
   }
 
   /** @returns {import('./camera_words.js').Facts} */
@@ -76,10 +70,10 @@ export class CameraFeed {
       isMuted: !!track?.muted,
       isVisible: document.visibilityState === 'visible',
       isTurned: this.phase === 'on' && this.rotation !== rotation(),
-      line: this.line,
-      refusal: this.refusal,
-      told: this.told,
-      isAsked: this.sinceSent < RECENT,
+      line: this.seen.line,
+      refusal: this.seen.refusal,
+      told: this.seen.told,
+      isAsked: this.seen.sinceSent < RECENT,
     };
   }
 
@@ -125,7 +119,9 @@ export class CameraFeed {
   fail(name) {
     this.phase = 'failed';
     this.failure = name;
-    if (passes(name)) this.again();
+    this.isOn = passes(name);
+    if (this.isOn) this.again();
+    else this.awake.want(false);
   }
 
   /** Try again in a moment: what took the camera away may give it back. */
@@ -185,15 +181,15 @@ export class CameraFeed {
     this.worker = this.locks = this.opened = null;
     this.refusedLocks = {};
     this.failure = '';
-    this.forget();
+    this.seen = fresh();
   }
 
   /** @param {any} data - of the worker */
   hear(data) {
     switch (data.said) {
       case 'line':
-        this.line = data.line;
-        if (data.line === 'refused') this.refusal = { problem: data.problem, remedy: data.remedy };
+        this.seen.line = data.line;
+        if (data.line === 'refused') this.seen.refusal = { problem: data.problem, remedy: data.remedy };
         if (data.line === 'open') this.locked(this.refusedLocks);
         break;
       case 'want':
@@ -203,7 +199,7 @@ export class CameraFeed {
         this.locks?.apply(data.groups);
         break;
       case 'told':
-        this.told = data.words;
+        this.seen.told = data.words;
         break;
       case 'figures':
         this.count(data);
@@ -224,13 +220,15 @@ export class CameraFeed {
 
   /** Once a second. @param {any} figures */
   count(figures) {
-    const { delivered, sent } = this.figures;
-    this.figures = figures;
-    this.rate = figures.sent - sent;
-    this.sinceSent = this.rate ? 0 : this.sinceSent + 1;
+    const { delivered, sent } = this.seen.figures;
+    this.seen.figures = figures;
+    this.seen.rate = figures.sent - sent;
+    this.seen.sinceSent = this.seen.rate ? 0 : this.seen.sinceSent + 1;
     const mustLive = document.visibilityState === 'visible' && !this.opened?.track.muted;
-    this.stillFor = mustLive && figures.delivered === delivered ? this.stillFor + 1 : 0;
-    if (this.stillFor >= MOST_STILL) this.taken();
+    this.seen.stillFor = mustLive && figures.delivered === delivered ? this.seen.stillFor + 1 : 0;
+    if (this.seen.stillFor < MOST_STILL) return;
+    this.seen.stillFor = 0;
+    this.taken();
   }
 
   /** The camera is gone: unplugged, or taken by a call. */

@@ -30,7 +30,7 @@ const FAILURES = /** @type {Record<string, Said>} */ ({
 const OTHER_FAILURE = said('bad', 'The camera does not start', 'Close other camera apps, or choose another camera; it is tried again by itself.');
 
 /** Failures that end by themselves: it is tried again. @param {string} name */
-export const passes = (name) => !['NotAllowedError', 'NotFoundError', 'OverconstrainedError', 'NotSupportedError'].includes(name);
+export const passes = (name) => !['NotAllowedError', 'SecurityError', 'OverconstrainedError', 'NotSupportedError'].includes(name);
 
 /** @param {Facts} facts @returns {Said} */
 export function stateOf(facts) {
