@@ -60,6 +60,13 @@ def started(opened: Opener, *, permissions: tuple[str, ...] = ("camera",), scrip
     return page
 
 
+def focus(camera: CameraStandIn) -> dict[str, Any]:
+    """What the page has told of the focus last; empty: nothing yet."""
+    told = camera.of_kind("locked")
+    values: dict[str, Any] = told[-1]["groups"]["focus"]["got"] if told else {}
+    return values
+
+
 def says(page: Any, words: str) -> str:
     """Wait until the camera's state begins with these words; return it whole, with what to do."""
     page.wait_for_function("words => document.getElementById('own-words').textContent.startsWith(words)", arg=words)
@@ -127,20 +134,17 @@ def test_without_credit_nothing_is_sent_and_what_is_dropped_is_counted(camera: C
 def test_settings_are_held_group_by_group_and_read_back(camera: CameraStandIn, opened: Opener) -> None:
     """Focus and exposure settle, are held and read back; the program's own values are set; what the camera does not have is refused by name; a group let go is automatic."""
     page = started(opened)
-    camera.until(lambda: any(each["groups"] for each in camera.of_kind("locked")))
+    camera.until(lambda: focus(camera).get("focusMode") == "manual")
     held = camera.of_kind("locked")[-1]
     assert held["refused"] == {}
-    assert held["groups"]["focus"]["got"]["focusMode"] == "manual"
     assert held["groups"]["exposure"]["got"] == held["groups"]["exposure"]["asked"]
-    before = len(camera.of_kind("locked"))
     camera.tell(kind="lock", groups={"focus": {"focusMode": "manual", "focusDistance": 40}, "zoom": {"zoom": 2}})
-    camera.until(lambda: len(camera.of_kind("locked")) > before)
+    camera.until(lambda: focus(camera) == {"focusMode": "manual", "focusDistance": 40})
     told = camera.of_kind("locked")[-1]
-    assert told["groups"]["focus"]["got"] == {"focusMode": "manual", "focusDistance": 40}
     assert told["groups"]["exposure"] == held["groups"]["exposure"]
     assert list(told["refused"]) == ["zoom"]
     page.uncheck("#own-groups [data-key=focus] input")
-    camera.until(lambda: "focus" not in camera.of_kind("locked")[-1]["groups"])
+    camera.until(lambda: focus(camera) == {"focusMode": "continuous"})
     assert page.text_content("#own-groups [data-key=focus] output") == "automatic"
     camera.until(lambda: camera.frames)
     assert camera.frames[-1].exposure_us == 100 * held["groups"]["exposure"]["got"]["exposureTime"]
@@ -274,7 +278,7 @@ def test_it_can_be_used_by_all_and_nothing_jumps(
     page = started(opened, size=size, color_scheme=scheme, bypass_csp=True)
     where = "() => ['own-go', 'own-device', 'own-size', 'own-video'].map(id => document.getElementById(id).getBoundingClientRect()).map(r => [r.x, r.y + scrollY])"
     before = page.evaluate(where)
-    camera.until(lambda: any(each["groups"] for each in camera.of_kind("locked")))
+    camera.until(lambda: focus(camera).get("focusMode") == "manual")
     says(page, "Streaming")
     assert page.evaluate(where) == before
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")

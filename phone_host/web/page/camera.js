@@ -160,7 +160,7 @@ export class CameraBox {
   }
 
   held() {
-    const { locks, refusedLocks, chosen } = this.feed;
+    const { locks } = this.feed;
     const settings = /** @type {any} */ (this.feed.opened?.track.getSettings() ?? {});
     const groups = locks?.groups() ?? [];
     keep(byId('own-groups'), groups, (group) => group, (group) => this.toggle(/** @type {Group} */ (group)), (label, name) => {
@@ -168,7 +168,7 @@ export class CameraBox {
       const [input, , output] = /** @type {[HTMLInputElement, Element, HTMLElement]} */ ([...label.children]);
       const isHeld = group === 'torch' ? !!settings.torch : locks?.settling.has(group) || !!locks?.held[group];
       if (input.checked !== isHeld) input.checked = !!isHeld;
-      const refusal = refusedLocks[group] ?? '';
+      const refusal = locks?.refused[group] ?? '';
       text(output, refusal ? sentence(refusal) : locks?.settling.has(group) ? 'finding its value \u2026' : isHeld || group === 'torch' ? valuesInWords(group, settings) : 'automatic');
       data(output, 'level', refusal ? 'bad' : '');
     });

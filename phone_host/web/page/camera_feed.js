@@ -48,8 +48,6 @@ export class CameraFeed {
     this.worker = null;
     /** @type {?Locks} */
     this.locks = null;
-    /** @type {Partial<Record<Group, string>>} */
-    this.refusedLocks = {};
     /** Size and rate that the program wants. @type {import('./camera_track.js').Choice} */
     this.wanted = {};
     this.endWatch = () => {};
@@ -148,7 +146,7 @@ export class CameraFeed {
       readable ? [readable] : [],
     );
     if (!readable) this.endWatch = watch(stream, (message, moved) => this.worker?.postMessage(message, moved));
-    this.locks = new Locks(track, base, (refused) => this.locked(refused));
+    this.locks = new Locks(track, base, (isDone) => (isDone ? this.locked() : this.changed()));
     const free = this.chosen.free ?? [];
     this.locks.apply(Object.fromEntries(this.locks.groups().filter((group) => HELD.some((one) => one === group) && !free.includes(group)).map((group) => [group, {}])));
   }
@@ -179,7 +177,6 @@ export class CameraFeed {
     this.worker?.postMessage({ do: 'stop', words });
     this.opened?.track.stop();
     this.worker = this.locks = this.opened = null;
-    this.refusedLocks = {};
     this.failure = '';
     this.seen = fresh();
   }
@@ -190,7 +187,7 @@ export class CameraFeed {
       case 'line':
         this.seen.line = data.line;
         if (data.line === 'refused') this.seen.refusal = { problem: data.problem, remedy: data.remedy };
-        if (data.line === 'open') this.locked(this.refusedLocks);
+        if (data.line === 'open') this.locked();
         break;
       case 'want':
         this.want(data.want);
@@ -253,10 +250,9 @@ export class CameraFeed {
     this.worker?.postMessage({ do: 'say', message });
   }
 
-  /** @param {Partial<Record<Group, string>>} refused */
-  locked(refused) {
-    this.refusedLocks = refused;
-    if (this.locks && !this.locks.settling.size) this.say({ kind: 'locked', groups: this.locks.report(), refused });
+  /** Tell the program what is held. */
+  locked() {
+    if (this.locks) this.say({ kind: 'locked', groups: this.locks.report(), refused: this.locks.refused });
     this.turned();
   }
 

@@ -34,7 +34,7 @@ const isSame = (asked, got, step) => (typeof asked === 'number' ? Math.abs(asked
 export class Locks {
   /**
    * @param {MediaStreamTrack} track @param {MediaTrackConstraints} base - with which it was opened: each call replaces them all
-   * @param {(refused: Partial<Record<Group, string>>) => void} told - after each change
+   * @param {(isDone: boolean) => void} told - after each change; not done: groups find their values now
    */
   constructor(track, base, told) {
     this.track = track;
@@ -45,6 +45,10 @@ export class Locks {
     this.sets = {};
     /** @type {Partial<Record<Group, Held>>} */
     this.held = {};
+    /** @type {Partial<Record<Group, string>>} why a group is not as it was wanted last */
+    this.refused = {};
+    /** @type {Groups} what was wanted last: a later wish overtakes one that still waits for its values */
+    this.wishes = {};
     /** @type {Set<Group>} groups that find their values now */
     this.settling = new Set();
     /** @type {Promise<void>} one change at a time */
@@ -57,38 +61,44 @@ export class Locks {
     return NAMES.filter((group) => canHold(this.capabilities, group));
   }
 
-  /** What is held, as the program is told. @returns {Record<string, Held>} */
+  /** All groups as they are, as the program is told. @returns {Record<string, Held>} */
   report() {
-    return /** @type {any} */ ({ ...this.held });
-  }
-
-  /** @param {Groups} wanted @returns {Promise<void>} */
-  apply(wanted) {
-    this.turn = this.turn.then(() => this.change(wanted)).catch(() => {});
-    return this.turn;
+    return Object.fromEntries(this.groups().map((group) => [group, this.held[group] ?? { asked: {}, got: this.readBack(GROUPS[group].mode ? { [GROUPS[group].mode]: '' } : {}) }]));
   }
 
   /** @param {Groups} wanted */
-  async change(wanted) {
-    /** @type {Partial<Record<Group, string>>} */
-    const refused = {};
-    const names = NAMES.filter((group) => group in wanted);
-    const found = names.filter((group) => wanted[group] && !Object.keys(/** @type {Values} */ (wanted[group])).length && GROUPS[group].mode);
-    for (const group of names) {
-      if (!canHold(this.capabilities, group)) refused[group] = 'this camera cannot hold it';
-      else if (wanted[group] === null || found.includes(group)) await this.release(group, refused);
+  async apply(wanted) {
+    const known = NAMES.filter((group) => group in wanted && this.isKnown(group));
+    const isFound = (/** @type {Group} */ group) => !!wanted[group] && !!GROUPS[group].mode && !Object.keys(wanted[group] ?? {}).length;
+    const found = known.filter(isFound);
+    Object.assign(this.wishes, wanted);
+    for (const group of known) this.settling.delete(group);
+    for (const group of found) this.settling.add(group);
+    await this.inTurn(known.filter((group) => !wanted[group] || isFound(group)), (group) => this.release(group));
+    if (found.length) {
+      this.told(false);
+      await new Promise((over) => setTimeout(over, SETTLE_MS));
     }
-    if (found.some((group) => !refused[group])) await this.settle(found);
-    for (const group of names) if (wanted[group] && !refused[group]) await this.hold(group, this.valuesFor(group, /** @type {Values} */ (wanted[group])), refused);
-    this.settling.clear();
-    this.told(refused);
+    const due = known.filter((group) => wanted[group] && !this.refused[group] && this.wishes[group] === wanted[group]);
+    await this.inTurn(due, (group) => this.hold(group, this.valuesFor(group, wanted[group] ?? {})));
+    for (const group of found) if (this.wishes[group] === wanted[group]) this.settling.delete(group);
+    this.told(true);
   }
 
-  /** Let the camera find its values. @param {Group[]} groups */
-  async settle(groups) {
-    for (const group of groups) this.settling.add(group);
-    this.told({});
-    await new Promise((over) => setTimeout(over, SETTLE_MS));
+  /** @param {Group} group @returns {boolean} */
+  isKnown(group) {
+    delete this.refused[group];
+    const isKnown = canHold(this.capabilities, group);
+    if (!isKnown) this.refused[group] = 'this camera cannot hold it';
+    return isKnown;
+  }
+
+  /** One after the other, after all that is under way. @param {Group[]} groups @param {(group: Group) => Promise<void>} change @returns {Promise<void>} */
+  inTurn(groups, change) {
+    this.turn = this.turn.then(async () => {
+      for (const group of groups) if (this.track.readyState === 'live') await change(group);
+    });
+    return this.turn;
   }
 
   /** @param {Group} group @param {Values} values - empty: those of now @returns {Values} */
@@ -106,27 +116,27 @@ export class Locks {
     return asked;
   }
 
-  /** @param {Group} group @param {Partial<Record<Group, string>>} refused */
-  async release(group, refused) {
+  /** @param {Group} group */
+  async release(group) {
     const { mode } = GROUPS[group];
     const isFree = mode && this.capabilities[mode].includes('continuous');
     delete this.held[group];
-    if (isFree) await this.constrain(group, { [mode]: 'continuous' }, refused);
-    else if (group === 'torch') await this.constrain(group, { torch: false }, refused);
+    if (isFree) await this.constrain(group, { [mode]: 'continuous' });
+    else if (group === 'torch') await this.constrain(group, { torch: false });
     else delete this.sets[group];
   }
 
-  /** @param {Group} group @param {Values} asked @param {Partial<Record<Group, string>>} refused */
-  async hold(group, asked, refused) {
-    if (!(await this.constrain(group, asked, refused))) return;
+  /** @param {Group} group @param {Values} asked */
+  async hold(group, asked) {
+    if (!(await this.constrain(group, asked))) return;
     const got = this.readBack(asked);
     this.held[group] = { asked, got };
     const other = this.differing(asked, got);
-    if (other) refused[group] = `${other} is ${got[other] ?? 'not told'}, not ${asked[other]}`;
+    if (other) this.refused[group] = `${other} is ${got[other] ?? 'not told'}, not ${asked[other]}`;
   }
 
-  /** Set a group beside all others that are set. @param {Group} group @param {Values} values @param {Partial<Record<Group, string>>} refused @returns {Promise<boolean>} */
-  async constrain(group, values, refused) {
+  /** Set a group beside all others that are set. @param {Group} group @param {Values} values @returns {Promise<boolean>} */
+  async constrain(group, values) {
     const before = this.sets[group];
     this.sets[group] = values;
     try {
@@ -135,7 +145,7 @@ export class Locks {
     } catch (error) {
       if (before) this.sets[group] = before;
       else delete this.sets[group];
-      refused[group] = /** @type {Error} */ (error).message || 'the camera refused it';
+      this.refused[group] = /** @type {Error} */ (error).message || 'the camera refused it';
       return false;
     }
   }
