@@ -26,7 +26,7 @@ const fresh = () => ({
   refusal: { problem: '', remedy: '' },
   /** What the program has to say of the frames. */
   told: '',
-  figures: { delivered: 0, dropped: 0, sent: 0, encoding: '', encodeMs: 0, bytes: 0, leastUs: Number.NaN },
+  figures: { delivered: 0, dropped: 0, sent: 0, encoding: '', encodeMs: 0, bytes: 0, leastUs: Number.NaN, trouble: '' },
   /** Frames that went out in the last second; seconds since the last one did; seconds without one from the camera. */
   rate: 0, sinceSent: Number.POSITIVE_INFINITY, stillFor: 0,
 });
@@ -70,6 +70,7 @@ export class CameraFeed {
       isTurned: this.phase === 'on' && this.rotation !== rotation(),
       line: this.seen.line,
       refusal: this.seen.refusal,
+      trouble: this.seen.figures.trouble,
       told: this.seen.told,
       isAsked: this.seen.sinceSent < RECENT,
     };

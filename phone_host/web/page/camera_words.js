@@ -11,6 +11,7 @@
  * @property {boolean} isTurned - the phone stands otherwise than at the start
  * @property {import('./camera_link.js').Line} line
  * @property {{problem: string, remedy: string}} refusal
+ * @property {string} trouble - why the last frame was not sent; empty: it was
  * @property {string} told - what the program has to say of the frames; empty: nothing
  * @property {boolean} isAsked - the program has asked for frames of late
  */
@@ -43,6 +44,7 @@ export function stateOf(facts) {
   if (facts.isMuted) return said('bad', 'The browser has paused the camera', 'End the call or the app that uses it; unlock the screen.');
   if (facts.line === 'refused') return said('bad', facts.refusal.problem, facts.refusal.remedy);
   if (facts.line !== 'open') return said('warning', 'The program does not answer', 'See whether phone-host still runs; it is tried again by itself.');
+  if (facts.trouble) return said('bad', 'The browser cannot encode a frame', `Choose another size; it says: ${facts.trouble}`);
   if (facts.isTurned) return said('warning', 'The phone was turned', 'Turn it back: a calibration holds for one position.');
   if (facts.told) return said('warning', facts.told);
   if (!facts.isAsked) return said('good', 'Ready: nobody asks for frames', 'Go on with the next step.');

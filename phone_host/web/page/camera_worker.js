@@ -24,6 +24,7 @@ class Feed {
     this.exposureUs = 0;
     this.delivered = this.dropped = this.sent = this.underWay = this.lastBytes = 0;
     this.encodeMs = 0;
+    this.encoding = this.trouble = '';
     /** @type {Promise<void>} frames are sent in their order, whichever is encoded first */
     this.order = Promise.resolve();
     this.link = new Link(start.origin, () => this.hello, {
@@ -47,7 +48,7 @@ class Feed {
 
   /** @param {Picture} picture - ours from now on @param {number} timestampUs @param {number} captureUs @param {number} callbackUs */
   async take(picture, timestampUs, captureUs, callbackUs) {
-    const sequence = this.delivered;
+    const { delivered: sequence, dropped } = this;
     this.delivered += 1;
     if (this.underWay >= MOST_UNDER_WAY || !this.link.hasRoom(this.underWay, Math.max(this.lastBytes, LEAST_WAITING_BYTES))) {
       picture.close();
@@ -67,24 +68,28 @@ class Feed {
       const encodedUs = nowUs();
       await before;
       // A frame for a connection that is gone is none for the next: that one's credit has not come yet.
-      if (this.link.socket !== socket || socket.readyState !== WebSocket.OPEN) throw new Error('the connection was lost');
-      this.write(encoded, { sequence, timestampUs, captureUs, callbackUs, encodedUs });
+      if (this.link.socket !== socket || socket.readyState !== WebSocket.OPEN) {
+        this.dropped += 1;
+        return;
+      }
+      this.write(encoded, { sequence, dropped, timestampUs, captureUs, callbackUs, encodedUs });
       this.link.send(encoded.message);
       this.encoder.done(encoded);
       this.sent += 1;
       this.lastBytes = encoded.message.length;
       this.encoding = encoded.encoding;
+      this.trouble = '';
     } catch (error) {
       picture.close();
       this.dropped += 1;
-      this.trouble = String(error);
+      this.trouble = /** @type {Error} */ (error).message;
     } finally {
       this.underWay -= 1;
       passOn();
     }
   }
 
-  /** @param {import('./camera_encode.js').Encoded} encoded @param {{sequence: number, timestampUs: number, captureUs: number, callbackUs: number, encodedUs: number}} stamps */
+  /** @param {import('./camera_encode.js').Encoded} encoded @param {{sequence: number, dropped: number, timestampUs: number, captureUs: number, callbackUs: number, encodedUs: number}} stamps */
   write({ message, encoding, width, height }, stamps) {
     const head = new DataView(message.buffer, message.byteOffset, HEADER_BYTES);
     head.setUint8(0, VERSION);
@@ -93,7 +98,7 @@ class Feed {
     head.setUint16(4, width, true);
     head.setUint16(6, height, true);
     head.setUint32(8, stamps.sequence, true);
-    head.setUint32(12, this.dropped, true);
+    head.setUint32(12, stamps.dropped, true);
     [stamps.timestampUs, stamps.captureUs, stamps.callbackUs, stamps.encodedUs, nowUs()].forEach((us, k) => head.setFloat64(16 + 8 * k, us, true));
     head.setUint32(56, this.exposureUs, true);
     head.setUint32(60, 0, true);
