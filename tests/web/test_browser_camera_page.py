@@ -61,9 +61,9 @@ def started(opened: Opener, *, permissions: tuple[str, ...] = ("camera",), scrip
 
 
 def focus(camera: CameraStandIn) -> dict[str, Any]:
-    """What the page has told of the focus last; empty: nothing yet."""
+    """What the page has told of the focus last: asked and got."""
     told = camera.of_kind("locked")
-    values: dict[str, Any] = told[-1]["groups"]["focus"]["got"] if told else {}
+    values: dict[str, Any] = told[-1]["groups"]["focus"] if told else {"asked": {}, "got": {}}
     return values
 
 
@@ -85,26 +85,27 @@ def test_frames_arrive_whole_in_order_and_with_stamps_of_their_own(
     frames = list(camera.frames)
     assert (np.diff([each.sequence for each in frames]) > 0).all()
     assert {(each.width, each.height) for each in frames} == {(640, 480)}
-    coded, plain = next(each for each in frames if not each.is_luma), frames[-1]
+    plain = next(each for each in frames if each.is_luma)
+    coded = frames[frames.index(plain) - 1]
     decoded = cv2.imdecode(np.frombuffer(coded.payload, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert decoded is not None
     assert decoded.shape == (480, 640)
     luma = np.frombuffer(plain.payload, np.uint8).reshape(480, 640)
-    # The built-in camera shows a pattern that moves a little: both are pictures of it.
-    assert np.corrcoef(decoded.ravel(), luma.ravel())[0, 1] > 0.7
+    # The built-in camera's pattern has moved by one frame.
+    assert np.corrcoef(decoded.ravel(), luma.ravel())[0, 1] > 0.9
     for each in frames:
         assert each.callback_us <= each.encoded_us <= each.sent_us
         assert each.callback_us - each.timestamp_us == pytest.approx(
             frames[0].callback_us - frames[0].timestamp_us, abs=1e6
         )
+    hello = camera.of_kind("hello")[0]
     periods_us = np.diff([each.timestamp_us for each in frames]) / np.diff([each.sequence for each in frames])
-    assert np.median(periods_us) == pytest.approx(1e6 / 30, rel=0.2)
+    assert np.median(periods_us) == pytest.approx(1e6 / hello["settings"]["frameRate"], rel=0.2)
     camera.until(lambda: len(camera.offsets_us) > 20)
     trip_us, offset_us = min(camera.offsets_us)
     delays_us = [each.received_ns / 1000 - (each.sent_us + offset_us) for each in frames]
     assert min(delays_us) > -trip_us
     assert np.median(delays_us) < 1e6
-    hello = camera.of_kind("hello")[0]
     assert (hello["path"], hello["isolated"]) == ("processor", True)
     assert hello["settings"]["width"] == 640
     assert says(page, "Streaming")
@@ -132,20 +133,23 @@ def test_without_credit_nothing_is_sent_and_what_is_dropped_is_counted(camera: C
 
 
 def test_settings_are_held_group_by_group_and_read_back(camera: CameraStandIn, opened: Opener) -> None:
-    """Focus and exposure settle, are held and read back; the program's own values are set; what the camera does not have is refused by name; a group let go is automatic."""
+    """Focus and exposure settle, are held and read back; the program's own values are set; what the camera does not have is refused by name; a group that cannot be let go is told."""
     page = started(opened)
-    camera.until(lambda: focus(camera).get("focusMode") == "manual")
+    camera.until(lambda: focus(camera)["asked"])
     held = camera.of_kind("locked")[-1]
     assert held["refused"] == {}
     assert held["groups"]["exposure"]["got"] == held["groups"]["exposure"]["asked"]
     camera.tell(kind="lock", groups={"focus": {"focusMode": "manual", "focusDistance": 40}, "zoom": {"zoom": 2}})
-    camera.until(lambda: focus(camera) == {"focusMode": "manual", "focusDistance": 40})
+    camera.until(lambda: focus(camera)["got"] == {"focusMode": "manual", "focusDistance": 40})
     told = camera.of_kind("locked")[-1]
     assert told["groups"]["exposure"] == held["groups"]["exposure"]
     assert list(told["refused"]) == ["zoom"]
     page.uncheck("#own-groups [data-key=focus] input")
-    camera.until(lambda: focus(camera) == {"focusMode": "continuous"})
-    assert page.text_content("#own-groups [data-key=focus] output") == "automatic"
+    camera.until(lambda: not focus(camera)["asked"])
+    # The built-in camera promises an automatic mode and stays manual: what it says counts, not what was asked.
+    assert focus(camera)["got"] == {"focusMode": "manual"}
+    assert "does not go back" in camera.of_kind("locked")[-1]["refused"]["focus"]
+    page.wait_for_selector("#own-groups [data-key=focus] output[data-level=bad]")
     camera.until(lambda: camera.frames)
     assert camera.frames[-1].exposure_us == 100 * held["groups"]["exposure"]["got"]["exposureTime"]
 
@@ -171,7 +175,7 @@ def test_one_browser_feeds_and_a_second_is_told_so_until_the_first_stops(camera:
     first = started(opened)
     says(first, "Streaming")
     second = started(opened)
-    assert BUSY["remedy"].capitalize()[:4] in says(second, "Another browser is the camera").capitalize()
+    assert BUSY["remedy"][1:] in says(second, "Another browser is the camera")
     first.click("#own-go")
     says(first, "The camera is off")
     says(second, "Streaming")
@@ -251,8 +255,9 @@ def test_an_address_that_the_browser_does_not_trust_is_told_with_the_ways_out(
 
 def test_only_who_is_the_camera_loads_it(program: Played, opened: Opener) -> None:
     """Its modules are not loaded on other steps; another camera that is chosen ends it; beside a run, which has no steps, it stands above the run."""
+    program.change(done={StepName.BOARD, StepName.CAMERA})
     page = opened("board")
-    loaded = []
+    loaded: list[str] = []
     page.on("request", lambda asked: loaded.append(asked.url.rpartition("/")[2]))
     page.click("#step-run")
     page.wait_for_timeout(300)
@@ -278,7 +283,7 @@ def test_it_can_be_used_by_all_and_nothing_jumps(
     page = started(opened, size=size, color_scheme=scheme, bypass_csp=True)
     where = "() => ['own-go', 'own-device', 'own-size', 'own-video'].map(id => document.getElementById(id).getBoundingClientRect()).map(r => [r.x, r.y + scrollY])"
     before = page.evaluate(where)
-    camera.until(lambda: focus(camera).get("focusMode") == "manual")
+    camera.until(lambda: focus(camera)["asked"])
     says(page, "Streaming")
     assert page.evaluate(where) == before
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")

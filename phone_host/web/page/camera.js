@@ -10,6 +10,8 @@ import { isBrowsers } from './own_camera.js';
 /** @typedef {import('./camera_locks.js').Group} Group */
 
 const KEPT = 'camera';
+/** In the header, where there is no room for words: all as wide as the widest. */
+const CHIPS = { good: 'on', warning: '?', bad: '!', unknown: '\u2026' };
 const NO = '\u2013';
 
 /** What was chosen in this browser before. @returns {import('./camera_feed.js').Chosen} */
@@ -112,14 +114,15 @@ export class CameraBox {
     const now = stateOf(facts);
     data(byId('own-state'), 'level', now.level);
     text(byId('own-words'), sentence(now.words));
-    text(byId('own-remedy'), now.remedy);
+    text(byId('own-remedy'), sentence(now.remedy));
     if (feed.isOn || facts.phase === 'failed') say(`${now.words}. ${now.remedy}`);
     show(byId('own-ways'), !facts.isSecure);
     for (const id of ['own-parts', 'own-buttons']) show(byId(id), facts.isSecure);
     text(byId('own-go'), feed.isOn ? 'Stop' : 'Start');
     data(byId('own-go'), 'running', feed.isOn ? 'yes' : 'no');
     show(byId('own-chip'), feed.isOn);
-    text(byId('own-chip'), now.level === 'good' ? 'camera on' : 'see the camera');
+    text(byId('own-chip'), `camera ${CHIPS[now.level]}`);
+    byId('own-chip').setAttribute('aria-label', `camera: ${now.words}`);
     this.picture();
     this.choices();
     this.held();
@@ -145,14 +148,15 @@ export class CameraBox {
     const track = feed.opened?.track;
     const settings = track?.getSettings() ?? {};
     const capabilities = track ? capabilitiesOf(track) : {};
-    const device = settings.deviceId ?? feed.chosen.device ?? '';
     const devices = this.devices.length ? this.devices : [{ id: '', name: 'the usual one' }];
+    const chosen = settings.deviceId ?? feed.chosen.device ?? '';
+    const device = devices.some(({ id }) => id === chosen) ? chosen : devices[0].id;
     options(byId('own-device'), devices.map(({ id, name }) => ({ value: id, words: name })), device);
     const wanted = { width: feed.chosen.width ?? 640, height: feed.chosen.height ?? 480 };
     const size = settings.width ? { width: Math.max(settings.width, settings.height ?? 0), height: Math.min(settings.width, settings.height ?? 0) } : wanted;
     options(byId('own-size'), sizesOf(capabilities, size).map(([w, h]) => ({ value: `${w}x${h}`, words: `${w} x ${h}` })), `${size.width}x${size.height}`);
-    const rate = feed.chosen.fps ?? 30;
-    options(byId('own-rate'), ratesOf(capabilities).map((each) => ({ value: String(each), words: `${each} /s` })), String(feed.wanted.fps ?? rate));
+    const rate = Math.round(settings.frameRate ?? feed.chosen.fps ?? 30);
+    options(byId('own-rate'), ratesOf(capabilities, rate).map((each) => ({ value: String(each), words: `${each} /s` })), String(rate));
     const words = feed.opened?.words ?? '';
     if (words && words !== this.said) text(byId('own-answer'), sentence(`${words}: it gives ${settings.width} x ${settings.height}`));
     if (!words && this.said) text(byId('own-answer'), '');

@@ -124,6 +124,8 @@ export class Locks {
     if (isFree) await this.constrain(group, { [mode]: 'continuous' });
     else if (group === 'torch') await this.constrain(group, { torch: false });
     else delete this.sets[group];
+    // Only where a person or the program has let it go: else it is held in a moment anyway.
+    if (mode && this.wishes[group] === null && /** @type {any} */ (this.track.getSettings())[mode] === 'manual') this.refused[group] = 'the camera does not go back to automatic';
   }
 
   /** @param {Group} group @param {Values} asked */

@@ -64,8 +64,11 @@ export function sizesOf(capabilities, settings) {
   return /** @type {[number, number][]} */ (sizes.sort((a, b) => a[0] * a[1] - b[0] * b[1]));
 }
 
-/** @param {any} capabilities @returns {number[]} rates to offer, 1/s */
-export const ratesOf = (capabilities) => RATES.filter((rate) => rate <= (capabilities.frameRate?.max ?? 30) + 0.5);
+/** @param {any} capabilities @param {number} now - always among them, 1/s @returns {number[]} rates to offer, 1/s */
+export function ratesOf(capabilities, now) {
+  const rates = RATES.filter((rate) => rate <= (capabilities.frameRate?.max ?? 30) + 0.5);
+  return rates.includes(now) ? rates : [...rates, now].sort((a, b) => a - b);
+}
 
 /** Longest exposure that a stamp should account for, µs; 0: unknown. @param {any} settings */
 export const exposureOf = (settings) => (settings.exposureTime > 0 ? Math.round(100 * settings.exposureTime) : 0);

@@ -43,12 +43,13 @@ export function stateOf(facts) {
   if (!facts.isVisible) return said('warning', 'This tab is in the background', 'Bring it to the front: browsers stop the camera of hidden tabs.');
   if (facts.isMuted) return said('bad', 'The browser has paused the camera', 'End the call or the app that uses it; unlock the screen.');
   if (facts.line === 'refused') return said('bad', facts.refusal.problem, facts.refusal.remedy);
+  if (facts.line === 'connecting') return said('unknown', 'Calling the program');
   if (facts.line !== 'open') return said('warning', 'The program does not answer', 'See whether phone-host still runs; it is tried again by itself.');
   if (facts.trouble) return said('bad', 'The browser cannot encode a frame', `Choose another size; it says: ${facts.trouble}`);
   if (facts.isTurned) return said('warning', 'The phone was turned', 'Turn it back: a calibration holds for one position.');
   if (facts.told) return said('warning', facts.told);
   if (!facts.isAsked) return said('good', 'Ready: nobody asks for frames', 'Go on with the next step.');
-  return said('good', 'Streaming', 'Keep this tab in front.');
+  return said('good', 'Streaming', 'Keep this tab in front; the screen stays on.');
 }
 
 /** @type {Record<string, string>} */
@@ -58,7 +59,7 @@ export const GROUP_WORDS = { focus: 'Focus', exposure: 'Exposure', white_balance
 export function valuesInWords(group, now) {
   const some = (/** @type {any} */ value, /** @type {(v: number) => string} */ words) => (typeof value === 'number' ? [words(value)] : []);
   const parts = {
-    focus: some(now.focusDistance, (v) => (Number.isFinite(v) && v < 100 ? `${v.toFixed(2)} m` : 'far')),
+    focus: some(now.focusDistance, (v) => (Number.isFinite(v) && v < 1000 ? `${v.toFixed(v < 1 ? 2 : v < 10 ? 1 : 0)} m` : 'far')),
     exposure: [...some(now.exposureTime, (v) => `${(v / 10).toFixed(1)} ms`), ...some(now.iso, (v) => `ISO ${v}`)],
     white_balance: some(now.colorTemperature, (v) => `${v} K`),
     zoom: some(now.zoom, (v) => `${v.toFixed(1)} times`),
