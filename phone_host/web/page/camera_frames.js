@@ -21,8 +21,8 @@ export function watch(stream, give) {
     const captureUs = seen.captureTime === undefined ? Number.NaN : (performance.timeOrigin + seen.captureTime) * 1000;
     try {
       const picture = 'VideoFrame' in window ? new VideoFrame(video) : await createImageBitmap(video);
-      const timestampUs = 'timestamp' in picture ? picture.timestamp : seen.mediaTime * 1e6;
-      give({ do: 'frame', picture, timestampUs, captureUs, callbackUs }, [picture]);
+      // Not the picture's own timestamp: Firefox 153 counts it in seconds, Chromium's is this very time.
+      give({ do: 'frame', picture, timestampUs: seen.mediaTime * 1e6, captureUs, callbackUs }, [picture]);
     } catch {
       // it has no picture just now
     }
