@@ -103,7 +103,8 @@ def origin_words(origin: StampOrigin) -> str:
     """Say how a camera's stamps came onto this machine's clock."""
     if not origin.epoch or origin.uncertainty_ns is None:
         return "on which clock its stamps count is not known yet"
-    return f"its stamps count on {origin.epoch}, known to +-{origin.uncertainty_ns / 1e6:.2f} ms"
+    known = f", known to +-{origin.uncertainty_ns / 1e6:.2f} ms" if origin.uncertainty_ns else ""
+    return f"its stamps count on {origin.epoch}{known}"
 
 
 @dataclass(frozen=True, slots=True)
