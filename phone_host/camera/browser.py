@@ -24,6 +24,7 @@ from phone_host.camera.browser_epoch import Epoch
 from phone_host.camera.browser_feed import BrowserFeed, Seat
 from phone_host.camera.browser_locks import locks_of
 from phone_host.camera.browser_uri import BrowserSettings
+from phone_host.camera.browser_wire import Hello
 from phone_host.camera.waiting_grabs import WaitingGrabs
 
 _LOG = logging.getLogger(__name__)
@@ -50,7 +51,6 @@ _LIFE: Final = LifeSettings(
 )
 
 _TURNED: Final = "turned after the first image: nothing is used until it is turned back"
-_OTHER_CAMERA: Final = "this is another camera than the one that the run began with: nothing of it is used"
 
 
 class BrowserCamera:
@@ -195,11 +195,15 @@ class BrowserCamera:
 
     # What the feed tells, with the lock held.
 
+    def takes(self, hello: Hello) -> bool:
+        """See User: until the end, the camera with which it began."""
+        known = self._description
+        return known is None or not known.identity.differs_from(hello.identity)
+
     def came(self, seat: Seat, now_ns: int) -> None:
         """See User."""
         self._border.begin(seat.hello, is_same_machine=seat.line.is_near)
         self._rate.restart()
-        self._tell(_OTHER_CAMERA if self._is_other(seat) else "")
         self._tick(now_ns)
 
     def left(self, now_ns: int) -> None:
@@ -258,6 +262,8 @@ class BrowserCamera:
 
     def _absent(self) -> UnavailableError:
         seat = self._feed.seat
+        if self._feed.has_ended:
+            return UnavailableError("stopped before a browser gave its camera", "start it on the page first")
         if seat is None:
             return UnavailableError(
                 "no browser gives its camera", "open the page on the phone, and start its camera there"
@@ -279,7 +285,7 @@ class BrowserCamera:
             if self._life.due(now_ns) is Step.CLOSE:
                 self._shut("no image came any more")
             return
-        if seat is None or not seat.is_live or self._is_other(seat) or self._life.due(now_ns) is not Step.OPEN:
+        if seat is None or not seat.is_live or self._life.due(now_ns) is not Step.OPEN:
             return
         if self._life.opened(now_ns, self._rate.period_ns or 0) is Step.CLOSE:
             self._life.closed()
@@ -289,10 +295,6 @@ class BrowserCamera:
     def _grant(self) -> None:
         if self._life.phase is Standing.STREAMING:
             self._feed.grant(self._rate.period_ns or 0)
-
-    def _is_other(self, seat: Seat) -> bool:
-        known = self._description
-        return known is not None and known.identity.differs_from(seat.hello.identity)
 
     def _lose(self, loss: Loss, problem: str, now_ns: int) -> None:
         if self._life.lost(loss, now_ns) is Step.CLOSE:

@@ -104,6 +104,9 @@ class User(Protocol):
     def settings(self) -> BrowserSettings:
         """What it wants."""
 
+    def takes(self, hello: Hello) -> bool:
+        """Whether it takes images of this camera."""
+
     def came(self, seat: Seat, now_ns: int) -> None:
         """A browser has taken the seat, or its camera has come to life."""
 
@@ -158,8 +161,8 @@ class BrowserFeed:
             line.close()
             return None
         with self.changed:
-            if not self._make_room(said, now_ns):
-                line.say(refused_text("another browser gives its camera", "stop it there, or close that page"))
+            if (refusal := self._refusal(said, now_ns)) is not None:
+                line.say(refused_text(*refusal))
                 line.close()
                 return None
             known = (
@@ -277,18 +280,20 @@ class BrowserFeed:
             if self.seat is seat:
                 self._leave(now.monotonic_ns())
 
-    def _make_room(self, hello: Hello, now_ns: int) -> bool:
-        """Free the seat for a browser, if it is the same one come back, or the other one is silent."""
+    def _refusal(self, hello: Hello, now_ns: int) -> tuple[str, str] | None:
+        """Return why a browser cannot have the seat, and what to do. If it can, because the one before is silent or itself, free it."""
+        if self._user is not None and not self._user.takes(hello):
+            return "the run began with another camera", "stop the run first, or start that camera again"
         seat = self.seat
         if seat is None:
-            return True
+            return None
         is_same = bool(hello.track) and hello.track == seat.hello.track
         if not is_same and now_ns - seat.heard_ns < _SILENT_NS:
-            return False
+            return "another browser gives its camera", "stop it there, or close that page"
         seat.line.say(refused_text("another browser gives its camera now", "stop it there, or close that page"))
         seat.line.close()
         self._leave(now_ns)
-        return True
+        return None
 
     def _leave(self, now_ns: int) -> None:
         self.seat = None
