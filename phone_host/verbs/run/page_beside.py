@@ -14,7 +14,7 @@ from phone_host.declared_settings import PhoneHostSettings
 from phone_host.output.axes import Axes
 from phone_host.serve.beside import BesideRun
 from phone_host.settings import key_folder
-from phone_host.verbs.serve.choices import choices_of, run_words
+from phone_host.verbs.serve.choices import choices_of, shown_words
 from phone_host.verbs.serve.page import own_settings, served
 from phone_host.verbs.serve.places import snapshot_folder
 
@@ -35,7 +35,7 @@ def page_beside(options: argparse.Namespace, found: Resolved[PhoneHostSettings])
     choices = {**choices_of(options), "camera": without_password(values.camera)}
     beside = BesideRun(
         choices,
-        lambda chosen: command_line("phone-host", "run", *run_words(chosen)),
+        lambda chosen: command_line("phone-host", "run", *shown_words(chosen)),
         snapshots=snapshot_folder(options.out),
         axes=Axes(options.axes),
     )

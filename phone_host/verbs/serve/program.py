@@ -33,6 +33,7 @@ from phone_host.verbs.serve.choices import (
     placed,
     run_options,
     run_words,
+    shown_words,
     with_changes,
     without_depth,
 )
@@ -101,7 +102,7 @@ class Commands:
 
     def command(self, choices: Choices) -> str:
         """See Program."""
-        return command_line("phone-host", "run", *self._fixed, *run_words(self.shown(choices)))
+        return command_line("phone-host", "run", *self._fixed, *shown_words(self.shown(choices)))
 
     def run(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
         """See Program."""
