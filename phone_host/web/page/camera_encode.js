@@ -7,7 +7,7 @@ export const HEADER_BYTES = 64;
 const MS_PER_BYTE = 22e-6;
 /** Luma has to gain a tenth: a change for nothing would cost the program its settled decoder. */
 const GAIN = 0.9;
-/** Frames of each kind that are measured; the first makes buffers and does not count. */
+/** Frames of each kind that are measured. The first makes buffers and is slow. */
 const TRIES = 5;
 /** Memory comes in steps, so that a frame that is a little larger than the last one fits as well. */
 const STEP_BYTES = 65_536;
@@ -16,9 +16,6 @@ const PLANAR = /^(I4\d\dA?|NV12)$/;
 /** @typedef {'jpeg' | 'luma'} Encoding */
 /** @typedef {{encoding: Encoding, width: number, height: number, message: Uint8Array}} Encoded - the message's first `HEADER_BYTES` are free */
 /** @typedef {VideoFrame | ImageBitmap} Picture */
-
-/** @param {number[]} values @returns {number} */
-const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 
 /** BT.601, as the cameras' own luma. @param {Uint8ClampedArray} rgba @param {Uint8Array} luma */
 export function lumaOf(rgba, luma) {
@@ -85,7 +82,8 @@ export class Encoder {
   learn(encoding, ms) {
     this.costs[encoding].push(ms);
     const { jpeg, luma } = this.costs;
-    if (jpeg.length > TRIES && luma.length > TRIES) this.chosen = median(luma.slice(1)) < GAIN * median(jpeg.slice(1)) ? 'luma' : 'jpeg';
+    // The least of each: whatever else the machine does only adds.
+    if (jpeg.length > TRIES && luma.length > TRIES) this.chosen = Math.min(...luma) < GAIN * Math.min(...jpeg) ? 'luma' : 'jpeg';
   }
 
   /** @param {Picture} picture @returns {Promise<Encoded>} */
