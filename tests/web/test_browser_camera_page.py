@@ -254,9 +254,11 @@ def test_an_address_that_the_browser_does_not_trust_is_told_with_the_ways_out(
 
 
 def test_only_who_is_the_camera_loads_it(program: Played, opened: Opener) -> None:
-    """Its modules are not loaded on other steps; another camera that is chosen ends it; beside a run, which has no steps, it stands above the run."""
+    """The page's policy gives the camera to itself alone. Its modules are not loaded on other steps; another camera that is chosen ends it; beside a run, which has no steps, it stands above the run."""
     program.change(done={StepName.BOARD, StepName.CAMERA})
     page = opened("board")
+    policy = page.evaluate("async () => (await fetch('/')).headers.get('Permissions-Policy')")
+    assert "camera=(self)" in policy.split(", ")
     loaded: list[str] = []
     page.on("request", lambda asked: loaded.append(asked.url.rpartition("/")[2]))
     page.click("#step-run")
@@ -273,7 +275,6 @@ def test_only_who_is_the_camera_loads_it(program: Played, opened: Opener) -> Non
 
 @pytest.mark.parametrize(("size", "scheme"), [(PHONE, "dark"), (LAPTOP, "light")], ids=["phone", "laptop"])
 def test_it_can_be_used_by_all_and_nothing_jumps(
-    camera: CameraStandIn,
     opened: Opener,
     axe: str,
     size: dict[str, int],
@@ -283,8 +284,9 @@ def test_it_can_be_used_by_all_and_nothing_jumps(
     page = started(opened, size=size, color_scheme=scheme, bypass_csp=True)
     where = "() => ['own-go', 'own-device', 'own-size', 'own-video'].map(id => document.getElementById(id).getBoundingClientRect()).map(r => [r.x, r.y + scrollY])"
     before = page.evaluate(where)
-    camera.until(lambda: focus(camera)["asked"])
+    page.wait_for_selector("#own-groups [data-key=exposure]")
     says(page, "Streaming")
+    page.wait_for_function("() => document.querySelector('#own-figures [data-key=frames] .value').textContent > 0")
     assert page.evaluate(where) == before
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
     page.evaluate(axe)
