@@ -165,6 +165,44 @@ def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: CameraStand
     assert "Close other camera apps" in says(page, "Another program holds the camera")
     assert says(page, "Streaming")
     assert camera.frames
+    page.evaluate(
+        "() => { const track = document.getElementById('own-video').srcObject.getVideoTracks()[0]; track.stop(); track.dispatchEvent(new Event('ended')); }"
+    )
+    assert "it is tried again" in says(page, "The camera was taken away")
+    camera.until(lambda: any(not each["live"] for each in camera.of_kind("track")))
+    says(page, "Streaming")
+    assert len({each["track"] for each in camera.of_kind("hello")}) == 2
+
+
+def test_each_state_has_words_of_its_own_and_what_to_do(opened: Opener) -> None:
+    """Whatever becomes of the camera is said in other words than the rest, and what is not good comes with a remedy."""
+    page = opened("camera")
+    good = {
+        "isSecure": True,
+        "phase": "on",
+        "failure": "",
+        "isEnded": False,
+        "isMuted": False,
+        "isVisible": True,
+        "isTurned": False,
+        "line": "open",
+        "refusal": {"problem": "busy", "remedy": "wait"},
+        "trouble": "",
+        "told": "",
+        "isAsked": True,
+    }
+    others = [
+        {"isSecure": False}, {"phase": "off"}, {"phase": "opening"}, {"isEnded": True}, {"isMuted": True}, {"isVisible": False},
+        {"isTurned": True}, {"line": "connecting"}, {"line": "lost"}, {"line": "refused"}, {"trouble": "x"}, {"told": "turned"}, {"isAsked": False},
+        *({"phase": "failed", "failure": f"{name}Error"} for name in ("NotAllowed", "NotFound", "NotReadable", "Overconstrained", "NotSupported", "Other")),
+    ]  # fmt: skip
+    told = page.evaluate(
+        "async all => { const { stateOf } = await import('/static/camera_words.js'); return all.map(stateOf); }",
+        [good, *(good | other for other in others)],
+    )
+    assert len({each["words"] for each in told}) == len(told)
+    without = [each["words"] for each in told if each["level"] in {"warning", "bad"} and not each["remedy"]]
+    assert without == ["turned"]  # the program's own words, whole
 
 
 def test_one_browser_feeds_and_a_second_is_told_so_until_the_first_stops(camera: CameraStandIn, opened: Opener) -> None:
