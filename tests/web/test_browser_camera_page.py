@@ -165,6 +165,44 @@ def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: CameraStand
     assert "Close other camera apps" in says(page, "Another program holds the camera")
     assert says(page, "Streaming")
     assert camera.frames
+    page.evaluate(
+        "() => { const track = document.getElementById('own-video').srcObject.getVideoTracks()[0]; track.stop(); track.dispatchEvent(new Event('ended')); }"
+    )
+    assert "it is tried again" in says(page, "The camera was taken away")
+    camera.until(lambda: any(not each["live"] for each in camera.of_kind("track")))
+    says(page, "Streaming")
+    assert len({each["track"] for each in camera.of_kind("hello")}) == 2
+
+
+def test_each_state_has_words_of_its_own_and_what_to_do(opened: Opener) -> None:
+    """Whatever becomes of the camera is said in other words than the rest, and what is not good comes with a remedy."""
+    page = opened("camera")
+    good = {
+        "isSecure": True,
+        "phase": "on",
+        "failure": "",
+        "isEnded": False,
+        "isMuted": False,
+        "isVisible": True,
+        "isTurned": False,
+        "line": "open",
+        "refusal": {"problem": "busy", "remedy": "wait"},
+        "trouble": "",
+        "told": "",
+        "isAsked": True,
+    }
+    others = [
+        {"isSecure": False}, {"phase": "off"}, {"phase": "opening"}, {"isEnded": True}, {"isMuted": True}, {"isVisible": False},
+        {"isTurned": True}, {"line": "connecting"}, {"line": "lost"}, {"line": "refused"}, {"trouble": "x"}, {"told": "turned"}, {"isAsked": False},
+        *({"phase": "failed", "failure": f"{name}Error"} for name in ("NotAllowed", "NotFound", "NotReadable", "Overconstrained", "NotSupported", "Other")),
+    ]  # fmt: skip
+    told = page.evaluate(
+        "async all => { const { stateOf } = await import('/static/camera_words.js'); return all.map(stateOf); }",
+        [good, *(good | other for other in others)],
+    )
+    assert len({each["words"] for each in told}) == len(told)
+    without = [each["words"] for each in told if each["level"] in {"warning", "bad"} and not each["remedy"]]
+    assert without == ["turned"]  # the program's own words, whole
 
 
 def test_one_browser_feeds_and_a_second_is_told_so_until_the_first_stops(camera: CameraStandIn, opened: Opener) -> None:
@@ -254,9 +292,11 @@ def test_an_address_that_the_browser_does_not_trust_is_told_with_the_ways_out(
 
 
 def test_only_who_is_the_camera_loads_it(program: Played, opened: Opener) -> None:
-    """Its modules are not loaded on other steps; another camera that is chosen ends it; beside a run, which has no steps, it stands above the run."""
+    """The page's policy gives the camera to itself alone. Its modules are not loaded on other steps; another camera that is chosen ends it; beside a run, which has no steps, it stands above the run."""
     program.change(done={StepName.BOARD, StepName.CAMERA})
     page = opened("board")
+    policy = page.evaluate("async () => (await fetch('/')).headers.get('Permissions-Policy')")
+    assert "camera=(self)" in policy.split(", ")
     loaded: list[str] = []
     page.on("request", lambda asked: loaded.append(asked.url.rpartition("/")[2]))
     page.click("#step-run")
@@ -273,7 +313,6 @@ def test_only_who_is_the_camera_loads_it(program: Played, opened: Opener) -> Non
 
 @pytest.mark.parametrize(("size", "scheme"), [(PHONE, "dark"), (LAPTOP, "light")], ids=["phone", "laptop"])
 def test_it_can_be_used_by_all_and_nothing_jumps(
-    camera: CameraStandIn,
     opened: Opener,
     axe: str,
     size: dict[str, int],
@@ -283,8 +322,9 @@ def test_it_can_be_used_by_all_and_nothing_jumps(
     page = started(opened, size=size, color_scheme=scheme, bypass_csp=True)
     where = "() => ['own-go', 'own-device', 'own-size', 'own-video'].map(id => document.getElementById(id).getBoundingClientRect()).map(r => [r.x, r.y + scrollY])"
     before = page.evaluate(where)
-    camera.until(lambda: focus(camera)["asked"])
+    page.wait_for_selector("#own-groups [data-key=exposure]")
     says(page, "Streaming")
+    page.wait_for_function("() => document.querySelector('#own-figures [data-key=frames] .value').textContent > 0")
     assert page.evaluate(where) == before
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
     page.evaluate(axe)

@@ -105,6 +105,7 @@ export class CameraBox {
   show(state) {
     // Another camera was chosen, here or elsewhere: this one is not left on.
     if (!isBrowsers(state) && this.feed.isOn) this.press();
+    /** @type {HTMLAnchorElement} */ (byId('own-chip')).href = state.steps.length ? '#camera' : '#own';
     this.draw();
   }
 

@@ -8,7 +8,7 @@ import { passes } from './camera_words.js';
 import { token } from './token.js';
 
 const VERSION = 1;
-const AGAIN_MS = 3000;
+const AGAIN_MS = 2000;
 /** A camera that delivers nothing for so many seconds, though it claims to live, is opened anew. */
 const MOST_STILL = 6;
 /** Frames went to the program within so many seconds: it asks for them. */

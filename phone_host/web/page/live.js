@@ -31,11 +31,12 @@ export class Live {
       });
     /** @type {?import('./cloud.js').Cloud} */
     this.cloud = null;
-    this.startCloud();
+    this.hasAskedForCloud = false;
   }
 
   /** The viewer is heavy: it comes after the first pictures. */
   async startCloud() {
+    this.hasAskedForCloud = true;
     const { Cloud, canShowClouds } = await import('./cloud.js');
     try {
       if (!canShowClouds()) throw new Error(NO_WEBGL);
@@ -69,6 +70,7 @@ export class Live {
     const lines = !pair.head.range ? 'none' : pair.head.way[1] ? 'columns' : 'rows';
     data(frame, 'lines', lines);
     text(byId('pictures-words'), lines === 'none' ? 'As the cameras see it: nothing is rectified in this run' : 'Rectified: a point lies on the same line in both');
+    if (!this.hasAskedForCloud) this.startCloud();
     const aspect = `${pair.head.width} / ${pair.head.height}`;
     if (frame.style.getPropertyValue('--aspect') !== aspect) frame.style.setProperty('--aspect', aspect);
   }

@@ -16,7 +16,11 @@ export function showOwnCamera(state) {
   show(byId('own'), isHere);
   // Beside a run there is no step for it: it stands above the run.
   const place = byId(state.steps.length ? 'panel-camera' : 'panel-run');
-  if (isHere && !place.contains(byId('own'))) place.prepend(byId('own'));
+  if (isHere && !place.contains(byId('own'))) {
+    place.prepend(byId('own'));
+    // It stands before the depth: open only as long as there is none.
+    /** @type {HTMLDetailsElement} */ (byId('own-fold')).open = !state.live?.pairs;
+  }
   if (isHere && !loading && (document.body.dataset.step === 'camera' || !state.steps.length || wasOn()))
     loading = import('./camera.js').then(({ CameraBox }) => new CameraBox(wasOn()));
   loading?.then((box) => box.show(state));
