@@ -1,4 +1,4 @@
-"""Tells when other programs read a file: `python -m tests.support.file_reads FILE` prints CLOCK_MONOTONIC, ns, and the reads since the line before (Linux, inotify).
+"""Tells when other programs read a file: `python -m tests.support.file_reads FILE` prints CLOCK_MONOTONIC, ns, and the events since the line before (Linux, inotify).
 
 A process of its own, so that nothing else delays it.
 """

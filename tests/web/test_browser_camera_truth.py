@@ -86,7 +86,7 @@ def number_in(frame: Frame) -> int:
 def test_each_image_has_the_stamp_of_the_moment_at_which_it_was_taken(
     browser: Any, film: Path, reads: list[int], way: tuple[str, str, str]
 ) -> None:
-    """Images show the number of the reading nearest to their stamps; the typical error is below 3 ms. One in five may differ: on a busy machine the watcher itself is late."""
+    """Stamps advance with the images' numbers, are younger than a period on arrival, and typically within 3 ms of the file's reading."""
     uri, script, epoch = way
     feed = BrowserFeed(30_000_000_000)
     program = Played((), settings={"camera": "browser:"}, done={StepName.BOARD}, feed=feed)
@@ -114,9 +114,11 @@ def test_each_image_has_the_stamp_of_the_moment_at_which_it_was_taken(
     assert origin is not None
     assert origin.epoch == epoch
     exposed_ns, read_ns = np.array([frame.exposed.ns for frame in frames]), np.array(reads)
-    nearest = np.abs(exposed_ns[:, None] - read_ns).argmin(axis=1)
-    # The first image is read twice in a row whenever the film begins anew.
-    shown = np.array([number_in(frame) for frame in frames])
-    agree = max(np.mean((nearest - first) % (IMAGES + 1) == shown) for first in range(IMAGES + 1))
-    assert agree > 0.8, np.median(exposed_ns - read_ns[nearest])
-    assert abs(np.median(exposed_ns - read_ns[nearest])) < 3_000_000
+    # Numbers and stamps advance together, but where the film begins anew (its first image is read twice).
+    steps = np.diff([number_in(frame) for frame in frames]) % IMAGES
+    assert np.mean(np.round(np.diff(exposed_ns) * 30e-9) == steps) > 0.9
+    # A stamp that belonged to another image would be a period off.
+    assert 0 < np.median([frame.grabbed - frame.exposed for frame in frames]) < 33_000_000
+    # Under load inotify reports some readings late, or two as one: the median does not mind.
+    errors_ns = exposed_ns - read_ns[np.abs(exposed_ns[:, None] - read_ns).argmin(axis=1)]
+    assert abs(np.median(errors_ns)) < 3_000_000
