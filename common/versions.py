@@ -15,8 +15,8 @@ PROTOCOL_VERSION: Final = 3
 ENROLMENT_VERSION: Final = 2
 """Version of the words that prove a code. 2: asking reserves nothing; a proof's first word carries its commitment."""
 
-RIG_FORMAT: Final = 2
-"""rig.yaml; a file without `format_version` is of format 1. 2: lenses, covariance, views."""
+RIG_FORMAT: Final = 3
+"""rig.yaml; a file without `format_version` is of format 1. 2: lenses, covariance, views. 3: views name their board, and are as seen."""
 
 LEDGER_FORMAT: Final = 1
 """delays.jsonl; lines of format 1 do not state it."""

@@ -12,8 +12,8 @@ from phone_host.calibration.target import Board, find_corners, is_outlined
 from phone_host.calibration.threads import side_by_side
 from phone_host.model import Image
 
-Size = tuple[int, int]
-"""Inner corners: the larger count first."""
+Inner = tuple[int, int]
+"""How many inner corners a chessboard has each way: the larger count first."""
 
 ENOUGH: Final = 4
 """So many images tell. Of 174 images of four real rigs the quick search finds the right size in all, a larger one in one."""
@@ -34,19 +34,19 @@ class Fits:
     """
 
     images: Sequence[Image]
-    _counts: dict[Size, int] = field(default_factory=dict)
+    _counts: dict[Inner, int] = field(default_factory=dict)
 
-    def count(self, size: Size) -> int:
+    def count(self, size: Inner) -> int:
         """Return how many images a size fits; 0 if the first ones show none."""
         if size not in self._counts:
             self._counts[size] = self._counted(size)
         return self._counts[size]
 
-    def holds(self, size: Size) -> bool:
+    def holds(self, size: Inner) -> bool:
         """Return whether a size fits more than half of the images."""
         return 2 * self.count(size) > len(self.images)
 
-    def grown(self, size: Size) -> Size:
+    def grown(self, size: Inner) -> Inner:
         """Return the largest size that holds and of which the given one is a part; the given one, if there is none."""
         while True:
             columns, rows = size
@@ -56,7 +56,7 @@ class Fits:
                 return size
             size = best
 
-    def rivals(self, size: Size, other: Size) -> bool:
+    def rivals(self, size: Inner, other: Inner) -> bool:
         """Return whether a size fits half as many images as another one: of some it fits one in 26 by mistake."""
         board = Board(*size, _ANY_SIDE_M)
         return 2 * sum(side_by_side(lambda image: is_outlined(image, board), self.images)) >= self.count(other) > 0
@@ -65,7 +65,7 @@ class Fits:
         """Return whether the full search finds a board in any of the images."""
         return any(side_by_side(lambda image: len(find_corners(image, board)) > 0, self.images))
 
-    def _counted(self, size: Size) -> int:
+    def _counted(self, size: Inner) -> int:
         if not _LEAST <= min(size) <= max(size) <= _MOST:
             return 0
         board = Board(*size, _ANY_SIDE_M)
@@ -73,5 +73,5 @@ class Fits:
         return first and first + sum(side_by_side(lambda image: is_outlined(image, board), self.images[_FIRST:]))
 
 
-def _sized(columns: int, rows: int) -> Size:
+def _sized(columns: int, rows: int) -> Inner:
     return max(columns, rows), min(columns, rows)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, TandemError
 from common.imagesize.head import MOST_PIXELS
-from phone_host.calibration.board_fits import ENOUGH, Fits, Size
+from phone_host.calibration.board_fits import ENOUGH, Fits, Inner
 from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
 from phone_host.calibration.small_picture import shrunk
 from phone_host.calibration.target import Board, Corners
@@ -63,7 +63,7 @@ _TRIED: Final = 4
 
 _ANY_SIDE_M: Final = 0.01
 
-_USUAL_SIZES: Final[tuple[Size, ...]] = ((9, 6), (8, 6), (7, 6), (7, 5), (8, 5), (9, 7), (10, 7), (8, 7), (11, 8))
+_USUAL_SIZES: Final[tuple[Inner, ...]] = ((9, 6), (8, 6), (7, 6), (7, 5), (8, 5), (9, 7), (10, 7), (8, 7), (11, 8))
 """Of the boards that OpenCV, ROS, MATLAB and Kalibr give away and describe, and of the boards of chess."""
 
 
@@ -77,10 +77,10 @@ class Vote:
     """
 
     asked: int
-    sizes: Counter[Size]
+    sizes: Counter[Inner]
 
     @property
-    def leader(self) -> Size | None:
+    def leader(self) -> Inner | None:
         """The size on which the images agree; None if they do not."""
         if not self.sizes:
             return None
@@ -95,30 +95,31 @@ class Vote:
         return best is not None and self.sizes[best] >= _CLEAR_VOTES and self._share(best) >= _CLEAR_SHARE
 
     @property
-    def ranked(self) -> list[Size]:
+    def ranked(self) -> list[Inner]:
         """All sizes, the one that most corners show first."""
         return sorted(self.sizes, key=self._weight, reverse=True)
 
-    def _weight(self, size: Size) -> int:
+    def _weight(self, size: Inner) -> int:
         return self.sizes[size] * _area(size)
 
-    def _share(self, size: Size) -> float:
+    def _share(self, size: Inner) -> float:
         return self._weight(size) / sum(map(self._weight, self.sizes))
 
 
-def size_seen(grey: Image) -> Size | None:
+def size_seen(grey: Image, way: int = _USUAL_WAY) -> Inner | None:
     """Return the inner corners of the chessboard in an image; None if there is none.
 
     Args:
         grey: (H, W) uint8.
+        way: how the detector looks.
 
     Returns:
         The two counts, the larger first. It may be a part of the board.
     """
-    return _size_of(_lattice(small_for_sizes(grey)))
+    return _size_of(_lattice(small_for_sizes(grey), way))
 
 
-def whole_size_seen(grey: Image) -> Size | None:
+def whole_size_seen(grey: Image) -> Inner | None:
     """Return the inner corners of the chessboard in an image, if its white margin is seen on all four sides.
 
     A board that reaches beyond the image, or that a hand covers, looks like a smaller one. On the side where it is cut there are more
@@ -183,7 +184,7 @@ def _grey_between(grey: Image, grid: Corners) -> float:
     return float(np.percentile(squares, 10) + np.percentile(squares, 90)) / 2
 
 
-def _size_of(grid: Corners) -> Size | None:
+def _size_of(grid: Corners) -> Inner | None:
     size = max(grid.shape[:2]), min(grid.shape[:2])
     return None if size[1] < _SEED[1] or size == _SEED else size
 
@@ -201,7 +202,7 @@ class _Seen:
     """An image, small, and which lattice it shows; None: none."""
 
     image: Image
-    size: Size | None
+    size: Inner | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,7 +210,7 @@ class _Decided:
     """What some images show, and which board that is; None: it cannot be told."""
 
     vote: Vote
-    size: Size | None
+    size: Inner | None
     fits: Fits
 
 
@@ -224,7 +225,7 @@ def _asked(images: Iterator[Path], look: Callable[[Path], _Seen | None]) -> tupl
     return result, every
 
 
-def _decided(files: ViewFiles, most_pixels: int, given: Size | None = None) -> _Decided:
+def _decided(files: ViewFiles, most_pixels: int, given: Inner | None = None) -> _Decided:
     """Ask the images; if they show boards and do not agree, ask them again another way; then try what most boards have.
 
     Args:
@@ -250,7 +251,7 @@ def _fits_of(seen: list[_Seen]) -> Fits:
     return Fits([each.image for each in best[:ENOUGH]])
 
 
-def _fitting(result: Vote, fits: Fits, given: Size | None) -> Size | None:
+def _fitting(result: Vote, fits: Fits, given: Inner | None) -> Inner | None:
     """Return the largest size that fits most images, of those that images show; else the one on which they agree."""
     leader = result.leader
     shown = [leader] if leader is not None and fits.holds(leader) else result.ranked[:_TRIED]
@@ -263,11 +264,11 @@ def _fitting(result: Vote, fits: Fits, given: Size | None) -> Size | None:
     return None if leader is None else fits.grown(leader)
 
 
-def _area(size: Size) -> int:
+def _area(size: Inner) -> int:
     return size[0] * size[1]
 
 
-def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
+def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Inner:
     """Find out which chessboard the images show.
 
     Args:
@@ -304,7 +305,7 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Size:
     )
 
 
-def require_size(files: ViewFiles, given: Size, most_pixels: int = MOST_PIXELS) -> None:
+def require_size(files: ViewFiles, given: Inner, most_pixels: int = MOST_PIXELS) -> None:
     """Check in some images that a chessboard has the size that was given; what cannot be told passes.
 
     Args:
@@ -352,7 +353,7 @@ def _marks_in(files: ViewFiles, most_pixels: int) -> SeenMarks | None:
     return find_marks(side_by_side(lambda path: _small(path, most_pixels), list(_sample(files))[:_MARKED]))
 
 
-def size_text(size: Size) -> str:
+def size_text(size: Inner) -> str:
     """Write a size as `--board` takes it."""
     return f"{size[0]}x{size[1]}"
 
@@ -362,7 +363,7 @@ def _seen_in(path: Path, most_pixels: int, way: int) -> _Seen | None:
     if image is None:
         return None
     small = small_for_sizes(image)
-    return _Seen(small, _size_of(_lattice(small, way)))
+    return _Seen(small, size_seen(small, way))
 
 
 def _small(path: Path, most_pixels: int) -> Image | None:

@@ -1,7 +1,7 @@
 """Finds the board in the image files of both sides: every pair is read, searched, and kept or rejected with its reason."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -74,6 +74,13 @@ class _Seen:
     picture: bytes
 
 
+_Look = Callable[[Path, int], _Seen]
+"""Looks at an image of the left (0) or the right (1) side; raises DataError."""
+
+_SeenPair = tuple[str, _Seen, _Seen]
+"""Name, left and right."""
+
+
 def look_for_boards(
     files: ViewFiles,
     board: Board,
@@ -96,38 +103,18 @@ def look_for_boards(
     Raises:
         DataError: no image could be read.
     """
-    rejected = [_alone(path, "left") for path in files.left_alone] + [
-        _alone(path, "right") for path in files.right_alone
-    ]
-    seen: list[tuple[str, _Seen, _Seen]] = []
-    first_problem: DataError | None = None
 
-    def look(pair: tuple[str, Path, Path]) -> tuple[_Seen, _Seen] | DataError:
-        try:
-            one, other = (_look(path, board, most_pixels, turn) for path, turn in zip(pair[1:], mounted, strict=True))
-        except DataError as error:
-            return error
-        return one, other
+    def look(path: Path, index: int) -> _Seen:
+        return _look(path, board, most_pixels, mounted[index])
 
-    looked = side_by_side(look, files.pairs[:_FIRST], advance)
-    failures = [each for each in looked if isinstance(each, DataError)]
-    if len(failures) == _FIRST < len(files.pairs):
-        raise DataError(
-            f"none of the first {_FIRST} pairs can be read: {failures[0].problem}",
-            "give pictures, or mend that one first",
-        )
-    looked += side_by_side(look, files.pairs[_FIRST:], advance)
-    for (name, _, _), found in zip(files.pairs, looked, strict=True):
-        if isinstance(found, DataError):
-            first_problem = first_problem or found
-            rejected.append(Rejected(name, Reason.UNREADABLE, found.problem))
-        else:
-            seen.append((name, *found))
-    every = _every_file(files, seen, lambda path, index: _look(path, board, most_pixels, mounted[index]))
+    seen, failures = _read(files, look, advance)
+    rejected = [_alone(path, side.value) for side, alone in _unpaired(files) for path in alone]
+    rejected += [Rejected(name, Reason.UNREADABLE, error.problem) for name, error in failures]
+    every = _every_file(files, seen, look)
     if not seen:
-        raise first_problem or DataError(
-            "no image has a partner on the other side", "give both images of a pair the same number"
-        )
+        if failures:
+            raise failures[0][1]
+        raise DataError("no image has a partner on the other side", "give both images of a pair the same number")
     known: dict[bytes, str] = {}
     usual = _usual([left for _, left, _ in seen]), _usual([right for _, _, right in seen])
     pairs = []
@@ -149,8 +136,45 @@ def look_for_boards(
     )
 
 
+def _unpaired(files: ViewFiles) -> tuple[tuple[Side, Sequence[Path]], ...]:
+    return (Side.LEFT, files.left_alone), (Side.RIGHT, files.right_alone)
+
+
+def _read(
+    files: ViewFiles, look: _Look, advance: Callable[[], None]
+) -> tuple[list[_SeenPair], list[tuple[str, DataError]]]:
+    """Look at all pairs, several at a time.
+
+    Returns:
+        Those whose images could be read, and why the others could not.
+
+    Raises:
+        DataError: the first ones cannot be read, and there are many more.
+    """
+
+    def both(pair: tuple[str, Path, Path]) -> tuple[_Seen, _Seen] | DataError:
+        try:
+            return look(pair[1], 0), look(pair[2], 1)
+        except DataError as error:
+            return error
+
+    looked = side_by_side(both, files.pairs[:_FIRST], advance)
+    failures = [each for each in looked if isinstance(each, DataError)]
+    if len(failures) == _FIRST < len(files.pairs):
+        raise DataError(
+            f"none of the first {_FIRST} pairs can be read: {failures[0].problem}",
+            "give pictures, or mend that one first",
+        )
+    looked += side_by_side(both, files.pairs[_FIRST:], advance)
+    named = [(name, found) for (name, _, _), found in zip(files.pairs, looked, strict=True)]
+    return (
+        [(name, *found) for name, found in named if not isinstance(found, DataError)],
+        [(name, found) for name, found in named if isinstance(found, DataError)],
+    )
+
+
 def _every_file(
-    files: ViewFiles, seen: list[tuple[str, _Seen, _Seen]], look: Callable[[Path, int], _Seen]
+    files: ViewFiles, seen: list[_SeenPair], look: _Look
 ) -> tuple[tuple[FileCorners, ...], tuple[FileCorners, ...]]:
     """Return the corners of all files of both sides, if they were paired by order and the counts differ; else nothing."""
     alone = files.left_alone, files.right_alone

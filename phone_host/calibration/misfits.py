@@ -1,5 +1,7 @@
 """Finds pairs that do not fit the others, and says why. Pure."""
 
+import math
+
 import numpy as np
 
 from phone_host.calibration.board_in_space import misses
@@ -33,7 +35,8 @@ def misfits(pairs: list[BoardPair], result: BundleResult, points_m: Vector) -> l
         for index in np.flatnonzero(by_error > 1)
     ]
     missed = misses(pairs, rig_of(result.state))
-    usual = float(np.median(missed))
+    crossing = missed[np.isfinite(missed)]  # NaN: the cameras see no corner of that pair in common
+    usual = float(np.median(crossing)) if crossing.size else math.nan
     by_rays = missed / max(_RAYS_FACTOR * usual, _RAYS_FLOOR_PX)
     found += [
         (

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.board_fits import ENOUGH, Fits, Size
+from phone_host.calibration.board_fits import ENOUGH, Fits, Inner
 from phone_host.calibration.board_size import Vote, size_text, small_for_sizes, whole_size_seen
 from phone_host.calibration.marks_seen import find_marks, require_marks
 from phone_host.calibration.small_picture import shrunk
@@ -155,7 +155,7 @@ class SizeCheck:
                 )
             return
         shown = self._finder.find(left, right)
-        given: Size = (self._board.columns, self._board.rows)
+        given: Inner = (self._board.columns, self._board.rows)
         if shown is not None and {shown.columns, shown.rows} != set(given):
             size = size_text((shown.columns, shown.rows))
             raise SettingsError(

@@ -1,7 +1,7 @@
 """Copies what a calibration's page shows out of its parts: each view with its corners and what is left of them, and the rig."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -31,12 +31,14 @@ class Taken:
         views: what was found in the images.
         pairs: corners of all pairs that the calibration was given, those of an earlier one included; perhaps a drift of the
             cameras was taken out of them.
+        seen: the same pairs in the same order, as they were seen.
         board: the board.
     """
 
     order: Sequence[str]
     views: BoardViews
     pairs: list[BoardPair]
+    seen: list[BoardPair]
     board: Board
 
     def own(self, pair: BoardPair) -> BoardPair | None:
@@ -44,13 +46,13 @@ class Taken:
         return next((each for each in self.views.pairs if each.left_px is pair.left_px), None)
 
     def as_seen(self, pair: BoardPair) -> BoardPair:
-        """Return a pair as it was seen, under the name that it has now; one of an earlier calibration as it is."""
-        return replace(self.own(pair) or pair, name=pair.name)
+        """Return a pair as it was seen."""
+        return next(each for each in self.seen if each.name == pair.name)
 
     @property
     def is_straightened(self) -> bool:
         """Whether a drift was taken out."""
-        return any(self.as_seen(pair).right_px is not pair.right_px for pair in self.pairs)
+        return any(used.right_px is not seen.right_px for used, seen in zip(self.pairs, self.seen, strict=True))
 
 
 def series_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejected, ...]) -> tuple[SeriesView, ...]:

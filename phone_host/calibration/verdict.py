@@ -216,4 +216,5 @@ _CURES = {
     Reason.CORNERS_LEFT: "avoid glare and blur",
     Reason.CORNERS_RIGHT: "avoid glare and blur",
     Reason.MOVED: "hold the board still, or put it down, until both cameras have their image",
+    Reason.REPEATED: "delete the copies, and take pairs with the board elsewhere in their place",
 }

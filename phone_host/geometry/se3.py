@@ -1,7 +1,7 @@
 """Rotations and rigid motions, SO(3) and SE(3). Pure.
 
-`T_a_b` takes b-coordinates to a. Rotation vectors point along the axis; their length is the angle, rad. Small motions act
-from the left: `exp(twist) @ T_a_b` moves T_a_b in the axes of a. A twist is (rotation, translation), rad and m.
+`T_a_b` takes b-coordinates to a. Rotation vectors point along the axis; their length is the angle, rad. Small motions
+act from the left: they move T_a_b in the axes of a.
 
 Source: T. D. Barfoot, "State Estimation for Robotics", 2017, chapter 7.
 """
@@ -119,30 +119,6 @@ class SE3:
     def of(pose: Floats) -> "SE3":
         """Return the motion of a (6,) pose: rotation vector, rad, and translation, m."""
         return SE3(rotations_of(pose[:3]), np.asarray(pose[3:], np.float64))
-
-    @staticmethod
-    def exp(twist: Floats) -> "SE3":
-        """Return the motion of a (6,) twist: rotation, rad, and translation, m, both at constant speed."""
-        across = cross_matrices(twist[:3])
-        angle = float(np.linalg.norm(twist[:3]))
-        if angle < _SMALL:
-            along = np.eye(3) + across / 2 + across @ across / 6
-        else:
-            along = (
-                np.eye(3)
-                + (1 - np.cos(angle)) / angle**2 * across
-                + (angle - np.sin(angle)) / angle**3 * across @ across
-            )
-        return SE3(rotations_of(twist[:3]), along @ twist[3:])
-
-    def log(self) -> Floats:
-        """Return the (6,) twist of this motion, the inverse of `exp` for angles below half a turn."""
-        vector = vectors_of(self.R)
-        angle = float(np.linalg.norm(vector))
-        across = cross_matrices(vector)
-        share = 1 / 12 if angle < _SMALL else 1 / angle**2 - (1 + np.cos(angle)) / (2 * angle * np.sin(angle))
-        along = np.eye(3) - across / 2 + share * across @ across
-        return np.concatenate([vector, along @ self.t_m])
 
     def pose(self) -> Floats:
         """Return the (6,) rotation vector, rad, and translation, m: the inverse of `of`."""

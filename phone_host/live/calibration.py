@@ -19,9 +19,10 @@ from common.link.base import Link
 from phone_host.calibration.board_views import Size
 from phone_host.calibration.causes.looks import look_at
 from phone_host.calibration.guide.gates import Gate, Glance
-from phone_host.calibration.guide.guide import Guide, View
+from phone_host.calibration.guide.guide import Guide
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
+from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import Want
 from phone_host.calibration.guide.words import Words
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
@@ -147,12 +148,6 @@ class LiveCalibration:
         return self._ended if self._guide is not None else Ended.STOPPED
 
     @property
-    def views(self) -> tuple[View, ...]:
-        """The views taken so far."""
-        with self._lock:
-            return () if self._guide is None else tuple(self._guide.views)
-
-    @property
     def trouble(self) -> str:
         """Why no pairs come though the board was met; empty: nothing is wrong yet."""
         now_ns = now.monotonic_ns()
@@ -190,19 +185,24 @@ class LiveCalibration:
 
     def snapshot(self) -> GuideSnapshot:
         """Return everything that presenters show, with the words that are to be said now."""
+        return self.shown()[0]
+
+    def shown(self) -> tuple[GuideSnapshot, tuple[View, ...]]:
+        """Return the snapshot, and the views that were taken by then."""
         now_ns = now.monotonic_ns()
         with self._lock:
             if self._guide is not None:
                 self._guide.words(now_ns)
-                return self._guide.snapshot(now_ns)
+                return self._guide.snapshot(now_ns), tuple(self._guide.views)
         words = (
             Words.HELP if self.host.first_done_ns and now_ns - self.host.first_done_ns > _HELP_NS else Words.SHOW_BOTH
         )
-        return before_board(words.value, self._settings.most_views, (now_ns - self._began_ns) / 1e9)
+        return before_board(words.value, self._settings.most_views, (now_ns - self._began_ns) / 1e9), ()
 
     @property
     def _ended(self) -> Ended:
-        return Ended.RUNNING if self._guide is None else self._guide.ended
+        guide = self._guide  # once: the looker may drop it in between
+        return Ended.RUNNING if guide is None else guide.ended
 
     def _raise_failures(self) -> None:
         for failure in (self._solver.failure, self._pictures.failure):

@@ -1,7 +1,8 @@
 """The views in rig.yaml from which a rig was computed, so that a later calibration can add others: the map `views`.
 
-It holds board (as `--board` names it), board_columns and board_rows (inner corners), square (m), names (one text per pair), left and right (corners, px, one
-row per pair: x y x y ..., .Nan where one is not seen). A rig without the map cannot be added to.
+It holds board (as `--board` names it; in format 2 it may be absent: a chessboard), board_columns and board_rows (inner corners), square (m), names (one text
+per pair), left and right (corners, px, one row per pair: x y x y ..., .Nan where one is not seen). The corners are as they were seen, in the order in which
+they were taken, also where a drift was taken out of them for the rig (format 2: without the drift). A rig without the map cannot be added to.
 """
 
 from collections.abc import Callable
@@ -54,7 +55,7 @@ def write_views(storage: cv2.FileStorage, views: RigViews) -> None:
         views: what the rig was computed from.
     """
     storage.startWriteStruct(KEY, cv2.FileNode_MAP)
-    storage.write("board", views.board)
+    storage.write("board", views.board or f"{views.columns}x{views.rows}")
     storage.write("board_columns", views.columns)
     storage.write("board_rows", views.rows)
     storage.write("square", views.square_m)

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from common.keys import KeyFolder
-from phone_host.calibration.guide.guide import View
 from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.guide.view import View
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration

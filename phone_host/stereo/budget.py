@@ -37,6 +37,9 @@ _AS_FAST: Final = 1.1
 """Where nothing holds the budget, the best step is taken that is slower than the fastest by no more than this: when decoding takes
 most of the time, nothing is won by less depth."""
 
+_UNSURE: Final = 1.5
+"""A step that was never measured may take so much less than is expected of it: simulated machines have 0.6 to 1.5."""
+
 _PATIENCE_NS: Final = 2_000_000_000
 _MOST_PATIENCE_NS: Final = 60_000_000_000
 _UNDONE_NS: Final = 10_000_000_000
@@ -108,17 +111,30 @@ class BudgetController:
         return BudgetReason.TOO_SLOW
 
     def _make_the_best_of_it(self, now_ns: int) -> BudgetReason | None:
-        """Nothing is expected to hold the budget: go to the best of the fastest, at once, but afterwards only with patience."""
-        step, present_ns = self._fastest(), self._rest_ns + self.match_ns
+        """Nothing is expected to hold the budget: go to a step that may all the same, else to the best of the fastest; at once, but afterwards only with patience."""
+        untried = self._untried()
+        step, present_ns = untried or self._fastest(), self._rest_ns + self.match_ns
         is_first, self.is_missed = now_ns - self._gave_up_ns >= _MOST_PATIENCE_NS, True
         is_better = self._steps.index(step) < self._steps.index(self.step)
-        is_faster = self._rest_ns + self._model.expected_ns(step) <= _GAIN * present_ns
+        is_faster = untried is not None or self._rest_ns + self._model.expected_ns(step) <= _GAIN * present_ns
         if step == self.step or not (is_first or self._is_patient(now_ns)) or not (is_better or is_faster):
             return None
         self._set_patience(is_failure=not is_first)
         self._gave_up_ns = now_ns
         self._change(step, now_ns)
         return BudgetReason.TOO_SLOW if is_faster else BudgetReason.AS_FAST
+
+    def _untried(self) -> Step | None:
+        """Return the step that is expected to be the fastest of those never measured, if it may hold the budget; None: there is none.
+
+        What is measured of other steps foretells it only roughly: to stay too slow beside it, or to go back to what was too slow, is worse than a try.
+        """
+        new = [step for step in self._steps if not self._model.is_measured(step)]
+        step = min(new, key=self._model.expected_ns, default=None)
+        if step is None:
+            return None
+        limit_ns = min(_UNSURE * self._budget_ns, _AS_FAST * (self._rest_ns + self.match_ns))
+        return self._first_within(limit_ns, (step,))
 
     def _set_patience(self, *, is_failure: bool) -> None:
         """Wait longer before the next change for the better, if the last one was a failure; else shorter again."""

@@ -46,6 +46,10 @@ class CostModel:
         """Return how long matching would take now, ns."""
         return self._level * (self._known.get(step) or self._fitted(step))
 
+    def is_measured(self, step: Step) -> bool:
+        """Return whether a step was ever used, so that its cost is no guess."""
+        return step in self._known
+
     def observe(self, step: Step, match_ns: float) -> None:
         """Take what matching took.
 

@@ -31,7 +31,7 @@ from phone_host.calibration.causes.mistakes import Mistake
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.cause_judge import finding_of
-from tests.support.cause_real import real_seriess
+from tests.support.cause_real import named_real_series
 from tests.support.cause_series import MAKERS, Made, good, good_pictures
 
 _MISTAKES, _GOOD = 200, 50
@@ -76,7 +76,7 @@ def main() -> int:
         for each in pool.map(_judge, cases):
             judged.append(each)
             bar.advance(task)
-    real = list(real_seriess())
+    real = list(named_real_series())
     verdicts = _verdicts(judged)
     if options.json:
         shown = {"verdicts": [asdict(verdict) for verdict in verdicts], "named": _counts(judged)}

@@ -20,7 +20,7 @@ from phone_host.calibration.causes.partners import wrong_partners
 from phone_host.calibration.causes.unturned import unturned
 from phone_host.calibration.target import find_corners
 from phone_host.calibration.verdict import Assessment, Verdict
-from phone_host.verbs.calibrate.cause import assessed, cause_report, with_cause
+from phone_host.verbs.calibrate.cause import assessed, with_cause
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.cause_judge import finding_of
 from tests.support.cause_real import real_pairs, variants
@@ -188,10 +188,6 @@ def test_a_mistake_is_the_first_remedy_and_caps_the_verdict() -> None:
     finding = Finding(mistake=Mistake.UNSTIFF, sentence="they turned", remedy="tighten it", most=Verdict.USABLE)
     assert with_cause(Assessment(Verdict.GOOD, ""), finding) == Assessment(Verdict.USABLE, "they turned: tighten it")
     assert with_cause(Assessment(Verdict.REJECT, "x"), finding).verdict is Verdict.REJECT
-    assert cause_report(None, "") == {"cause": None}
-    told = cause_report(replace(finding, turned=_unstiff(Course.DRIFT)[1].turned), "")["cause"]
-    assert told["name"] == "rig not stiff"
-    assert told["turned"]["course"] == "steadily"
 
 
 @pytest.mark.slow

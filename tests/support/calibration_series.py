@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import cv2
 import numpy as np
 
+from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.board_views import BoardViews, ViewPictures
 from phone_host.calibration.calibrate import calibrate
@@ -14,6 +16,9 @@ from phone_host.calibration.small_picture import small_jpeg
 from phone_host.calibration.view_turns import view_turns
 from phone_host.model import Verdict
 from phone_host.model.calibration_series import CalibrationSeries, RectifiedView
+from phone_host.stereo.view_files import ViewFiles
+from phone_host.verbs.calibrate.board import Known, Origin
+from phone_host.verbs.calibrate.report import CalibrationReport, Judged
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 
@@ -44,7 +49,21 @@ def taken(used: list[BoardPair] | None = None) -> Taken:
     """What was taken: the views, and one picture of a pair without a board; `used`: corners that were changed since."""
     names = [pair.name for pair in pairs()] + ["8"]
     views = BoardViews(pairs(), REJECTED, SIZES, pictures=tuple(ViewPictures(name, JPEG, JPEG) for name in names))
-    return Taken(order=names, views=views, pairs=list(pairs()) if used is None else used, board=BOARD)
+    seen = list(pairs())
+    return Taken(order=names, views=views, pairs=seen if used is None else used, seen=seen, board=BOARD)
+
+
+def calibration_report(result: Judged | DataError) -> CalibrationReport:
+    """The report of the command on them."""
+    files = ViewFiles(pairs=(), by_number=True, by_name=False, left_alone=(), right_alone=())
+    return CalibrationReport(
+        files=files,
+        views=taken().views,
+        known=Known(BOARD, Origin.IMAGES),
+        rejected=REJECTED,
+        result=result,
+        page=Path("index.html"),
+    )
 
 
 def series() -> CalibrationSeries:

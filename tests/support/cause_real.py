@@ -181,7 +181,7 @@ def _lit(image: Image, board: Board) -> Image:
     return lit(image, (float(x), float(y)), 0.2 * float(np.ptp(corners, axis=0).max()))
 
 
-def real_seriess() -> Iterator[tuple[str, Mistake | None, Finding | None]]:
+def named_real_series() -> Iterator[tuple[str, Mistake | None, Finding | None]]:
     """Give each real series's name, the mistake made and what is named; nothing without $SCAN_DATA."""
     if not os.environ.get("SCAN_DATA"):
         return

@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Final
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phone_host.model import BudgetReason, Search
@@ -125,6 +125,9 @@ def test_a_budget_that_cannot_be_reached_gets_the_best_of_the_fastest() -> None:
     rest_ms=st.floats(0, 40),
     budget_ms=st.integers(1, 200),
 )
+# Nothing is expected to hold these budgets, because nothing that was measured is like the cheapest steps, which do.
+@example(step_ns=20.0, pixel_ns=2.63, block_ns=20.0, rest_ms=15.25, budget_ms=23)
+@example(step_ns=15.92, pixel_ns=89.9, block_ns=19.78, rest_ms=8.59, budget_ms=20)
 def test_what_was_measured_too_slow_is_not_tried_again(
     step_ns: float, pixel_ns: float, block_ns: float, rest_ms: float, budget_ms: int
 ) -> None:

@@ -95,6 +95,18 @@ def test_a_pair_of_two_moments_is_rejected(shift_m: float) -> None:
     assert [(each.name, each.reason) for each in found.rejected] == [("4", Reason.MOVED)]
 
 
+def test_a_pair_without_a_corner_in_common_switches_no_check_off() -> None:
+    """Rows of one pair are 0.9 px off: its rays tell, also beside a pair of which each camera saw another half of the board."""
+    pairs = exact_pairs(_rig(), poses(10, seed=2), noise_px=0.1, seed=6)
+    pairs = _changed(pairs, 3, pairs[3].right_px + np.array([0.0, 0.9]))
+    half = len(pairs[5].left_px) // 2
+    pairs[5].left_px[half:], pairs[5].right_px[:half] = np.nan, np.nan
+    (rejected,) = calibrate(pairs, BOARD, _SIZES).rejected
+    assert (rejected.name, rejected.reason) == ("3", Reason.MOVED)
+    assert "rays of left and right miss each other" in rejected.detail
+    assert "others by nan" not in rejected.detail
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_exchanged_pairs_are_told_with_numbers_that_mean_something(seed: int) -> None:
     """Five pairs whose right images went to their neighbours: no error above 1000 px is printed, and an error says to check the pairs."""
@@ -220,6 +232,18 @@ def test_what_spoils_pairs_comes_before_what_they_measure() -> None:
     assert judge(found, unpaired) == Assessment(Verdict.GOOD, "")
     remedy = judge(replace(found, vertical_px=np.full(100, 0.3)), unpaired).remedy
     assert remedy == "6 of 16 pairs were rejected: no partner: give both images of a pair the same number"
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_every_reason_has_its_cure(reason: Reason) -> None:
+    """Whatever most pairs were rejected for, and whatever the verdict: the remedy names it and says what to do; a good rig has none."""
+    found, rejected = _fine(), tuple(Rejected(str(number), reason, "so it was") for number in range(6))
+    for rows_px, verdict in ((0.01, Verdict.GOOD), (0.3, Verdict.USABLE), (3.0, Verdict.REJECT)):
+        judgement = judge(replace(found, vertical_px=np.full(100, rows_px)), rejected)
+        assert judgement.verdict is verdict
+        told, _, cure = judgement.remedy.rpartition(": ")
+        assert told == ("" if verdict is Verdict.GOOD else f"6 of 16 pairs were rejected: {reason.value}")
+        assert bool(cure) is (verdict is not Verdict.GOOD)
 
 
 def test_what_would_help_most_can_be_told() -> None:

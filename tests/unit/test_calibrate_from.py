@@ -25,7 +25,7 @@ from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.board import Known, Named, Origin
 from phone_host.verbs.calibrate.command import run
-from phone_host.verbs.calibrate.earlier import Series, asked_of, calibrated, notes, series_of
+from phone_host.verbs.calibrate.earlier import Series, asked_of, calibrated, every_pair, notes, series_of
 from phone_host.verbs.calibrate.rig_file import replace_rig
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.pictures import encoded
@@ -70,7 +70,7 @@ def test_added_views_are_solved_together_with_the_earlier_ones(tmp_path: Path) -
     path = _written(tmp_path, pairs[:6])
     series = _series(_options(tmp_path, "--from", str(path)))
     later = [replace(pair, name=str(number)) for number, pair in enumerate(pairs[6:])]
-    found = calibrated(series, later, _SIZES)
+    found = calibrated(series, every_pair(series, later, _SIZES), _SIZES)
     at_once = calibrate(pairs, BOARD, _SIZES)
     np.testing.assert_allclose(found.rig.t_right_left_m, at_once.rig.t_right_left_m, atol=1e-6)
     assert len(found.used) == 12
@@ -83,10 +83,10 @@ def test_pictures_that_are_in_the_rig_already_do_not_count_twice(tmp_path: Path)
     pairs = exact_pairs(unlike_rig(), poses(12, seed=3), noise_px=0.1)
     path = _written(tmp_path, pairs[:6])
     series = _series(_options(tmp_path, "--from", str(path)))
-    assert len(calibrated(series, pairs[3:], _SIZES).used) == 12
+    assert [pair.name for pair in every_pair(series, pairs[3:], _SIZES)] == [pair.name for pair in pairs]
     assert notes(series, pairs[3:], _SIZES) == [f"from     6 pairs of {path} and 6 new ones; 3 were in it already"]
     with pytest.raises(DataError, match=r"in .*rig\.yaml already"):
-        calibrated(series, pairs[:2], _SIZES)
+        every_pair(series, pairs[:2], _SIZES)
 
 
 def test_names_that_are_taken_get_a_number() -> None:
@@ -129,7 +129,7 @@ def test_lenses_are_scaled_to_new_pictures_and_that_is_said(tmp_path: Path) -> N
     assert said[2].endswith("the right lens is cropped to its middle: 1280x720 to 1280x680 px")
     path = _written(tmp_path, exact_pairs(truth, poses(5, seed=1)))
     with pytest.raises(DataError, match=r"the new left pictures are 1280x960 px, those of .*rig.yaml 640x480 px"):
-        calibrated(_series(_options(tmp_path, "--from", str(path))), seen, sizes)
+        every_pair(_series(_options(tmp_path, "--from", str(path))), seen, sizes)
 
 
 def test_what_contradicts_the_earlier_calibration_is_refused(tmp_path: Path) -> None:
@@ -249,14 +249,14 @@ def test_no_views_are_lost(tmp_path: Path) -> None:
     """A file whose views the new one does not hold is moved aside, and kept there from one without views; one whose views are all in the new one is replaced."""
     rig, out = unlike_rig(), _filed(tmp_path, BOARD)
     made, views = rectify_rig(rig), read_rig_views(out)
-    assert replace_rig(out, rig, made, views) == {}
-    assert replace_rig(out, rig, made) == {"earlier_rig": "rig.yaml.old"}
-    assert replace_rig(out, rig, made) == {}
-    assert replace_rig(out, rig, made, views) == {}
+    assert replace_rig(out, rig, made, views) == ""
+    assert replace_rig(out, rig, made) == "rig.yaml.old"
+    assert replace_rig(out, rig, made) == ""
+    assert replace_rig(out, rig, made, views) == ""
     rejected = replace(rig, verdict=Verdict.REJECT)
     out.write_text(out.read_text().partition("# what the rig was")[0])  # it loses its views
-    assert replace_rig(out, rejected, made) == {"earlier_rig": "rig.yaml.old2"}
-    assert replace_rig(out, rig, None) == replace_rig(out, None, None) == {"earlier_rig": "rig.yaml"}
+    assert replace_rig(out, rejected, made) == "rig.yaml.old2"
+    assert replace_rig(out, rig, None) == replace_rig(out, None, None) == "rig.yaml"
     assert read_rig(out).is_rejected
     kept = read_rig_views(tmp_path / "rig.yaml.old")
     assert kept is not None

@@ -15,13 +15,13 @@ from phone_host.calibration.causes.mistakes import Finding, Mistake
 from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import Image
 from phone_host.output.rig_yaml import read_rig
-from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.arguments import add_arguments
-from phone_host.verbs.calibrate.cause import cause_report, with_cause
+from phone_host.verbs.calibrate.cause import with_cause
 from phone_host.verbs.calibrate.command import run
-from phone_host.verbs.calibrate.figures import passed_over_notes, report_of, summary
+from phone_host.verbs.calibrate.report import Judged
+from phone_host.verbs.calibrate.summary import passed_over_notes, summary
 from tests.support.boards import poses, render_pair
-from tests.support.calibration_series import calibration, taken
+from tests.support.calibration_series import calibration, calibration_report
 from tests.support.oriented import oriented
 from tests.support.pictures import encoded
 from tests.support.rigs import small_rig
@@ -201,10 +201,6 @@ def test_a_good_rig_has_no_remedy_though_a_mistake_was_found(verdict: Verdict, r
     before = Assessment(verdict, "" if verdict is Verdict.GOOD else "take more")
     judgement = with_cause(before, finding)
     assert judgement == Assessment(verdict, remedy)
-    found, views = calibration(), taken().views
-    files = ViewFiles(pairs=(), by_number=True, by_name=False, left_alone=(), right_alone=())
-    report = report_of(files, views, (), found, judgement) | cause_report(finding, "") | {"page": "index.html"}
-    told = summary(report, views, found, (), Path("rig.yaml"))
+    told = summary(calibration_report(Judged(calibration(), judgement, finding)), Path("rig.yaml"))
     assert ("note     the board is blurred; the light is poor" in told) == (verdict is Verdict.GOOD)
     assert [line for line in told if line.startswith("remedy")] == ([f"remedy   {remedy}"] if remedy else [])
-    assert (report["remedy"] == "") == (verdict is Verdict.GOOD)

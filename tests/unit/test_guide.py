@@ -15,12 +15,13 @@ from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.gates import Gate, Glance, is_alike
-from phone_host.calibration.guide.guide import Guide, View
+from phone_host.calibration.guide.guide import Guide
 from phone_host.calibration.guide.picture import guide_svg
 from phone_host.calibration.guide.progress import Progress, Taught, lessons
 from phone_host.calibration.guide.snapshot import Ended, before_board
 from phone_host.calibration.guide.text_picture import figure_lines, picture_lines
 from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corners
+from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Want
 from phone_host.calibration.guide.words import Speech, Words
 from phone_host.calibration.next_view import Spot, after_one_m

@@ -4,6 +4,8 @@ import argparse
 import io
 import shlex
 import threading
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import cv2
@@ -11,26 +13,37 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from common import now
 from common.errors import DataError, SettingsError, UnavailableError
+from common.link.factory import open_link, parse_link
+from common.stamp import HOST_CLOCK
 from phone_host.calibration import moving_board
 from phone_host.calibration.board_names import named_board
+from phone_host.calibration.causes.looks import BoardLook
+from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.snapshot import before_board
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target import Board, find_corners
 from phone_host.calibration.verdict import Verdict
+from phone_host.camera.factory import open_camera
+from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken
 from phone_host.live.newest import Newest
 from phone_host.live.view_folders import Pictures, ViewFolders
 from phone_host.live.voice import Voice, speech_program
+from phone_host.run.host_settings import HostSettings
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.command import exit_code, run
 from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.live import ring_instead
 from tests.support.boards import BOARD, poses, render_pair
+from tests.support.pictures import encoded
 from tests.support.programs import until
 from tests.support.rigs import small_rig
 
 _PAIR = render_pair(small_rig(), poses(1, seed=8, depth_m=(0.4, 0.5))[0])
+_SIZES = ((640, 480), (640, 480))
+_PAIR_CORNERS = 30.0 * BOARD.points_m()[:, :2] / BOARD.square_m + 100
 
 
 def test_a_moving_board_is_found_roughly_and_then_exactly() -> None:
@@ -241,3 +254,46 @@ def test_a_live_session_is_repeated_with_all_its_options() -> None:
     assert told[:4] == ["phone-host", "calibrate", "my views/left", "right"]
     assert vars(_parsed(*told[2:])) == vars(_parsed("my views/left", "right", *kept, "--out", "new rig.yaml"))
     assert command_again(_parsed("--live", "--from", "rig.yaml", "--out", "rig.yaml"), "l", "r") == ""
+
+
+class _EagerLock:
+    """A lock for which somebody waits: whenever it is free he is in, and takes a view."""
+
+    def __init__(self, take: Callable[[], None]) -> None:
+        self._take = take
+
+    def __enter__(self) -> None:
+        """Nobody else is in."""
+
+    def __exit__(self, *_: object) -> None:
+        self._take()
+
+
+def test_a_view_that_is_taken_while_it_is_shown_is_shown_later(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The looker waits for the lock of what is shown: picture and views are of one moment all the same, and both views are told in the end."""
+    (tmp_path / "film").mkdir()
+    (tmp_path / "film" / "1.png").write_bytes(encoded(".png", _PAIR[0]))
+    camera = open_camera(f"replay:{tmp_path}/film?fps=5&loop=1", HOST_CLOCK, now.monotonic_ns())
+    settings = LiveSettings(
+        host=HostSettings(), board=BOARD, square_m=0.025, most_views=5, left=tmp_path / "l", right=tmp_path / "r"
+    )
+    with closing(open_link(parse_link(f"ipc://{tmp_path}/b", listens_by_default=False))) as link, closing(camera):
+        live = LiveCalibration(settings, camera, [link], lambda *_: pytest.fail("nothing is to be calibrated"))
+        guide, at_s = live._guide, iter(range(1, 9))
+        assert guide is not None
+
+        def take() -> None:
+            corners = _PAIR_CORNERS + 40.0 * len(guide.views)
+            seen = Glance(at_ns=next(at_s) * 10**9, skew_ns=0, left_px=corners, right_px=corners - 20, sizes_px=_SIZES)
+            looks = BoardLook(2.0, 0.0, 0.0), BoardLook(2.0, 0.0, 0.0)
+            assert guide.examine(seen, looks, seen.at_ns) is Gate.TAKEN
+
+        live._lock = _EagerLock(take)  # type: ignore[assignment]  # stands for the looker's thread
+        shows = Lines()
+        for count in (0, 1, 2):
+            snapshot, views = live.shown()
+            assert (snapshot.views, len(views)) == (count, count)
+            shows.show(snapshot, views, "")
+    assert capsys.readouterr().err.count("taken: ") == 2

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
+from common.versions import RIG_FORMAT
 from phone_host.model import RIG_PARAMETERS, Verdict
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
@@ -97,7 +98,7 @@ def test_a_translation_that_points_elsewhere_is_refused(tmp_path: Path) -> None:
 def test_files_of_other_programs_need_no_rectification(tmp_path: Path) -> None:
     """Without a version any of R1 to Q may be missing; what is there must agree. A focal length of 0 is no division."""
     path = _written(tmp_path)
-    text = path.read_text().replace("format_version: 2\n", "")
+    text = path.read_text().replace(f"format_version: {RIG_FORMAT}\n", "")
     for missing in (("R1", "R2", "P1", "P2", "Q"), ("P1",), ("P2",), ("Q",), ("R1",), ("R2",)):
         kept = text
         for key in missing:

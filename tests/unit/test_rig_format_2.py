@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
+from common.versions import RIG_FORMAT
 from phone_host.model import Lens
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
@@ -35,7 +36,7 @@ def test_a_file_that_does_not_name_its_lenses_has_opencvs_polynomial(tmp_path: P
     rig = replace(rig, right=replace(rig.right, distortion=eight))
     write_rig(path, rig, rectify_rig(rig))
     assert "lens2: rational" in path.read_text()
-    text = path.read_text().replace("format_version: 2\n", "")
+    text = path.read_text().replace(f"format_version: {RIG_FORMAT}\n", "")
     path.write_text(re.sub(r"^lens[12]:.*\n", "", text, flags=re.MULTILINE))
     back = read_rig(path)
     assert (back.left.lens, back.right.lens) == (Lens.PINHOLE, Lens.RATIONAL)
@@ -111,6 +112,26 @@ def _views() -> RigViews:
     left[1, 4] = np.nan
     names = ("7", 'it\'s "two": [x]', "\u00e9")
     return RigViews(columns=9, rows=6, square_m=0.025, names=names, left_px=left, right_px=right)
+
+
+def test_views_of_format_2_are_a_chessboards_and_those_of_format_3_name_their_board(tmp_path: Path) -> None:
+    """A file of before marks does not say which board it shows: read as a chessboard's. One of today that does not is refused, and one of tomorrow by its number."""
+    path = tmp_path / "rig.yaml"
+    write_rig(path, unlike_rig(), rectify_rig(unlike_rig()), _views())
+    named = path.read_text()
+    assert 'board: "9x6"' in named
+    unnamed = re.sub(r"\n +board: \"9x6\"", "", named)
+    path.write_text(unnamed.replace(f"format_version: {RIG_FORMAT}", "format_version: 2"))
+    views = read_rig_views(path)
+    assert views is not None
+    assert views.board == ""
+    assert read_rig(path).left.width_px == 640
+    path.write_text(unnamed)
+    with pytest.raises(DataError, match=r"views\.board is missing: calibrate again from all pictures"):
+        read_rig_views(path)
+    path.write_text(named.replace(f"format_version: {RIG_FORMAT}", f"format_version: {RIG_FORMAT + 1}"))
+    with pytest.raises(DataError, match=f"format_version is {RIG_FORMAT + 1}, this program reads up to {RIG_FORMAT}"):
+        read_rig_views(path)
 
 
 def test_views_come_back(tmp_path: Path) -> None:

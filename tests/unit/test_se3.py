@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of, vectors_of
 
 vectors = arrays(np.float64, 3, elements=st.floats(-1.7, 1.7))
-twists = arrays(np.float64, 6, elements=st.floats(-1.5, 1.5))
+motions = arrays(np.float64, 6, elements=st.floats(-1.5, 1.5))
 
 
 @given(vectors)
@@ -32,15 +32,13 @@ def test_half_turns_and_tiny_turns_have_vectors(axis: list[float], angle: float)
     np.testing.assert_allclose(rotations_of(vectors_of(stack)), stack, atol=1e-9)
 
 
-@given(twists, twists, vectors)
+@given(motions, motions, vectors)
 def test_motions_are_a_group(one: np.ndarray, other: np.ndarray, point: np.ndarray) -> None:
-    """Composition applies the second motion first; the inverse leads back; exp and log undo each other; so do pose and of."""
-    first, second = SE3.exp(one), SE3.of(other)
+    """Composition applies the second motion first; the inverse leads back; pose and of undo each other."""
+    first, second = SE3.of(one), SE3.of(other)
     np.testing.assert_allclose((first @ second).apply(point), first.apply(second.apply(point)), atol=1e-12)
     np.testing.assert_allclose(first.inverse().apply(first.apply(point)), point, atol=1e-12)
     np.testing.assert_allclose(SE3.of(first.pose()).t_m, first.t_m, atol=1e-12)
-    if np.linalg.norm(one[:3]) < 3.0:
-        np.testing.assert_allclose(SE3.exp(first.log()).apply(point), first.apply(point), atol=1e-8)
 
 
 def test_cross_matrices_multiply_like_cross_products() -> None:

@@ -20,7 +20,7 @@ from phone_host.calibration.board_pairs import Reason, Rejected
 from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.report.summary import summary
 from phone_host.run.terminal_view import LiveTable
-from phone_host.verbs.calibrate.figures import rejections
+from phone_host.verbs.calibrate.summary import rejections
 from tests.support.bench_results import result
 from tests.support.run_snapshots import MS, run
 from tests.support.samples import LEDGER

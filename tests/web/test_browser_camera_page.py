@@ -85,14 +85,14 @@ def test_frames_arrive_whole_in_order_and_with_stamps_of_their_own(
     frames = list(camera.frames)
     assert (np.diff([each.sequence for each in frames]) > 0).all()
     assert {(each.width, each.height) for each in frames} == {(640, 480)}
-    plain = next(each for each in frames if each.is_luma)
-    coded = frames[frames.index(plain) - 1]
-    decoded = cv2.imdecode(np.frombuffer(coded.payload, np.uint8), cv2.IMREAD_GRAYSCALE)
-    assert decoded is not None
-    assert decoded.shape == (480, 640)
-    luma = np.frombuffer(plain.payload, np.uint8).reshape(480, 640)
-    # The built-in camera's pattern has moved by one frame.
-    assert np.corrcoef(decoded.ravel(), luma.ravel())[0, 1] > 0.9
+    coded = [
+        cv2.imdecode(np.frombuffer(each.payload, np.uint8), cv2.IMREAD_GRAYSCALE) for each in frames if not each.is_luma
+    ]
+    plain = [np.frombuffer(each.payload, np.uint8).reshape(480, 640) for each in frames if each.is_luma]
+    assert {picture.shape for picture in coded if picture is not None} == {(480, 640)}
+    # The built-in camera's pie goes round once a second: of each picture there is one like it the other way.
+    small = np.array([picture[::8, ::8].ravel() for picture in (*coded, *plain) if picture is not None])
+    assert np.corrcoef(small)[: len(coded), len(coded) :].max() > 0.9
     for each in frames:
         assert each.callback_us <= each.encoded_us <= each.sent_us
         assert each.callback_us - each.timestamp_us == pytest.approx(
@@ -121,7 +121,8 @@ def test_without_credit_nothing_is_sent_and_what_is_dropped_is_counted(camera: C
     camera.grant(3)
     camera.until(lambda: len(camera.frames) == 3)
     page.wait_for_function(
-        "() => Number(document.querySelector('#own-figures [data-key=dropped] .value').textContent) > 20"
+        "most => Number(document.querySelector('#own-figures [data-key=dropped] .value').textContent) > most",
+        arg=camera.frames[-1].dropped + 20,
     )
     assert len(camera.frames) == 3
     camera.grant(4)
@@ -177,7 +178,7 @@ def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: CameraStand
 def test_each_state_has_words_of_its_own_and_what_to_do(opened: Opener) -> None:
     """Whatever becomes of the camera is said in other words than the rest, and what is not good comes with a remedy."""
     page = opened("camera")
-    good = {
+    good: dict[str, Any] = {
         "isSecure": True,
         "phase": "on",
         "failure": "",
@@ -191,7 +192,7 @@ def test_each_state_has_words_of_its_own_and_what_to_do(opened: Opener) -> None:
         "told": "",
         "isAsked": True,
     }
-    others = [
+    others: list[dict[str, Any]] = [
         {"isSecure": False}, {"phase": "off"}, {"phase": "opening"}, {"isEnded": True}, {"isMuted": True}, {"isVisible": False},
         {"isTurned": True}, {"line": "connecting"}, {"line": "lost"}, {"line": "refused"}, {"trouble": "x"}, {"told": "turned"}, {"isAsked": False},
         *({"phase": "failed", "failure": f"{name}Error"} for name in ("NotAllowed", "NotFound", "NotReadable", "Overconstrained", "NotSupported", "Other")),

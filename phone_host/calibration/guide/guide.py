@@ -11,10 +11,8 @@ would help much. If all kinds are there before, they are wanted once more.
 
 import math
 from collections import Counter
-from dataclasses import dataclass
 from typing import Final
 
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.coverage import Coverage, Depth
 from phone_host.calibration.guide.gates import (
@@ -34,6 +32,7 @@ from phone_host.calibration.guide.placement import placement, usual_camera
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
 from phone_host.calibration.guide.unseen import is_guessed, unseen, with_corners
+from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Speech, Words, done, taken
 from phone_host.calibration.target import Board
@@ -71,7 +70,7 @@ _VAIN_NS: Final = 4_000_000_000
 """A view that was asked for in vain for so long gives way to any that is new: silence teaches less."""
 
 _LEAST_VIEWS: Final = 10
-"""From so many views on, lenses up to the rational one are tried (`lens_choice`)."""
+"""It does not end with fewer: from 7 on all lenses are tried (`lens_choice`), and some views are left to choose by."""
 
 _LONG_NS, _LONG_VIEWS = 90_000_000_000, 8
 """After a minute and a half these are enough, if the verdict is good: a person is to be done in two."""
@@ -92,26 +91,6 @@ _ABSENT: Final = {
     Gate.PART: Words.PART,
     Gate.SAME: Words.SAME,
 }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """A view that was taken.
-
-    Attributes:
-        name: how reports name it.
-        glance: the board's corners in it.
-        looks: how it looks, left and right.
-    """
-
-    name: str
-    glance: Glance
-    looks: tuple[BoardLook, BoardLook]
-
-    @property
-    def pair(self) -> BoardPair:
-        """Its corners, as the calibration takes them."""
-        return BoardPair(self.name, self.glance.left_px, self.glance.right_px)
 
 
 class Guide:

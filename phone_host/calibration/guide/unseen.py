@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.guide.placement import placement
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Placed, Want, is_seen
 from phone_host.calibration.target import Board
@@ -35,6 +35,20 @@ def unseen_in(pairs: Iterable[BoardPair], board: Board, left: CameraModel, right
     return unseen(
         Placed(placement(pair.left_px, board, left), placement(pair.right_px, board, right)) for pair in pairs
     )
+
+
+def guessed_corners(found: Calibration, pairs: Iterable[BoardPair], board: Board) -> frozenset[Want]:
+    """Return the image corners that the board reaches in none of the pairs that a calibration used, if a lens is guessed there.
+
+    Args:
+        found: the calibration.
+        pairs: all that it was given, as they were seen.
+        board: the board.
+    """
+    if not is_guessed(found.bends):
+        return frozenset()
+    used = {each.name for each in found.used}
+    return unseen_in((pair for pair in pairs if pair.name in used), board, found.rig.left, found.rig.right)
 
 
 def is_guessed(bends: Iterable[Bend]) -> bool:

@@ -29,9 +29,6 @@ Vector = NDArray[np.float64]
 PARAMETERS: Final = 4
 """The turn about the right camera's three axes, rad, and the focal length's factor minus 1."""
 
-YAW: Final = 1
-"""Place of the turn about the vertical axis of cameras that stand side by side."""
-
 _WIDER: Final = 1e-3
 """Step of the numeric derivative by the focal length: a webcam's refocusing is a few of these."""
 

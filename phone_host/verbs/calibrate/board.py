@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Final
 
 from common.errors import DataError
 from phone_host.calibration.board_names import named_board, no_square
@@ -59,16 +59,6 @@ class Known:
 
     board: Board
     origin: Origin
-
-    def as_report(self) -> dict[str, Any]:
-        """Return it for report.json."""
-        return {
-            "board": {
-                "inner_corners": size_text((self.board.columns, self.board.rows)),
-                "from": self.origin.value,
-                "square_mm": round(self.board.square_m * 1e3, 6),
-            }
-        }
 
     def as_line(self) -> str:
         """Return it for the summary."""

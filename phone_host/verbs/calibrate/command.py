@@ -11,6 +11,7 @@ from phone_host.verbs.calibrate.earlier import asked_of
 from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place
 from phone_host.verbs.calibrate.given import require_pictures
 from phone_host.verbs.calibrate.importing import import_calibration
+from phone_host.verbs.calibrate.report_json import report_values
 from phone_host.verbs.orientation_arguments import orientations
 
 _CHECK_FAILED = 4
@@ -31,13 +32,13 @@ def run(options: argparse.Namespace) -> int:
         live = take_views(options, asked)
     made = calibrate_pictures(options, asked, live)
     if options.json:
-        print(json_text(made.report))
+        print(json_text(report_values(made.report)))
     else:
         say(made.lines)
-    if isinstance(made.verdict, DataError):
-        raise made.verdict
+    if isinstance(made.report.result, DataError):
+        raise made.report.result
     # Asked only now: Ctrl-C may have come while the rig was computed.
-    return exit_code(made.verdict, is_interrupted=live is not None and live.signals.interrupted)
+    return exit_code(made.report.verdict, is_interrupted=live is not None and live.signals.interrupted)
 
 
 def exit_code(verdict: Verdict, *, is_interrupted: bool) -> int:

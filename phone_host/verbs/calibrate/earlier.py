@@ -144,11 +144,27 @@ def _known(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Kn
         ) from error
 
 
-def calibrated(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> Calibration:
-    """Calibrate from the new pairs and what the series has.
+def every_pair(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> list[BoardPair]:
+    """Return the pairs to calibrate from: those of the earlier calibration that are wanted, and the new ones behind them.
 
     Raises:
-        DataError: too few pairs are left, or the earlier calibration is for other images.
+        DataError: the earlier calibration is for other images, or holds all of these.
+    """
+    if series.rig is None or series.views is None:
+        return pairs
+    _require_sizes(series.rig, series.path, sizes_px)
+    earlier = pairs_of(series.views)
+    fresh = new_ones(earlier, pairs)
+    if pairs and not fresh:
+        raise DataError(f"all of these pictures are in {series.path} already", "give other ones")
+    return together(earlier, fresh)
+
+
+def calibrated(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> Calibration:
+    """Calibrate from the pairs of `every_pair`, and what the series has besides.
+
+    Raises:
+        DataError: too few pairs are left, or the earlier lenses fit no images of this size.
     """
     if series.rig is None:
         return calibrate(pairs, series.board, sizes_px, series.side)
@@ -156,28 +172,15 @@ def calibrated(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> Calib
         earlier = scaled_rig(series.rig, *sizes_px)
         found = solve_pose(pairs, series.board, replace(earlier, board_side=series.side))
     else:
-        _require_sizes(series.rig, series.path, sizes_px)
-        earlier_pairs = pairs_of(series.views)
-        fresh = new_ones(earlier_pairs, pairs)
-        if pairs and not fresh:
-            raise DataError(f"all of these pictures are in {series.path} already", "give other ones")
-        found = calibrate(together(earlier_pairs, fresh), series.board, sizes_px, series.side)
+        found = calibrate(pairs, series.board, sizes_px, series.side)
     return replace(found, rig=replace(found.rig, time_offset=series.rig.time_offset))
 
 
-def saved_views(series: Series, found: Calibration, pairs: list[BoardPair]) -> RigViews | None:
-    """Return what rig.yaml keeps of the views; None after --pose-only, whose lenses come from others."""
+def saved_views(series: Series, found: Calibration, seen: list[BoardPair]) -> RigViews | None:
+    """Return what rig.yaml keeps of the pairs as they were seen; None after --pose-only, whose lenses come from others."""
     if series.rig is not None and series.views is None:
         return None
-    return views_of(found, every_pair(series, pairs), series.board)
-
-
-def every_pair(series: Series, pairs: list[BoardPair]) -> list[BoardPair]:
-    """Return the pairs that the rig was computed from: those of the earlier calibration that are wanted, and the new ones."""
-    if series.views is None:
-        return pairs
-    earlier = pairs_of(series.views)
-    return together(earlier, new_ones(earlier, pairs))
+    return views_of(found, seen, series.board)
 
 
 def with_earlier_cameras(series: Series, rig: Rig) -> Rig:
@@ -196,7 +199,7 @@ def notes(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> list[str]:
     if series.rig is None:
         return []
     if series.views is not None:
-        fresh = len(every_pair(series, pairs)) - len(series.views.names)
+        fresh = len(new_ones(pairs_of(series.views), pairs))
         known = f"; {len(pairs) - fresh} were in it already" if fresh < len(pairs) else ""
         return [f"from     {len(series.views.names)} pairs of {series.path} and {fresh} new ones{known}"]
     rows = [f"from     {series.path}: its lenses are kept, the relative pose is new"]

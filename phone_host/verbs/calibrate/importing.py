@@ -1,30 +1,29 @@
-"""phone-host calibrate --import and --export: calibrations of other programs become rig.yaml, and rig.yaml becomes theirs."""
+"""phone-host calibrate --import: calibrations of other programs become rig.yaml."""
 
 import argparse
 import re
 from dataclasses import replace
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from common.errors import DataError, SettingsError, UnavailableError
+from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
-from common.places import Kind, kind_of, resolved
+from common.places import resolved
 from common.program.terminal import say
-from common.versions import REPORT_FORMAT
 from phone_host.calibration.causes.name import BASELINE_OFF
-from phone_host.declared_settings import NEAR_M
-from phone_host.model import Rectification, Rig, Side
+from phone_host.model import Rig, Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.rig_files.imported import Imported, RigKind, export_texts, import_rig
-from phone_host.output.rig_yaml import is_rig, read_rig_views
+from phone_host.output.rig_files.imported import Imported, RigKind, import_rig
+from phone_host.output.rig_yaml import read_rig_views
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.stereo.reproject import disparities_for_near
 from phone_host.verbs.calibrate.arguments import EXPORTS
+from phone_host.verbs.calibrate.exporting import export_lines, write_exports
 from phone_host.verbs.calibrate.given import require_import_alone
-from phone_host.verbs.calibrate.rig_file import earlier_words, replace_rig
+from phone_host.verbs.calibrate.report import ImportReport
+from phone_host.verbs.calibrate.report_json import import_values
+from phone_host.verbs.calibrate.rig_file import REFUSED, earlier_words, replace_rig, require_own
 from phone_host.verbs.output_folders import (
     PAGE,
     REPORT,
@@ -40,9 +39,6 @@ from phone_host.verbs.units import baseline_mm, length_mm
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 
 _SIZE: Final = re.compile(r"([1-9]\d{0,5})x([1-9]\d{0,5})", re.ASCII)
-_OF_RECTIFIED: Final = frozenset({RigKind.MIDDLEBURY.value, RigKind.KITTI.value})
-
-REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
 
 
 def import_calibration(options: argparse.Namespace) -> int:
@@ -60,25 +56,24 @@ def import_calibration(options: argparse.Namespace) -> int:
     if same and side is not found.rig.board_side:
         raise SettingsError(f"--board-side {side.value} would change {options.out}", "name another --out")
     found = replace(found, rig=_on_side(found.rig, side))
-    report = _report(found)
     if not same:
-        _require_own(options.out)
+        require_own(options.out)
         keep_other_report(options.out.parent, "calibrate")
         drop_page(options.out.parent, "calibrate")
         claim_names(options.out.parent, options.out, options.out.name, REPORT)
-    report |= write_exports(options, found.rig, rectification, found.files)
+    report = ImportReport(imported=found, exported=write_exports(options, found.rig, rectification, found.files))
     if not same:
         try:
             views = read_rig_views(found.files[0]) if found.kind is RigKind.RIG else None
-            report |= replace_rig(options.out, found.rig, rectification, views)
-            write_text(options.out.with_name(REPORT), json_text(report, indent=2) + "\n")
+            report = replace(report, earlier_rig=replace_rig(options.out, found.rig, rectification, views))
+            write_text(options.out.with_name(REPORT), json_text(import_values(report), indent=2) + "\n")
         except OSError as error:
             raise unwritable(options.out, error) from error
     if options.json:
-        print(json_text(report))
+        print(json_text(import_values(report)))
     else:
-        written = [] if same else [f"written to {options.out}{earlier_words(report)}"]
-        say([*_lines(found, report), *export_lines(report, rectification), *written])
+        written = [] if same else [f"written to {options.out}{earlier_words(report.earlier_rig)}"]
+        say([*_lines(found), *export_lines(report.exported, rectification), *written])
     return 0
 
 
@@ -106,11 +101,6 @@ def _on_side(rig: Rig, side: Side) -> Rig:
     return replace(rig, board_side=side, time_offset=offset)
 
 
-def _require_own(out: Path) -> None:
-    if kind_of(out) is not Kind.MISSING and not is_rig(out):
-        raise UnavailableError(f"{out} is not a calibration, and would be replaced", "name another --out")
-
-
 def _unit_m(text: str | None) -> float | None:
     return None if text is None else length_mm(text, "--unit", "1mm") / 1000
 
@@ -129,87 +119,16 @@ def _sizes_px(text: str | None) -> Sizes | None:
     return sizes[0], sizes[-1]
 
 
-def _report(found: Imported) -> dict[str, Any]:
+def _lines(found: Imported) -> list[str]:
     rig = found.rig
-    cameras = {"left": rig.left, "right": rig.right}
-    return {
-        "format_version": REPORT_FORMAT,
-        "command": "calibrate",
-        "imported": {
-            "kind": found.kind.value,
-            "files": [str(path) for path in found.files],
-            "notes": list(found.notes),
-        },
-        "baseline_mm": round(float(np.linalg.norm(rig.t_right_left_m)) * 1e3, 4),
-        "focal_px": {side: [round(float(model.matrix[i, i]), 3) for i in (0, 1)] for side, model in cameras.items()},
-        "sizes": {side: f"{model.width_px}x{model.height_px}" for side, model in cameras.items()},
-        "board_side": rig.board_side.value,
-        "verdict": None if rig.verdict is None else rig.verdict.value,
-    }
-
-
-def _lines(found: Imported, report: dict[str, Any]) -> list[str]:
-    sizes, focal = report["sizes"], report["focal_px"]
+    left, right = (size_text((model.width_px, model.height_px)) for model in (rig.left, rig.right))
     return [
         f"imported {found.kind.value}: {' and '.join(map(str, found.files))}",
         *(f"note     {note}" for note in found.notes),
-        f"images   left {sizes['left']}, right {sizes['right']} px",
-        f"focal    left {focal['left'][0]:.1f}, right {focal['right'][0]:.1f} px",
-        f"baseline {report['baseline_mm']:.2f} mm",
+        f"images   left {left}, right {right} px",
+        f"focal    left {rig.left.matrix[0, 0]:.1f}, right {rig.right.matrix[0, 0]:.1f} px",
+        f"baseline {np.linalg.norm(rig.t_right_left_m) * 1e3:.2f} mm",
         "         compare it with a ruler: it shows a wrong unit",
-        *([f"verdict  {report['verdict']}"] if report["verdict"] else []),
-        *([REFUSED] if found.rig.is_rejected else []),
+        *([] if rig.verdict is None else [f"verdict  {rig.verdict.value}"]),
+        *([REFUSED] if rig.is_rejected else []),
     ]
-
-
-def write_exports(
-    options: argparse.Namespace, rig: Rig, rectification: Rectification, inputs: tuple[Path, ...] = ()
-) -> dict[str, Any]:
-    """Write a rig as files of the programs that --export names, into a folder for each beside --out.
-
-    Args:
-        options: as parsed.
-        rig: two cameras.
-        rectification: computed from the same rig.
-        inputs: files that must stay as they are.
-
-    Returns:
-        For the report: the files of each kind; empty without --export.
-
-    Raises:
-        DataError: a program cannot hold the rig.
-        SettingsError: an input would be replaced.
-        UnavailableError: a file cannot be written, or is not ours.
-    """
-    along_px = rectification.height_px if rectification.epipolar.is_vertical else rectification.width_px
-    disparities = disparities_for_near(rectification.geometry, NEAR_M, along_px)
-    kinds = [RigKind(name) for name in dict.fromkeys(options.exports)]
-    texts = {kind: export_texts(rig, rectification, kind, disparities) for kind in kinds}
-    kept = {resolved(path) for path in inputs}
-    written: dict[str, list[str]] = {}
-    for kind, made in texts.items():
-        for each in made:
-            path = options.out.parent / kind.value / each.name
-            if resolved(path) in kept:
-                raise SettingsError(
-                    f"--export {kind.value} would replace {path}, which is imported", "name another --out"
-                )
-            claim_names(path.parent, options.out, path.name)
-            try:
-                write_text(path, each.text)
-            except OSError as error:
-                raise unwritable(options.out, error) from error
-            written.setdefault(kind.value, []).append(str(path))
-    return {"exported": written} if written else {}
-
-
-def export_lines(report: dict[str, Any], rectification: Rectification) -> list[str]:
-    """Return a line for each exported kind, and which images a calib.txt is for."""
-    exported: dict[str, list[str]] = report.get("exported", {})
-    lines = [f"exported {kind}: {', '.join(files)}" for kind, files in exported.items()]
-    if not _OF_RECTIFIED.isdisjoint(exported):
-        size = size_text((rectification.width_px, rectification.height_px))
-        lines.append(
-            f"         calib.txt is for rectified images of {size} px, not for images as the cameras take them"
-        )
-    return lines

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 from common import now
 from common.errors import DataError, SettingsError
@@ -28,10 +28,10 @@ from phone_host.calibration.causes.looks import SeenLook
 from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.earlier_views import board_of, pairs_of
-from phone_host.calibration.guide.guide import View
 from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.unseen import unseen_in
+from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, Want
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
@@ -46,7 +46,7 @@ from phone_host.run.host_settings import HostSettings
 from phone_host.settings import key_folder, most_pixels
 from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.cause import assessed
-from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated
+from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated, every_pair
 from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.hints import arrangement_hint
 from phone_host.verbs.orientation_arguments import orientations
@@ -91,17 +91,6 @@ class Live:
     def folders(self) -> tuple[str, str]:
         """Both folders, as LEFT and RIGHT."""
         return str(self.left), str(self.right)
-
-    def as_report(self) -> dict[str, Any]:
-        """Return it for report.json."""
-        return {
-            "live": {
-                "ended": self.last.ended.value,
-                "views": self.last.views,
-                "seconds": round(self.last.seconds, 1),
-                "refused": {gate.value: count for gate, count in self.last.refused},
-            }
-        }
 
     def as_lines(self, options: argparse.Namespace) -> list[str]:
         """Return it for the summary: where the pictures are, and how they are calibrated again."""
@@ -156,7 +145,7 @@ class PreparedViews:
         """
 
         def show() -> None:
-            snapshot, views, note = self.live.snapshot(), self.live.views, self.note
+            (snapshot, views), note = self.live.shown(), self.note
             for each in shows:
                 each.show(snapshot, views, note)
 
@@ -271,7 +260,7 @@ def grown(views: tuple[View, ...], series: Series, sizes_px: tuple[Size, Size], 
     )
     found: Calibration | DataError
     try:
-        found = calibrated(series, pairs, sizes_px)
+        found = calibrated(series, every_pair(series, pairs, sizes_px), sizes_px)
     except DataError as error:
         found = error
     board = series.board

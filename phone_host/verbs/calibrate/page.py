@@ -2,50 +2,50 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from phone_host.calibration.board_pairs import Calibration, Rejected
+from common.errors import DataError
+from phone_host.calibration.board_pairs import Rejected
+from phone_host.calibration.board_size import size_text
 from phone_host.calibration.board_views import Mounted
 from phone_host.calibration.rectified_view import fullest, rectified_view
 from phone_host.calibration.series_snapshot import Taken, series_rig, series_views
+from phone_host.calibration.target import Board
 from phone_host.calibration.view_turns import view_turns
 from phone_host.model import Rig, Verdict
 from phone_host.model.calibration_series import CalibrationSeries
 from phone_host.output.atomic import write_text
 from phone_host.report.calibration_page import calibration_page
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.calibrate.figures import depth_limit_m
+from phone_host.verbs.calibrate.report import Judged
 from phone_host.verbs.output_folders import PAGE, unwritable
 
 
-def series_of_failure(taken: Taken, report: dict[str, Any]) -> CalibrationSeries:
+def series_of_failure(taken: Taken, failure: DataError) -> CalibrationSeries:
     """Return what the page shows if there is no rig."""
     return CalibrationSeries(
         verdict=Verdict.REJECT,
-        problem=report["problem"],
-        remedy=report["remedy"],
-        board=_board_words(report),
+        problem=failure.problem,
+        remedy=failure.remedy,
+        board=_board_words(taken.board),
         sizes_px=taken.views.sizes_px,
         views=series_views(taken, None, taken.views.rejected),
     )
 
 
-def series_of_rig(
-    taken: Taken, found: Calibration, rig: Rig, rejected: tuple[Rejected, ...], report: dict[str, Any]
-) -> CalibrationSeries:
+def series_of_rig(taken: Taken, result: Judged, rig: Rig, rejected: tuple[Rejected, ...]) -> CalibrationSeries:
     """Return what the page shows of a rig, but for what is read from files again."""
-    cause = report["cause"]
+    found, judgement = result.found, result.judgement
     used = {each.name for each in found.used}
     kept = [taken.as_seen(pair) for pair in taken.pairs if pair.name in used]
     return CalibrationSeries(
-        verdict=Verdict(report["verdict"]),
-        remedy=report["remedy"],
-        cause="" if cause is None else cause["name"],
-        cause_words="" if cause is None else cause["sentence"],
-        board=_board_words(report),
+        verdict=judgement.verdict,
+        remedy=judgement.remedy,
+        cause="" if result.finding is None else result.finding.mistake.value,
+        cause_words=result.cause_words,
+        board=_board_words(taken.board),
         sizes_px=taken.views.sizes_px,
         views=series_views(taken, found, rejected),
-        found=series_rig(found, rig, depth_limit_m(found)),
+        found=series_rig(found, rig, result.depth_limit_m),
         turns=view_turns(kept, found.poses, taken.board.points_m(), found.rig),
         is_straightened=taken.is_straightened,
     )
@@ -67,15 +67,12 @@ def with_rectified(
     return replace(series, rectified=rectified_view(paths[one.name], one, rig, mounted, most_pixels))
 
 
-def write_page(out: Path, series: CalibrationSeries) -> dict[str, str]:
+def write_page(out: Path, series: CalibrationSeries) -> None:
     """Write the page beside the rig.
 
     Args:
         out: the rig's file.
         series: what the page shows.
-
-    Returns:
-        For the report: where it is.
 
     Raises:
         UnavailableError: it cannot be written.
@@ -86,9 +83,7 @@ def write_page(out: Path, series: CalibrationSeries) -> dict[str, str]:
         write_text(page, calibration_page(replace(series, rig_file=out.name if is_written else "")))
     except OSError as error:
         raise unwritable(out, error) from error
-    return {"page": str(page)}
 
 
-def _board_words(report: dict[str, Any]) -> str:
-    board = report["board"]
-    return f"board of {board['inner_corners']} corners, squares of {board['square_mm']:g} mm"
+def _board_words(board: Board) -> str:
+    return f"board of {size_text((board.columns, board.rows))} corners, squares of {board.square_m * 1e3:g} mm"

@@ -1,20 +1,20 @@
 """rig.yaml as phone-host calibrate writes it: what an earlier one holds, and the new one does not, is moved aside."""
 
 from pathlib import Path
-from typing import Any
+from typing import Final
 
-from common.errors import DataError
+from common.errors import DataError, UnavailableError
 from common.places import Kind, kind_of, make_folder
 from phone_host.calibration.earlier_views import new_ones, pairs_of
 from phone_host.model import Rectification, Rig
 from phone_host.output.rig_views import RigViews
-from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
+from phone_host.output.rig_yaml import is_rig, read_rig, read_rig_views, write_rig
 from phone_host.verbs.output_folders import unwritable
 
+REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
 
-def replace_rig(
-    out: Path, rig: Rig | None, rectification: Rectification | None, views: RigViews | None = None
-) -> dict[str, str]:
+
+def replace_rig(out: Path, rig: Rig | None, rectification: Rectification | None, views: RigViews | None = None) -> str:
     """Write rig.yaml. Keep an earlier one that the new one does not replace: because it is of use and the new one is not, or because its views would be lost.
 
     If there is nothing to write, a mistake of the user's was found, not of the earlier rig: that stays where it is.
@@ -26,30 +26,40 @@ def replace_rig(
         views: what it was computed from; None: not known.
 
     Returns:
-        For the report: where the earlier rig is now, if it was not replaced.
+        The name that the earlier rig has now, if it was not replaced; empty: there was none, or the new one is in its place.
 
     Raises:
         UnavailableError: a file cannot be written or moved.
     """
-    moved: dict[str, str] = {}
+    moved = ""
     try:
         make_folder(out.parent)
         if rig is None or rectification is None:
-            return {} if kind_of(out) is Kind.MISSING else {"earlier_rig": out.name}
+            return "" if kind_of(out) is Kind.MISSING else out.name
         is_of_use = not rig.is_rejected
         if kind_of(out) is not Kind.MISSING and not _is_rejected(out) and not (is_of_use and _holds(views, out)):
             aside = _aside(out)
             out.replace(aside)
-            moved = {"earlier_rig": aside.name}
+            moved = aside.name
         write_rig(out, rig, rectification, views)
     except OSError as error:
         raise unwritable(out, error) from error
     return moved
 
 
-def earlier_words(report: dict[str, Any]) -> str:
-    """Say where the earlier rig is now, behind a sentence on the new one that was written; empty: it was not moved."""
-    return f"; the earlier one is now {report['earlier_rig']}" if "earlier_rig" in report else ""
+def require_own(out: Path) -> None:
+    """Refuse to replace a file that is no calibration.
+
+    Raises:
+        UnavailableError: it is none.
+    """
+    if kind_of(out) is not Kind.MISSING and not is_rig(out):
+        raise UnavailableError(f"{out} is not a calibration, and would be replaced", "name another --out")
+
+
+def earlier_words(name: str) -> str:
+    """Say what the earlier rig is called now, behind a sentence on the new one that was written; empty if it was not moved."""
+    return f"; the earlier one is now {name}" if name else ""
 
 
 def _is_rejected(path: Path) -> bool:

@@ -180,14 +180,13 @@ class Calibration:
 
     def finish(self, may_write: Callable[[], None]) -> Calibrated:
         """See ReadyCalibration."""
-        made = calibrate_pictures(self.options, self.asked, self.views.taken(_Nobody()), may_write)
-        if isinstance(made.verdict, DataError):
-            trouble = trouble_of(made.verdict)
+        report = calibrate_pictures(self.options, self.asked, self.views.taken(_Nobody()), may_write).report
+        if isinstance(report.result, DataError):
+            trouble = trouble_of(report.result)
             return Calibrated(words=f"no calibration: {trouble.problem}", rig=None, trouble=trouble)
-        words = f"verdict {made.verdict.value}: {self.options.out}"
-        if made.verdict is Verdict.REJECT:
-            remedy = str(made.report.get("remedy") or "calibrate again")
-            return Calibrated(words=words, rig=None, trouble=Trouble("the calibration is rejected", remedy))
+        words = f"verdict {report.verdict.value}: {self.options.out}"
+        if report.verdict is Verdict.REJECT:
+            return Calibrated(words=words, rig=None, trouble=Trouble("the calibration is rejected", report.remedy))
         return Calibrated(words=words, rig=self.options.out.absolute(), trouble=None)
 
 

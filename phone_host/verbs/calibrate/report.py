@@ -1,0 +1,115 @@
+"""What came of a calibration, as report.json, the summary and the page tell it. Values only."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from common.errors import DataError
+from phone_host.calibration.board_pairs import Calibration, Rejected
+from phone_host.calibration.board_views import BoardViews
+from phone_host.calibration.causes.mistakes import Finding
+from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.verdict import Assessment
+from phone_host.declared_settings import NEAR_M
+from phone_host.model import Verdict
+from phone_host.output.rig_files.imported import Imported, RigKind
+from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_error_px
+from phone_host.stereo.reproject import disparities_for_near
+from phone_host.stereo.view_files import ViewFiles
+from phone_host.stereo.working import chosen_scale
+from phone_host.verbs.calibrate.board import Known
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """The files of another program that were written."""
+
+    kind: RigKind
+    files: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """A rig, and what is said of it.
+
+    Attributes:
+        found: the calibration.
+        judgement: the verdict with its remedy.
+        finding: what is wrong with the series; None: nothing.
+        hint: what to do about a turned or mirrored side; empty: it is none.
+    """
+
+    found: Calibration
+    judgement: Assessment
+    finding: Finding | None = None
+    hint: str = ""
+
+    @property
+    def cause_words(self) -> str:
+        """What is wrong with the series, in one sentence; empty: nothing."""
+        return "" if self.finding is None else self.hint or self.finding.sentence
+
+    @property
+    def depth_limit_m(self) -> float:
+        """The far limit that `stereo` uses with this rig if the user gives none, m; NaN if it cannot be rectified."""
+        made = self.found.rectification
+        if made is None:
+            return math.nan
+        along, across = (
+            (made.height_px, made.width_px) if made.epipolar.is_vertical else (made.width_px, made.height_px)
+        )
+        scale = chosen_scale(along, across, disparities_for_near(made.geometry, NEAR_M, along))
+        error_px = disparity_error_px(scale, self.found.rig.zero_sigma_px)
+        return depth_limits(made.geometry, error_px, DepthWanted()).far_m
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class CalibrationReport:
+    """What came of pictures.
+
+    Attributes:
+        files: the pictures.
+        views: what was found in them.
+        known: the board.
+        rejected: all pairs that are not used.
+        result: the rig; or why there is none.
+        page: where the page is.
+        earlier_rig: the name that an earlier rig has now if it was not replaced; empty: there is none.
+        exported: files of other programs.
+        live: how the pictures were taken; None: by somebody else.
+    """
+
+    files: ViewFiles
+    views: BoardViews
+    known: Known
+    rejected: tuple[Rejected, ...]
+    result: Judged | DataError
+    page: Path
+    earlier_rig: str = ""
+    exported: tuple[Exported, ...] = ()
+    live: GuideSnapshot | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict; no rig is a rejected one."""
+        return Verdict.REJECT if isinstance(self.result, DataError) else self.result.judgement.verdict
+
+    @property
+    def remedy(self) -> str:
+        """What to do; empty: nothing."""
+        return self.result.remedy if isinstance(self.result, DataError) else self.result.judgement.remedy
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ImportReport:
+    """What came of a calibration of another program.
+
+    Attributes:
+        imported: what was read.
+        earlier_rig: the name that an earlier rig has now if it was not replaced; empty: there is none.
+        exported: files of other programs.
+    """
+
+    imported: Imported
+    earlier_rig: str = ""
+    exported: tuple[Exported, ...] = ()

@@ -1,0 +1,78 @@
+"""From the board in the pictures to a rig: with the pairs of an earlier calibration, and without a drift of the cameras."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from common.errors import DataError
+from phone_host.calibration.board_pairs import BoardPair, Calibration
+from phone_host.calibration.board_views import BoardViews
+from phone_host.calibration.causes.mistakes import Course, Finding
+from phone_host.calibration.causes.name import BoardSeries, name_mistake
+from phone_host.calibration.causes.unturned import unturned
+from phone_host.calibration.out_of_step import out_of_step
+from phone_host.verbs.calibrate.earlier import Series, calibrated, every_pair
+from phone_host.verbs.calibrate.hints import out_of_step_error
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Solved:
+    """What was made of the views.
+
+    Attributes:
+        views: what was found in the pictures.
+        seen: all pairs to calibrate from, those of an earlier calibration first, as they were seen.
+        pairs: the same as they were used: perhaps without a drift of the cameras.
+        found: the rig; or why there is none.
+        finding: what is wrong with the series; None: nothing.
+    """
+
+    views: BoardViews
+    seen: list[BoardPair]
+    pairs: list[BoardPair]
+    found: Calibration | DataError
+    finding: Finding | None = None
+
+
+def solve_series(series: Series, views: BoardViews, baseline_m: float, say: Callable[[str], None]) -> Solved:
+    """Calibrate, and name what is wrong with the series. If the cameras turned against each other, the rig is that of the last view.
+
+    Args:
+        series: the board, and what an earlier calibration gives.
+        views: what was found in the pictures.
+        baseline_m: the distance of the cameras as the user measured it, m; NaN: not told.
+        say: told what is being done.
+    """
+    seen, sizes_px = list(views.pairs), views.sizes_px
+    say("fitting the rig")
+    shifted = out_of_step(*views.in_order, series.board, sizes_px)
+    if shifted is not None:
+        return Solved(views=views, seen=seen, pairs=seen, found=out_of_step_error(shifted))
+    try:
+        seen = every_pair(series, seen, sizes_px)
+    except DataError as failure:
+        return Solved(views=views, seen=seen, pairs=seen, found=failure)
+    found: Calibration | DataError
+    try:
+        found = calibrated(series, seen, sizes_px)
+    except DataError as failure:
+        found = failure
+    say("looking for mistakes")
+    taken = BoardSeries(
+        pairs=tuple(seen), board=series.board, sizes_px=sizes_px, looks=views.looks, baseline_m=baseline_m
+    )
+    finding = name_mistake(taken, found)
+    straight = _straightened(seen, finding)
+    try:
+        without = calibrated(series, straight, sizes_px) if straight is not seen else found
+    except DataError:
+        without = found
+    if isinstance(found, Calibration) and isinstance(without, Calibration) and len(without.used) < len(found.used):
+        without = found  # no better
+    pairs = seen if without is found else straight
+    return Solved(views=views, seen=seen, pairs=pairs, found=without, finding=finding)
+
+
+def _straightened(pairs: list[BoardPair], finding: Finding | None) -> list[BoardPair]:
+    """Return the pairs as the cameras would have seen them had they stood as they do in the last; the same if they did not turn, or this way and that."""
+    turned = None if finding is None else finding.turned
+    return pairs if turned is None or turned.course is Course.LOOSE else unturned(pairs, turned)
