@@ -21,10 +21,12 @@ class PixelFormat(Enum):
 
 
 class FrameFault(Enum):
-    """Why a frame's bytes are not the whole image that they claim to be.
+    """Why a frame is not what it claims to be, and is not used.
 
     flagged: its driver says so. stale: older than the stream. other_size: the size differs from the announced one. too_large: nobody asked for an
     image of that size. too_short: too few bytes for any image of that size. too_many_scans: more than any camera makes. corrupt: the decoder says so.
+    turned: its camera was turned after the first frame. implausible_time: its stamp does not fit the frames before it, or says a time at which it was
+    not there. clock_unknown: nothing tells yet, or any more, what its stamp means. unasked: more frames came than were asked for.
     """
 
     EMPTY = "empty"
@@ -38,6 +40,10 @@ class FrameFault(Enum):
     TOO_SHORT = "too_short"
     TOO_MANY_SCANS = "too_many_scans"
     CORRUPT = "corrupt"
+    TURNED = "turned"
+    IMPLAUSIBLE_TIME = "implausible_time"
+    CLOCK_UNKNOWN = "clock_unknown"
+    UNASKED = "unasked"
 
 
 class SpoiledImageError(DataError):
@@ -77,6 +83,8 @@ class Frame:
         pixel_format: encoding of `payload`.
         exposure_ns: exposure time, ns; None if the camera does not report it.
         payload: the encoded image.
+        uncertainty_ns: half-width of the error with which `exposed` was taken over from another clock, in 99.9 % of cases, ns; 0: it was not.
+        bound_ns: the same for certain, whatever the delays were.
     """
 
     sequence: int
@@ -87,6 +95,8 @@ class Frame:
     pixel_format: PixelFormat
     exposure_ns: int | None
     payload: Buffer
+    uncertainty_ns: int = 0
+    bound_ns: int = 0
 
 
 _PADDING_BYTES = 256

@@ -62,7 +62,7 @@ class PairLedger:
         stages: shares of the processing delay.
         time_skew_ns: exposure of the board's frame minus that of the host's.
         offset_ns: host clock minus board clock as estimated for this frame.
-        uncertainty_ns: uncertainty of that offset.
+        uncertainty_ns: uncertainty of that offset, with that of the host frame's stamp where it came from another clock.
         host: the marks of the host's own frame.
     """
 

@@ -85,6 +85,29 @@ class CameraState(Enum):
 
 
 @dataclass(frozen=True, slots=True)
+class StampOrigin:
+    """How a camera's stamps came onto this machine's clock, where they had to be taken over from another one.
+
+    Attributes:
+        epoch: the clock on which they were found to count, in words; empty: it is being found out.
+        uncertainty_ns: uncertainty of the newest one by that, ns; None: there is none yet.
+        bound_ns: its hard bound, ns; None likewise.
+    """
+
+    epoch: str
+    uncertainty_ns: int | None = None
+    bound_ns: int | None = None
+
+
+def origin_words(origin: StampOrigin) -> str:
+    """Say how a camera's stamps came onto this machine's clock."""
+    if not origin.epoch or origin.uncertainty_ns is None:
+        return "on which clock its stamps count is not known yet"
+    known = f", known to +-{origin.uncertainty_ns / 1e6:.2f} ms" if origin.uncertainty_ns else ""
+    return f"its stamps count on {origin.epoch}{known}"
+
+
+@dataclass(frozen=True, slots=True)
 class CameraHealth:
     """How a camera has performed since it was opened.
 
@@ -103,6 +126,7 @@ class CameraHealth:
         latency_ns: calibrated time from exposure to arrival, subtracted from every stamp, ns; None if there is none, or the driver knows it.
         latency_uncertainty_ns: stated uncertainty of that; None if not stated.
         jitter_ns: how much later than the fastest frame 95 % of the frames arrived; None where stamps are not arrival times.
+        origin: how stamps were taken over from another clock; None where they were not.
     """
 
     state: CameraState = CameraState.RUNNING
@@ -119,11 +143,12 @@ class CameraHealth:
     latency_ns: int | None = None
     latency_uncertainty_ns: int | None = None
     jitter_ns: int | None = None
+    origin: StampOrigin | None = None
 
 
 def health_values(health: CameraHealth) -> dict[str, Any]:
-    """A camera's health as a JSON object."""
-    return {
+    """A camera's health as a JSON object; `stamps` only where they were taken over from another clock."""
+    values: dict[str, Any] = {
         "state": health.state.value,
         "missed": health.missed,
         "faults": {fault.value: count for fault, count in health.faults},
@@ -136,6 +161,13 @@ def health_values(health: CameraHealth) -> dict[str, Any]:
         "held": dict(health.held),
         "period_ms": None if health.period_ns is None else round(health.period_ns / 1e6, 3),
     }
+    if (origin := health.origin) is not None:
+        values["stamps"] = {
+            "epoch": origin.epoch,
+            "uncertainty_us": None if origin.uncertainty_ns is None else origin.uncertainty_ns / 1e3,
+            "bound_us": None if origin.bound_ns is None else origin.bound_ns / 1e3,
+        }
+    return values
 
 
 class Camera(Protocol):

@@ -1,22 +1,29 @@
-"""Opens the host's cameras by URI: those that `common` knows, and servers."""
+"""Opens the host's cameras by URI: those that `common` knows, servers, and browsers that have the page open."""
 
 from typing import Final
 
 from common.camera import factory as common_factory
 from common.camera.base import Camera
 from common.camera.turned import turned
+from common.errors import SettingsError
 from common.frame import ImageSizeError
 from common.imagesize.head import MOST_PIXELS, require_pixels
 from common.orientation import Orientation
 from common.program.extensions import named
+from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.camera.browser_uri import browser_settings, is_browser
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.http_uri import http_settings, is_http, without_orientation
 
 _HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
 """Named, not imported: TLS and its dependencies are loaded only if a server is asked for."""
 
+_BROWSER: Final = "phone_host.camera.browser:BrowserCamera"
 
-def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXELS) -> Camera:
+
+def open_camera(
+    uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXELS, feed: BrowserFeed | None = None
+) -> Camera:
     """Open the camera that a URI names.
 
     Args:
@@ -24,16 +31,17 @@ def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXEL
         clock: name of this machine's clock, for the stamps.
         now_ns: CLOCK_MONOTONIC now, ns.
         most_pixels: largest accepted image size, pixels.
+        feed: brings the browsers that open the page; None: there is no page.
 
     Returns:
         The open camera.
 
     Raises:
         SettingsError: the URI is invalid.
-        UnavailableError: there is no such device, folder or server.
+        UnavailableError: there is no such device, folder or server, or no browser comes.
         DataError: a replay's images are bad, or the images are too large.
     """
-    camera = _open(uri, clock, now_ns)
+    camera = _open(uri, clock, now_ns, feed)
     said = camera.description
     try:
         require_pixels((said.width_px, said.height_px), most_pixels, f"camera {said.name}")
@@ -43,12 +51,31 @@ def open_camera(uri: str, clock: str, now_ns: int, most_pixels: int = MOST_PIXEL
     return camera
 
 
-def _open(uri: str, clock: str, now_ns: int) -> Camera:
-    if not is_http(uri):
+def _open(uri: str, clock: str, now_ns: int, feed: BrowserFeed | None) -> Camera:
+    if not is_http(uri) and not is_browser(uri):
         return common_factory.open_camera(uri, clock, now_ns, EXAMPLE)
     address, orientation = without_orientation(uri)
-    camera: Camera = named(_HTTP)(http_settings(address, clock))
+    camera: Camera
+    if is_http(uri):
+        camera = named(_HTTP)(http_settings(address, clock))
+    else:
+        settings = browser_settings(address, clock)
+        camera = named(_BROWSER)(settings, with_page(feed), now_ns)
     return turned(camera, orientation)
+
+
+def with_page(feed: BrowserFeed | None) -> BrowserFeed:
+    """Return what brings browsers.
+
+    Raises:
+        SettingsError: nothing does.
+    """
+    if feed is None:
+        raise SettingsError(
+            "camera browser: comes with the page, and none is served here",
+            "use phone-host serve, or add --serve to phone-host run",
+        )
+    return feed
 
 
 def check_camera(uri: str) -> None:
@@ -59,6 +86,8 @@ def check_camera(uri: str) -> None:
     """
     if is_http(uri):
         http_settings(without_orientation(uri)[0], "")
+    elif is_browser(uri):
+        browser_settings(without_orientation(uri)[0], "")
     else:
         common_factory.parse_camera(uri, "", EXAMPLE)
 
@@ -69,4 +98,5 @@ def camera_orientation(uri: str) -> Orientation:
     Raises:
         SettingsError: the URI is invalid.
     """
-    return without_orientation(uri)[1] if is_http(uri) else common_factory.parse_orientation(uri, EXAMPLE)
+    is_ours = is_http(uri) or is_browser(uri)
+    return without_orientation(uri)[1] if is_ours else common_factory.parse_orientation(uri, EXAMPLE)

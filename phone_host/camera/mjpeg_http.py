@@ -8,13 +8,11 @@ when to connect, give up and try again; the thread carries it out.
 """
 
 import logging
-import os
 import threading
-from contextlib import suppress
 from typing import Final
 
 from common import now
-from common.camera.base import CameraHealth, Grab, Mode, Offers, Skipped, Spoiled
+from common.camera.base import CameraHealth, Grab, Mode, Offers, Spoiled
 from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import TandemError, UnavailableError
@@ -27,6 +25,7 @@ from phone_host.camera.arrivals import Arrivals
 from phone_host.camera.http_client import Connection
 from phone_host.camera.http_uri import HttpSettings
 from phone_host.camera.jpegs import JpegStream, Whole
+from phone_host.camera.waiting_grabs import WaitingGrabs
 
 _LOG = logging.getLogger(__name__)
 
@@ -56,8 +55,6 @@ _LIFE: Final = LifeSettings(
 _LONGEST_WAIT_S: Final = 3600.0
 """A lock's timeout has a limit, and the far future is beyond it."""
 
-_MOST_PENDING: Final = 64
-
 
 class HttpCamera:
     """The images of one server.
@@ -72,7 +69,7 @@ class HttpCamera:
     def __init__(self, settings: HttpSettings) -> None:
         self._settings = settings
         self._lock = threading.Condition()
-        self._pending: list[Grab] = []
+        self._waiting = WaitingGrabs()
         self._connection: Connection | None = None
         self._life = Life(_LIFE, now.monotonic_ns())
         self._is_told_lost = False
@@ -84,7 +81,6 @@ class HttpCamera:
         self._rate, self._arrivals = RateMeter(), Arrivals()
         self._faults: dict[FrameFault, int] = {}
         self._turns = 0
-        self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._thread = threading.Thread(target=self._run, name="mjpeg", daemon=True)
         self._thread.start()
         try:
@@ -111,7 +107,7 @@ class HttpCamera:
     @property
     def pollable(self) -> int | None:
         """Readable when something has come."""
-        return self._wake_read
+        return self._waiting.pollable
 
     @property
     def offers(self) -> Offers:
@@ -127,11 +123,9 @@ class HttpCamera:
         """Return what has come: at most one frame, the newest."""
         del now_ns  # an image is grabbed when its last byte arrives
         with self._lock:
-            with suppress(BlockingIOError):
-                os.read(self._wake_read, 4096)
+            grabs = self._waiting.take()
             if self._failure is not None:
                 raise self._failure
-            grabs, self._pending = self._pending, []
         return grabs
 
     def anchor(self, exposed_ns: int, index: int) -> None:
@@ -181,16 +175,13 @@ class HttpCamera:
     def close(self) -> None:
         """Close the connection and end the thread. May be called again."""
         with self._lock:
-            was_open = not self._life.is_ended
             self._life.end()
             self._drop()
             self._lock.notify_all()
         # A name lookup cannot be interrupted. Then the thread ends later by itself and touches nothing that was closed.
         self._thread.join(1.0)
-        if was_open:
-            with self._lock:
-                os.close(self._wake_read)
-                os.close(self._wake_write)
+        with self._lock:
+            self._waiting.close()
 
     def _drop(self) -> None:
         if self._connection is not None:
@@ -209,7 +200,7 @@ class HttpCamera:
                     period_ns = self._rate.period_ns or (self._heard_ns - self._first_ns) // (self._sequence - 1)
                     self._asked_px = self._size_px
                     self._sequence = 0
-                    self._pending.clear()
+                    self._waiting.clear()
                     self._faults.clear()
                     self._rate, self._arrivals = RateMeter(), Arrivals()
                     self._life.accept()
@@ -351,7 +342,6 @@ class HttpCamera:
                 exposure_ns=None,
                 payload=image.payload,
             )
-            self._replace_waiting()
             self._add(frame)
 
     def _note_size(self, size_px: tuple[int, int]) -> None:
@@ -373,27 +363,10 @@ class HttpCamera:
             sequence, self._sequence = self._sequence, self._sequence + 1
             self._add(Spoiled(sequence, fault))
 
-    def _replace_waiting(self) -> None:
-        """A newer frame is here: turn the waiting one into Skipped, merged with any Skipped just before it."""
-        if not (self._pending and isinstance(waiting := self._pending[-1], Frame)):
-            return
-        self._pending.pop()
-        skipped = Skipped(waiting.sequence)
-        if self._pending and isinstance(before := self._pending[-1], Skipped):
-            self._pending.pop()
-            skipped = Skipped(before.sequence, before.frames + 1)
-        self._pending.append(skipped)
-
     def _add(self, grab: Grab) -> None:
-        self._pending.append(grab)
-        if len(self._pending) > _MOST_PENDING:  # nobody reads: merge the old grabs into one Skipped
-            *old, newest = self._pending
-            passed = sum(item.frames if isinstance(item, Skipped) else 1 for item in old)
-            self._pending = [Skipped(self._sequence - 1 - passed, passed), newest]
-        self._tell()
+        self._waiting.add(grab, self._sequence)
+        self._lock.notify_all()
 
     def _tell(self) -> None:
-        if not self._life.is_ended:
-            with suppress(BlockingIOError):
-                os.write(self._wake_write, b"\0")
+        self._waiting.tell()
         self._lock.notify_all()

@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 
 from common import now
 from common.android import is_android
+from common.camera.base import origin_words
 from common.camera.v4l2_device import capture_nodes
 from common.doctor import machine
 from common.doctor.access import check_access
@@ -31,6 +32,8 @@ from common.keys import KeyFolder
 from common.link.factory import parse_link
 from common.places import Kind, nearest
 from common.stamp import HOST_CLOCK
+from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import is_http
 from phone_host.doctor.android_checks import Phone, check_camera, check_phone, check_usb
@@ -64,6 +67,7 @@ class Question:
         out: folder of the results.
         wait_s: how long to wait for the board, s.
         keys: folder of this host's key and the boards that it knows.
+        feed: brings browsers that give their cameras; None: there is no page.
     """
 
     camera: str
@@ -72,6 +76,7 @@ class Question:
     out: Path
     wait_s: float
     keys: KeyFolder
+    feed: BrowserFeed | None = None
 
 
 def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
@@ -95,8 +100,8 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
     yield from packages
     yield native_finding()
     works = all(finding.verdict is not Grade.FAIL for finding in packages)
-    if is_http(question.camera):
-        yield _server(question.camera)
+    if is_http(question.camera) or is_browser(question.camera):
+        yield _far_camera(question.camera, question.feed)
     elif question.camera.startswith("v4l2:") and is_android():
         yield check_camera(question.camera)
     elif question.camera:
@@ -177,14 +182,19 @@ def _package(name: str, least: str, below: str = "", wheels: tuple[str, ...] = (
     return Package(name=name, version=str(version), problem="", least=least, below=below, wheels=wheels)
 
 
-def _server(uri: str) -> Finding:
+def _far_camera(uri: str, feed: BrowserFeed | None) -> Finding:
+    """Look at a camera whose images come over a network."""
+    if is_browser(uri) and feed is None:
+        remedy = "start phone-host serve, and press Check on its page"
+        return ok("camera", f"{uri} comes with the page, where it is checked: {remedy}")
     try:
-        camera = open_camera(uri, HOST_CLOCK, now.monotonic_ns())
+        camera = open_camera(uri, HOST_CLOCK, now.monotonic_ns(), feed=feed)
     except UnavailableError as error:
         return fail("camera", error.problem, error.remedy)
+    shown, origin = camera.description, camera.health.origin
     camera.close()
-    shown = camera.description
-    return ok("camera", f"{shown.name}: {shown.width_px}x{shown.height_px} every {shown.period_ns / 1e6:.1f} ms")
+    text = f"{shown.name}: {shown.width_px}x{shown.height_px} every {shown.period_ns / 1e6:.1f} ms"
+    return ok("camera", text if origin is None else f"{text}; {origin_words(origin)}")
 
 
 def _phone() -> Phone:

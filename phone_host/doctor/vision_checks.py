@@ -17,6 +17,7 @@ from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.calibration.capture.words import stored_finding
+from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import camera_orientation, open_camera
 from phone_host.camera.http_uri import is_http
 from phone_host.doctor.capture import source_of
@@ -96,7 +97,8 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
     except TandemError as error:
         return RigReadings(calibration, error.problem, error.remedy)
     own = rig.right if rig.board_side is Side.LEFT else rig.left
-    asked = parse_camera(camera, "") if camera and not is_http(camera) else None
+    is_ours = is_http(camera) or is_browser(camera)
+    asked = parse_camera(camera, "") if camera and not is_ours else None
     asked_px = asked.wanted.size_px if isinstance(asked, V4l2Settings) else None
     return RigReadings(
         path=calibration,

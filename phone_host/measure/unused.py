@@ -69,7 +69,8 @@ def _on_the_way(run: RunSnapshot) -> Iterator[Unused]:
 
 def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
     counts = run.counts
-    yield Unused("host frames that were not whole images", "", run.spoiled)
+    whole = "were not whole images" if run.camera.origin is None else "could not be used"
+    yield Unused(f"host frames that {whole}", "", run.spoiled)
     yield Unused("host frames replaced by newer ones", "", run.skipped)
     for reason, count in counts.board_orphans:
         yield Unused("board frames without partner", reason, count)

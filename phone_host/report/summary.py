@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from common.camera.base import CameraHealth
+from common.camera.base import CameraHealth, origin_words
 from common.words import counted, times
 from phone_host.measure.absence import away_words
 from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
@@ -52,6 +52,8 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += _agreement(run)
     lines += phase_lines(run.phase, run.alignment)
     lines += _arrivals(run.camera, run.time_offset)
+    if run.camera.origin is not None:
+        lines.append(f"this machine's camera: {origin_words(run.camera.origin)}")
     lines.append(judge(figures(run)).sentence)
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {run.shortfall}"] if run.shortfall else []
@@ -140,12 +142,13 @@ def corrected_lines(depth: DepthAccount) -> list[str]:
 
 def camera_troubles(health: CameraHealth) -> list[str]:
     """Say in one line what went wrong with a camera; nothing if nothing did."""
+    missed = "missed by its driver" if health.origin is None else "dropped in the browser"
     parts = [
         *([f"unplugged {times(health.unplugged)}"] if health.unplugged else []),
         *([f"stalled {times(health.stalls)}"] if health.stalls else []),
         *([f"failed {times(health.failures)}"] if health.failures else []),
         *([f"back {times(health.returned)}"] if health.returned else []),
-        *([f"{counted(health.missed, 'frame')} missed by its driver"] if health.missed else []),
+        *([f"{counted(health.missed, 'frame')} {missed}"] if health.missed else []),
         *(f"{counted(count, 'frame')} {fault.value}" for fault, count in health.faults),
         *([f"{counted(health.distrusted_stamps, 'stamp')} not believed"] if health.distrusted_stamps else []),
         *([f"{counted(health.refused_controls, 'control')} refused"] if health.refused_controls else []),

@@ -121,7 +121,7 @@ class Ledgerer:
             stages=replace(processed.stages, write=marks.done_ns - marks.computed_ns),
             time_skew_ns=pair.time_skew_ns,
             offset_ns=board.offset_ns,
-            uncertainty_ns=board.uncertainty_ns,
+            uncertainty_ns=board.uncertainty_ns + pair.host.uncertainty_ns,
             host=HostMarks(exposed_ns=pair.host.exposed.ns, grabbed_ns=pair.host.grabbed.ns),
         )
         idle_ns = max(0, pair.queued_ns - self.last_done_ns) if self.last_done_ns else 0

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import TandemError
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.output.axes import Axes
@@ -29,19 +30,28 @@ class BesideRun:
 
     Args:
         choices: the run's options, as they may be shown.
-        command: the run's command line.
-        core: of the run.
+        command: makes the command line of such options.
         snapshots: folder for snapshots.
         axes: of the points in them.
     """
 
-    def __init__(self, choices: Choices, command: str, core: StereoCore | None, *, snapshots: Path, axes: Axes) -> None:
+    def __init__(self, choices: Choices, command: Callable[[Choices], str], *, snapshots: Path, axes: Axes) -> None:
         self._command, self._snapshots, self._axes = command, snapshots, axes
         self._shelf = Shelf()
         self._memory = Memory(choices)
-        self.sink = PageSink(self._shelf, core)
+        self.feed: Final = BrowserFeed(None)
         self._stop = threading.Event()
         self._has_ended = False
+
+    def sink(self, core: StereoCore | None, links: Sequence[str]) -> PageSink:
+        """The run is open: return what takes its results.
+
+        Args:
+            core: of the run.
+            links: addresses of its board, which may have been found only now.
+        """
+        self._memory.choose({**self._memory.choices, "link": " ".join(links)})
+        return PageSink(self._shelf, core)
 
     def watch(self, ask: Callable[[], RunSnapshot]) -> None:
         """Begin to show the run.
@@ -66,7 +76,8 @@ class BesideRun:
         activity = Activity.RUNNING
         if self._has_ended or self._stop.is_set():
             activity = Activity.IDLE if self._has_ended else Activity.ENDING
-        return replace(self._memory.state(activity, self._memory.choices, self._command), steps=())
+        choices = self._memory.choices
+        return replace(self._memory.state(activity, choices, self._command(choices)), steps=())
 
     def newest(self) -> Newest | None:
         """See Source."""
@@ -81,6 +92,7 @@ class BesideRun:
         """See Source."""
         if command.do is Do.STOP:
             self._stop.set()
+            self.feed.end()
             self._shelf.tell()
             return Answer(words="it is ending")
         if command.do is not Do.SNAPSHOT:

@@ -7,6 +7,7 @@ from common.link.factory import needs_keys, parse_link
 from common.peers import Peer, peer_at
 from phone_host.boards.discovery import list_boards
 from phone_host.boards.found import Found
+from phone_host.camera.browser_uri import SCHEME
 from phone_host.web.source import Choice
 
 
@@ -46,6 +47,15 @@ def stranger(links: str, peers: tuple[Peer, ...]) -> str:
         if needs_keys(parse_link(link, listens_by_default=False)) and peer_at(peers, link) is None:
             return link
     return ""
+
+
+def browser_choice(words: str) -> Choice:
+    """Return the camera of whichever browser gives it as a choice.
+
+    Args:
+        words: what is known of it; empty: none gives it yet.
+    """
+    return Choice(uri=SCHEME, name="A browser's camera", note=words or "start it on the page that the phone has open")
 
 
 def find_cameras() -> tuple[Choice, ...]:

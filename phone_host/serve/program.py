@@ -10,6 +10,7 @@ from common.keys import KeyFolder
 from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.view import View
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
 from phone_host.measure.run_snapshot import RunSnapshot
@@ -98,6 +99,10 @@ class Program(Protocol):
     @property
     def keys(self) -> KeyFolder:
         """This machine's key and the boards that it knows."""
+
+    @property
+    def feed(self) -> BrowserFeed:
+        """What browsers give their cameras to."""
 
     @property
     def matchers(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from common.protocol.enrolment_code import read_code
 from common.words import counted
 from phone_host.boards.enrolment import PairingCall
 from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.doctor.host_doctor import examine
 from phone_host.live.calibration_view import SnapshotValues
 from phone_host.measure.run_snapshot import RunSnapshot
@@ -65,6 +66,11 @@ class Station:
             Do.STOP: self._stop,
             Do.SNAPSHOT: self._snapshot,
         }
+
+    @property
+    def feed(self) -> BrowserFeed:
+        """See Source."""
+        return self._program.feed
 
     def state(self) -> PageState:
         """See Source."""
@@ -127,7 +133,7 @@ class Station:
     def _find(self, values: Choices) -> Answer:
         del values
         boards, cameras = find.find_boards(self._program.keys), find.find_cameras()
-        self._memory.found(boards, cameras)
+        self._memory.found(boards, (*cameras, find.browser_choice(self.feed.words)))
         taken = [
             name
             for name, there in (("link", boards), ("camera", cameras))

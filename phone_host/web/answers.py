@@ -11,6 +11,7 @@ from aiohttp import web
 
 from phone_host.measure.trouble import Trouble
 from phone_host.output.json_text import json_text
+from phone_host.web.camera_lines import CameraLines
 from phone_host.web.door import KNOWN, problem
 from phone_host.web.encoder import FILES, has_data
 from phone_host.web.gate import Gate, is_loopback
@@ -51,6 +52,7 @@ class Answers:
     Args:
         hub: what there is to tell.
         viewers: those who look all the time.
+        cameras: browsers that give their cameras.
         gate: makes the cookie.
         files: the page's files.
         limits: how much at once.
@@ -62,13 +64,14 @@ class Answers:
         *,
         hub: Hub,
         viewers: Viewers,
+        cameras: CameraLines,
         gate: Gate,
         files: dict[str, StaticFile],
         limits: Limits,
         authority: bytes,
     ) -> None:
         self._hub, self._viewers, self._gate, self._files, self._limits = hub, viewers, gate, files, limits
-        self._authority = authority
+        self._authority, self._cameras = authority, cameras
         self._commander = ThreadPoolExecutor(limits.commands + 1, "page command")
         self._commands = 0
         self._downloads = {False: 0, True: 0}
@@ -80,6 +83,8 @@ class Answers:
             web.get("/", self._index),
             web.get("/static/{path:.+}", self._static),
             web.get("/ws", self._socket),
+            web.get("/ws/camera", self._camera),
+            web.get("/ws/camera/clock", self._camera_clock),
             web.get("/api/events", self._events),
             web.get("/api/state", self._state),
             web.get("/api/report.json", self._report),
@@ -136,6 +141,12 @@ class Answers:
             raise web.HTTPBadRequest
         is_near = is_loopback(request.remote or "")
         return await self._viewers.sockets(request, is_known=request[KNOWN], is_near=is_near)
+
+    async def _camera(self, request: web.Request) -> web.StreamResponse:
+        return await self._cameras.frames(request)
+
+    async def _camera_clock(self, request: web.Request) -> web.StreamResponse:
+        return await self._cameras.echoes(request)
 
     async def _events(self, request: web.Request) -> web.StreamResponse:
         if not self._viewers.has_room(is_known=request[KNOWN]):

@@ -9,6 +9,7 @@ from typing import Final
 from aiohttp import web
 
 from phone_host.web.answers import Answers
+from phone_host.web.camera_lines import CameraLines
 from phone_host.web.connections import Connections
 from phone_host.web.door import Door
 from phone_host.web.gate import Gate
@@ -42,11 +43,18 @@ class Serving:
         page = files[INDEX].content["identity"] if INDEX in files else b""
         self._hub = Hub(source)
         self._viewers = Viewers(self._hub, limits)
+        self._cameras = CameraLines(source.feed, gate, limits)
         self._connections = Connections(limits, self._protocol, tls)
         door = Door(gate, limits, self._connections, content_policy(script_hashes(page)))
         authority = b"" if settings.credentials is None else settings.credentials.authority
         self._answers = Answers(
-            hub=self._hub, viewers=self._viewers, gate=gate, files=files, limits=limits, authority=authority
+            hub=self._hub,
+            viewers=self._viewers,
+            cameras=self._cameras,
+            gate=gate,
+            files=files,
+            limits=limits,
+            authority=authority,
         )
         app = web.Application(middlewares=[door.middleware()], client_max_size=limits.body_bytes)
         app.add_routes(self._answers.routes())
@@ -81,7 +89,7 @@ class Serving:
         """Tell viewers goodbye, and end."""
         assert self._server is not None
         self._server.close()
-        await self._viewers.close()
+        await asyncio.gather(self._viewers.close(), self._cameras.close())
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

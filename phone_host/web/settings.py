@@ -87,6 +87,10 @@ class Limits:
         silent_s: how long a viewer may leave a pair without acknowledgement, or take for a message.
         downloads: large answers under way at once, of those without the token; as many again for those with it.
         commands: commands under way at once, but for `stop`.
+        cameras: WebSockets of browsers that give their cameras at once, of those without the cookie; as many again for those with it.
+        frame_bytes: of a message of such a browser; the luma of 1920x1080 takes half of it.
+        words_per_s: text messages of such a browser.
+        hello_s: how long it may take for its first one.
     """
 
     connections: int = 96
@@ -100,6 +104,10 @@ class Limits:
     silent_s: float = 60.0
     downloads: int = 6
     commands: int = 4
+    cameras: int = 6
+    frame_bytes: int = 4 << 20
+    words_per_s: float = 50.0
+    hello_s: float = 2.0
 
 
 LIMITS: Final = Limits()

@@ -195,8 +195,62 @@ class Newest:
     begun: int = 0
 
 
+class Line(Protocol):
+    """A WebSocket over which a browser gives its camera, as the server hands it on."""
+
+    @property
+    def is_near(self) -> bool:
+        """Whether it comes from this machine, as far as its address tells."""
+
+    def say(self, text: str) -> None:
+        """Send a text, soon. Safe from any thread."""
+
+    def close(self) -> None:
+        """Close it after what was said. Safe from any thread."""
+
+
+class Hearer(Protocol):
+    """Takes what comes over a line. Called in the server's thread; returns at once."""
+
+    def heard(self, said: str | bytes, now_ns: int) -> str:
+        """Take a message.
+
+        Args:
+            said: text or bytes.
+            now_ns: when it came, CLOCK_MONOTONIC, ns.
+
+        Returns:
+            What to answer at once; empty: nothing.
+        """
+
+    def left(self) -> None:
+        """The line has ended."""
+
+
+class Feed(Protocol):
+    """What a browser gives its camera to. Called in the server's thread; returns at once."""
+
+    def camera(self, line: Line, hello: str) -> Hearer | None:
+        """Take a browser's first line, for frames.
+
+        Args:
+            line: the line.
+            hello: its first message, whose token is right.
+
+        Returns:
+            What hears the rest; None: it is refused, and was told so.
+        """
+
+    def clock(self, line: Line, hello: str) -> Hearer | None:
+        """Take a browser's second line, for clock echoes; as above, but that its hello names the session instead of the token."""
+
+
 class Source(Protocol):
     """The program behind the page. Its methods may be called from any thread."""
+
+    @property
+    def feed(self) -> Feed | None:
+        """What browsers give their cameras to; None: nothing here takes them."""
 
     def state(self) -> PageState:
         """Return the state now. Takes a few milliseconds at most."""

@@ -101,6 +101,13 @@ def read_command(text: str | bytes) -> Command | None:
     return Command(do=Do(said["do"]), values=values)
 
 
+def token_in(text: str) -> str:
+    """Return the token that a hello carries; empty: none."""
+    said = _object(text)
+    token = said.get("token")
+    return token if said.get("kind") == "hello" and isinstance(token, str) else ""
+
+
 def read_measure(text: str | bytes) -> MeasureRequest | None:
     """Read which points to measure.
 

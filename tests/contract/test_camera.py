@@ -2,7 +2,8 @@
 
 import select
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,12 +17,17 @@ from common.camera.factory import CameraRequest
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
 from common.protocol.message import Pacing, Steering
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.factory import open_camera
+from phone_host.web.server import PageServer
+from phone_host.web.settings import PageSettings
 from tests.support.mjpeg_server import MjpegServer
 from tests.support.novice.camera import PLAN, NoviceCamera
 from tests.support.novice.hands import write_plan
 from tests.support.novice.head import Novice
+from tests.support.page_source import PageSource
 from tests.support.pictures import encoded, jpeg, picture
+from tests.support.scripted_browser import LUMA, Script, ScriptedBrowser, Shot
 
 CLOCK = "board:test"
 START_NS = 5_000_000_007
@@ -41,6 +47,7 @@ class Set:
     camera: Camera
     now_ns: int
     server: MjpegServer | None = None
+    ending: ExitStack = field(default_factory=ExitStack)
 
     @property
     def is_real(self) -> bool:
@@ -92,6 +99,33 @@ def served(folder: Path) -> Set:
     return Set(open_camera(server.uri, CLOCK, now.monotonic_ns()), now.monotonic_ns(), server)
 
 
+def browser(encoding: str) -> Callable[[Path], Set]:
+    """Open the camera of a browser that sends JPEG images, or their luma."""
+
+    def opened(_folder: Path) -> Set:
+        feed = BrowserFeed(20_000_000_000)
+        source = PageSource()
+        source.feed = feed
+        server = PageServer(source, PageSettings(port=0))
+        server.start()
+        ending = ExitStack()
+        ending.callback(server.stop)
+        ending.enter_context(ScriptedBrowser(server.url, Script(shots=shots(encoding))))
+        opened = open_camera(f"browser:?encoding={encoding}", CLOCK, now.monotonic_ns(), feed=feed)
+        return Set(opened, now.monotonic_ns(), ending=ending)
+
+    return opened
+
+
+def shots(encoding: str) -> list[Shot]:
+    """Some images as a browser sends them."""
+    grey = [np.ascontiguousarray(picture(seed=i)[..., 1]) for i in range(IMAGES)]
+    height, width = grey[0].shape
+    if encoding == "luma":
+        return [Shot(payload=image.tobytes(), width=width, height=height, encoding=LUMA) for image in grey]
+    return [Shot(payload=encoded(".jpg", image), width=width, height=height) for image in grey]
+
+
 def held(folder: Path) -> Set:
     """Open another package's camera before which somebody holds a board."""
     folder.mkdir()
@@ -109,6 +143,8 @@ CAMERAS: dict[str, Callable[[Path], Set]] = {
     "replay of a turned camera": replay("fps=30&loop=1&rotate=90&flip=h"),
     "mjpeg over http": served,
     "painted by another package": held,
+    "browser, jpeg": browser("jpeg"),
+    "browser, luma": browser("luma"),
 }
 
 
@@ -118,6 +154,7 @@ def opened(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Set]:
     made = CAMERAS[request.param](tmp_path / "images")
     yield made
     made.camera.close()
+    made.ending.close()
     if made.server is not None:
         made.server.stop()
 
@@ -131,6 +168,9 @@ def test_description_fits_the_frames(opened: Set) -> None:
             assert (grab.width_px, grab.height_px) == (description.width_px, description.height_px)
             assert grab.pixel_format is description.pixel_format
             assert find_fault(grab.pixel_format, grab.payload) is None
+            if grab.pixel_format is PixelFormat.GREY:
+                assert len(grab.payload) == description.height_px * description.width_px
+                continue
             image = cv2.imdecode(np.frombuffer(grab.payload, np.uint8), cv2.IMREAD_UNCHANGED)
             assert image is not None
             assert image.shape[:2] == (description.height_px, description.width_px)

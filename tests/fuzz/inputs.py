@@ -53,6 +53,7 @@ def uri_seeds() -> list[bytes]:
         b"v4l2:/dev/video0?send=luma&gain=3&white_balance=4600&focus=2",
         b"https://[::1]/?action=stream&verify=0&latency_uncertainty_ms=3.5",
         b"http://user:pass@phone:8080/video?latency_ms=120",
+        b"browser:?w=640&h=480&fps=30&encoding=luma&quality=0.9&rotate=90",
     ]
 
 

@@ -4,7 +4,7 @@ A target takes any bytes and raises only if something is wrong. The same functio
 coverage, and in the test suite over the corpus, which holds every input that ever found something.
 """
 
-from tests.fuzz import inputs, protocols, rig_files
+from tests.fuzz import browser, inputs, protocols, rig_files
 from tests.fuzz.target import Target
 
 TARGETS: dict[str, Target] = {
@@ -20,6 +20,7 @@ TARGETS: dict[str, Target] = {
     "v4l2": Target("a driver's controls and stamps", inputs.v4l2, inputs.v4l2_seeds, 2048, 0.005),
     "image": Target("JPEG, PNG and PNM headers", inputs.image, inputs.image_seeds, 4096, 0.005),
     "decode": Target("sizes of images, and decoding them", inputs.decoding, inputs.decoding_seeds, 4096, 0.005),
+    "browser": Target("a browser's words and images", browser.browser, browser.browser_seeds, 4096, 0.01),
     "mjpeg": Target("images in a server's stream", inputs.mjpeg, inputs.mjpeg_seeds, 8192, 0.01),
     "rig": Target("rig.yaml", inputs.rig, inputs.rig_seeds, 4096, 0.005),
     "rigfiles": Target("calibrations of other programs", rig_files.rig_files, rig_files.rig_files_seeds, 8192, 0.005),

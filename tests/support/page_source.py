@@ -17,6 +17,7 @@ from phone_host.web.source import (
     Choice,
     Command,
     Do,
+    Feed,
     Measured,
     Newest,
     PageState,
@@ -40,6 +41,7 @@ class PageSource:
 
     def __init__(self, shown: Processed | None = None, saved: str = "") -> None:
         self.processed = processed() if shown is None else shown
+        self.feed: Feed | None = None
         self.asked: list[Command] = []
         self.commands: list[Command] = []
         self.asked_states = 0

@@ -24,7 +24,7 @@ from phone_host.serve.point_answer import answered
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.steps import Facts, steps
-from phone_host.verbs.serve.choices import choices_of, run_options, run_words, with_changes, without_depth
+from phone_host.verbs.serve.choices import choices_of, run_options, run_words, shown_words, with_changes, without_depth
 from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.page import address_of, own_settings
 from phone_host.verbs.serve.program import Commands
@@ -232,6 +232,8 @@ def test_choices_are_a_command_line_and_back() -> None:
     options = run_options(run_words(made))
     assert (options.link, options.rectified, options.near) == (["tcp://a:1", "tcp://b:2"], True, "300")
     assert choices_of(options) == made
+    assert shown_words(made) == run_words(made)
+    assert shown_words({"camera": "browser:"}) == ["--camera", "browser:", "--serve"]
     assert with_changes(made, {"rectified": "no"}) == {"link": "tcp://a:1 tcp://b:2", "near": "300"}
     assert run_words({"crop": "-1,0,2,2"}) == ["--crop=-1,0,2,2"]
     assert without_depth(made) == {"link": "tcp://a:1 tcp://b:2"}

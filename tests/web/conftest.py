@@ -1,7 +1,9 @@
 """A browser for all tests of this part; a server and a played program for each."""
 
+import hashlib
 import os
 import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -15,6 +17,15 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 PHONE = {"width": 390, "height": 844}
 LAPTOP = {"width": 1366, "height": 768}
 TOKEN = "only-for-tests"
+OTHER_NAME = "scanner.test"
+FLAGS = (
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--use-fake-device-for-media-stream",  # a camera with focus and exposure; pages are asked for permission all the same
+    f"--host-resolver-rules=MAP {OTHER_NAME} 127.0.0.1",
+)
+AXE = "axe-core@4.14.1"
+AXE_SHA256 = "e6b0ce02b84d892e2e33e403485e7f3d6c29e2be6df65daf44d89ba564139745"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -32,11 +43,27 @@ def browser() -> Iterator[Any]:
     from playwright.sync_api import sync_playwright  # noqa: PLC0415  # only where there is a browser
 
     with sync_playwright() as playwright:
-        running = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--enable-unsafe-swiftshader"]
-        )
+        running = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         yield running
         running.close()
+
+
+@pytest.fixture(scope="session")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """axe-core's script, from npm: for tests only, the package never holds it."""
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("needs npm for axe-core")
+    folder = tmp_path_factory.mktemp("axe")
+    done = subprocess.run(
+        [npm, "pack", "--silent", AXE], cwd=folder, capture_output=True, text=True, check=False, timeout=90
+    )
+    if done.returncode:
+        pytest.skip(f"npm has no {AXE}: {done.stderr.strip().splitlines()[-1:]}")
+    tarball = folder / done.stdout.strip()
+    assert hashlib.sha256(tarball.read_bytes()).hexdigest() == AXE_SHA256
+    subprocess.run(["tar", "xzf", tarball], cwd=folder, check=True)
+    return (folder / "package" / "axe.min.js").read_text()
 
 
 @pytest.fixture

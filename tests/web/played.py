@@ -33,6 +33,7 @@ from phone_host.web.source import (
     Choice,
     Command,
     Do,
+    Feed,
     Measured,
     Newest,
     PageState,
@@ -83,6 +84,7 @@ class Played:
 
     pairs: tuple[Processed, ...]
     activity: Activity = Activity.IDLE
+    feed: Feed | None = None
     settings: dict[str, str] = field(default_factory=dict)
     done: set[StepName] = field(default_factory=set)
     boards: tuple[Choice, ...] | None = BOARDS

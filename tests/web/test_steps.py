@@ -1,8 +1,5 @@
 """The way from nothing to a run on the page: each step does what the command line would, and leads on. Everybody can use it."""
 
-import hashlib
-import shutil
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -15,8 +12,6 @@ from phone_host.web.source import Activity, Answer, Do, StepName
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
 from tests.web.played import BOARDS, CAMERAS, Played, guide_snapshot
 
-AXE = "axe-core@4.14.1"
-AXE_SHA256 = "e6b0ce02b84d892e2e33e403485e7f3d6c29e2be6df65daf44d89ba564139745"
 EXPECTED_STEPS = ["board", "camera", "check", "calibration", "run"]
 
 
@@ -149,24 +144,6 @@ def test_every_control_is_reached_by_keys_and_shows_that(program: Played, opened
             unseen.append(name)
     assert [name for name in wanted if name not in reached] == []
     assert unseen == []
-
-
-@pytest.fixture(scope="session")
-def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """axe-core's script, from npm: for tests only, the package never holds it."""
-    npm = shutil.which("npm")
-    if npm is None:
-        pytest.skip("needs npm for axe-core")
-    folder = tmp_path_factory.mktemp("axe")
-    done = subprocess.run(
-        [npm, "pack", "--silent", AXE], cwd=folder, capture_output=True, text=True, check=False, timeout=90
-    )
-    if done.returncode:
-        pytest.skip(f"npm has no {AXE}: {done.stderr.strip().splitlines()[-1:]}")
-    tarball = folder / done.stdout.strip()
-    assert hashlib.sha256(tarball.read_bytes()).hexdigest() == AXE_SHA256
-    subprocess.run(["tar", "xzf", tarball], cwd=folder, check=True)
-    return (folder / "package" / "axe.min.js").read_text()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

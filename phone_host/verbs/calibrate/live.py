@@ -35,6 +35,7 @@ from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, Want
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.live.calibration import LiveCalibration, LiveSettings
@@ -169,12 +170,13 @@ class PreparedViews:
         return Live(last, self.left, self.right, signals)
 
 
-def prepare_views(options: argparse.Namespace, asked: Asked) -> PreparedViews:
+def prepare_views(options: argparse.Namespace, asked: Asked, feed: BrowserFeed | None = None) -> PreparedViews:
     """Open everything that a live calibration needs.
 
     Args:
         options: the command's.
         asked: what they ask for, with what the earlier calibration says.
+        feed: brings browsers that give their cameras; None: there is no page.
 
     Raises:
         SettingsError: an option is missing or not valid.
@@ -198,7 +200,7 @@ def prepare_views(options: argparse.Namespace, asked: Asked) -> PreparedViews:
         return grown(views, series, sizes_px, baseline_m)
 
     with ExitStack() as opened:  # what cannot be had closes what was
-        camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels)
+        camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels, feed)
         opened.enter_context(closing(camera))
         keys = key_folder(options.keys or "")
         named = tuple(options.link or (find_board_and_say(keys.path, options.wait),))

@@ -41,6 +41,7 @@ from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, require_folder, unwritable
+from phone_host.verbs.run.page_beside import camera_page
 
 _Reading = TypeVar("_Reading")
 
@@ -98,14 +99,15 @@ def _write_pattern(options: argparse.Namespace) -> int:
 def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     if options.frames is not None:
         return read(options.frames)
-    camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns())
     keys = key_folder(options.keys or "")
-    uri = parse_link(options.link or find_board_and_say(keys.path, options.wait), listens_by_default=False)
-    tell_insecure(uri)
-    links = open_links([uri], keys)
-    wait_ns = None if options.wait is None else round(options.wait * 1e9)
-    with share_bar("waiting for the board", then="filming") as advance:
-        footage = film(links, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
+    with camera_page(options.camera, keys.path) as feed:
+        camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
+        uri = parse_link(options.link or find_board_and_say(keys.path, options.wait), listens_by_default=False)
+        tell_insecure(uri)
+        links = open_links([uri], keys)
+        wait_ns = None if options.wait is None else round(options.wait * 1e9)
+        with share_bar("waiting for the board", then="filming") as advance:
+            footage = film(links, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
     if options.keep:
         try:
             keep(footage, options.out)

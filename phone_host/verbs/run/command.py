@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
-from common.program.settings import log_level
+from common.program.settings import Resolved, log_level
 from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
+from phone_host.declared_settings import PhoneHostSettings
 from phone_host.measure.run_snapshot import depth_is_wrong
 from phone_host.measure.trouble import trouble_of
 from phone_host.output.json_text import json_text
@@ -19,7 +20,7 @@ from phone_host.report.summary import summary
 from phone_host.run.host_settings import EndReason
 from phone_host.run.terminal_view import LiveTable
 from phone_host.run.waiting_note import WaitingNote
-from phone_host.verbs.run.prepared import Ended, Opened, PreparedRun, checked, open_run
+from phone_host.verbs.run.prepared import Ended, PreparedRun, checked, open_run
 
 if TYPE_CHECKING:
     from phone_host.serve.beside import BesideRun
@@ -31,10 +32,10 @@ def run(options: argparse.Namespace) -> int:
     """Run until stopped, until the number of pairs is reached, or until a stream ends."""
     found = checked(options)
     logs.set_up(log_level(found.values.log_level))
-    opened = open_run(options, found, _tell)
-    signals = StopSignals()
-    with _page(opened) as page:
-        prepared = opened.prepared(sys.argv, () if page is None else (page.sink,))
+    with _page(options, found) as page:  # first of all, because a browser gives its camera by it
+        opened = open_run(options, found, _tell, None if page is None else page.feed)
+        signals = StopSignals()
+        prepared = opened.prepared(sys.argv, () if page is None else (page.sink(opened.core, opened.named),))
         if page is not None:
             page.watch(prepared.host.snapshot)
 
@@ -55,13 +56,15 @@ def run(options: argparse.Namespace) -> int:
     return _finish(options, prepared, written, ended, signals, is_stopped=stopped())
 
 
-def _page(opened: Opened) -> "AbstractContextManager[BesideRun | None]":
+def _page(
+    options: argparse.Namespace, found: Resolved[PhoneHostSettings]
+) -> "AbstractContextManager[BesideRun | None]":
     """Serve the page of a run, if it is wanted."""
-    if opened.options.serve is None:
+    if options.serve is None:
         return nullcontext()
     from phone_host.verbs.run.page_beside import page_beside  # noqa: PLC0415 - a server that most runs do without
 
-    return page_beside(opened)
+    return page_beside(options, found)
 
 
 def _watched(options: argparse.Namespace, prepared: PreparedRun, stop: Callable[[], bool]) -> EndReason:

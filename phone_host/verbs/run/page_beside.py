@@ -1,41 +1,72 @@
 """The page beside a run: `run --serve`."""
 
+import argparse
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from common.program.invocation import command_line
+from common.program.settings import Resolved
 from common.program.terminal import say
+from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.http_uri import without_password
+from phone_host.declared_settings import PhoneHostSettings
 from phone_host.output.axes import Axes
 from phone_host.serve.beside import BesideRun
-from phone_host.verbs.run.prepared import Opened
-from phone_host.verbs.serve.choices import choices_of, run_words
+from phone_host.settings import key_folder
+from phone_host.verbs.serve.choices import choices_of, shown_words
 from phone_host.verbs.serve.page import own_settings, served
 from phone_host.verbs.serve.places import snapshot_folder
 
 
 @contextmanager
-def page_beside(opened: Opened) -> Iterator[BesideRun]:
+def camera_page(uri: str, keys: Path) -> Iterator[BrowserFeed | None]:
+    """Serve the page while the block lasts, if a browser's camera is meant: it has no other way to give it.
+
+    Args:
+        uri: of the camera.
+        keys: folder of the secrets.
+
+    Raises:
+        UnavailableError: the port is taken, or a package is missing.
+    """
+    if not is_browser(uri):
+        yield None
+        return
+    page = BesideRun({"camera": uri}, lambda _: "", snapshots=snapshot_folder(None), axes=Axes.CAMERA)
+    with served(page, own_settings(None, keys)) as server:
+        _tell(server.url, uri)
+        yield page.feed
+
+
+def _tell(url: str, camera: str) -> None:
+    say(f"phone-host: the page: {url}", sys.stderr, flush=True)
+    if is_browser(camera):
+        say("phone-host: open it in the browser whose camera is meant, and start that camera", sys.stderr, flush=True)
+
+
+@contextmanager
+def page_beside(options: argparse.Namespace, found: Resolved[PhoneHostSettings]) -> Iterator[BesideRun]:
     """Serve the page of a run while the block lasts; its address is told on stderr.
 
     Args:
-        opened: the run, which has not begun.
+        options: of the run, of which nothing is open yet.
+        found: its settings.
 
     Raises:
         SettingsError: other machines reach the address that --serve names.
         UnavailableError: the port is taken, or a package is missing.
     """
-    options = opened.options
-    values = opened.found.values
-    choices = {**choices_of(options), "link": " ".join(opened.named), "camera": without_password(values.camera)}
+    values = found.values
+    choices = {**choices_of(options), "camera": without_password(values.camera)}
     beside = BesideRun(
         choices,
-        command_line("phone-host", "run", *run_words(choices)),
-        opened.core,
+        lambda chosen: command_line("phone-host", "run", *shown_words(chosen)),
         snapshots=snapshot_folder(options.out),
         axes=Axes(options.axes),
     )
-    with served(beside, own_settings(options.serve, opened.keys)) as server:
-        say(f"phone-host: the page: {server.url}", sys.stderr, flush=True)
+    with served(beside, own_settings(options.serve, key_folder(values.keys).path)) as server:
+        _tell(server.url, values.camera)
         yield beside

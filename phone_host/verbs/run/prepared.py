@@ -17,6 +17,7 @@ from common.places import Kind, kind_of, resolved
 from common.program.settings import Resolved, with_origins
 from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import find_board_and_say, remember
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
@@ -168,13 +169,19 @@ def checked(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
     return found
 
 
-def open_run(options: argparse.Namespace, found: Resolved[PhoneHostSettings], tell: Callable[[str], None]) -> Opened:
+def open_run(
+    options: argparse.Namespace,
+    found: Resolved[PhoneHostSettings],
+    tell: Callable[[str], None],
+    feed: BrowserFeed | None = None,
+) -> Opened:
     """Open the camera, the core and the links of a run.
 
     Args:
         options: of `run`.
         found: its settings, from `checked`.
         tell: takes a line that the user should know.
+        feed: brings browsers that give their cameras; None: there is no page.
 
     Raises:
         SettingsError: options contradict each other.
@@ -187,7 +194,7 @@ def open_run(options: argparse.Namespace, found: Resolved[PhoneHostSettings], te
     if options.out is not None:
         spare(options.out, replayed(settings.camera), settings.calibration, options.overlay)
     with ExitStack() as opened:  # what cannot be had closes what was
-        camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
+        camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels, feed)
         opened.enter_context(closing(camera))
         core, board_side = _core(options, settings, upright_px(camera), tell)
         overlay_of(options, core)

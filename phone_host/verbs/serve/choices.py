@@ -9,6 +9,7 @@ from typing import Final, NoReturn
 
 from common.errors import SettingsError
 from common.program.commandline import ExamplesFirstParser
+from phone_host.camera.browser_uri import is_browser
 from phone_host.verbs.calibrate import arguments as calibrate_arguments
 from phone_host.verbs.run import arguments as run_arguments
 
@@ -98,6 +99,11 @@ def run_words(choices: Mapping[str, str]) -> list[str]:
             for each in value.split() if name == "link" else [value]:
                 words += [f"--{name}={each}"] if each.startswith("-") else [f"--{name}", each]
     return words
+
+
+def shown_words(choices: Mapping[str, str]) -> list[str]:
+    """Return choices as the words of the command line that is shown: a browser's camera needs the page."""
+    return [*run_words(choices), *(["--serve"] if is_browser(choices.get("camera", "")) else [])]
 
 
 def choices_of(options: argparse.Namespace) -> dict[str, str]:

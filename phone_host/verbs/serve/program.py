@@ -16,6 +16,7 @@ from common.program.settings import log_level
 from common.stamp import HOST_CLOCK
 from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.verdict import Verdict
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.doctor.capture import check_capture
@@ -38,6 +39,7 @@ from phone_host.verbs.serve.choices import (
     placed,
     run_options,
     run_words,
+    shown_words,
     with_changes,
     without_depth,
 )
@@ -49,6 +51,9 @@ _TRIAL_S: Final = 2.5
 """Two seconds show the rate of both cameras; a clock is known after less than one."""
 
 _BOARD_S: Final = 4.0
+_BROWSER_NS: Final = 10_000_000_000
+"""Whoever begins something on the page has started the phone's camera before, or is told to."""
+
 _RIG: Final = Path("rig") / "rig.yaml"
 _CAPTURE_S: Final = 60.0
 """So long a phone is watched for growing hot; half a minute tells about its film."""
@@ -70,6 +75,7 @@ class Commands:
 
     def __init__(self, file: Path, keys: str | None, tell: Callable[[str], None]) -> None:
         self._file, self._tell = file, tell
+        self.feed: Final = BrowserFeed(_BROWSER_NS)
         self._kept, others = kept(file)
         self._fixed = [*others, *(("--keys", keys) if keys else ())]
         self.keys: KeyFolder = chosen_keys(file if file.exists() else None, keys)
@@ -105,20 +111,20 @@ class Commands:
 
     def command(self, choices: Choices) -> str:
         """See Program."""
-        return command_line("phone-host", "run", *self._fixed, *run_words(self.shown(choices)))
+        return command_line("phone-host", "run", *self._fixed, *shown_words(self.shown(choices)))
 
     def run(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
         """See Program."""
         words = [*self._fixed, *run_words(choices)]
         options = run_options(words)
-        opened = open_run(options, checked(options), self._tell)
+        opened = open_run(options, checked(options), self._tell, self.feed)
         return opened.prepared(["phone-host", "run", *words], sinks_of(opened.core))
 
     def trial(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
         """See Program."""
         short = {**without_depth(choices), "seconds": str(_TRIAL_S)}
         options = run_options([*self._fixed, *run_words(short), "--wait", str(_BOARD_S)])
-        opened = open_run(options, checked(options), lambda _: None)
+        opened = open_run(options, checked(options), lambda _: None, self.feed)
         return opened.prepared((), sinks_of(None))
 
     def question(self, choices: Choices) -> Question:
@@ -132,6 +138,7 @@ class Commands:
             out=options.out or data_folder(),
             wait_s=_BOARD_S,
             keys=self.keys,
+            feed=self.feed,
         )
 
     def capture(
@@ -139,7 +146,7 @@ class Commands:
     ) -> Sequence[Finding]:
         """See Program."""
         question = self.question(choices)
-        camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns())
+        camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns(), feed=self.feed)
         calibration = Path(question.calibration) if question.calibration else None
         return check_capture(camera, calibration, _CAPTURE_S, stopped, tell).findings
 
@@ -155,7 +162,7 @@ class Commands:
         options = calibrate_options(["--live", "--no-sound", *words, "--out", str(out)])
         asked = asked_of(options)
         require_rig_place(out)
-        return Calibration(options, asked, prepare_views(options, asked))
+        return Calibration(options, asked, prepare_views(options, asked, self.feed))
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """See Program."""

@@ -7,6 +7,7 @@ import { byId, data, show, text } from './dom.js';
 import { showFigures } from './figures.js';
 import { showGuide } from './guide.js';
 import { Live } from './live.js';
+import { showOwnCamera } from './own_camera.js';
 import { connectSetup, showSetup } from './setup.js';
 import { STEPS, showSteps, stepOf } from './steps.js';
 import { takeToken } from './token.js';
@@ -70,6 +71,7 @@ function draw() {
   showTrust(state);
   showSetup(state);
   showGuide(state);
+  showOwnCamera(state);
   showFigures(state.live, charts.delay());
   controls.show(state);
   text(byId('activity'), state.activity);

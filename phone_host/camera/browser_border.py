@@ -1,0 +1,143 @@
+"""Decides which images of a browser's camera are believed, and when they were exposed. Pure.
+
+An image is believed no more than a board's: its bytes must be a whole image of the size that it claims, that size and the
+way it is turned must be those of the first image, its number must grow, and its stamp must be possible and fit the pace of
+those before it. What is not believed is dropped by its name.
+"""
+
+from dataclasses import dataclass
+
+from common.frame import FrameFault
+from phone_host.camera.browser_clock import BrowserClock
+from phone_host.camera.browser_epoch import Epoch, Handed, Stamps
+from phone_host.camera.browser_wire import BrowserFrame, Hello, read_frame
+from phone_host.camera.intervals import COARSE, EVEN, Intervals
+from phone_host.sync.clock import HostTime
+
+
+@dataclass(frozen=True, slots=True)
+class Believed:
+    """An image that is believed.
+
+    Attributes:
+        image: the image.
+        exposed: exposure mid-point as far as it is known, host's clock.
+        missed: images between this and the one before it that the browser dropped.
+    """
+
+    image: BrowserFrame
+    exposed: HostTime
+    missed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Disbelieved:
+    """An image that is not, and why; `missed` as in Believed."""
+
+    fault: FrameFault
+    missed: int = 0
+
+
+class BrowserBorder:
+    """The images of a browser's camera while one run uses it.
+
+    Args:
+        size_px: width and height that every image must have, px; None: as the first one.
+    """
+
+    def __init__(self, size_px: tuple[int, int] | None) -> None:
+        self._size_px = size_px
+        self._turn_deg: int | None = None
+        self._track: str | None = None
+        self._stamps = Stamps(is_same_machine=False)
+        self._intervals = Intervals()
+        self._is_phone = False
+        self._sequence = -1
+        self._dropped = 0
+        self._changes = 0
+        self._newest_ns = -(2**63)
+
+    @property
+    def epoch(self) -> Epoch | None:
+        """On which clock the stamps count; None: it is being found out."""
+        return self._stamps.epoch
+
+    @property
+    def scatter_ns(self) -> int:
+        """How exact the stamps are if they count on no clock, ns."""
+        return self._stamps.scatter_ns
+
+    def begin(self, hello: Hello, *, is_same_machine: bool) -> None:
+        """A browser has come. The stamps of a track that is known already go on.
+
+        Args:
+            hello: what it said.
+            is_same_machine: whether it may run on this machine.
+        """
+        if hello.track and hello.track == self._track:
+            return
+        self._track, self._is_phone = hello.track, hello.is_phone
+        self._stamps = Stamps(is_same_machine=is_same_machine)
+        self._intervals = Intervals()
+        self._sequence, self._dropped, self._changes = -1, 0, 0
+
+    def judge(self, data: bytes, arrived_ns: int, clock: BrowserClock, asleep_ns: int) -> Believed | Disbelieved:
+        """Judge an image.
+
+        Args:
+            data: the message as it came.
+            arrived_ns: when it came, host's clock, ns.
+            clock: the browser's.
+            asleep_ns: how long the host has slept since it booted, ns.
+        """
+        image = read_frame(data)
+        if isinstance(image, FrameFault):
+            return Disbelieved(image)
+        if image.sequence <= self._sequence:
+            return Disbelieved(FrameFault.STALE)
+        missed = min(image.sequence - self._sequence - 1, max(0, image.dropped - self._dropped))
+        self._sequence, self._dropped = image.sequence, image.dropped
+        if self._turn_deg not in {image.rotation_deg, None}:
+            return Disbelieved(FrameFault.TURNED, missed)
+        if self._size_px not in {(image.width_px, image.height_px), None}:
+            return Disbelieved(FrameFault.OTHER_SIZE, missed)
+        exposed = self._exposed(image, arrived_ns, clock, asleep_ns)
+        if isinstance(exposed, FrameFault):
+            return Disbelieved(exposed, missed)
+        self._turn_deg, self._size_px = image.rotation_deg, (image.width_px, image.height_px)
+        return Believed(image, exposed, missed)
+
+    def _exposed(
+        self, image: BrowserFrame, arrived_ns: int, clock: BrowserClock, asleep_ns: int
+    ) -> HostTime | FrameFault:
+        handed = clock.to_host(image.callback_ns)
+        if handed is None:
+            return FrameFault.CLOCK_UNKNOWN
+        if handed.ns - handed.bound_ns > arrived_ns:
+            return FrameFault.IMPLAUSIBLE_TIME
+        captured_ns = handed.ns
+        if image.capture_ns is not None and image.capture_ns <= image.callback_ns:
+            captured_ns -= image.callback_ns - image.capture_ns
+        seen = Handed(
+            stamp_ns=image.stamp_ns,
+            browser_ns=image.callback_ns,
+            host=handed,
+            captured_ns=captured_ns,
+            asleep_ns=asleep_ns,
+        )
+        found = self._stamps.exposed(seen)
+        if self._changes != self._stamps.changes:
+            self._changes, self._intervals = self._stamps.changes, Intervals()
+        if found is None:
+            return FrameFault.CLOCK_UNKNOWN if self._stamps.epoch is None else FrameFault.IMPLAUSIBLE_TIME
+        if self._is_phone and image.exposure_ns is not None:
+            found = HostTime(found.ns + image.exposure_ns // 2, found.uncertainty_ns, found.bound_ns)
+        is_free = self._stamps.epoch is Epoch.FREE
+        fits = self._intervals.fits(found.ns, COARSE if is_free else EVEN)
+        if not fits or not self._newest_ns < found.ns <= arrived_ns:
+            return FrameFault.IMPLAUSIBLE_TIME
+        if is_free:
+            coarse_ns = self._intervals.unevenness_ns
+            found = HostTime(found.ns, found.uncertainty_ns + coarse_ns, found.bound_ns + coarse_ns)
+        self._newest_ns = found.ns
+        return found

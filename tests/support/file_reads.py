@@ -1,0 +1,31 @@
+"""Tells when other programs read a file: `python -m tests.support.file_reads FILE` prints CLOCK_MONOTONIC, ns, and the events since the line before (Linux, inotify).
+
+A process of its own, so that nothing else delays it.
+"""
+
+import ctypes
+import os
+import struct
+import sys
+import time
+from typing import Final
+
+_ACCESS: Final = 1
+_EVENT: Final = struct.Struct("iIII")
+"""struct inotify_event without its name: inotify(7)."""
+
+
+def main(path: str) -> None:
+    """Watch until killed."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    watcher = libc.inotify_init()
+    if watcher < 0 or libc.inotify_add_watch(watcher, os.fsencode(path), _ACCESS) < 0:
+        raise OSError(ctypes.get_errno(), path)
+    print("ready", flush=True)
+    while True:
+        events = os.read(watcher, 4096)
+        print(time.monotonic_ns(), len(events) // _EVENT.size, flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
