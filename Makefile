@@ -19,7 +19,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board deb lint types bench fuzz lock clean
+.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -52,12 +52,18 @@ test-slow: $(READY) ## run the tests with large samples, too slow for every day;
 coverage: $(READY) ## run the unit tests; lists branches of the pure modules that no test takes (CI requires 98 %)
 	@COVERAGE=1 .ci/test unit
 
-test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, under qemu-user
+test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, and try the phone's stand-in, under qemu-user
 	@$(BIN)/python -m tests.native.arm
+	@.ci/phone
+	@.ci/test phone
 
 test-board: $(READY) ## run the tests on booted virtual boards (the first run builds their images: needs apt and root)
 	@.ci/board
 	@.ci/test vm
+
+walk: $(READY) ## walk the ways between board and phone on the booted virtual board, as docs/phone.md says (two minutes)
+	@.ci/board
+	@WALK=1 $(BIN)/python -m pytest -q tests/vm/test_gadget.py -k each_way
 
 deb: ## build the board's Debian package in dist
 	@deploy/board/build-deb dist

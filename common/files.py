@@ -11,7 +11,6 @@ milliseconds. Meanwhile other threads of a root process must not open root's fil
 """
 
 import errno
-import grp
 import os
 import pwd
 import stat
@@ -23,6 +22,7 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from common.errors import DataError, UnavailableError
+from common.groups import group_of_one
 from common.unfinished import unfinished
 
 _TURN: Final = threading.RLock()
@@ -268,10 +268,10 @@ def is_open_to_others(status: os.stat_result) -> bool:
 
 def _is_own_group(status: os.stat_result) -> bool:
     try:
-        user, group = pwd.getpwuid(status.st_uid), grp.getgrgid(status.st_gid)
+        user = pwd.getpwuid(status.st_uid)
     except KeyError:
         return False
-    return user.pw_gid == group.gr_gid and user.pw_name == group.gr_name and set(group.gr_mem) <= {user.pw_name}
+    return user.pw_gid == status.st_gid and group_of_one(status.st_gid) == user.pw_name
 
 
 @contextmanager

@@ -30,6 +30,9 @@ CAMERAS_FORMAT: Final = 1
 OVERLAY_FORMAT: Final = 1
 """overlay.yaml."""
 
+CAPTURE_FORMAT: Final = 1
+"""capture.json."""
+
 
 def all_versions() -> str:
     """What `--version` prints, without the newline."""
@@ -39,6 +42,7 @@ def all_versions() -> str:
         "report.json": REPORT_FORMAT,
         "cameras.json": CAMERAS_FORMAT,
         "overlay.yaml": OVERLAY_FORMAT,
+        "capture.json": CAPTURE_FORMAT,
     }
     formats = ", ".join(f"{name} {version}" for name, version in files.items())
     return f"tandemscan {PACKAGE_VERSION} (protocol {PROTOCOL_VERSION}, {formats})"

@@ -9,6 +9,7 @@ from common.doctor import machine
 from common.doctor.access import Account, Holder, check_access
 from common.doctor.finding import Finding, Grade
 from common.doctor.machine_checks import check_bluetooth
+from common.doctor.network_probe import examine_network
 from common.doctor.unit_check import Unit
 from common.errors import TakenError, TandemError
 from common.link.factory import open_link, parse_link
@@ -36,6 +37,7 @@ def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: 
             return findings
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
         findings.append(check_access("permission", node, account))
+    findings += examine_network(parsed)
     readings = _readings(uri, address, account, listens=parsed.listens)
     if not (readings.holders or readings.terminals or readings.console):
         readings = _tried(readings, account, listens_by_default=listens_by_default)

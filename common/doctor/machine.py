@@ -1,12 +1,13 @@
 """Reads what the checks need from /sys, /proc, /dev and systemd. Nothing is decided here, and nothing is changed."""
 
 import ctypes
-import grp
+import fcntl
 import os
 import pwd
 import re
 import shutil
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -19,10 +20,18 @@ from common import now
 from common.doctor.access import Account, Holder, Node
 from common.doctor.camera_checks import UsbBus, UsbCamera
 from common.doctor.machine_checks import Bluetooth, Clocks, Disk, KernelLog, LogLine, Supply, throttled
+from common.doctor.network_checks import Card
 from common.doctor.unit_check import Unit
+from common.groups import group_name
 from common.places import nearest
 
 _VIDEO_CLASS: Final = "0e"
+_SIOCGIFADDR: Final = 0x8915
+"""Asks for a network card's IPv4 address (netdevice(7))."""
+
+_AT_ADDRESS: Final = slice(20, 24)
+"""Where the answer, a struct ifreq, holds it: behind name, family and port."""
+
 _RECORD_BYTES: Final = 8192
 """The longest record of /dev/kmsg (kernel, Documentation/ABI/testing/dev-kmsg: LOG_LINE_MAX and its dictionary)."""
 
@@ -64,10 +73,7 @@ def read_node(path: Path) -> Node | None:
         state = real.stat()
     except OSError:
         return None
-    try:
-        group = grp.getgrgid(state.st_gid).gr_name
-    except KeyError:
-        group = str(state.st_gid)
+    group = group_name(state.st_gid) or str(state.st_gid)
     usable = os.access(real, os.R_OK | os.W_OK)
     return Node(
         path=str(real), uid=state.st_uid, gid=state.st_gid, group=group, mode=state.st_mode & 0o777, open_to_me=usable
@@ -221,6 +227,48 @@ def read_clocks(program: Path) -> Clocks:
         source=read_text(source) or "unknown",
         resolution_ns=round(time.get_clock_info("monotonic").resolution * 1e9),
     )
+
+
+def read_cards() -> tuple[Card, ...]:
+    """The network cards that have an IPv4 address, without loopback; none where the system shows none."""
+    found = []
+    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        for _, name in socket.if_nameindex():
+            with suppress(OSError):  # it has no address
+                answer = fcntl.ioctl(asking, _SIOCGIFADDR, struct.pack("256s", name.encode()[:15]))
+                address = socket.inet_ntoa(answer[_AT_ADDRESS])
+                carrier = read_text(Path("/sys/class/net", name, "carrier"))
+                if not address.startswith("127."):
+                    found.append(Card(name, address, carrier == "1" if carrier else None))
+    return tuple(found)
+
+
+def read_way(host: str) -> tuple[str, str]:
+    """The IPv4 address of another machine, and the one from which the kernel would go there; empty: unknown. No packet is sent.
+
+    Args:
+        host: name or address.
+    """
+    address = own = ""
+    with suppress(OSError, UnicodeError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        address = socket.gethostbyname(host)
+        asking.connect((address, 9))
+        own = str(asking.getsockname()[0])
+    return address, own
+
+
+def read_property(name: str) -> str:
+    """What an Android phone says of itself; empty where it does not.
+
+    Args:
+        name: of the property, such as ro.product.model.
+    """
+    return _output("getprop", name).strip()
+
+
+def has_usb_device_socket() -> bool:
+    """Whether this machine can be a device on a USB cable."""
+    return any(Path("/sys/class/udc").glob("*"))
 
 
 def read_bluetooth() -> Bluetooth:

@@ -2,7 +2,6 @@
 
 import errno
 import fcntl
-import grp
 import os
 import select
 import sys
@@ -14,6 +13,7 @@ from typing import Final
 import serial
 
 from common.errors import MissingDeviceError, TakenError, UnavailableError
+from common.groups import group_name
 from common.link.stream import StreamLink
 from common.link.uri import LinkRequest
 from common.protocol.framing import LinkEnd
@@ -156,8 +156,8 @@ def _explained(path: str, error: Exception) -> UnavailableError:
 
 def _group(path: str) -> str:
     """The group that may use a port: dialout on Debian, uucp elsewhere."""
-    with suppress(OSError, KeyError):
-        return grp.getgrgid(Path(path).stat().st_gid).gr_name
+    with suppress(OSError):
+        return group_name(Path(path).stat().st_gid) or "dialout"
     return "dialout"
 
 

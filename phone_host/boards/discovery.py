@@ -1,7 +1,7 @@
 """Finds a board for `phone-host run` without --link.
 
-It tries the last board, the board on the USB cable, one on this machine, and then one that announces itself on the
-network. Only a port with ZeroMQ's greeting counts as a board's port. The key, not an answer on the network, decides
+It tries the last board, the board on the USB cable, one on this machine, one whose own Wi-Fi this machine is in, and then
+one that announces itself on the network. Only a port with ZeroMQ's greeting counts as a board's port. The key, not an answer on the network, decides
 whether it is the right board.
 """
 
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from common import now
+from common.android import is_android
 from common.errors import TandemError, UnavailableError
 from common.files import opened_folder, read_file, replacing_in
 from phone_host.boards.found import LISTEN_S, Found
@@ -24,7 +25,12 @@ from phone_host.boards.udev_rule import find_usb_board
 GADGET: Final = "tcp://192.168.7.2:5555"
 """A BeagleBone on its USB cable."""
 
+ACCESS_POINT: Final = "tcp://10.42.0.1:5555"
+"""A board that is its own Wi-Fi, as NetworkManager makes it."""
+
 THIS_MACHINE: Final = "tcp://127.0.0.1:5555"
+
+_NEAR: Final = (GADGET, THIS_MACHINE, ACCESS_POINT)
 
 _LAST_FILE: Final = "last-board"
 _MOST_BYTES: Final = 4096
@@ -51,7 +57,7 @@ def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) ->
         UnavailableError: no board was found in time, or there are several.
     """
     deadline_s = float("inf") if wait_s is None else now_s() + wait_s
-    near = tuple(dict.fromkeys((*_last(state), GADGET, THIS_MACHINE)))
+    near = tuple(dict.fromkeys((*_last(state), *_NEAR)))
     while True:
         if there := answering(near):
             return there[0]
@@ -84,7 +90,7 @@ def list_boards(state: Path) -> list[Found]:
     """
     announced = _announced()
     names = {board.link: board.name for board in announced}
-    asked = tuple(dict.fromkeys((*_last(state), GADGET, THIS_MACHINE, *names)))
+    asked = tuple(dict.fromkeys((*_last(state), *_NEAR, *names)))
     found = [Found(names.get(link, ""), link) for link in answering(asked)]
     with suppress(TandemError):
         found.append(Found("board on the USB cable", f"serial:/dev/{find_usb_board(None).device}"))
@@ -130,6 +136,8 @@ def _greets(link: str) -> bool:
 
 
 def _why_not() -> str:
+    if is_android():
+        return ", which Android keeps from Termux"
     return "" if find_spec("zeroconf") else ", for which the package zeroconf is missing"
 
 

@@ -10,16 +10,19 @@ All of it is told beside what the corners' noise makes of it, so a far board is 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from phone_host.calibration.bent_board import bow_shapes
 from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.board_pose import towards
 from phone_host.calibration.bundle import Vector
-from phone_host.geometry.lens import rays_through
+from phone_host.geometry.lens import project_linearised, rays_through
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of
-from phone_host.geometry.triangulate import Intersections, triangulate
-from phone_host.model import CameraModel, Rig
+from phone_host.geometry.triangulate import triangulate
+from phone_host.model import CameraModel, Lens, Rig
 from phone_host.model.calibration_series import BoardInSpace
 
 _STEPS: Final = 4
@@ -33,7 +36,22 @@ _FITTED: Final = 9
 _LEAST_CORNERS: Final = 12
 
 
-def ray_crossings(pairs: Sequence[BoardPair], rig: Rig, sigmas_px: tuple[float, float] = (1.0, 1.0)) -> Intersections:
+@dataclass(frozen=True, slots=True, eq=False)
+class Crossings:
+    """Where both rays of M corners cross best; NaN where they do not, or a camera does not see the corner.
+
+    Attributes:
+        points_m: (M, 3) in the left camera's axes, m.
+        covariance_m2: (M, 3, 3) of the points, m^2.
+        chi2: (M,) how far the rays miss each other: squared, in standard deviations; its expectation is 1.
+    """
+
+    points_m: Vector
+    covariance_m2: Vector
+    chi2: Vector
+
+
+def ray_crossings(pairs: Sequence[BoardPair], rig: Rig, sigmas_px: tuple[float, float] = (1.0, 1.0)) -> Crossings:
     """Intersect the rays of all corners.
 
     Args:
@@ -42,19 +60,33 @@ def ray_crossings(pairs: Sequence[BoardPair], rig: Rig, sigmas_px: tuple[float, 
         sigmas_px: standard deviation of a coordinate in the left and in the right image, px.
 
     Returns:
-        V N intersections in the left camera's axes, pair by pair; NaN where a camera does not see the corner.
+        V N crossings, pair by pair.
     """
-    left, right = (np.concatenate([pair.left_px for pair in pairs]), np.concatenate([pair.right_px for pair in pairs]))
-    slopes = np.stack([_slopes(left, rig.left), _slopes(right, rig.right)])
-    # Noise is alike in pixels; the finer camera's rays are surer.
-    noise = np.array(
-        [
-            sigma**2 * np.diag(np.diag(model.matrix)[:2] ** -2.0)
-            for sigma, model in zip(sigmas_px, (rig.left, rig.right), strict=True)
-        ]
+    if Lens.FISHEYE not in {rig.left.lens, rig.right.lens} or not pairs:
+        return _crossed(pairs, rig, sigmas_px, (np.eye(3), np.eye(3)))
+    # A fisheye sees boards aside of its image plane, where slopes end: each camera looks towards the board instead.
+    found = [
+        _crossed([pair], rig, sigmas_px, (towards(pair.left_px, rig.left), towards(pair.right_px, rig.right)))
+        for pair in pairs
+    ]
+    return Crossings(
+        np.concatenate([each.points_m for each in found]),
+        np.concatenate([each.covariance_m2 for each in found]),
+        np.concatenate([each.chi2 for each in found]),
     )
-    noises = np.broadcast_to(noise[:, np.newaxis], (*slopes.shape, 2))
-    return triangulate(slopes, noises, (SE3.identity(), SE3(rig.R_right_left, rig.t_right_left_m.reshape(3))))
+
+
+def _crossed(
+    pairs: Sequence[BoardPair], rig: Rig, sigmas_px: tuple[float, float], turns: tuple[Vector, Vector]
+) -> Crossings:
+    """Intersect rays in cameras that are turned."""
+    left = _slopes(np.concatenate([pair.left_px for pair in pairs]), rig.left, turns[0], sigmas_px[0])
+    right = _slopes(np.concatenate([pair.right_px for pair in pairs]), rig.right, turns[1], sigmas_px[1])
+    slopes, noises = (np.stack(both) for both in zip(left, right, strict=True))
+    ahead, aside = (SE3(turn, np.zeros(3)) for turn in turns)
+    relative = SE3(rig.R_right_left, rig.t_right_left_m.reshape(3))
+    found = triangulate(slopes, noises, (SE3.identity(), aside @ relative @ ahead.inverse()))
+    return Crossings(found.points_m @ turns[0], turns[0].T @ found.covariance_m2 @ turns[0], found.chi2)
 
 
 def misses(pairs: Sequence[BoardPair], rig: Rig, sigmas_px: tuple[float, float] = (1.0, 1.0)) -> Vector:
@@ -106,7 +138,7 @@ def _laid_onto(points: Vector, covariances: Vector, points_m: Vector, pose: Vect
     """
     weights = np.linalg.inv(covariances)
     board = points_m - points_m.mean(axis=0)
-    shapes = _bow_shapes(board)
+    shapes = bow_shapes(board)
     turn, found = rotations_of(pose[:3]), np.concatenate([points.mean(axis=0), np.zeros(3), [1.0, 0.0, 0.0]])
     covariance = np.zeros((_FITTED, _FITTED))
     for _ in range(_STEPS):
@@ -123,21 +155,33 @@ def _laid_onto(points: Vector, covariances: Vector, points_m: Vector, pose: Vect
     return found, np.sqrt(np.diag(covariance))
 
 
-def _bow_shapes(board: Vector) -> Vector:
-    """Return (M, 2) depth of a board that is bent along its rows, and along its columns, so that its middle stands out by 1."""
-    halves = np.ptp(board[:, :2], axis=0) / 2
-    shapes: Vector = 1 - (board[:, :2] / halves) ** 2
-    return shapes
+def _slopes(corners: Vector, model: CameraModel, turn: Vector, sigma_px: float) -> tuple[Vector, Vector]:
+    """Return slopes of the rays of corners, and their noise.
 
+    Noise is alike in pixels, not in slopes: off the axis a pixel of a fisheye covers many times the slope of one in the middle. So it goes
+    through the inverse of the projection's derivative.
 
-def _slopes(corners: Vector, model: CameraModel) -> Vector:
-    """Return (N, 2) x / z and y / z of the rays of corners; NaN where one is not seen, or lies aside of the image plane."""
-    slopes = np.full(corners.shape, np.nan)
+    Args:
+        corners: (N, 2), NaN where one is not seen.
+        model: the camera.
+        turn: (3, 3) from its axes to those in which slopes are meant.
+        sigma_px: standard deviation of a coordinate, px.
+
+    Returns:
+        (N, 2) x / z and y / z; NaN where one is not seen, or lies aside of the image plane. (N, 2, 2) their covariance.
+    """
+    slopes, noise = np.full(corners.shape, np.nan), np.tile(np.eye(2), (len(corners), 1, 1))
     seen = np.flatnonzero(np.isfinite(corners).all(axis=1))
-    rays = rays_through(corners[seen], model)
-    ahead = rays[:, 2] > 0
-    slopes[seen[ahead]] = rays[ahead, :2] / rays[ahead, 2:]
-    return slopes
+    rays = rays_through(corners[seen], model) @ turn.T
+    seen, rays = seen[rays[:, 2] > 0], rays[rays[:, 2] > 0]
+    if not len(seen):
+        return slopes, noise
+    rays = rays / rays[:, 2:]
+    slopes[seen] = rays[:, :2]
+    by_slope = project_linearised(rays @ turn, model)[1] @ turn.T[:, :2]
+    per_pixel = sigma_px * np.linalg.inv(by_slope)
+    noise[seen] = per_pixel @ np.swapaxes(per_pixel, 1, 2)
+    return slopes, noise
 
 
 def _root_mean(squares: Vector) -> float:

@@ -47,14 +47,29 @@ def rough_pose(points_m: Vector, corners: Corners, model: CameraModel) -> Vector
     usable = np.isfinite(rays).all(axis=1)
     if usable.sum() < _LEAST_CORNERS:
         raise cv2.error("the view has no rays that a pose could start from")
-    rays = rays[usable] / np.linalg.norm(rays[usable], axis=1, keepdims=True)
     # A fisheye lens may see the board aside of its own image plane: look towards the board instead.
-    towards = rays.mean(axis=0) / np.linalg.norm(rays.mean(axis=0))
-    axis = np.cross(towards, [0.0, 0.0, 1.0])
-    sine = float(np.linalg.norm(axis))
-    turn = rotations_of(axis / sine * np.arctan2(sine, towards[2]) if sine > 0 else np.zeros(3))
-    ahead = rays @ turn.T
-    slopes = ahead[:, :2] / np.maximum(ahead[:, 2:], _LEAST_FORWARD)
+    turn = _turn_to(rays[usable])
+    ahead = rays[usable] @ turn.T
+    slopes = ahead[:, :2] / np.maximum(ahead[:, 2:], _LEAST_FORWARD * np.linalg.norm(ahead, axis=1, keepdims=True))
     _, rotation, translation = cv2.solvePnP(points_m[usable], slopes, np.eye(3), None, flags=cv2.SOLVEPNP_ITERATIVE)
     pose = np.concatenate([np.ravel(rotation), np.ravel(translation)]).astype(np.float64)
     return (SE3(turn.T, np.zeros(3)) @ SE3.of(pose)).pose()
+
+
+def towards(corners: Corners, model: CameraModel) -> Vector:
+    """Return the (3, 3) turn from a camera's axes to those of one that looks at the middle of what it sees.
+
+    Args:
+        corners: (N, 2) px; NaN where one was not seen.
+        model: the camera.
+    """
+    rays = rays_through(corners, model)
+    return _turn_to(rays[np.isfinite(rays).all(axis=1)])
+
+
+def _turn_to(rays: Vector) -> Vector:
+    """Return the (3, 3) shortest turn that brings the middle of rays (M, 3) onto the z axis; none, if there are no rays."""
+    middle = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).sum(axis=0)
+    axis = np.cross(middle, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    return rotations_of(axis / sine * np.arctan2(sine, middle[2]) if sine > 0 else np.zeros(3))

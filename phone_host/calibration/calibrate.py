@@ -8,55 +8,42 @@ rejected, all of them get a second chance with lenses that bend more freely. At 
 predicts views which it was not fitted to (`lens_choice.py`).
 """
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_in_space import boards_in_space
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected, Used
+from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import (
-    BundleResult,
     BundleState,
     BundleView,
     FreeParameters,
     Vector,
     adjust,
-    rig_of,
-    rms_px,
 )
 from phone_host.calibration.calibrate_alone import (
     LoneCamera,
     calibrate_alone,
     corners_of,
-    own_errors_px,
     require_enough,
     with_poses,
 )
-from phone_host.calibration.fit_quality import LensTrial
-from phone_host.calibration.held_out import held_out_squares
+from phone_host.calibration.fitted_rig import Bends, Fitted, summed_up
 from phone_host.calibration.lens_choice import choose_lens, grows, is_fisheye
-from phone_host.calibration.misfits import misfits, rms, vertical_errors_px
-from phone_host.calibration.next_view import next_view
+from phone_host.calibration.misfits import misfits
 from phone_host.calibration.relative_pose import prediction_errors_px, states_of
-from phone_host.calibration.rig_sigma import DEPTHS_M, depth_sigma_m, zero_sigma_px
-from phone_host.calibration.target import Board, Corners
+from phone_host.calibration.target import Board
 from phone_host.geometry.lens import PARAMETERS
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.model import CameraModel, Rig, Side
-from phone_host.stereo.rectify import rectify_rig
+from phone_host.model import Rig, Side
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 """Width and height of the left and of the right images, px."""
-
-Bends = tuple[Bend, Bend]
-"""How freely the left and the right lens may bend."""
 
 # With fewer pairs a richer lens explains wrong pairs. (Of those that fit, `lens_choice` asks views that were held out.)
 _FREER_PAIRS = 5
@@ -70,22 +57,6 @@ _CHANCE_LOSS = 0.05
 
 # Limits for the right view predicted from the left one, while the cameras are not yet adjusted to each other.
 _MOVED_FACTOR, _MOVED_FLOOR_PX = 5.0, 3.0
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Fitted:
-    """A rig fitted to the pairs that it explains: the optimum, those pairs, the others, and how freely each lens bent."""
-
-    result: BundleResult
-    kept: list[BoardPair]
-    rejected: list[Rejected]
-    bends: Bends
-    free: FreeParameters
-    trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())
-
-    def views(self) -> list[BundleView]:
-        """The pairs that are used, as the adjustment takes them."""
-        return [BundleView(pair.left_px, pair.right_px) for pair in self.kept]
 
 
 def calibrate(
@@ -112,7 +83,7 @@ def calibrate(
     with _unexplained():
         best = _best_fit(pairs, points_m, sizes_px)
         is_hopeless = best.result.rms_px() > _HOPELESS_SHARE * max(size[0] for size in sizes_px)
-        fitted = best if is_hopeless else _with_chosen_lenses(best, pairs, points_m)
+        fitted = best if is_hopeless else _with_chosen_lenses(best, pairs, points_m, best.bends)
         return summed_up(fitted, points_m=points_m, board_side=board_side)
 
 
@@ -183,7 +154,7 @@ def _best_fit(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Fitt
 
 
 def _second_chances(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -> Iterator[Bends]:
-    """Yield how freely lenses may bend, after the usual way: both wide, then a fisheye where it explains a camera's views far better."""
+    """Yield how freely lenses may bend, after the usual way: both wide, then a fisheye where it explains a camera's views far better, then two."""
     if len(pairs) < _FREER_PAIRS:
         return
     yield Bend.WIDE, Bend.WIDE
@@ -193,6 +164,8 @@ def _second_chances(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes) -
     )
     if Bend.FISHEYE in {left, right}:
         yield left, right
+        if left is not right:
+            yield Bend.FISHEYE, Bend.FISHEYE
 
 
 def _explains_more(other: Fitted, best: Fitted) -> bool:
@@ -212,7 +185,7 @@ def _with_freer_lenses(pairs: list[BoardPair], points_m: Vector, sizes_px: Sizes
     return fitted if _both_grow(fitted.result.state) else None
 
 
-def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector) -> Fitted:
+def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector, at_least: Bends) -> Fitted:
     """Give each camera the lens that best predicts views which it was not fitted to, and adjust once more."""
     state = fitted.result.state
     relative = SE3(rotations_of(state.rotation), state.translation_m)
@@ -220,7 +193,7 @@ def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector
     found = [
         choose_lens([corners_of(pair, side) for pair in fitted.kept], points_m, model, poses, bend)
         for side, model, poses, bend in zip(
-            Side, (state.left, state.right), (state.poses, right_poses), fitted.bends, strict=True
+            Side, (state.left, state.right), (state.poses, right_poses), at_least, strict=True
         )
     ]
     bends = (found[0][0].bend, found[1][0].bend)
@@ -236,7 +209,9 @@ def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector
     if not _both_grow(result.state) or result.rms_px() > (1 + _CHANCE_LOSS) * fitted.result.rms_px():
         return fitted
     chosen = replace(fitted, result=result, bends=bends, free=free)
-    return _with_pairs_that_came_back(chosen, pairs, points_m) if fitted.rejected else chosen
+    back = _with_pairs_that_came_back(chosen, pairs, points_m) if fitted.rejected else chosen
+    # The pairs that came back may be those that show what the lens is; each turn brings at least one.
+    return _with_chosen_lenses(back, pairs, points_m, at_least) if len(back.kept) > len(fitted.kept) else back
 
 
 def _with_pairs_that_came_back(fitted: Fitted, pairs: list[BoardPair], points_m: Vector) -> Fitted:
@@ -322,77 +297,3 @@ def fit_of_known_lenses(pairs: list[BoardPair], points_m: Vector, rig: Rig, bend
     nothing = np.zeros(PARAMETERS, bool)
     fitted = _adjust_robustly(kept, points_m, start, bends, FreeParameters(nothing, nothing))
     return replace(fitted, rejected=[*rejected, *fitted.rejected])
-
-
-def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibration:
-    """Make a rig and its figures from the optimum.
-
-    Args:
-        fitted: the optimum.
-        points_m: (N, 3) corners in the board's axes.
-        board_side: which camera is the board's.
-    """
-    result, pairs = fitted.result, fitted.kept
-    state = result.state
-    rig = replace(
-        rig_of(state),
-        covariance=result.covariance,
-        board_side=board_side,
-        rms_left_px=_alone_rms_px(pairs, Side.LEFT, points_m, state.left),
-        rms_right_px=_alone_rms_px(pairs, Side.RIGHT, points_m, state.right),
-        rms_stereo_px=result.rms_px(),
-    )
-    rectification, obstacle, advice = None, None, None
-    vertical = [np.full(1, np.nan)] * len(pairs)
-    depths: tuple[tuple[float, float], ...] = ()
-    try:
-        rectification = rectify_rig(rig)
-    except DataError as error:
-        obstacle = error
-    else:
-        vertical = [vertical_errors_px(pair, rig, rectification) for pair in pairs]
-        rig = replace(rig, zero_sigma_px=zero_sigma_px(rig, rectification))
-        depths = tuple((depth_m, depth_sigma_m(rig, rectification, depth_m)) for depth_m in DEPTHS_M)
-        advice = next_view(result, fitted.free, points_m, rectification)
-    boards = boards_in_space(pairs, points_m, rig, state.poses, result.sigmas_px())
-    used = tuple(
-        Used(name=pair.name, left_px=float(a), right_px=float(b), vertical_px=rms(v), in_space=board)
-        for pair, a, b, v, board in zip(pairs, *result.view_rms_px(), vertical, boards, strict=True)
-    )
-    return Calibration(
-        rig=rig,
-        rectification=rectification,
-        obstacle=obstacle,
-        used=used,
-        rejected=tuple(fitted.rejected),
-        vertical_px=np.abs(np.concatenate(vertical)),
-        baseline_sigma_m=rig.baseline_sigma_m,
-        tilts_deg=np.array([_tilt_deg(pose) for pose in state.poses]),
-        spread=min(
-            _spread([corners_of(pair, side) for pair in pairs], (model.width_px, model.height_px))
-            for side, model in ((Side.LEFT, state.left), (Side.RIGHT, state.right))
-        ),
-        bends=fitted.bends,
-        squares=held_out_squares(pairs, points_m, state, fitted.free),
-        depths=depths,
-        advice=advice,
-        trials=fitted.trials,
-        poses=state.poses,
-        left_errors_px=result.left_errors_px,
-        right_errors_px=result.right_errors_px,
-    )
-
-
-def _alone_rms_px(pairs: list[BoardPair], side: Side, points_m: Vector, model: CameraModel) -> float:
-    return rms_px(*(own_errors_px(points_m, corners_of(pair, side), model) for pair in pairs))
-
-
-def _tilt_deg(pose: Vector) -> float:
-    """Return the angle between a board and the left image plane."""
-    normal_z = abs(float(rotations_of(pose[:3])[2, 2]))
-    return math.degrees(math.acos(min(normal_z, 1.0)))
-
-
-def _spread(views: list[Corners], size_px: tuple[int, int]) -> float:
-    corners = np.concatenate(views)
-    return float(((np.nanmax(corners, axis=0) - np.nanmin(corners, axis=0)) / np.array(size_px)).min())

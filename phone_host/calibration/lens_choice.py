@@ -41,11 +41,17 @@ _STANDARD_ERRORS: Final = 1.0
 _LEAST_GAIN: Final = 0.005
 """Of the mean squared error: a smaller gain moves no point by a measurable amount, and is not worth another formula."""
 
-_FAR_BETTER: Final = 0.7
-"""Share of the wide lens's median error below which a fisheye lens is worth rejecting pairs anew."""
+_FAR_BETTER: Final = 0.85
+"""Share of the wide lens's squared errors below which a fisheye lens is worth rejecting pairs anew: of fisheyes of 120 degrees at most 0.7, of pinholes 0.99."""
+
+_WRONG: Final = 3.0
+"""In usual errors: a view beyond is as wrong as any. Those far off the axis tell the lenses apart, so no median does."""
 
 _WIDEST_RAD: Final = 4.5
 """Angle that an image's width covers, at the scale of its middle: no lens sees more than 260 degrees."""
+
+_WIDE_RAD: Final = 1.3
+"""Angle that an image's width covers from which on poses that a pinhole gave mislead the search for a fisheye."""
 
 _EDGE_SAMPLES: Final = 200
 _BEYOND: Final = 1.1
@@ -83,7 +89,7 @@ def choose_lens(
 
 
 def is_fisheye(views: list[Corners], points_m: Vector, size_px: tuple[int, int]) -> bool:
-    """Return whether a fisheye lens explains the views of one camera far better than a wide one; views may be wrong.
+    """Return whether a fisheye lens explains the views of one camera far better than a wide one, or that one only by folding back; views may be wrong.
 
     Args:
         views: (N, 2) corners of each view.
@@ -99,13 +105,11 @@ def is_fisheye(views: list[Corners], points_m: Vector, size_px: tuple[int, int])
         wide = adjust_alone(views, points_m, start, Bend.WIDE.free())
     except (DataError, cv2.error, np.linalg.LinAlgError):
         return False
-    as_fisheye, as_wide = (_median_error_px(views, points_m, state) for state in (alone_state(model, poses), wide))
-    return as_fisheye < _FAR_BETTER * as_wide
-
-
-def _median_error_px(views: list[Corners], points_m: Vector, state: BundleState) -> float:
-    unseen = [BundleView(corners, np.full(corners.shape, np.nan)) for corners in views]
-    return float(np.nanmedian(np.linalg.norm(errors_of(unseen, points_m, state)[0], axis=2)))
+    as_fisheye, as_wide = (_errors_px(views, points_m, state) for state in (alone_state(model, poses), wide))
+    most = _WRONG * float(np.median(as_fisheye))
+    squares = [float((np.fmin(errors, most) ** 2).mean()) for errors in (as_fisheye, as_wide)]
+    is_folded = size_px[0] > _WIDE_RAD * model.matrix[0, 0] and grows(model) and not grows(wide.left)
+    return is_folded or squares[0] < _FAR_BETTER * squares[1]
 
 
 def grows(model: CameraModel) -> bool:
@@ -129,7 +133,7 @@ def _trial(
 ) -> LensTrial | None:
     """Fit one formula to all views and to all but each part; None if that leads nowhere, as where it explains no more than `plain`."""
     try:
-        whole = adjust_alone(views, points_m, _start(start, bend), bend.free())
+        whole = adjust_alone(views, points_m, _start(views, points_m, start, bend), bend.free())
         fitted_px = _errors_px(views, points_m, whole)
         # What does not explain the views that it was fitted to any better predicts no others better.
         if not grows(whole.left) or (plain is not None and not _is_less(fitted_px, plain.fitted_px)):
@@ -143,13 +147,16 @@ def _trial(
     return LensTrial(bend, whole.left, errors, fitted_px) if np.isfinite(errors).all() else None
 
 
-def _start(start: BundleState, bend: Bend) -> BundleState:
-    if bend.lens is start.left.lens:
+def _start(views: list[Corners], points_m: Vector, start: BundleState, bend: Bend) -> BundleState:
+    model = start.left
+    if bend.lens is model.lens:
         return start
-    values = parameters_of(start.left)
-    if Lens.FISHEYE in {bend.lens, start.left.lens}:
+    values = parameters_of(model)
+    if bend.lens is Lens.FISHEYE and model.width_px > _WIDE_RAD * values[0]:
+        return alone_state(*fisheye_camera(views, points_m, (model.width_px, model.height_px)))
+    if bend is not Bend.RATIONAL or model.lens is Lens.FISHEYE:
         values[4:] = 0  # near the axis all lenses agree; the coefficients follow
-    return alone_state(with_parameters(start.left, values, bend.lens), start.poses)
+    return alone_state(with_parameters(model, values, bend.lens), start.poses)
 
 
 def _errors_px(views: list[Corners], points_m: Vector, state: BundleState) -> Vector:

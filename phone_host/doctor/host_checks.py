@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, assert_never
 
+from common.android import INSTALL as TERMUX_INSTALL
 from common.doctor.finding import Finding, fail, ok, warn
 from common.errors import SettingsError
 from phone_host.stereo.native.library import VARIABLE, Library, Missing
@@ -17,6 +18,9 @@ OPENCV_WHEELS: Final = (
     "opencv-contrib-python-headless",
 )
 """All of them install the same folder `cv2`: they overwrite each other's files, and removing one breaks the others."""
+
+_COST_OF_SGBM: Final = "six times the work for each pair"
+"""CPU time of both at 640x480 with 64 disparities (docs/figures.md)."""
 
 _USABLE_PX: Final = 1.0
 """With a stereo RMS above one pixel, the rows of the two images do not match, and no matcher finds much."""
@@ -124,7 +128,7 @@ def check_package(package: Package) -> Finding:
         return fail(
             package.name,
             f"cannot be imported ({package.problem})",
-            "install it: make run-venv in a checkout, or pipx reinstall tandemscan; on Termux pkg install it",
+            f"install it: make run-venv in a checkout, or pipx reinstall tandemscan; in Termux: {TERMUX_INSTALL}",
         )
     text = f"{package.name} {package.version}" + (f" ({package.wheels[0]})" if package.wheels else "")
     found = _numbers(package.version)
@@ -146,7 +150,7 @@ def check_native(library: Library | Missing | SettingsError, wanted: str = "") -
             return ok("native", f"own matcher: {library.simd.text}")
         case Missing(reason=reason, remedy=remedy):
             idle = f"; {VARIABLE}={wanted} has no effect" if wanted else ""
-            return warn("native", f"own matcher {reason}; sgbm is used{idle}", remedy)
+            return warn("native", f"own matcher {reason}; sgbm is used, {_COST_OF_SGBM}{idle}", remedy)
         case _:
             return fail("native", library.problem, library.remedy)
 

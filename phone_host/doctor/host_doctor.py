@@ -17,6 +17,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from common import now
+from common.android import is_android
 from common.camera.base import origin_words
 from common.camera.v4l2_device import capture_nodes
 from common.doctor import machine
@@ -24,6 +25,7 @@ from common.doctor.access import check_access
 from common.doctor.camera_probe import examine_camera
 from common.doctor.finding import Finding, Grade, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
+from common.doctor.network_probe import examine_network
 from common.doctor.unit_check import Unit
 from common.errors import SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder
@@ -34,6 +36,8 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import is_http
+from phone_host.doctor.android_checks import Phone, check_camera, check_phone, check_usb
+from phone_host.doctor.android_checks import check_bluetooth as check_android_bluetooth
 from phone_host.doctor.host_checks import (
     OPENCV_WHEELS,
     Answer,
@@ -75,11 +79,12 @@ class Question:
     feed: BrowserFeed | None = None
 
 
-def examine(question: Question) -> Iterator[Finding]:
+def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
     """Check this machine for a run.
 
     Args:
         question: what the run would use.
+        keeps: whether to look for an earlier check of the camera's images.
 
     Yields:
         The findings, in the order in which problems arise.
@@ -89,31 +94,37 @@ def examine(question: Question) -> Iterator[Finding]:
     """
     account = machine.own_account()
     yield check_python(sys.version_info[:3], sys.platform)
+    if is_android():
+        yield check_phone(_phone())
     packages = [check_package(package) for package in _packages()]
     yield from packages
     yield native_finding()
     works = all(finding.verdict is not Grade.FAIL for finding in packages)
     if is_http(question.camera) or is_browser(question.camera):
         yield _far_camera(question.camera, question.feed)
+    elif question.camera.startswith("v4l2:") and is_android():
+        yield check_camera(question.camera)
     elif question.camera:
         yield from examine_camera(question.camera, account, Unit("phone-host"))
     else:
         yield _cameras()
-    yield _ports()
-    yield check_bluetooth(machine.read_bluetooth(), wanted=any(uri.startswith("rfcomm:") for uri in question.links))
+    yield from _local_links(question.links)
     if not question.links:
         yield ok("board", "not asked: give --link")
     for uri in question.links:
         yield from _examine_board(uri, question.wait_s, question.keys, works=works)
     if question.calibration and works:
-        from phone_host.doctor.vision_checks import read_rig_readings  # noqa: PLC0415 - numpy and OpenCV, seen to work
+        from phone_host.doctor import vision_checks  # noqa: PLC0415 - numpy and OpenCV, seen to work
 
-        yield check_rig(read_rig_readings(question.calibration, question.camera))
+        yield check_rig(vision_checks.read_rig_readings(question.calibration, question.camera))
+        if keeps and question.camera:
+            yield from vision_checks.check_kept_capture(question.calibration, question.camera, question.feed)
     yield from check_clocks(machine.read_clocks(Path(__file__).parent))
     yield from examine_out(question.out)
-    log = machine.read_kernel_log()
-    yield check_power(log, machine.read_supply())
-    yield check_usb_log(log)
+    if not is_android():  # which shows the kernel's log to nobody
+        log = machine.read_kernel_log()
+        yield check_power(log, machine.read_supply())
+        yield check_usb_log(log)
 
 
 def native_finding() -> Finding:
@@ -142,7 +153,8 @@ def examine_out(out: Path) -> list[Finding]:
 
 
 def _packages() -> list[Package]:
-    wheels = tuple(name for name in OPENCV_WHEELS if _is_installed(name))
+    # Termux's own package bears the names of several wheels and is one.
+    wheels = () if is_android() else tuple(name for name in OPENCV_WHEELS if _is_installed(name))
     return [
         _package("numpy", "1.24"),
         _package("cv2", "4.10", "5", wheels),
@@ -185,15 +197,35 @@ def _far_camera(uri: str, feed: BrowserFeed | None) -> Finding:
     return ok("camera", text if origin is None else f"{text}; {origin_words(origin)}")
 
 
+def _phone() -> Phone:
+    maker, model = (machine.read_property(f"ro.product.{name}") for name in ("manufacturer", "model"))
+    version, shop = (os.environ.get(name, "") for name in ("TERMUX_VERSION", "TERMUX_APK_RELEASE"))
+    return Phone(
+        model=f"{maker} {model}".strip(),
+        android=machine.read_property("ro.build.version.release"),
+        termux=f"{version} {shop}".strip(),
+        processor=os.uname().machine,
+    )
+
+
+def _local_links(links: tuple[str, ...]) -> list[Finding]:
+    """Check what there is besides the network: USB and Bluetooth."""
+    wireless = [uri for uri in links if uri.startswith("rfcomm:")]
+    if is_android():
+        cables = [uri for uri in links if uri.startswith("serial:")]
+        return [check_usb(machine.read_cards(), cables), check_android_bluetooth(wireless)]
+    return [_ports(), check_bluetooth(machine.read_bluetooth(), wanted=bool(wireless))]
+
+
 def _cameras() -> Finding:
+    if is_android():
+        return check_camera()
     nodes = capture_nodes()
     text = f"{', '.join(map(str, nodes))}; give one with --camera" if nodes else "no camera of this machine is seen"
     return ok("camera", text)
 
 
 def _ports() -> Finding:
-    if sys.platform != "linux":
-        return check_ports((), f"{sys.platform} shows none")
     try:
         from serial.tools import list_ports  # noqa: PLC0415 - optional, and an ImportError where its platform is unknown
     except ImportError as error:
@@ -204,8 +236,9 @@ def _ports() -> Finding:
 
 def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> list[Finding]:
     """Check the way to the board and, if the packages work, ask the board itself."""
-    address = parse_link(uri, listens_by_default=False).address
-    findings = []
+    link = parse_link(uri, listens_by_default=False)
+    address = link.address
+    findings = examine_network(link)
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
         findings.append(check_access("permission", node, machine.own_account()))
     if not works:
@@ -216,6 +249,8 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
         board = ask_board(uri, wait_s, keys)
     except TandemError as error:
         return [*findings, Finding(what="board", verdict=Grade.FAIL, text=error.problem, remedy=error.remedy)]
+    if board.answer is Answer.BOARD:  # whatever way it came
+        findings = [finding for finding in findings if finding.verdict is not Grade.FAIL]
     if board.answer is Answer.SILENT:
         board = BoardReadings(uri=board.uri, answer=_way(address), waited_s=board.waited_s)
     return [*findings, check_board(board)]

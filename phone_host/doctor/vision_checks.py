@@ -11,14 +11,20 @@ import numpy as np
 from common import now
 from common.camera.factory import parse_camera
 from common.camera.v4l2_stream import V4l2Settings
-from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, TandemError
+from common.doctor.finding import Finding, warn
+from common.errors import AbsentBoardError, BusyBoardError, DataError, OtherVersionError, TandemError
 from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
+from common.stamp import HOST_CLOCK
+from phone_host.calibration.capture.words import stored_finding
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
-from phone_host.camera.factory import camera_orientation
+from phone_host.camera.factory import camera_orientation, open_camera
 from phone_host.camera.http_uri import is_http
+from phone_host.doctor.capture import source_of
 from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
 from phone_host.model import Side
+from phone_host.output.capture_json import capture_path, read_capture
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stream.await_board import BoardPatience, await_board
@@ -103,3 +109,26 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
         is_rejected=rig.is_rejected,
         asked_size_px=asked_px if asked_px is None else camera_orientation(camera).turned_size(asked_px),
     )
+
+
+def check_kept_capture(calibration: str, camera: str, feed: BrowserFeed | None) -> list[Finding]:
+    """Look for the check of a camera's images that is kept beside a calibration, and whether it holds for this camera.
+
+    Phones stabilise their images, other cameras hardly: of a camera of this machine nothing is said if it was never checked.
+
+    Args:
+        calibration: rig.yaml.
+        camera: URI of the host camera.
+        feed: brings browsers that give their cameras; None: there is no page.
+    """
+    try:
+        kept = read_capture(capture_path(Path(calibration)))
+        if kept is None and not is_http(camera) and not is_browser(camera):
+            return []
+        opened = open_camera(camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
+    except DataError as error:
+        return [warn("capture", error.problem, error.remedy)]
+    except TandemError:
+        return []  # the camera's own finding says so
+    opened.close()
+    return [stored_finding(kept, source_of(opened.description))]

@@ -27,6 +27,12 @@ _MOST_STEPS: Final = 50
 CONVERGED: Final = 1e-9
 """Relative decrease of the cost at which the search ends; the baseline of a rig then moves by less than a micrometre."""
 
+_TILE: Final = 16
+"""OpenBLAS works alone up to 262144 products: 16 x 16 x 1024."""
+
+_ALONE: Final = 150
+"""It solves systems up to 200 x 200 alone."""
+
 _DAMPING_START, _DAMPING_LEAST, _DAMPING_MOST = 1e-3, 1e-12, 1e12
 
 
@@ -62,9 +68,16 @@ class NormalEquations:
             np.linalg.LinAlgError: a block is singular.
         """
         blocks = self.blocks + damping * self.blocks * np.eye(self.blocks.shape[1])
-        taken, taken_right, inverse = eliminated(self.coupling[:, free], blocks, self.blocks_right)
+        coupling = self.coupling[:, free]
+        inverse = np.asarray(np.linalg.inv(blocks), np.float64)
+        wide = coupling.shape[1], blocks.shape[0] * blocks.shape[1]
+        through, coupled = (np.swapaxes(each, 0, 1).reshape(wide) for each in (coupling @ inverse, coupling))
         matrix = self.shared[np.ix_(free, free)] + damping * np.diag(np.diag(self.shared)[free])
-        return matrix - taken.sum(axis=0), self.shared_right[free] - taken_right.sum(axis=0), inverse
+        return (
+            matrix - _product(through, coupled),
+            self.shared_right[free] - through @ self.blocks_right.ravel(),
+            inverse,
+        )
 
     def step(self, damping: float, free: Flags) -> tuple[Floats, Floats]:
         """Return the damped step: shared parameters (G,), 0 for those that are not free, and blocks (V, B).
@@ -74,7 +87,7 @@ class NormalEquations:
         """
         matrix, right, inverse = self.reduced(damping, free)
         step = np.zeros(len(free))
-        step[free] = np.linalg.solve(matrix, right)
+        step[free] = solved(matrix, right)
         return step, np.einsum("vij,vj->vi", inverse, self.blocks_right - np.einsum("vij,i->vj", self.coupling, step))
 
     def covariance(self, free: Flags) -> Floats:
@@ -82,6 +95,49 @@ class NormalEquations:
         result = np.zeros(self.shared.shape)
         result[np.ix_(free, free)] = inverse_of(self.reduced(0.0, free)[0])
         return result
+
+
+def _product(one: Floats, other: Floats) -> Floats:
+    """Return one @ other.T, (G, G), of two wide matrices (G, K), in tiles: too small for the linear algebra library to wake its threads.
+
+    They spin while they wait for each other: on a busy machine that took ten times as long. One product for each block, and their sum, fills the
+    memory instead.
+    """
+    rows = len(one)
+    tiles = [np.pad(each, ((0, -rows % _TILE), (0, 0))).reshape(-1, _TILE, each.shape[1]) for each in (one, other)]
+    product = tiles[0][:, np.newaxis] @ np.swapaxes(tiles[1], 1, 2)[np.newaxis]
+    return np.asarray(product.transpose(0, 2, 1, 3).reshape(2 * (rows + -rows % _TILE,))[:rows, :rows], np.float64)
+
+
+def solved(matrix: Floats, right: Floats) -> Floats:
+    """Solve matrix @ x = right, in parts that are too small for the linear algebra library to wake its threads; see `_product`.
+
+    Args:
+        matrix: (F, F), symmetric and positive definite.
+        right: (F,) or (F, K).
+
+    Returns:
+        x, as large as `right`.
+
+    Raises:
+        np.linalg.LinAlgError: the matrix is singular.
+    """
+    size = len(matrix)
+    if size <= _ALONE:
+        return np.asarray(np.linalg.solve(matrix, right), np.float64)
+    rest, factor, found = matrix.copy(), np.zeros_like(matrix), np.array(right, np.float64)
+    parts = [slice(first, min(first + 2 * _TILE, size)) for first in range(0, size, 2 * _TILE)]
+    for here in parts:
+        below = slice(here.stop, size)
+        factor[here, here] = np.linalg.cholesky(rest[here, here])
+        factor[below, here] = np.linalg.solve(factor[here, here], rest[below, here].T).T
+        rest[below, below] -= _product(factor[below, here], factor[below, here])
+        found[here] = np.linalg.solve(factor[here, here], found[here])
+        found[below] -= factor[below, here] @ found[here]
+    for here in reversed(parts):
+        found[here] -= factor[here.stop :, here].T @ found[here.stop :]
+        found[here] = np.linalg.solve(factor[here, here].T, found[here])
+    return found
 
 
 def eliminated(coupling: Floats, blocks: Floats, right: Floats) -> tuple[Floats, Floats, Floats]:

@@ -14,7 +14,7 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera
-from common.errors import DataError
+from common.errors import SettingsError
 from common.link.base import Link
 from phone_host.calibration.board_views import Size
 from phone_host.calibration.causes.looks import look_at
@@ -89,14 +89,14 @@ class LiveCalibration:
         grow: calibrates from the views so far; called in a thread of its own.
 
     Raises:
-        DataError: the host camera has no clock.
+        SettingsError: the host camera has no clock.
         UnavailableError: the folders hold other pictures.
         OSError: they cannot be written to.
     """
 
     def __init__(self, settings: LiveSettings, camera: Camera, links: Sequence[Link], grow: Grow) -> None:
         if not has_own_time(camera.description.pacing):
-            raise DataError("a camera with pace=demand has no clock", "give it fps= or pace=clock")
+            raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
         self._settings, self._grow = settings, grow
         self._folders = ViewFolders(settings.left, settings.right)
         self._lock = Lock()

@@ -134,14 +134,15 @@ def film(
 
     Raises:
         UnavailableError: there is no board, or it does not talk to this host.
-        DataError: a camera shows images on demand and so has no time stamps.
+        DataError: the board shows images on demand and so has no time stamps.
+        SettingsError: the same of the own camera.
     """
     pacing = camera.description.pacing
     if not has_own_time(pacing):
         camera.close()
         for link in links:
             link.close()
-        raise DataError("a camera with pace=demand has no clock", "give it fps= or pace=clock")
+        raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
     keeper = _Keeper(camera.description.orientation)
     own = OwnCamera(camera, keeper.add_host, DemandClock(pacing))
     receiver = Receiver(links, now.random_id(), keeper)

@@ -81,6 +81,10 @@ class ShareBar:
             self._then = ""
         self._progress.update(self._task, completed=share)
 
+    def say(self, what: str) -> None:
+        """Show what is being done from now on."""
+        self._progress.update(self._task, description=what)
+
 
 @contextmanager
 def share_bar(what: str, then: str = "", console: Console | None = None) -> Iterator[ShareBar]:

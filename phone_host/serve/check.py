@@ -1,11 +1,18 @@
 """What a check of the two chosen cameras came to: what the doctor said, and what a run of some seconds without depth saw. Pure."""
 
 import math
+from collections.abc import Iterable
 
 from common.doctor.finding import Finding, Grade
 from common.words import counted
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
+from phone_host.web.source import Checked
+
+
+def checked(findings: Iterable[Finding]) -> list[Checked]:
+    """Return findings as the page shows them."""
+    return [Checked(each.what, each.verdict.value, each.text, each.remedy) for each in findings]
 
 
 def obstacle(findings: list[Finding]) -> Trouble | None:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from common.doctor.finding import Finding
 from common.keys import KeyFolder
+from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.view import View
 from phone_host.camera.browser_feed import BrowserFeed
@@ -129,6 +131,17 @@ class Program(Protocol):
 
     def question(self, choices: Choices) -> Question:
         """Return what the doctor is to look at."""
+
+    def capture(
+        self, choices: Choices, stopped: Callable[[], bool], tell: Callable[[Progress], None]
+    ) -> Sequence[Finding]:
+        """Film for a minute with the own camera, and return what its film is worth; kept beside the chosen calibration.
+
+        Args:
+            choices: with a camera.
+            stopped: asked often; True ends it.
+            tell: called with each frame.
+        """
 
     def calibration(self, choices: Choices, values: Choices) -> ReadyCalibration:
         """Open everything that a live calibration needs."""

@@ -24,6 +24,7 @@ from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.run.freed_memory import give_back_freed_memory
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task
+from phone_host.serve.capture_guide import CaptureGuide
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.program import Choices, Program, ReadyRun
@@ -59,6 +60,7 @@ class Station:
             Do.ENROL: self._enrol,
             Do.SET: self._set,
             Do.CHECK: self._check,
+            Do.CAPTURE: self._capture,
             Do.CALIBRATE: self._calibrate,
             Do.RUN: self._run,
             Do.STOP: self._stop,
@@ -187,9 +189,7 @@ class Station:
                 if task.stopped():
                     return
                 findings.append(finding)
-                self._memory.checking(
-                    [Checked(each.what, each.verdict.value, each.text, each.remedy) for each in findings]
-                )
+                self._memory.checking(check.checked(findings))
             if (trouble := check.obstacle(findings)) is not None:
                 self._memory.fail(trouble)
                 return
@@ -202,6 +202,24 @@ class Station:
                 self._memory.fail(check.unseen(over))
 
         return self._begun(Activity.CHECKING, work, "the check begins")
+
+    def _capture(self, values: Choices) -> Answer:
+        del values
+        choices = self._memory.choices
+        if not choices.get("camera"):
+            raise SettingsError("no camera of this machine is chosen", "find one, or type its address")
+
+        def work(task: Task) -> None:
+            guide = CaptureGuide(self._show_checks)
+            with task.held():
+                findings = self._program.capture(choices, task.stopped, guide.tell)
+            self._show_checks([] if task.stopped() else check.checked(findings))
+
+        return self._begun(Activity.CHECKING, work, "hold the camera still")
+
+    def _show_checks(self, checks: Sequence[Checked]) -> None:
+        self._memory.checking(checks)
+        self._shelf.tell()
 
     def _calibrate(self, values: Choices) -> Answer:
         choices = self._both_chosen()

@@ -167,7 +167,7 @@ def _window_offsets(
     difference = cv2.multiply(_inner(cv2.subtract(here, there, dtype=cv2.CV_32F)), mask)
     size = (mask.shape[1] // WINDOW_PX, mask.shape[0] // WINDOW_PX)
 
-    def window_mean(values: cv2.typing.MatLike) -> NDArray[np.float32]:
+    def window_mean(values: "cv2.typing.MatLike") -> NDArray[np.float32]:
         return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA), np.float32)
 
     share = window_mean(mask)
@@ -185,7 +185,7 @@ def _window_offsets(
     return np.asarray(guesses[counted], np.float32), np.asarray(information[counted], np.float32)
 
 
-def _inner(rows: cv2.typing.MatLike) -> NDArray[np.float32]:
+def _inner(rows: "cv2.typing.MatLike") -> NDArray[np.float32]:
     """Return the windows' rows without those above and below them."""
     width = rows.shape[1]
     inner = rows.reshape(-1, WINDOW_PX + 2, width)[:, 1:-1]

@@ -16,7 +16,6 @@ captured and the lines go where they went before.
 
 import ctypes
 import platform
-import sys
 import threading
 from collections.abc import Callable
 from functools import cache
@@ -24,10 +23,14 @@ from typing import Final
 
 import cv2
 
+from common.android import is_android
+
 _LOCK: Final = threading.Lock()
 """Guards the process's `stderr`; there is only one."""
 
 _FROM_START: Final = 0
+_SILENT: Final = 0
+"""LOG_LEVEL_SILENT of opencv2/core/utils/logger.defines.hpp."""
 
 
 class _Ear:
@@ -78,7 +81,7 @@ def overhear(work: Callable[[], object]) -> str:
         Exception: whatever the work raises.
     """
     with _LOCK:
-        log_level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        log_level = _log_level(_SILENT)
         try:
             ear = _ear()
             if ear is not None:
@@ -86,16 +89,23 @@ def overhear(work: Callable[[], object]) -> str:
             work()
             return ""
         finally:
-            cv2.utils.logging.setLogLevel(log_level)
+            _log_level(log_level)
+
+
+def _log_level(level: int) -> int:
+    """Set the level of OpenCV's own log; return the one before. Its wheels and the packages of Termux and Debian put it in different places."""
+    if hasattr(cv2.utils, "logging"):
+        return cv2.utils.logging.setLogLevel(level)
+    reading, setting = getattr(cv2, "getLogLevel", None), getattr(cv2, "setLogLevel", None)
+    before = reading() if reading else level
+    if setting:
+        setting(level)
+    return int(before)
 
 
 @cache
 def _ear() -> _Ear | None:
     """Return None where `stderr` may be a constant, as in musl: setting it would crash the process."""
-    if platform.libc_ver()[0] != "glibc" and not _is_android():
+    if platform.libc_ver()[0] != "glibc" and not is_android():
         return None
     return _Ear(ctypes.CDLL(None))
-
-
-def _is_android() -> bool:
-    return sys.platform == "android" or hasattr(sys, "getandroidapilevel")

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from phone_host.model import Image
 from phone_host.stereo.native.library import Library, Missing, RemapJob, Simd, native
 
-Maps = tuple[cv2.typing.MatLike, cv2.typing.MatLike]
-"""(H, W, 2) int16 and (H, W) uint16, as `cv2.convertMaps` makes them for CV_16SC2."""
+Maps = tuple["cv2.typing.MatLike", "cv2.typing.MatLike"]
+"""(H, W, 2) int16 and (H, W) uint16, as `cv2.convertMaps` makes them for CV_16SC2. Only OpenCV's wheels have `cv2.typing`: Termux's and Debian's packages lack it."""
 
 _FASTER = frozenset({Simd.AVX512, Simd.AVX2, Simd.SSE41})
 """Sets for which the kernel has code of its own: two thirds of OpenCV's time. Elsewhere OpenCV is the faster one."""

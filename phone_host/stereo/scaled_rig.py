@@ -33,7 +33,7 @@ def scaled_rig(rig: Rig, left_px: tuple[int, int], right_px: tuple[int, int]) ->
     Raises:
         DataError: a size is neither a scaling nor a crop of the size that its camera was calibrated for.
     """
-    left, right = _scaled(rig.left, left_px, Side.LEFT), _scaled(rig.right, right_px, Side.RIGHT)
+    left, right = scaled_camera(rig.left, left_px, Side.LEFT), scaled_camera(rig.right, right_px, Side.RIGHT)
     if left is rig.left and right is rig.right:
         return rig
     # Disparities are in px of the rectified images, whose focal length is that of the coarser camera (`rectify`).
@@ -95,7 +95,17 @@ def coarser_focal_px(left: CameraModel, right: CameraModel) -> float:
     return min(left.mean_focal_px, right.mean_focal_px)
 
 
-def _scaled(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraModel:
+def scaled_camera(model: CameraModel, size_px: tuple[int, int], side: Side) -> CameraModel:
+    """Scale or crop one camera of a rig to the size of its images.
+
+    Args:
+        model: as it was calibrated.
+        size_px: width and height of the images, px.
+        side: which camera it is, for errors.
+
+    Raises:
+        DataError: the size is neither a scaling nor a crop of the size that it was calibrated for.
+    """
     own_px = (model.width_px, model.height_px)
     if size_px == own_px:
         return model

@@ -125,6 +125,7 @@ class Do(Enum):
     ENROL = "enrol"
     SET = "set"
     CHECK = "check"
+    CAPTURE = "capture"
     CALIBRATE = "calibrate"
     RUN = "run"
     STOP = "stop"

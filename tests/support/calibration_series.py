@@ -45,11 +45,11 @@ def calibration() -> Calibration:
     return calibrate(list(pairs()), BOARD, SIZES)
 
 
-def taken(used: list[BoardPair] | None = None) -> Taken:
-    """What was taken: the views, and one picture of a pair without a board; `used`: corners that were changed since."""
+def taken(used: list[BoardPair] | None = None, seen: list[BoardPair] | None = None) -> Taken:
+    """What was taken: the views, and one picture of a pair without a board; `used`: corners that were changed since they were `seen`."""
     names = [pair.name for pair in pairs()] + ["8"]
     views = BoardViews(pairs(), REJECTED, SIZES, pictures=tuple(ViewPictures(name, JPEG, JPEG) for name in names))
-    seen = list(pairs())
+    seen = list(pairs()) if seen is None else seen
     return Taken(order=names, views=views, pairs=seen if used is None else used, seen=seen, board=BOARD)
 
 

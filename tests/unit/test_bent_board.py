@@ -36,7 +36,7 @@ def test_a_bend_of_all_views_is_named_with_its_figures() -> None:
 @pytest.mark.parametrize(
     ("bows_mm", "sigma_mm"),
     [
-        ([0.9] * 8, 0.01),  # less than half a percent of the side
+        ([0.7] * 8, 0.01),  # less than 0.4 % of the side
         ([3.0] * 8, 2.0),  # within the noise
         ([9.0, -3.0] * 4, 0.1),  # each view another
         ([3.0] * 5, 0.1),  # too few views

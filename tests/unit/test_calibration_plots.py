@@ -115,7 +115,7 @@ def test_views_of_an_earlier_calibration_come_first_and_have_no_picture() -> Non
     """Their corners are known, their images are not; a new pair whose name was taken keeps its own picture."""
     renamed = [replace(pair, name=f"{pair.name} (2)") for pair in pairs()[4:]]
     earlier = [replace(pair, left_px=pair.left_px.copy()) for pair in pairs()[:4]]
-    views = series_views(taken([*renamed, *earlier]), None, ())
+    views = series_views(taken([*renamed, *earlier], [*renamed, *earlier]), None, ())
     assert [view.name for view in views] == ["0", "1", "2", "3", "4 (2)", "5 (2)", "6 (2)", "7 (2)"]
     assert [bool(view.left.picture) for view in views] == [False] * 4 + [True] * 4
     assert not any(view.is_used for view in views)

@@ -139,9 +139,12 @@ def test_a_missing_native_library_is_a_warning_with_its_reason() -> None:
     """Everything works without it; a wrong TANDEMSCAN_SIMD stops every command, so that fails; the library's instructions are named."""
     missing = check_native(Missing(reason="not built: no C compiler", remedy="install gcc"))
     assert (missing.verdict, missing.remedy) == (WARN, "install gcc")
-    assert missing.text == "own matcher not built: no C compiler; sgbm is used"
+    assert missing.text == "own matcher not built: no C compiler; sgbm is used, six times the work for each pair"
     idle = check_native(Missing(reason="not built", remedy="install gcc"), "avx2")
-    assert idle.text == "own matcher not built; sgbm is used; TANDEMSCAN_SIMD=avx2 has no effect"
+    assert (
+        idle.text
+        == "own matcher not built; sgbm is used, six times the work for each pair; TANDEMSCAN_SIMD=avx2 has no effect"
+    )
     assert check_native(SettingsError("TANDEMSCAN_SIMD=mmx is no instruction set", "give scalar")).verdict is FAIL
     found = check_native(native())
     assert found.verdict is OK

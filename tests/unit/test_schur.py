@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from phone_host.geometry.schur import NormalEquations, minimise
+from phone_host.geometry.schur import NormalEquations, minimise, solved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,3 +91,16 @@ def test_a_singular_system_leaves_the_start() -> None:
 
     lines = problem()
     assert minimise(Nothing(lines.x, lines.y), START, np.array([True, True])) is START
+
+
+@pytest.mark.parametrize("size", [20, 151, 190])
+def test_large_systems_are_solved_in_parts(size: int) -> None:
+    """The solution of a system of any size, also with several right sides, satisfies it; a singular one is refused."""
+    random = np.random.default_rng(size)
+    half = random.normal(size=(size, size + 5))
+    matrix, right = half @ half.T, random.normal(size=(size, 2))
+    assert matrix @ solved(matrix, right) == pytest.approx(right, abs=1e-6)
+    assert matrix @ solved(matrix, right[:, 0]) == pytest.approx(right[:, 0], abs=1e-6)
+    matrix[:, 3] = matrix[3] = 0.0
+    with pytest.raises(np.linalg.LinAlgError):
+        solved(matrix, right)

@@ -23,9 +23,9 @@ def test_every_command_prints_all_versions(command: str) -> None:
 
 
 def test_the_line_names_each_version() -> None:
-    """Package, wire and the five kinds of files."""
+    """Package, wire and the six kinds of files."""
     found = re.fullmatch(
-        r"tandemscan (\S+) \(protocol (\d+), rig\.yaml (\d+), delays\.jsonl (\d+), report\.json (\d+), cameras\.json (\d+), overlay\.yaml (\d+)\)",
+        r"tandemscan (\S+) \(protocol (\d+), rig\.yaml (\d+), delays\.jsonl (\d+), report\.json (\d+), cameras\.json (\d+), overlay\.yaml (\d+), capture\.json (\d+)\)",
         all_versions(),
     )
     assert found is not None
@@ -35,6 +35,7 @@ def test_the_line_names_each_version() -> None:
         versions.REPORT_FORMAT,
         versions.CAMERAS_FORMAT,
         versions.OVERLAY_FORMAT,
+        versions.CAPTURE_FORMAT,
     )
     assert found.groups() == tuple(map(str, (PACKAGE_VERSION, PROTOCOL_VERSION, *formats)))
 

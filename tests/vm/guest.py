@@ -10,6 +10,8 @@ import socket
 import subprocess
 import tarfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -296,6 +298,19 @@ class Guest:
         """Start a command that keeps running; the caller ends it."""
         return subprocess.Popen(self._ssh_command(command), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
+    @contextmanager
+    def forwarded(self, port: int) -> Iterator[int]:
+        """Reach a port of the guest's loopback for the length of a block; yields the port on this machine."""
+        here = free_port()
+        line = ["-N", "-L", f"127.0.0.1:{here}:127.0.0.1:{port}", "-o", "ExitOnForwardFailure=yes", "-S", "none"]
+        command = self._ssh_command("")
+        with subprocess.Popen([command[0], *line, *command[1:-1]], stdin=subprocess.DEVNULL) as carrier:
+            try:
+                until(lambda: _is_open(here), "the port is forwarded")
+                yield here
+            finally:
+                carrier.kill()
+
     def _ssh(self, command: str) -> "subprocess.CompletedProcess[str]":
         return subprocess.run(
             self._ssh_command(command),
@@ -360,6 +375,11 @@ class GuestClock:
         assert self._echo.stdout is not None
         self._echo.stdin.write(b"\n")
         return int(self._echo.stdout.readline())
+
+
+def _is_open(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def _literal(text: str) -> str:

@@ -1,13 +1,12 @@
 """board-agent doctor on a booted board: what it reports about each thing that keeps a board from streaming."""
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests.support.programs import until
+from tests.vm.doctor import doctor
 from tests.vm.guest import UNIT, Guest
 from tests.vm.stream import Film, Skew, check_journal, streaming
 from tests.vm.webcam import Webcam
@@ -24,17 +23,6 @@ def _sound_afterwards(guest: Guest, webcam: Webcam) -> Iterator[None]:
     check_journal(guest)
 
 
-def doctor(guest: Guest, options: str = "") -> tuple[int, dict[str, Any]]:
-    """Run the doctor as root; return the exit code, and the first check of each kind, or the one that failed."""
-    shown = guest.sh(f"board-agent doctor --json {options} > /run/doctor.json; echo $?; cat /run/doctor.json")
-    code, _, text = shown.partition("\n")
-    found: dict[str, Any] = {}
-    for check in json.loads(text)["checks"]:
-        if check["what"] not in found or check["verdict"] == "fail":
-            found[check["what"]] = check
-    return int(code), found
-
-
 def test_a_board_that_streams_is_well(guest: Guest, film: Film, skew: Skew, tmp_path: Path) -> None:
     """While the service streams nothing fails: the doctor finds its camera and port, reports its rate, and does not disturb it."""
     with streaming(guest, film.right, tmp_path / "out") as stream:
@@ -47,6 +35,7 @@ def test_a_board_that_streams_is_well(guest: Guest, film: Film, skew: Skew, tmp_
     assert "our own service has it" in checks["stream"]["finding"]
     assert "sent to the host" in checks["stream"]["finding"]
     assert "our own service has it" in checks["link"]["finding"]
+    assert "tcp://10.0.3.15:5555 (eth1)" in checks["network"]["finding"]  # where the host of this test dials
     assert "user tandemscan may open" in checks["permission"]["finding"]
     assert checks["settings"]["finding"] == "/etc/tandemscan/board-agent.toml"
     assert len(report["sessions"]) == 1

@@ -1,18 +1,22 @@
 """One USB cable as network card and serial port: the package's gadget on the kernel's dummy controller, with its host end in the same machine."""
 
 import hashlib
+import os
 import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from common.doctor.network_checks import ACCESS_POINT, CABLE_BOARD
 from phone_host.boards.udev_rule import RULES, UsbBoard, write_rule
 from tests.support.programs import ledgers, lines, until
 from tests.vm.conftest import CAMERA
 from tests.vm.contract import run_contract
+from tests.vm.doctor import doctor
 from tests.vm.extension import extension
 from tests.vm.guest import NETWORK_CARD, OPEN_TO_ALL, Guest
 from tests.vm.stream import Film, Skew, check_journal, streaming
@@ -186,18 +190,98 @@ def test_the_card_is_silent_while_the_host_selects_it(cabled: Guest) -> None:
     assert cabled.sh(sent) == before
 
 
-def test_the_network_over_the_same_cable(cabled: Guest) -> None:
-    """The host end is a network card with its own name, behind which 192.168.7.2 answers; the host is offered an address there."""
-    _bring_up(cabled)
-    cabled.sh("ip netns add laptop && ip link set tandemscan0 netns laptop")
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A way between board and phone.
+
+    Attributes:
+        board, phone: the addresses of both ends.
+        link: what the board's settings say.
+    """
+
+    board: str
+    phone: str
+    link: str
+
+
+WAYS = {
+    "cable": Way(CABLE_BOARD, "192.168.7.1", f"tcp://{CABLE_BOARD}:5555?insecure=1"),
+    "access point": Way(ACCESS_POINT, "10.42.0.77", OPEN_TO_ALL),
+}
+"""The cable's two cards stand for the radio of the board's own Wi-Fi. The phone's hotspot is the board's second card in every other test here."""
+
+
+@contextmanager
+def _phone_at_the_end(guest: Guest, way: Way) -> Iterator[None]:
+    """A network namespace with the cable's host end, as a phone has it."""
+    _bring_up(guest)
+    card = guest.sh(f"cat {OURS}/functions/ncm.0/ifname").strip()
+    until(lambda: "0.0.0.0%" + card + ":67" in guest.sh("ss -lun"), "addresses are offered on the cable")
+    moved = way.board != CABLE_BOARD
+    if moved:
+        guest.sh(f"ip addr flush dev {card}; ip addr add {way.board}/24 dev {card}")
+    guest.sh("ip netns add phone && ip link set tandemscan0 netns phone && ip -n phone link set tandemscan0 up")
+    guest.sh(f"ip -n phone addr add {way.phone}/24 dev tandemscan0")
     try:
-        cabled.sh("ip -n laptop addr add 192.168.7.1/24 dev tandemscan0 && ip -n laptop link set tandemscan0 up")
-        ask = "import socket; print(socket.create_connection(('192.168.7.2', 22), 60).recv(4))"
-        assert "SSH-" in cabled.sh(f'ip netns exec laptop python3 -c "{ask}"')
-        card = cabled.sh(f"cat {OURS}/functions/ncm.0/ifname").strip()
-        until(lambda: "0.0.0.0%" + card + ":67" in cabled.sh("ss -lun"), "addresses are offered on the cable")
+        yield
     finally:
-        cabled.sh("ip netns del laptop")
+        guest.sh("ip netns del phone")
+        if moved:
+            guest.sh(f"ip addr flush dev {card}; ip addr add {CABLE_BOARD}/24 dev {card}")
+        until(lambda: guest.code("test -e /sys/class/net/tandemscan0") == 0, "the host's end is back")
+
+
+@contextmanager
+def _dialled_from_the_phone(guest: Guest, board: str) -> Iterator[str]:
+    """A link of this machine by which one dials the board's link as the phone does."""
+    guest.put(Path(__file__).with_name("way_in.py"), "/srv")
+    carrier = guest.popen(f"exec python3 -u /srv/way_in.py phone 6000 {board} 5555")
+    try:
+        assert carrier.stdout is not None
+        assert carrier.stdout.readline() == b"ready\n"
+        with guest.forwarded(6000) as port:
+            yield f"tcp://127.0.0.1:{port}"
+    finally:
+        carrier.kill()
+        with carrier:  # closes its pipes and waits
+            pass
+
+
+def _judged_there(guest: Guest, host: str) -> str:
+    """What the host's doctor says of the way, asked in the phone's namespace."""
+    ask = (
+        "from common.doctor.network_probe import examine_network as e; from common.link.factory import parse_link as p;"
+        f" print(*e(p('tcp://{host}:5555', listens_by_default=False)))"
+    )
+    return guest.sh(
+        f"cd /usr/lib/tandemscan && ip netns exec phone python3 -P -c \"import sys; sys.path[0:0] = ['.']; {ask}\""
+    )
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        WAYS["cable"],
+        pytest.param(
+            WAYS["access point"], marks=pytest.mark.skipif("WALK" not in os.environ, reason="make walk has the time")
+        ),
+    ],
+    ids=WAYS,
+)
+def test_a_phone_pairs_over_each_way(serving: Guest, way: Way, film: Film, skew: Skew, tmp_path: Path) -> None:
+    """As docs/phone.md says: the doctors of both ends find the way sound, and pairs come over it."""
+    with _phone_at_the_end(serving, way):
+        serving.configure(CAMERA, way.link)
+        _, checks = doctor(serving)
+        assert f"tcp://{way.board}:5555 (" in checks["network"]["finding"]
+        assert f"which is {way.phone} there" in _judged_there(serving, way.board)
+        with (
+            _dialled_from_the_phone(serving, way.board) as link,
+            streaming(serving, film.right, tmp_path / "out", (), link) as stream,
+        ):
+            stream.more(10, "over the way")
+            report = stream.finish(skew)
+    assert len(report["sessions"]) == 1
 
 
 def test_no_login_prompt_on_the_port(cabled: Guest) -> None:

@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
+from common.android import INSTALL as TERMUX_INSTALL
+from common.android import is_android
 from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
 
@@ -284,8 +286,12 @@ def _missing(folder: Path, error: Exception) -> Missing:
     try:
         reason = (folder / REASON_FILE).read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
-        return Missing(reason="not built", remedy=_INSTALL)
-    return Missing(reason=f"not built: {reason}", remedy=_INSTALL)
+        return Missing(reason="not built", remedy=_remedy())
+    return Missing(reason=f"not built: {reason}", remedy=_remedy())
+
+
+def _remedy() -> str:
+    return f"pkg install clang, then {TERMUX_INSTALL}" if is_android() else _INSTALL
 
 
 def _choices(library: Library) -> str:

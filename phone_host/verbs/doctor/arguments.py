@@ -9,6 +9,7 @@ SUMMARY = "check this machine, its camera, the board, the calibration and the di
 
 EXAMPLES = """  phone-host doctor
   phone-host doctor --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out scan
+  phone-host doctor --camera http://192.168.1.5:8080/video --calibration rig.yaml --capture    # hold it, turn it a little
   phone-host doctor --config phone-host.toml --json
 """
 
@@ -26,6 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera", metavar="URI", help="camera of this machine; the check streams from it for a second"
     )
     parser.add_argument("--calibration", metavar="FILE", help="rig.yaml to check")
+    parser.add_argument(
+        "--capture",
+        type=reading(seconds, "--capture"),
+        nargs="?",
+        const=60.0,
+        metavar="S",
+        help="film with --camera for S seconds (default 60) and judge rate, stamps, shutter, and whether its software warps the"
+        " images; kept beside --calibration as capture.json",
+    )
     parser.add_argument(
         "--out",
         type=Path,

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from common.android import is_android
 from common.errors import DataError, SettingsError, UnavailableError
 from common.keys import KeyFolder
 from common.link.enrolment_door import pairing_address
@@ -39,6 +40,8 @@ def run(options: argparse.Namespace) -> int:
     to = ("--link", link.address) if needs_keys(link) else ()
     with_keys = ("--keys", options.keys) if options.keys else ()
     next_step = command_line("phone-host", "run", *to, *with_keys, "--camera", "v4l2:auto", "--pairs", "100")
+    if is_android():  # the page's browser is the camera there
+        next_step = "sh deploy/host/termux-run.sh"
     print(json_text(known) if options.json else fitted(f"paired with {board.name}; now try\n  {next_step}"))
     return 0
 

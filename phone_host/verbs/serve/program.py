@@ -6,14 +6,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from common import now
+from common.doctor.finding import Finding
 from common.errors import DataError
 from common.keys import KeyFolder
 from common.program.extensions import registered_names
 from common.program.invocation import command_line
 from common.program.settings import log_level
+from common.stamp import HOST_CLOCK
+from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.verdict import Verdict
 from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
+from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
@@ -49,6 +55,9 @@ _BROWSER_NS: Final = 10_000_000_000
 """Whoever begins something on the page has started the phone's camera before, or is told to."""
 
 _RIG: Final = Path("rig") / "rig.yaml"
+_CAPTURE_S: Final = 60.0
+"""So long a phone is watched for growing hot; half a minute tells about its film."""
+
 _OF_CALIBRATION: Final = ("board", "square", "baseline", "views")
 
 
@@ -131,6 +140,15 @@ class Commands:
             keys=self.keys,
             feed=self.feed,
         )
+
+    def capture(
+        self, choices: Choices, stopped: Callable[[], bool], tell: Callable[[Progress], None]
+    ) -> Sequence[Finding]:
+        """See Program."""
+        question = self.question(choices)
+        camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns(), feed=self.feed)
+        calibration = Path(question.calibration) if question.calibration else None
+        return check_capture(camera, calibration, _CAPTURE_S, stopped, tell).findings
 
     def calibration(self, choices: Choices, values: Choices) -> "Calibration":
         """See Program."""

@@ -72,6 +72,11 @@ let stranger = '';
 /** The board that takes a code: one that is reached over a network. @param {any} state @returns {string} */
 const boardOf = (state) => state.stranger || (state.settings.link ?? '').split(' ').find((/** @type {string} */ link) => link.startsWith('tcp://')) || '';
 
+/** Whether the camera's film is being checked: then the only thing that is shown is what to do. @param {any} state */
+function isFilming(state) {
+  return state.activity === 'checking' && state.checks?.[0]?.what === 'film';
+}
+
 /** @param {any} state */
 export function showSetup(state) {
   showChoices('link', state.boards, state.settings.link ?? '');
@@ -79,7 +84,9 @@ export function showSetup(state) {
   show(byId('enrol'), !!boardOf(state));
   // A board that forgot this machine asks again: the field stays at hand.
   if (state.stranger !== stranger) /** @type {HTMLDetailsElement} */ (byId('enrol')).open = !!(stranger = state.stranger);
-  text(byId('check-words'), state.activity === 'checking' ? 'Looking at the machine, the board and both cameras \u2026' : '');
+  const isLooking = state.activity === 'checking' && !isFilming(state);
+  text(byId('check-words'), isLooking ? 'Looking at the machine, the board and both cameras \u2026' : '');
+  text(byId('capture-go'), isFilming(state) ? 'Stop' : 'Check the film');
   showChecks(state.checks ?? []);
   text(byId('calibrate-go'), state.activity === 'calibrating' ? 'Stop' : 'Start live calibration');
   follow(byId('calibration-typed'), state.settings.calibration ?? '');
@@ -105,6 +112,7 @@ export function connectSetup(current) {
     code.value = '';
   });
   onPress(byId('check-go'), () => begin('check'), byId('check-answer'));
+  onPress(byId('capture-go'), () => (isFilming(current()) ? command('stop') : begin('capture')), byId('check-answer'));
   onPress(byId('calibrate-go'), () => calibrate(current()), byId('calibration-answer'));
   onPress(byId('command-copy'), () => copy(byId('command').textContent ?? ''), byId('command-answer'));
 }

@@ -1,0 +1,22 @@
+#!/bin/sh
+# Opens the page on this phone: `sh deploy/host/termux-run.sh [OPTIONS of phone-host serve]`. Serves it until Ctrl-C and keeps the phone
+# awake meanwhile; if the service serves it already (termux-install.sh --service), opens that one.
+set -eu
+cd "$(dirname "$0")/../.."
+program=$(pwd)/.venv/bin/phone-host
+[ -x "$program" ] || { echo "error: phone-host is not installed here: run sh deploy/host/termux-install.sh" >&2; exit 3; }
+command -v termux-wake-lock >/dev/null || { echo "error: this is not Termux: run phone-host serve --open" >&2; exit 3; }
+
+log=$PREFIX/var/log/sv/phone-host-page/current
+if [ $# = 0 ] && SVDIR=$PREFIX/var/service sv status phone-host-page 2>/dev/null | grep -q '^run:'; then
+    url=$(sed -n 's/.*the page: \(http[^ ]*\).*/\1/p' "$log" 2>/dev/null | tail -n 1)
+    [ -n "$url" ] || { echo "error: the service has not said its address yet: look into $log" >&2; exit 3; }
+    exec termux-open-url "$url"
+fi
+
+termux-wake-lock
+trap termux-wake-unlock EXIT
+trap : INT # the program ends in order, then this script goes on
+code=0
+"$program" serve --open "$@" || code=$?
+exit "$code"

@@ -1,0 +1,222 @@
+"""Checks a camera while it films: hold it still, move it a little, then leave it. Pure: frames in, what to do next and verdicts out.
+
+A look at a stretch of film takes seconds. So this hands the stretches out, no more at a time than it needs, and takes what was
+seen in them; whoever drives it looks in another thread, or frames would seem to be missing.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+import cv2
+import numpy as np
+
+from phone_host.calibration.capture.look import FRAMES, Reading, Window, may_tell
+from phone_host.calibration.capture.pace import Shot, pace_of
+from phone_host.model import CameraModel, Image, Side
+from phone_host.model.capture import CaptureReport, CaptureSource, Rigidity, Unseen, Warping
+from phone_host.stereo.scaled_rig import scaled_camera
+
+_WIDTH_PX: Final = 640
+"""Wider images are reduced: points are followed to a thirtieth of a pixel, and a stabiliser's warp is larger than one."""
+
+_FASTEST_HZ: Final = 40.0
+"""Of faster films every second frame, or fewer, is used: in two thirds of a second a hand trembles, in a third hardly."""
+
+ENOUGH: Final = 6
+"""Stretches that tell something, after which no more is asked for."""
+
+_FEWEST: Final = 3
+_WARPED_SHARE: Final = 0.5
+_RIGID_SHARE: Final = 0.75
+_GAP: Final = 1.5
+_BRIGHTNESS_STEP: Final = 8
+
+
+class Stage(Enum):
+    """What the user shall do."""
+
+    STILL = "still"
+    MOVE = "move"
+    WATCH = "watch"
+    DONE = "done"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How long a check takes.
+
+    Attributes:
+        whole_s: all of it.
+        still_s: of that, held still at first.
+        move_s: no longer than this the user is asked to move it.
+    """
+
+    whole_s: float = 60.0
+    still_s: float = 8.0
+    move_s: float = 40.0
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a check is.
+
+    Attributes:
+        stage: what the user shall do.
+        share: of the whole that is done, 0 to 1.
+        told: stretches that told something.
+        last: why the last one did not; None: it did, or there was none.
+    """
+
+    stage: Stage
+    share: float
+    told: int
+    last: Unseen | None
+
+
+class CaptureCheck:
+    """Checks one camera.
+
+    Args:
+        source: whose images they are.
+        asked_hz: rate that was asked for; NaN: none was.
+        lens: the calibrated lens, for images of the source's size; None: not calibrated.
+        plan: how long it takes.
+    """
+
+    def __init__(self, source: CaptureSource, asked_hz: float, lens: CameraModel | None, plan: Plan) -> None:
+        self._source, self._asked_hz, self._plan = source, asked_hz, plan
+        self._by = min(1.0, _WIDTH_PX / source.width_px)
+        self._size = (round(source.width_px * self._by), round(source.height_px * self._by))
+        self._lens = None if lens is None else scaled_camera(lens, self._size, Side.RIGHT)
+        self._shots: list[Shot] = []
+        self._frames: list[Image] = []
+        self._skipped = 0
+        self._readings: list[Reading] = []
+        self._looks = 0
+
+    def add(self, luma: Image, captured_ns: int, arrived_ns: int, exposure_ns: int | None) -> Window | None:
+        """Take a frame.
+
+        Args:
+            luma: (H, W) uint8, grey.
+            captured_ns: its stamp, on the host's clock.
+            arrived_ns: when the host had it, on the same clock.
+            exposure_ns: exposure time; None: the camera does not say.
+
+        Returns:
+            A stretch of film to look at, whose reading `take` must be given.
+        """
+        brightness = float(luma[::_BRIGHTNESS_STEP, ::_BRIGHTNESS_STEP].mean())
+        before = self._shots[-1].captured_ns if self._shots else None
+        self._shots.append(Shot(captured_ns, arrived_ns, exposure_ns, brightness))
+        is_usual = luma.shape == (self._source.height_px, self._source.width_px)
+        if self.progress.stage is not Stage.MOVE or before is None or not is_usual:
+            self._frames.clear()
+            return None
+        return self._collected(luma, captured_ns - before)
+
+    def take(self, reading: Reading) -> None:
+        """Take what was seen in the last stretch."""
+        self._looks -= 1
+        self._readings.append(reading)
+
+    @property
+    def progress(self) -> Progress:
+        """How far it is."""
+        told = sum(each.unseen is None for each in self._readings)
+        last = self._readings[-1].unseen if self._readings else None
+        if not self._shots:
+            return Progress(Stage.STILL, 0.0, told, last)
+        plan, at_s = self._plan, (self._shots[-1].captured_ns - self._shots[0].captured_ns) / 1e9
+        share = min(max(at_s / plan.whole_s, 0.0), 1.0)
+        is_enough = told + self._looks >= ENOUGH
+        if at_s >= plan.whole_s:
+            stage = Stage.DONE
+        elif at_s < plan.still_s:
+            stage = Stage.STILL
+        else:
+            stage = Stage.WATCH if is_enough or at_s >= plan.still_s + plan.move_s else Stage.MOVE
+        return Progress(stage, share, told, last)
+
+    @property
+    def report(self) -> CaptureReport:
+        """What was found so far."""
+        rigidity = replace(rigidity_of(self._readings), knows_lens=self._lens is not None)
+        return CaptureReport(source=self._source, pace=pace_of(self._shots, self._asked_hz), rigidity=rigidity)
+
+    def _collected(self, luma: Image, step_ns: int) -> Window | None:
+        """Add a frame to the stretch; return it when it is complete."""
+        usual_ns = self._usual_ns
+        if not 0 < step_ns < _GAP * usual_ns:
+            self._frames.clear()
+        stride = max(1, math.ceil(1e9 / usual_ns / _FASTEST_HZ))
+        self._skipped = (self._skipped + 1) % stride if self._frames else 0
+        if self._skipped:
+            return None
+        small = luma if self._by == 1.0 else cv2.resize(luma, self._size, interpolation=cv2.INTER_AREA)
+        self._frames.append(np.asarray(small, np.uint8))
+        if len(self._frames) < FRAMES:
+            return None
+        window = Window(tuple(self._frames), stride * usual_ns / 1e6, self._lens)
+        self._frames.clear()
+        self._looks += 1
+        if may_tell(window):
+            return window
+        self.take(Reading(Unseen.STILL))
+        return None
+
+    @property
+    def _usual_ns(self) -> float:
+        """The usual interval, by the newest frames."""
+        newest = [shot.captured_ns for shot in self._shots[-2 * FRAMES :]]
+        return max(float(np.median(np.diff(newest))), 1.0)
+
+
+def rigidity_of(readings: list[Reading]) -> Rigidity:
+    """Judge what all stretches of film tell.
+
+    Args:
+        readings: in their order.
+    """
+    told = [each for each in readings if each.unseen is None]
+    if not told:
+        return Rigidity(unseen=_usual([each.unseen for each in readings if each.unseen is not None]))
+    warped = [each for each in told if each.is_warped]
+    share = len(warped) / len(told)
+    found, unseen = Warping.UNKNOWN, None
+    if len(told) >= _FEWEST:
+        if share >= _WARPED_SHARE:
+            found = Warping.STABILISED
+        elif share <= 1 - _RIGID_SHARE:
+            found = Warping.GOOD
+        else:
+            unseen = Unseen.VAGUE
+    else:
+        unseen = _usual([each.unseen for each in readings if each.unseen is not None] or [Unseen.STILL])
+    rigid = [each for each in told if not each.is_warped]
+    readout_ms, readout_sigma_ms = _readout(rigid) if found is Warping.GOOD else (math.nan, math.nan)
+    return Rigidity(
+        warping=found,
+        unseen=unseen,
+        windows=len(told),
+        warped=len(warped),
+        excess=float(np.median([each.excess for each in told])),
+        noise_px=float(np.median([each.noise_px for each in told])),
+        readout_ms=readout_ms,
+        readout_sigma_ms=readout_sigma_ms,
+    )
+
+
+def _usual(reasons: list[Unseen]) -> Unseen:
+    """Return the most frequent reason, the earlier one of two that are as frequent; without any, that nothing moved."""
+    return max(Unseen, key=reasons.count)
+
+
+def _readout(rigid: list[Reading]) -> tuple[float, float]:
+    """Return the readout and its uncertainty, ms: the median of the stretches, and how far they scatter."""
+    found = np.array([each.readout_ms for each in rigid])
+    middle = float(np.median(found))
+    scatter = 1.48 * float(np.median(np.abs(found - middle))) / math.sqrt(len(found))
+    return middle, max(scatter, float(np.median([each.readout_sigma_ms for each in rigid])))

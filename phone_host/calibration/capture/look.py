@@ -1,0 +1,147 @@
+"""Looks at one stretch of film: could a rigid camera have made it? Pure, and slow: some seconds."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+
+from phone_host.calibration.capture.rigid import Compared, Flags, compare
+from phone_host.calibration.capture.tracks import filled_cells, follow, motion_px
+from phone_host.model import CameraModel, Image
+from phone_host.model.capture import Unseen
+
+FRAMES: Final = 20
+"""Two thirds of a second at 30 frames/s: a hand trembles several times in it."""
+
+_FEWEST_POINTS: Final = 60
+_FEWEST_CELLS: Final = 12
+_LEAST_SHARE: Final = 0.5
+_LEAST_MOTION: Final = 0.01
+_MOTION: Final = 0.03
+_ACROSS: Final = 0.004
+"""Shares of the width by which the picture must move to say anything, and to be called rigid: along and across."""
+
+RIGID: Final = 0.42
+WARPED: Final = 0.48
+"""Excess of a warp over noise. Rendered films of rigid cameras leave 0.1 to 0.4, stabilised ones 0.5 to 17 (bench_capture)."""
+
+_FLAT_PX: Final = 3.0
+_FLAT: Final = 0.05
+"""Of a scene that moves by more than so many pixels and leaves a plane by less than this share of it, nothing is told: a plane's film fits
+many cameras."""
+
+_COUNTS: Final = 0.3
+_GLANCE_PX: Final = 160
+_GUESSED_VIEW: Final = 64.0
+"""Horizontal angle of view of phones' main cameras in video, degrees."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Window:
+    """Frames without a gap between them.
+
+    Attributes:
+        frames: `FRAMES` images (H, W) uint8, grey.
+        period_ms: time between two of them.
+        lens: the camera's, for this size; None: not calibrated.
+    """
+
+    frames: tuple[Image, ...]
+    period_ms: float
+    lens: CameraModel | None
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a window tells.
+
+    Attributes:
+        unseen: why it tells nothing; None: it does.
+        excess: by how much a warp explains more than noise, in standard deviations of it; NaN: not computed.
+        noise_px: standard deviation of the noise.
+        readout_ms: rolling shutter, first to last row.
+        readout_sigma_ms: its standard uncertainty.
+        along: share of the width by which the picture moved.
+    """
+
+    unseen: Unseen | None
+    excess: float = math.nan
+    noise_px: float = math.nan
+    readout_ms: float = math.nan
+    readout_sigma_ms: float = math.nan
+    along: float = 0.0
+
+    @property
+    def is_warped(self) -> bool:
+        """Whether no rigid camera made it."""
+        return self.excess >= WARPED
+
+
+def may_tell(window: Window) -> bool:
+    """Tell, quickly, whether the picture moves enough in a window for a look."""
+    by = min(1.0, _GLANCE_PX / window.frames[0].shape[1])
+    some = [
+        cv2.resize(frame, None, fx=by, fy=by, interpolation=cv2.INTER_AREA).astype(np.float32)
+        for frame in window.frames[:: FRAMES // 4]
+    ]
+    moved = [math.hypot(*cv2.phaseCorrelate(some[0], other)[0]) for other in some[1:]]
+    return bool(max(moved) >= _LEAST_MOTION * some[0].shape[1] / 2)
+
+
+def look(window: Window) -> Reading:
+    """Look at a window.
+
+    Args:
+        window: its frames.
+
+    Returns:
+        What it tells.
+    """
+    height, width = window.frames[0].shape
+    tracks = follow(window.frames)
+    if tracks.points_px.shape[1] < _FEWEST_POINTS or filled_cells(tracks, (width, height)) < _FEWEST_CELLS:
+        return Reading(Unseen.PLAIN)
+    along, across = (moved / width for moved in motion_px(tracks))
+    if along < _LEAST_MOTION:
+        return Reading(Unseen.STILL, along=along)
+    try:
+        compared = compare(tracks, window.lens or guessed_lens(width, height), knows_lens=window.lens is not None)
+    except np.linalg.LinAlgError:
+        return Reading(Unseen.PLAIN, along=along)
+    return _judged(compared, tracks.seen, window.period_ms, along, across)
+
+
+def excess_of(compared: Compared) -> float:
+    """Return by how much warps explain more than noise does, in standard deviations of the noise."""
+    counted = int((compared.trust > _COUNTS).sum())
+    return math.sqrt(max(compared.rigid - compared.warped, 0.0) / max(2 * counted, 1))
+
+
+def _judged(compared: Compared, seen: Flags, period_ms: float, along: float, across: float) -> Reading:
+    excess, unseen = excess_of(compared), None
+    if (compared.trust > _COUNTS)[seen].mean() < _LEAST_SHARE:
+        unseen = Unseen.LIVELY
+    elif compared.parallax_px > _FLAT_PX and compared.off_plane_px < _FLAT * compared.parallax_px:
+        unseen = Unseen.FLAT
+    elif excess < WARPED:
+        if along < _MOTION or across < _ACROSS:
+            unseen = Unseen.STILL
+        elif excess > RIGID:
+            unseen = Unseen.VAGUE
+    return Reading(
+        unseen,
+        excess,
+        compared.noise_px,
+        compared.common[4] * period_ms,
+        compared.readout_sigma * period_ms,
+        along,
+    )
+
+
+def guessed_lens(width_px: int, height_px: int) -> CameraModel:
+    """Return a lens as phones and webcams have it, for a camera that was never calibrated."""
+    focal = width_px / 2 / math.tan(math.radians(_GUESSED_VIEW) / 2)
+    matrix = np.array([[focal, 0, (width_px - 1) / 2], [0, focal, (height_px - 1) / 2], [0, 0, 1.0]])
+    return CameraModel(width_px=width_px, height_px=height_px, matrix=matrix, distortion=np.zeros(5))

@@ -1,0 +1,30 @@
+"""Tells the page how far the check of a camera's film is, no oftener than there is something new. Pure."""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from phone_host.calibration.capture.check import ENOUGH, Progress
+from phone_host.calibration.capture.words import stage_words
+from phone_host.web.source import Checked
+
+_STEPS: Final = 20
+
+
+class CaptureGuide:
+    """Guides whoever holds the camera.
+
+    Args:
+        show: takes what the page shall show.
+    """
+
+    def __init__(self, show: Callable[[Sequence[Checked]], None]) -> None:
+        self._show, self._shown = show, ("", -1, -1)
+
+    def tell(self, progress: Progress) -> None:
+        """Take the progress; called with each frame."""
+        now = (stage_words(progress), int(progress.share * _STEPS), progress.told)
+        if now == self._shown:
+            return
+        self._shown = now
+        done = f"{100 * now[1] // _STEPS} % done, {min(progress.told, ENOUGH)} of {ENOUGH} stretches of film told something"
+        self._show([Checked("film", "ok", f"{now[0]} ({done})")])

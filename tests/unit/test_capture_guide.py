@@ -1,0 +1,21 @@
+"""What the page says while a camera's film is checked."""
+
+from collections.abc import Sequence
+
+from phone_host.calibration.capture.check import Progress, Stage
+from phone_host.model.capture import Unseen
+from phone_host.serve.capture_guide import CaptureGuide
+from phone_host.web.source import Checked
+
+
+def test_the_page_is_told_what_is_new_and_no_more() -> None:
+    """A hundred frames of one stage are told in steps; a reason why film tells nothing stands in the words at once."""
+    told: list[Sequence[Checked]] = []
+    guide = CaptureGuide(told.append)
+    for number in range(100):
+        guide.tell(Progress(Stage.STILL, number / 1000, 0, None))
+    assert len(told) == 2
+    guide.tell(Progress(Stage.MOVE, 0.1, 1, Unseen.PLAIN))
+    ((said,),) = told[-1:]
+    assert "too few details" in said.words
+    assert "1 of" in said.words
