@@ -118,7 +118,7 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
 
         yield check_rig(vision_checks.read_rig_readings(question.calibration, question.camera))
         if keeps and question.camera:
-            yield from vision_checks.check_kept_capture(question.calibration, question.camera)
+            yield from vision_checks.check_kept_capture(question.calibration, question.camera, question.feed)
     yield from check_clocks(machine.read_clocks(Path(__file__).parent))
     yield from examine_out(question.out)
     if not is_android():  # which shows the kernel's log to nobody

@@ -17,6 +17,7 @@ from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.calibration.capture.words import stored_finding
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import camera_orientation, open_camera
 from phone_host.camera.http_uri import is_http
@@ -110,7 +111,7 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
     )
 
 
-def check_kept_capture(calibration: str, camera: str) -> list[Finding]:
+def check_kept_capture(calibration: str, camera: str, feed: BrowserFeed | None) -> list[Finding]:
     """Look for the check of a camera's images that is kept beside a calibration, and whether it holds for this camera.
 
     Phones stabilise their images, other cameras hardly: of a camera of this machine nothing is said if it was never checked.
@@ -118,12 +119,13 @@ def check_kept_capture(calibration: str, camera: str) -> list[Finding]:
     Args:
         calibration: rig.yaml.
         camera: URI of the host camera.
+        feed: brings browsers that give their cameras; None: there is no page.
     """
     try:
         kept = read_capture(capture_path(Path(calibration)))
-        if kept is None and not is_http(camera):
+        if kept is None and not is_http(camera) and not is_browser(camera):
             return []
-        opened = open_camera(camera, HOST_CLOCK, now.monotonic_ns())
+        opened = open_camera(camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
     except DataError as error:
         return [warn("capture", error.problem, error.remedy)]
     except TandemError:

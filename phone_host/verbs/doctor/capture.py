@@ -11,6 +11,7 @@ from phone_host.camera.factory import open_camera
 from phone_host.doctor.capture import CheckedCapture, check_capture
 from phone_host.doctor.host_doctor import Question
 from phone_host.run.progress_bar import ShareBar, share_bar
+from phone_host.verbs.run.page_beside import camera_page
 
 
 def guided_capture(question: Question, whole_s: float) -> CheckedCapture:
@@ -23,9 +24,9 @@ def guided_capture(question: Question, whole_s: float) -> CheckedCapture:
     Raises:
         TandemError: the camera cannot be had.
     """
-    camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns())
     calibration = Path(question.calibration) if question.calibration else None
-    with share_bar("checking the camera") as bar:
+    with camera_page(question.camera, question.keys.path) as feed, share_bar("checking the camera") as bar:
+        camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
         return check_capture(camera, calibration, whole_s, lambda: False, _Guide(bar).tell)
 
 
