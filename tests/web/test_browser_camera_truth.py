@@ -86,7 +86,7 @@ def number_in(frame: Frame) -> int:
 def test_each_image_has_the_stamp_of_the_moment_at_which_it_was_taken(
     browser: Any, film: Path, reads: list[int], way: tuple[str, str, str]
 ) -> None:
-    """Stamps advance with the images' numbers, are younger than a period on arrival, and typically within 3 ms of the file's reading."""
+    """Stamps advance at least as the images' numbers, are younger than a period on arrival, and typically within 3 ms of the file's reading."""
     uri, script, epoch = way
     feed = BrowserFeed(30_000_000_000)
     program = Played((), settings={"camera": "browser:"}, done={StepName.BOARD}, feed=feed)
@@ -114,9 +114,9 @@ def test_each_image_has_the_stamp_of_the_moment_at_which_it_was_taken(
     assert origin is not None
     assert origin.epoch == epoch
     exposed_ns, read_ns = np.array([frame.exposed.ns for frame in frames]), np.array(reads)
-    # Numbers and stamps advance together, but where the film begins anew (its first image is read twice).
+    # Image by image, each in its period; a machine that is busy reads late and leaves no image out, so stamps may step farther.
     steps = np.diff([number_in(frame) for frame in frames]) % IMAGES
-    assert np.mean(np.round(np.diff(exposed_ns) * 30e-9) == steps) > 0.9
+    assert np.mean(np.round(np.diff(exposed_ns) * 30e-9) >= steps) > 0.9
     # A stamp that belonged to another image would be a period off.
     assert 0 < np.median([frame.grabbed - frame.exposed for frame in frames]) < 33_000_000
     # Under load inotify reports some readings late, or two as one: the median does not mind.
