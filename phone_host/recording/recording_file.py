@@ -6,6 +6,7 @@ Used by one thread. Source: the MCAP specification, version 0.
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 
@@ -102,6 +103,11 @@ class RecordingFile:
         """Bring onto the disk what was written. May take long."""
         self._file.flush()
         os.fsync(self._file.fileno())
+
+    def abandon(self) -> None:
+        """Leave the file as it is. Whatever is whole in it can be read."""
+        with suppress(OSError):
+            self._file.close()
 
     def close(self) -> None:
         """End the file in order.
