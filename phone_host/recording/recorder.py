@@ -4,69 +4,71 @@ Whoever brings a frame never waits: it goes into a bounded queue, which a thread
 """
 
 import json
+import logging
 import threading
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from common import now
 from common.frame import Frame
 from common.ledger import PairLedger
+from common.program.logs import event
+from common.protocol.message import CameraDescription
+from common.recording.layout import CAPTURE, CLOCK, DELAYS, camera_name, camera_values, image_topic
+from common.recording.recording_file import RecordingFile
+from common.recording.ros_messages import RecordedImage, image_message, image_type
+from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.model import BoardFrame, Side
-from phone_host.recording.recording_file import JSON, RecordingFile
-from phone_host.recording.ros_messages import RecordedImage, image_message, image_type
 from phone_host.sync.clock import ClockEstimate
+
+_LOG = logging.getLogger(__name__)
 
 _MOST_BYTES: Final = 64 << 20
 """What may wait for the disk: 10 s of both cameras at 3 MB/s, and a phone has memory for it."""
 
+_TEXT_BYTES: Final = 1000
+"""What a message that is no image takes, roughly."""
+
 _SYNC_NS: Final = 1_000_000_000
 """A power cut takes a second at most."""
 
-DELAYS: Final = "/delays"
-CLOCK: Final = "/clock_estimate"
-
-
-def image_topic(side: Side, *, is_raw: bool) -> str:
-    """Return the topic of one camera's images."""
-    return f"/{side.value}/image" if is_raw else f"/{side.value}/image/compressed"
-
-
-@dataclass(frozen=True, slots=True)
-class RecordingAccount:
-    """What became of the frames.
-
-    Attributes:
-        frames: how many are in the file.
-        dropped: how many came faster than the disk takes them.
-        lost: how many came after the recording had ended early.
-        size_bytes: how long the file is.
-        failure: what ended the recording early; None: nothing did.
-    """
-
-    frames: int
-    dropped: int
-    lost: int
-    size_bytes: int
-    failure: Trouble | None
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Waiting:
-    """A message on its way. An image's bytes are those that its camera gave: nobody writes into them any more."""
+class _Image:
+    """An image on its way. Its bytes are those that its camera gave: nobody writes into them any more.
 
-    topic: str
-    content: "RecordedImage | Mapping[str, object]"
+    `capture_ns` is the time from its exposure until it was grabbed, of the board's images only.
+    """
+
+    image: RecordedImage
     sequence: int
     log_ns: int
     publish_ns: int
+    capture_ns: int | None = None
 
-    @property
-    def size(self) -> int:
-        """Its bytes, roughly."""
-        return len(self.content.payload) if isinstance(self.content, RecordedImage) else 1000
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Text:
+    """A message in JSON on its way."""
+
+    topic: str
+    text: str
+    sequence: int
+    at_ns: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Told:
+    """Values by name on their way."""
+
+    name: str
+    values: dict[str, str]
+
+
+_Item = _Image | _Text | _Told
 
 
 class Recorder:
@@ -80,119 +82,178 @@ class Recorder:
 
     def __init__(self, file: RecordingFile, board_side: Side, unix_ns: int) -> None:
         self._file, self._unix_ns = file, unix_ns
-        self._board, self._own = board_side, board_side.other
-        self._queue: deque[_Waiting] = deque()
+        self._board, self._own = board_side.value, board_side.other.value
+        self._camera: CameraDescription | None = None
+        self._session = ""
+        self._clock: ClockEstimate | None = None
+        self._captured: list[tuple[int, list[int]]] = []
+        self._queue: deque[_Item] = deque()
         self._queued_bytes = 0
         self._changed = threading.Condition()
         self._is_closing = False
         self._frames = self._dropped = self._lost = 0
         self._failure: Trouble | None = None
+        self._attached: Mapping[str, bytes] = {}
         self._thread = threading.Thread(target=self._write_all, name="recorder", daemon=True)
         self._thread.start()
 
     @property
     def account(self) -> RecordingAccount:
-        """What became of the frames so far."""
+        """What became of the images so far."""
         with self._changed:
-            return RecordingAccount(self._frames, self._dropped, self._lost, self._file.size_bytes, self._failure)
+            return RecordingAccount(
+                file=str(self._file.path),
+                frames=self._frames,
+                dropped=self._dropped,
+                lost=self._lost,
+                size_bytes=self._file.size_bytes,
+                failure=self._failure,
+            )
+
+    def own_camera(self, camera: CameraDescription) -> None:
+        """Take what the host's camera says of itself."""
+        self._put(_Told(camera_name(self._own), camera_values(camera)))
+
+    def board_camera(self, camera: CameraDescription) -> None:
+        """Take what the board's camera says of itself, at the begin of a session. Called by the thread that brings its frames."""
+        self._camera = camera
 
     def board_frame(self, frame: BoardFrame) -> None:
         """Take a frame of the board. Never waits."""
-        message = frame.message
+        message, marks = frame.message, frame.marks
+        if message.session != self._session and self._camera is not None:
+            self._session = message.session
+            told = {**camera_values(self._camera), "session": message.session, "link": frame.link}
+            self._put(_Told(camera_name(self._board), told))
         size = (message.width_px, message.height_px)
-        image = RecordedImage(
-            self._unix_ns + frame.marks.exposed_ns, self._board.value, message.pixel_format, size, message.payload
-        )
-        self._offer(image, message.sequence, frame.received_ns, frame.marks.sent_ns)
+        stamp_ns = self._unix_ns + marks.exposed_ns
+        image = RecordedImage(stamp_ns, self._board, message.pixel_format, size, message.payload)
+        capture_ns = marks.grabbed_ns - marks.exposed_ns
+        self._put(_Image(image, message.sequence, frame.received_ns, marks.sent_ns, capture_ns))
 
     def own_frame(self, frame: Frame) -> None:
         """Take a frame of the host's camera. Never waits."""
-        size = (frame.width_px, frame.height_px)
-        image = RecordedImage(
-            self._unix_ns + frame.exposed.ns, self._own.value, frame.pixel_format, size, bytes(frame.payload)
-        )
-        self._offer(image, frame.sequence, now.monotonic_ns(), frame.grabbed.ns)
+        size, stamp_ns = (frame.width_px, frame.height_px), self._unix_ns + frame.exposed.ns
+        image = RecordedImage(stamp_ns, self._own, frame.pixel_format, size, bytes(frame.payload))
+        self._put(_Image(image, frame.sequence, now.monotonic_ns(), frame.grabbed.ns))
 
     def delays(self, ledger: PairLedger) -> None:
         """Take the ledger of a pair. Never waits."""
-        self._put(_Waiting(DELAYS, ledger.as_json(), ledger.sequence, ledger.done_ns, ledger.done_ns))
+        self._put(_Text(DELAYS, ledger.to_json(), ledger.sequence, ledger.done_ns))
 
-    def clock(self, estimate: ClockEstimate, at_ns: int) -> None:
-        """Take a clock estimate. Never waits."""
-        values = {
-            "offset_ns": estimate.offset_ns,
-            "uncertainty_ns": estimate.uncertainty_ns,
-            "bound_ns": estimate.bound_ns,
-        }
-        self._put(_Waiting(CLOCK, values, 0, at_ns, at_ns))
+    def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
+        """Take a clock estimate; one that is not new is left out. Never waits."""
+        if estimate is not None and estimate != self._clock:
+            self._clock = estimate
+            self._put(_Text(CLOCK, json.dumps(asdict(estimate), separators=(",", ":")), 0, at_ns))
 
-    def finish(self) -> RecordingAccount:
-        """Write what waits, end the file in order, and return what became of the frames."""
+    def finish(self, attached: Mapping[str, bytes] | None = None) -> RecordingAccount:
+        """Write what waits, end the file in order, and return what became of the images.
+
+        Args:
+            attached: files to be added at the end, by name.
+        """
         with self._changed:
+            self._attached = attached or {}
             self._is_closing = True
             self._changed.notify()
         self._thread.join()
         return self.account
 
-    def _offer(self, image: RecordedImage, sequence: int, log_ns: int, publish_ns: int) -> None:
-        side = Side(image.frame_id)
-        topic = image_topic(side, is_raw="Compressed" not in image_type(image.pixel_format))
-        self._put(_Waiting(topic, image, sequence, log_ns, publish_ns))
-
-    def _put(self, item: _Waiting) -> None:
-        is_image = isinstance(item.content, RecordedImage)
+    def _put(self, item: _Item) -> None:
+        size, is_image = _size(item), isinstance(item, _Image)
         with self._changed:
             if self._failure is not None or self._is_closing:
                 self._lost += is_image
-            elif self._queued_bytes + item.size > _MOST_BYTES:
+            elif self._queued_bytes + size > _MOST_BYTES:
                 self._dropped += is_image
             else:
                 self._queue.append(item)
-                self._queued_bytes += item.size
+                self._queued_bytes += size
                 self._changed.notify()
 
     def _write_all(self) -> None:
         synced_ns = now.monotonic_ns()
         try:
-            while (item := self._next()) is not None:
-                self._write(item)
-                if now.monotonic_ns() - synced_ns > _SYNC_NS:
+            while (taken := self._next()) is not None:
+                for item in taken:
+                    self._write(item)
+                if now.monotonic_ns() - synced_ns >= _SYNC_NS:
+                    self._write_captured()
                     self._file.sync()
                     synced_ns = now.monotonic_ns()
-            self._file.close()
+            self._end()
         except OSError as error:
-            with self._changed:
-                self._failure = Trouble(
-                    f"the recording {self._file.path} ended early ({error.strerror})",
-                    "make room; what it holds until then can be read",
-                )
-                self._lost += sum(isinstance(each.content, RecordedImage) for each in self._queue)
-                self._queue.clear()
-            self._file.abandon()
+            self._fail(error)
 
-    def _next(self) -> _Waiting | None:
-        with self._changed:
-            while not self._queue and not self._is_closing:
-                self._changed.wait()
-            if not self._queue:
-                return None
-            item = self._queue.popleft()
-            self._queued_bytes -= item.size
-            return item
+    def _end(self) -> None:
+        self._write_captured()
+        at_ns = self._unix_ns + now.monotonic_ns()
+        if self._clock is not None:
+            self._file.tell("clock", {name: str(value) for name, value in asdict(self._clock).items()})
+        for name, data in self._attached.items():
+            self._file.attach(name, "application/octet-stream", data, at_ns)
+        self._file.close()
 
-    def _write(self, item: _Waiting) -> None:
-        is_image = isinstance(item.content, RecordedImage)
-        data = image_message(item.content) if is_image else json.dumps(item.content).encode()  # type: ignore[arg-type]
-        self._file.add(
-            item.topic,
-            data,
-            sequence=item.sequence,
-            log_ns=self._unix_ns + item.log_ns,
-            publish_ns=self._unix_ns + item.publish_ns,
+    def _fail(self, error: OSError) -> None:
+        cause = error.strerror or str(error)
+        failure = Trouble(
+            f"the recording {self._file.path} ended early ({cause})", "make room; what is in it can be used"
+        )
+        _LOG.error(
+            event("recording_ended_early", file=self._file.path, cause=cause, remedy="make room; the run goes on")
         )
         with self._changed:
-            self._frames += is_image
+            self._failure = failure
+            self._lost += sum(isinstance(each, _Image) for each in self._queue)
+            self._queue.clear()
+            self._queued_bytes = 0
+        self._file.abandon()
+
+    def _next(self) -> list[_Item] | None:
+        """Wait for what came, at most for a second; None: nothing will."""
+        with self._changed:
+            if not self._queue and not self._is_closing:
+                self._changed.wait(_SYNC_NS / 1e9)
+            if not self._queue and self._is_closing:
+                return None
+            item = [self._queue.popleft()] if self._queue else []
+            self._queued_bytes -= sum(map(_size, item))
+            return item
+
+    def _write(self, item: _Item) -> None:
+        match item:
+            case _Image(image, sequence, log_ns, publish_ns, capture_ns):
+                topic = image_topic(image.frame_id, image_type(image.pixel_format))
+                self._add(topic, image_message(image), sequence, log_ns, publish_ns)
+                if capture_ns is not None:
+                    self._note_capture(sequence, capture_ns)
+                with self._changed:
+                    self._frames += 1
+            case _Text(topic, text, sequence, at_ns):
+                self._add(topic, text.encode(), sequence, at_ns, at_ns)
+            case _Told(name, values):
+                self._file.tell(name, values)
+
+    def _add(self, topic: str, data: bytes, sequence: int, log_ns: int, publish_ns: int) -> None:
+        unix_ns = self._unix_ns
+        self._file.add(topic, data, sequence=sequence, log_ns=unix_ns + log_ns, publish_ns=unix_ns + publish_ns)
+
+    def _note_capture(self, sequence: int, capture_ns: int) -> None:
+        first, values = self._captured[-1] if self._captured else (sequence, [])
+        if not self._captured or first + len(values) != sequence:
+            values = []
+            self._captured.append((sequence, values))
+        values.append(capture_ns)
+
+    def _write_captured(self) -> None:
+        """Write the board's marks of the last second in one message: one for each image would be a fifth of all that is not image."""
+        if self._captured:
+            self._add(
+                CAPTURE, json.dumps(self._captured, separators=(",", ":")).encode(), 0, *2 * (now.monotonic_ns(),)
+            )
+            self._captured = []
 
 
-TOPICS: Final[Mapping[str, str]] = {DELAYS: JSON, CLOCK: JSON}
-"""Those of a recording that are no images."""
+def _size(item: _Item) -> int:
+    return len(item.image.payload) if isinstance(item, _Image) else _TEXT_BYTES

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from common.frame import PixelFormat
-from phone_host.recording.cdr import BrokenMessageError, CdrReader, CdrWriter
+from common.frame import Buffer, PixelFormat
+from common.recording.cdr import BrokenMessageError, CdrReader, CdrWriter
 
 NS: Final = 1_000_000_000
 _MOST_SECONDS: Final = 2**31 - 1
@@ -61,7 +61,7 @@ class RecordedImage:
     frame_id: str
     pixel_format: PixelFormat
     size_px: tuple[int, int]
-    payload: "bytes | memoryview"
+    payload: Buffer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +109,7 @@ def image_message(image: RecordedImage) -> bytes:
         writer.number("B", 0)
         writer.number("I", width * bytes_per_column)
     writer.data(image.payload)
-    return writer.bytes()
+    return writer.done()
 
 
 def read_image(kind: str, data: "bytes | memoryview") -> RecordedImage:
@@ -153,7 +153,7 @@ def camera_info_message(info: CameraInfo) -> bytes:
     for _ in range(6):  # binning, and a region of interest that is the whole image
         writer.number("I", 0)
     writer.number("B", 0)
-    return writer.bytes()
+    return writer.done()
 
 
 def read_camera_info(data: "bytes | memoryview") -> CameraInfo:

@@ -8,6 +8,8 @@ import struct
 from collections.abc import Sequence
 from typing import Final
 
+from common.frame import Buffer
+
 HEADER: Final = b"\x00\x01\x00\x00"
 """CDR_LE, no options."""
 
@@ -22,7 +24,7 @@ class CdrWriter:
     def __init__(self) -> None:
         self._data = bytearray(HEADER)
 
-    def bytes(self) -> bytes:
+    def done(self) -> bytes:
         """Return the message so far."""
         return bytes(self._data)
 
@@ -53,7 +55,7 @@ class CdrWriter:
             self._align(8)
             self._data += struct.pack(f"<{len(values)}d", *values)
 
-    def data(self, value: "bytes | bytearray | memoryview") -> None:
+    def data(self, value: Buffer) -> None:
         """Add a sequence of bytes."""
         self.number("I", len(value))
         self._data += value
@@ -82,7 +84,8 @@ class CdrReader:
         """Return a number; `kind` as in `CdrWriter.number`."""
         size = struct.calcsize(kind)
         self._at += -(self._at - len(HEADER)) % size
-        return struct.unpack(f"<{kind}", self._take(size))[0]
+        found: int | float = struct.unpack(f"<{kind}", self._take(size))[0]
+        return found
 
     def text(self) -> str:
         """Return a string."""

@@ -276,7 +276,11 @@ def _attachment(content: memoryview) -> Attachment:
     (length,) = _unpacked(_LENGTH, content, at)
     data = content[at + _LENGTH.size : at + _LENGTH.size + length]
     (checksum,) = _unpacked(_SUM, content, len(content) - _SUM.size)
-    if len(data) != length or at + _LENGTH.size + length + _SUM.size != len(content) or not 0 < len(name) <= _LONGEST_NAME:
+    if (
+        len(data) != length
+        or at + _LENGTH.size + length + _SUM.size != len(content)
+        or not 0 < len(name) <= _LONGEST_NAME
+    ):
         raise _SpoiledError("an attachment contradicts itself")
     if checksum and zlib.crc32(content[: -_SUM.size]) != checksum:
         raise _SpoiledError(f"the checksum of the attachment {name!r} is wrong")
