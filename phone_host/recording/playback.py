@@ -6,6 +6,7 @@ pace=demand each comes when the one before it is done with, and time for pairing
 
 import json
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -225,7 +226,7 @@ class _Player:
         tally.bytes += len(shown.image.payload)
         frame = self._board_frame(shown, size, hello.session)
         tally.age.add(frame.received_ns - frame.marks.exposed_ns)
-        if (objection := self._sink.objection(frame)) is not None:
+        if self._pacing is Pacing.CLOCK and (objection := self._sink.objection(frame)) is not None:
             account.disbelieved[objection] += 1
             return
         self._sink.add_board(frame)
@@ -237,6 +238,11 @@ class _Player:
             grabbed_ns=shown.grabbed_ns + shift_ns,
             sent_ns=shown.publish_ns + shift_ns,
         )
+        received_ns = shown.log_ns + shift_ns
+        if self._pacing is Pacing.DEMAND:  # everything but the exposure, by which it is paired, counts from now
+            late_ns = now.monotonic_ns() - received_ns
+            received_ns += late_ns
+            marks = replace(marks, grabbed_ns=marks.grabbed_ns + late_ns, sent_ns=marks.sent_ns + late_ns)
         while self._estimates and self._estimates[0][0] <= shown.log_ns:
             self.estimate = self._estimates.pop(0)[1]
         known = self.estimate
@@ -256,7 +262,7 @@ class _Player:
             message=message,
             link=LINK,
             marks=marks,
-            received_ns=shown.log_ns + shift_ns,
+            received_ns=received_ns,
             offset_ns=offset_ns,
             uncertainty_ns=0 if known is None else known.uncertainty_ns,
             asked_px=(self._camera.width_px, self._camera.height_px),

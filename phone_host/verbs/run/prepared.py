@@ -104,9 +104,9 @@ class Opened:
             return None
         rig = self.found.values.calibration
         attached = {"settings.json": json_text(dict(settings.resolved or {}), indent=1).encode()}
-        if rig:
-            attached["rig.yaml"] = Path(rig).read_bytes()
         known = None if self.core is None else self.core.rig
+        if rig:
+            attached[Path(rig).name if known is None else "rig.yaml"] = Path(rig).read_bytes()
         camera = self.camera.description
         return begin_recording(self.options.record, camera, self.board_side, known, attached)
 
