@@ -113,7 +113,11 @@ def _cut(options: argparse.Namespace) -> Told:
 
     def wanted(message: Message) -> bool:
         topic = "" if message.channel is None else message.channel.topic
-        return topic == CAPTURE or topic.endswith("camera_info") or (first_ns <= message.log_ns and (last_ns is None or message.log_ns < last_ns))
+        return (
+            topic == CAPTURE
+            or topic.endswith("camera_info")
+            or (first_ns <= message.log_ns and (last_ns is None or message.log_ns < last_ns))
+        )
 
     return _copied(options, copy_recording(options.paths[0], options.out, wanted))
 
