@@ -1,6 +1,7 @@
 """A recording's bytes: messages as ROS 2 writes them, and a file of which all that is whole is read, whatever happened to it."""
 
 import random
+import struct
 
 import pytest
 from hypothesis import given
@@ -149,3 +150,31 @@ def test_other_files_are_no_mcap(data: bytes) -> None:
     """They are told apart by their first bytes."""
     assert is_mcap(memoryview(WHOLE))
     assert not is_mcap(memoryview(data))
+
+
+def _record(opcode: int, content: bytes) -> bytes:
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        _record(0x00, b"x"),
+        _record(0x06, b"short"),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 0, 4) + b"zstd" + struct.pack("<Q", 3) + b"abc"),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 0, 0) + struct.pack("<Q", 7) + b"abc"),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 1, 0) + struct.pack("<Q", 9) + bytes(9)),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 0, 0) + struct.pack("<Q", 9) + struct.pack("<BQ", 5, 4)),
+        _record(0x09, bytes(16) + struct.pack("<I", 1) + b"a" + struct.pack("<IQ", 0, 9) + bytes(4)),
+        _record(0x0C, struct.pack("<I", 1) + b"a" + struct.pack("<I", 9)),
+        _record(0x0C, struct.pack("<I", 2) + b"\xff\xff" + struct.pack("<I", 0)),
+        _record(0x0C, struct.pack("<I", 99) + b"a"),
+    ],
+)
+def test_a_spoiled_record_is_passed_over(spoiled: bytes) -> None:
+    """Whatever is wrong with one record before the others: it is told, and the rest is read."""
+    at = WHOLE.index(b"\x0c")
+    records, is_complete = _read(WHOLE[:at] + spoiled + WHOLE[at:])
+    assert is_complete
+    assert len(_messages(records)) == 2 * PAIRS + 1
+    assert [record for record in records if isinstance(record, Damage)]

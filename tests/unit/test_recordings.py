@@ -3,17 +3,20 @@
 from pathlib import Path
 from typing import Any
 
+import cv2
 import pytest
 
 from common.camera.base import Ended
 from common.camera.factory import open_camera
 from common.errors import DataError, SettingsError, UnavailableError
-from common.frame import Frame
+from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes, ledger_of
 from common.protocol.message import Pacing
 from common.recording.layout import camera_of, camera_values
+from common.recording.mcap_writer import McapWriter, Topic
 from common.recording.numbering import numbers_of_two
 from common.recording.opened import open_recorded
+from common.recording.ros_messages import RecordedImage, image_message
 from phone_host.recording.copied import copy_recording
 from phone_host.recording.folders import export_folders, import_folders
 from phone_host.recording.opened import open_playback
@@ -211,3 +214,64 @@ def test_a_line_of_delays_comes_back() -> None:
     for text in ("", "{}", "[]", '{"stages_ns": 3}'):
         with pytest.raises(ValueError, match=r"delays|Expecting"):
             ledger_of(text)
+
+
+def test_one_camera_is_described_alone(tmp_path: Path) -> None:
+    """There is no skew, no number that pairs, and no side but its own; a single image has no rate."""
+    path = recording_file(tmp_path, 1)
+    copy_recording(path, tmp_path / "one.mcap", lambda m: m.channel is not None and "left" in m.channel.topic)
+    found = open_recorded(tmp_path / "one.mcap")
+    info = session_info(found)
+    assert (info.skew, info.streams[0].rate_hz, found.topic_of("right")) == (None, 0.0, "")
+    camera = open_camera(f"replay:{tmp_path / 'one.mcap'}", "here", 0)
+    assert camera.numbers == ()  # type: ignore[attr-defined]
+    assert len(_shown(camera, 1)) == 1
+
+
+def _other(folder: Path, *messages: tuple[str, str, bytes]) -> Path:
+    """A file of another program: topic, kind and content of each message; ROS 1 names, no metadata of ours."""
+    data = bytearray()
+    kinds = dict.fromkeys((topic, kind) for topic, kind, _ in messages)
+    channels = tuple(Topic(topic, "cdr" if kind else "json", kind, "ros2msg") for topic, kind in kinds)
+    writer = McapWriter(data.extend, "another", channels)
+    for number, (topic, _, content) in enumerate(messages):
+        writer.add(topic, content, sequence=number, log_ns=number * PERIOD_NS, publish_ns=0)
+    writer.finish()
+    path = folder / "other.mcap"
+    path.write_bytes(data)
+    return path
+
+
+def test_files_of_other_programs_are_read(tmp_path: Path) -> None:
+    """By the names of their topics, else in their order; raw images tell their size; what is no image is counted as missing."""
+    raw = RecordedImage(7, "cam", PixelFormat.GREY, (4, 2), bytes(8))
+    image, kind = image_message(raw), "sensor_msgs/Image"
+    path = _other(
+        tmp_path,
+        ("/cam1/raw", kind, image),
+        ("/cam0/raw", kind, image),
+        ("/cam0/raw", kind, b"\0\1\0\0"),
+        ("/say", "", b"{"),
+    )
+    found = open_recorded(path)
+    assert (found.is_ours, found.topic_of("left"), found.topic_of("right")) == (False, "/cam0/raw", "/cam1/raw")
+    assert (found.camera("/cam0/raw").width_px, found.camera("/cam0/raw").pixel_format) == (4, PixelFormat.GREY)
+    assert [damage.words for damage in found.damages] == ["1 messages are of an unknown topic or spoiled"]
+    named = open_recorded(_other(tmp_path, ("/a/right", kind, image), ("/z/left", kind, image)))
+    assert (named.topic_of("left"), named.topic_of("right")) == ("/z/left", "/a/right")
+    with pytest.raises(DataError, match="holds no images"):
+        open_recorded(
+            _other(tmp_path, ("/say", "", b"{}"), ("/board_capture", "", b"nonsense"), ("/board_capture", "", b"[[1]]"))
+        )
+
+
+def test_raw_images_become_png_files(tmp_path: Path) -> None:
+    """A format without a file of its own is decoded."""
+    raw = image_message(RecordedImage(PERIOD_NS, "left", PixelFormat.GREY, (4, 2), bytes(range(8))))
+    path = _other(
+        tmp_path, ("/left/image", "sensor_msgs/msg/Image", raw), ("/right/image", "sensor_msgs/msg/Image", raw)
+    )
+    export_folders(open_recorded(path), tmp_path / "raw")
+    written = cv2.imread(str(tmp_path / "raw" / "left" / f"{PERIOD_NS}.png"), cv2.IMREAD_GRAYSCALE)
+    assert written is not None
+    assert written.ravel().tolist() == list(range(8))

@@ -9,9 +9,7 @@ from phone_host.verbs.source_arguments import add_source_arguments
 SUMMARY = "record what both cameras give, without computing anything, to replay it later"
 
 EXAMPLES = """  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --out session.mcap
-  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --seconds 60 --out session.mcap
-  phone-host run --replay session.mcap --calibration rig.yaml --out scan    # and compute depth from it, as often as you like
-  phone-host sessions info session.mcap
+  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --seconds 60 --out session.mcap    # run --replay computes depth from it
 """
 
 
