@@ -126,21 +126,22 @@ class McapWriter:
         self._attachments += 1
         self._put(record)
 
-    def add(self, topic: str, data: Buffer, *, sequence: int, log_ns: int, publish_ns: int) -> None:
+    def add(self, topic: str, *parts: Buffer, sequence: int, log_ns: int, publish_ns: int) -> None:
         """Write a message.
 
         Args:
             topic: name of its channel.
-            data: the message; it must not change until its chunk is written.
+            parts: the message, in pieces; they must not change until their chunk is written.
             sequence: its number in its stream; of larger ones the lowest 32 bits are kept.
             log_ns: when it was received, ns since 1970.
             publish_ns: when it was sent, ns since 1970.
         """
         number, chunk = self._numbers[topic], self._chunk
         chunk.index.setdefault(number, []).append((log_ns, chunk.size))
-        length = _MESSAGE_HEAD.size - _HEAD.size + len(data)
+        length = _MESSAGE_HEAD.size - _HEAD.size + sum(map(len, parts))
         chunk.add(_MESSAGE_HEAD.pack(_MESSAGE, length, number, sequence & 0xFFFF_FFFF, log_ns, publish_ns))
-        chunk.add(data)
+        for part in parts:
+            chunk.add(part)
         chunk.start_ns, chunk.end_ns = min(chunk.start_ns, log_ns), max(chunk.end_ns, log_ns)
         self._counts[number] += 1
         if chunk.size >= CHUNK_BYTES:

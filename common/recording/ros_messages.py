@@ -96,6 +96,11 @@ def image_type(pixel_format: PixelFormat) -> str:
 
 def image_message(image: RecordedImage) -> bytes:
     """Write an image."""
+    return b"".join(image_parts(image))
+
+
+def image_parts(image: RecordedImage) -> tuple[bytes, Buffer]:
+    """Write an image in two pieces, the second of which is its own bytes: copies of them would cost more than all else."""
     writer = CdrWriter()
     _write_header(writer, image.stamp_ns, image.frame_id)
     if image.pixel_format in _COMPRESSED:
@@ -108,8 +113,8 @@ def image_message(image: RecordedImage) -> bytes:
         writer.text(encoding)
         writer.number("B", 0)
         writer.number("I", width * bytes_per_column)
-    writer.data(image.payload)
-    return writer.done()
+    writer.number("I", len(image.payload))
+    return writer.done(), image.payload
 
 
 def read_image(kind: str, data: "bytes | memoryview") -> RecordedImage:

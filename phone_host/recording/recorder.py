@@ -12,13 +12,13 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from common import now
-from common.frame import Frame
+from common.frame import Buffer, Frame
 from common.ledger import PairLedger
 from common.program.logs import event
 from common.protocol.message import CameraDescription
 from common.recording.layout import CAPTURE, CLOCK, DELAYS, camera_name, camera_values, image_topic
 from common.recording.recording_file import RecordingFile
-from common.recording.ros_messages import RecordedImage, image_message, image_type
+from common.recording.ros_messages import RecordedImage, image_parts, image_type
 from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.model import BoardFrame, Side
@@ -27,7 +27,7 @@ from phone_host.sync.clock import ClockEstimate
 _LOG = logging.getLogger(__name__)
 
 _MOST_BYTES: Final = 64 << 20
-"""What may wait for the disk: 10 s of both cameras at 3 MB/s, and a phone has memory for it."""
+"""What may wait for the disk, and as much again may be under way to it: 10 s of both cameras at 3 MB/s, and a phone has memory for it."""
 
 _TEXT_BYTES: Final = 1000
 """What a message that is no image takes, roughly."""
@@ -173,19 +173,21 @@ class Recorder:
                 self._changed.notify()
 
     def _write_all(self) -> None:
-        synced_ns = now.monotonic_ns()
+        synced_ns, waiting = now.monotonic_ns(), 0
         try:
             while (taken := self._next()) is not None:
+                waiting = sum(isinstance(item, _Image) for item in taken)
                 for item in taken:
                     self._write(item)
+                    waiting -= isinstance(item, _Image)
                 now_ns = now.monotonic_ns()
                 if now_ns - synced_ns >= _SYNC_NS:  # counted from the begin of one to the begin of the next
                     synced_ns = now_ns
                     self._write_captured()
                     self._file.sync()
             self._end()
-        except OSError as error:
-            self._fail(error)
+        except Exception as error:  # noqa: BLE001 - a thread's root: the run goes on, and its account says what is missing
+            self._fail(error, waiting)
 
     def _end(self) -> None:
         self._write_captured()
@@ -196,8 +198,8 @@ class Recorder:
             self._file.attach(name, "application/octet-stream", data, at_ns)
         self._file.close()
 
-    def _fail(self, error: OSError) -> None:
-        cause = error.strerror or str(error)
+    def _fail(self, error: Exception, unwritten: int) -> None:
+        cause = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
         failure = Trouble(
             f"the recording {self._file.path} ended early ({cause})", "make room; what is in it can be used"
         )
@@ -206,7 +208,7 @@ class Recorder:
         )
         with self._changed:
             self._failure = failure
-            self._lost += sum(isinstance(each, _Image) for each in self._queue)
+            self._lost += unwritten + sum(isinstance(each, _Image) for each in self._queue)
             self._queue.clear()
             self._queued_bytes = 0
         self._file.abandon()
@@ -218,27 +220,28 @@ class Recorder:
                 self._changed.wait(_SYNC_NS / 1e9)
             if not self._queue and self._is_closing:
                 return None
-            item = [self._queue.popleft()] if self._queue else []
-            self._queued_bytes -= sum(map(_size, item))
-            return item
+            taken = list(self._queue)
+            self._queue.clear()
+            self._queued_bytes = 0
+            return taken
 
     def _write(self, item: _Item) -> None:
         match item:
             case _Image(image, sequence, log_ns, publish_ns, capture_ns):
                 topic = image_topic(image.frame_id, image_type(image.pixel_format))
-                self._add(topic, image_message(image), sequence, log_ns, publish_ns)
+                self._add(topic, image_parts(image), sequence, log_ns, publish_ns)
                 if capture_ns is not None:
                     self._note_capture(sequence, capture_ns)
                 with self._changed:
                     self._frames += 1
             case _Text(topic, text, sequence, at_ns):
-                self._add(topic, text.encode(), sequence, at_ns, at_ns)
+                self._add(topic, (text.encode(),), sequence, at_ns, at_ns)
             case _Told(name, values):
                 self._file.tell(name, values)
 
-    def _add(self, topic: str, data: bytes, sequence: int, log_ns: int, publish_ns: int) -> None:
+    def _add(self, topic: str, parts: tuple[Buffer, ...], sequence: int, log_ns: int, publish_ns: int) -> None:
         unix_ns = self._unix_ns
-        self._file.add(topic, data, sequence=sequence, log_ns=unix_ns + log_ns, publish_ns=unix_ns + publish_ns)
+        self._file.add(topic, *parts, sequence=sequence, log_ns=unix_ns + log_ns, publish_ns=unix_ns + publish_ns)
 
     def _note_capture(self, sequence: int, capture_ns: int) -> None:
         first, values = self._captured[-1] if self._captured else (sequence, [])
@@ -250,9 +253,9 @@ class Recorder:
     def _write_captured(self) -> None:
         """Write the board's marks of the last second in one message: one for each image would be a fifth of all that is not image."""
         if self._captured:
-            self._add(
-                CAPTURE, json.dumps(self._captured, separators=(",", ":")).encode(), 0, *2 * (now.monotonic_ns(),)
-            )
+            text = json.dumps(self._captured, separators=(",", ":"))
+            at_ns = now.monotonic_ns()
+            self._add(CAPTURE, (text.encode(),), 0, at_ns, at_ns)
             self._captured = []
 
 

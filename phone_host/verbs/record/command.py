@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import os
 import sys
 from contextlib import ExitStack, closing
 from dataclasses import asdict
@@ -31,6 +30,7 @@ from phone_host.recording.begin import begin_recording
 from phone_host.recording.filming import take_frames
 from phone_host.recording.unpaired import UnpairedFrames
 from phone_host.run.progress_bar import step_bar
+from phone_host.run.recording_words import recording_words
 from phone_host.settings import check, key_folder, resolve_settings
 
 _BAD_DATA = 4
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         with step_bar("waiting for the board", None, Console(stderr=True)) as bar:
 
             def advance(_: float) -> None:
-                bar.say(_progress(recorder.account))
+                bar.say(recording_words(recorder.account))
 
             seconds = options.seconds or math.inf
             frames = UnpairedFrames(recorder)
@@ -79,16 +79,6 @@ def run(options: argparse.Namespace) -> int:
     finally:
         account = recorder.finish()
     return _tell(account, as_json=options.json, is_interrupted=signals.interrupted)
-
-
-def _progress(account: RecordingAccount) -> str:
-    """Return what stands before the time: images, size and the space that is left."""
-    try:
-        disk = os.statvfs(Path(account.file).parent)
-    except OSError:
-        return f"{account.frames} images, {account.size_bytes / 1e6:.0f} MB"
-    left = disk.f_bavail * disk.f_frsize
-    return f"{account.frames} images, {account.size_bytes / 1e6:.0f} MB, {left / 1e9:.1f} GB left"
 
 
 def _tell(account: RecordingAccount, *, as_json: bool, is_interrupted: bool) -> int:
