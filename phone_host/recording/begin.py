@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from common import now
-from common.errors import DataError
+from common.errors import SettingsError
 from common.protocol.message import CameraDescription
 from common.recording.layout import ABOUT, About, camera_info_topic
 from common.recording.recording_file import RecordingFile
@@ -35,13 +35,11 @@ def begin_recording(
         attached: files to be kept in it, by name.
 
     Raises:
-        DataError: the host's camera has no clock.
+        SettingsError: the host's camera has no clock.
         UnavailableError: the file exists or cannot be made.
     """
     if not has_own_time(camera.pacing):
-        raise DataError(
-            "a camera with pace=demand has no clock, so there is nothing to record", "give it fps= or pace=clock"
-        )
+        raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
     file = RecordingFile(path)
     unix_ns = now.unix_offset_ns()
     at_ns = unix_ns + now.monotonic_ns()
