@@ -35,7 +35,7 @@ class RecordingAccount:
         """For people, one line."""
         missing = [
             f"{count} {why}"
-            for count, why in ((self.dropped, "too fast for the disk"), (self.lost, "came too late"))
+            for count, why in ((self.dropped, "too fast for the disk"), (self.lost, "came after its end"))
             if count
         ]
         told = f"; not in it: {', '.join(missing)}" if missing else ""

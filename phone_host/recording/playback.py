@@ -124,6 +124,8 @@ class _Player:
         self._camera, self._recorded = playback.board, playback.recorded
         told = self._recorded.metadata.get(camera_name(playback.board_side.value), {})
         self._first_session = told.get("session", LINK)
+        began = told.get("began_ns", "")
+        self._began_ns = int(began) if began.isdecimal() else 0  # the board said hello; 0: before all frames
         self._shift_ns = 0  # from the times of the recording to those of this run
         self._estimates = _estimates(self._recorded)
         self._last_sequence = -1
@@ -167,6 +169,8 @@ class _Player:
             if due_ns - ticked_ns >= _TICK_NS:
                 self._sink.tick()
                 ticked_ns = due_ns
+            if self.hello is None and shown.log_ns >= self._began_ns:
+                self._begin()
             self._bring(shown, is_board=is_board)
         self._await(self.now_ns)
         self.ended = True

@@ -84,6 +84,7 @@ class Recorder:
         self._file, self._unix_ns = file, unix_ns
         self._board, self._own = board_side.value, board_side.other.value
         self._camera: CameraDescription | None = None
+        self._began_ns = 0
         self._session = ""
         self._clock: ClockEstimate | None = None
         self._captured: list[tuple[int, list[int]]] = []
@@ -116,7 +117,7 @@ class Recorder:
 
     def board_camera(self, camera: CameraDescription) -> None:
         """Take what the board's camera says of itself, at the begin of a session. Called by the thread that brings its frames."""
-        self._camera = camera
+        self._camera, self._began_ns = camera, now.monotonic_ns()
 
     def board_frame(self, frame: BoardFrame) -> None:
         """Take a frame of the board. Never waits."""
@@ -124,6 +125,7 @@ class Recorder:
         if message.session != self._session and self._camera is not None:
             self._session = message.session
             told = {**camera_values(self._camera), "session": message.session, "link": frame.link}
+            told["began_ns"] = str(self._unix_ns + self._began_ns)
             self._put(_Told(camera_name(self._board), told))
         size = (message.width_px, message.height_px)
         stamp_ns = self._unix_ns + marks.exposed_ns

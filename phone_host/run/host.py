@@ -8,7 +8,6 @@ from common import now
 from common.camera.base import Camera
 from common.camera.image_numbers import ShowsFiles
 from common.errors import AbsentBoardError
-from common.frame import Frame
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.orientation import UPRIGHT, Orientation
@@ -23,7 +22,6 @@ from phone_host.model import Processed, Result, Side
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.recording.playback import Playback
 from phone_host.recording.recorder import Recorder
-from phone_host.recording.tap import Tap
 from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.drift_keeper import DriftKeeper
 from phone_host.run.file_sink import FileSink
@@ -36,6 +34,7 @@ from phone_host.run.pipeline import Pipeline
 from phone_host.run.recording_sink import RecordingSink
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
+from phone_host.run.sources import streams
 from phone_host.run.time_limit import TimeLimit
 from phone_host.run.trust_sink import PERIOD_NS, TrustSink
 from phone_host.run.worker import Worker
@@ -44,11 +43,8 @@ from phone_host.stereo.interpolate import Interpolator
 from phone_host.stream.await_board import BoardPatience, refusal_error
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.one_kind import require_one_kind
-from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
-from phone_host.stream.receiver import Receiver
 from phone_host.stream.refusals import BoardRefusal, refusal_text
-from phone_host.stream.streams import BoardStream, OwnStream
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.stills import Stills
 
@@ -135,7 +131,7 @@ class Host:
             clock=now.monotonic_ns if self._playback is None else self._playback.clock_ns,
             marking=now.monotonic_ns,
         )
-        self._camera, self._receiver = self._streams(camera, links, demand)
+        self._camera, self._receiver = streams(camera, links, self._queue, demand, recorder)
         rig = None if core is None else core.rig
         self._matcher_is_fastest = core is not None and core.matcher_is_fastest
         self._rig_rejected = rig is not None and rig.is_rejected
@@ -174,24 +170,6 @@ class Host:
         self._replay: ReplayFacts | None = None
         if (played := self._playback) is not None:
             self._replay = replay_facts(str(played.file), "demand" if played.is_timeless else "clock", played.ledgers())
-
-    def _streams(
-        self, camera: Camera | Playback, links: Sequence[Link], demand: DemandClock
-    ) -> tuple[OwnStream, BoardStream]:
-        """Return where the frames of both sides come from."""
-        if isinstance(camera, Playback):
-            return camera.into(self._queue)
-        queue, recorder = self._queue, self._recorder
-        if recorder is None:
-            own = OwnCamera(camera, queue.add_host, demand, queue.own_image_missing)
-            return own, Receiver(links, now.random_id(), queue)
-
-        def seen(frame: Frame) -> None:
-            recorder.own_frame(frame)
-            queue.add_host(frame)
-
-        own = OwnCamera(camera, seen, demand, queue.own_image_missing)
-        return own, Receiver(links, now.random_id(), Tap(queue, recorder))
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
