@@ -10,7 +10,7 @@ from common.errors import DataError
 from common.frame import Frame, SpoiledImageError, find_fault
 from common.orientation import UPRIGHT
 from common.protocol.message import Pacing, Steering
-from common.recording.numbering import numbers_of_two
+from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
 from common.recording.recorded import Recorded, Shown, period_ns, size_px
 from common.stamp import Stamp
@@ -109,7 +109,9 @@ class _Shower:
 
 
 class RecordedStills(_Shower):
-    """Shows an image whenever one is asked for. Those that were taken at the same moment have the same number on both sides.
+    """Shows an image whenever one is asked for. Those of one moment have the same number on both sides.
+
+    Those without a partner are not shown, unless the recording is of one camera.
 
     Attributes:
         images: what its description tells of them.
@@ -123,7 +125,9 @@ class RecordedStills(_Shower):
     def __init__(self, settings: RecordedSettings, now_ns: int) -> None:
         del now_ns
         super().__init__(settings)
-        self.numbers = _numbers(self._found, self._topic)
+        paired = _paired(self._found, self._topic)
+        self._shown = paired or self._shown
+        self.numbers = tuple(range(len(paired)))
         ends = (self.numbers[0], self.numbers[-1]) if self.numbers else (None, None)
         self.images = ImageNumbers(count=len(self._shown), first=ends[0], last=ends[1], looped=settings.loop)
         self.description = replace(self.description, name=with_numbers(self.description.name, self.images))
@@ -152,22 +156,19 @@ class RecordedStills(_Shower):
         return [self._grab(self._shown[index % count], self._first_ns + self._label_ns(index), now_ns)]
 
     def _label_ns(self, index: int) -> int:
-        lap, place = divmod(index, len(self._shown))
-        if not self.numbers:
-            return index * self.description.period_ns
-        span = self.numbers[-1] - self.numbers[0] + 1
-        return (lap * span + self.numbers[place] - self.numbers[0]) * self.description.period_ns
+        return index * self.description.period_ns
 
 
-def _numbers(found: Recorded, topic: str) -> tuple[int, ...]:
-    """Return the numbers of a stream's images; none if it is the only one."""
+def _paired(found: Recorded, topic: str) -> list[Shown]:
+    """Return those images of a stream that have a partner in the other one; none if it is the only one."""
     pair = [found.topic_of(side) for side in ("left", "right")]
     if topic not in pair or "" in pair:
-        return ()
-    streams = [found.images[each] for each in pair]
+        return []
+    streams = [sorted(found.images[each], key=lambda shown: shown.image.stamp_ns) for each in pair]
     stamps = [[shown.image.stamp_ns for shown in stream] for stream in streams]
-    both = numbers_of_two(stamps[0], stamps[1], max(map(period_ns, streams)) // 2)
-    return tuple(both[pair.index(topic)])
+    side = pair.index(topic)
+    places = pairs_of_two(stamps[0], stamps[1], max(map(period_ns, streams)) // 2)
+    return [streams[side][both[side]] for both in places]
 
 
 class RecordedFilm(_Shower):

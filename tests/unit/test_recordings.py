@@ -14,7 +14,7 @@ from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes, ledger_
 from common.protocol.message import Pacing
 from common.recording.layout import camera_of, camera_values
 from common.recording.mcap_writer import McapWriter, Topic
-from common.recording.numbering import numbers_of_two
+from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
 from common.recording.ros_messages import RecordedImage, image_message
 from phone_host.recording.copied import copy_recording
@@ -34,13 +34,11 @@ def _shown(camera: Any, count: int, now_ns: int = 0) -> list[Frame]:
     return found
 
 
-def test_images_of_one_moment_have_one_number() -> None:
-    """Each other's nearest within the limit; those between have numbers of their own, and all ascend."""
-    first, second = numbers_of_two([0, 100, 200, 300], [10, 55, 110, 290, 420], 50)
-    assert [number in first for number in second] == [True, False, True, True, False]
-    assert (first[0], first[1], first[3]) == (second[0], second[2], second[3])
-    assert first == sorted(set(first))
-    assert second == sorted(set(second))
+def test_images_of_one_moment_are_a_pair() -> None:
+    """Each other's nearest within the limit, in order; one that is nearer to another's partner is alone, and so is one too far away."""
+    assert pairs_of_two([0, 100, 200, 300], [10, 55, 110, 290, 420], 50) == [(0, 0), (1, 2), (3, 3)]
+    assert pairs_of_two([0, 100], [], 50) == []
+    assert pairs_of_two([], [1], 50) == []
 
 
 def test_both_sides_show_the_images_of_one_moment_under_one_number(tmp_path: Path) -> None:
@@ -50,8 +48,8 @@ def test_both_sides_show_the_images_of_one_moment_under_one_number(tmp_path: Pat
         open_camera(f"replay:{path}?topic=/{side}/image/compressed", "here", 0) for side in ("left", "right")
     )
     assert left.description.pacing is Pacing.DEMAND
-    pairs = set(left.numbers) & set(right.numbers)  # type: ignore[attr-defined]
-    assert len(pairs) == 5
+    assert left.numbers == right.numbers == (0, 1, 2, 3, 4)  # type: ignore[attr-defined]
+    assert [bytes(frame.payload) for frame in _shown(right, 5)] == [payload(number) for number in (0, 1, 3, 4, 5)]
     frames = _shown(left, 5)
     assert [bytes(frame.payload) for frame in frames] == [payload(number) for number in (0, 1, 3, 4, 5)]
     assert (frames[0].width_px, frames[0].height_px) == (32, 24)
