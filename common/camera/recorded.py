@@ -184,7 +184,8 @@ class RecordedFilm(_Shower):
         every = [shown for stream in self._found.images.values() for shown in stream]
         self._zero_ns = min(shown.image.stamp_ns for shown in every)
         longest_ns = max(period_ns(stream) for stream in self._found.images.values())
-        self._lap_ns = max(shown.grabbed_ns for shown in every) - self._zero_ns + longest_ns
+        last_ns = max(shown.image.stamp_ns for shown in every) - self._zero_ns
+        self._lap_ns = (last_ns // longest_ns + 1) * longest_ns  # whole periods: the next lap is in step
         self._shown = sorted(self._shown, key=lambda shown: shown.grabbed_ns)
         self._lap, self._next = 0, 0
         self._start_ns = now_ns
