@@ -19,7 +19,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz lock clean
+.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -114,6 +114,10 @@ fuzz: .venv/.ready-fuzz ## feed pairs to the native matcher, requests to the pag
 .venv/.ready-fuzz: $(READY) requirements/fuzz.txt
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/fuzz.txt
 	@touch $@
+
+oracles: $(READY) ## install what judges recordings, other programs' readers of MCAP, into build/oracles
+	@$(BIN)/python -m venv build/oracles
+	@build/oracles/bin/python -m pip -qq --no-input install "mcap-ros2-support>=0.5" "rosbags>=0.10"
 
 vendor: ## build the page's libraries and the static pages' scripts again (after changing phone_host/web/page; needs node; FETCH=1: take npm's files, too)
 	@$(if $(FETCH),node .ci/vendor.mjs fetch &&) node .ci/vendor.mjs build

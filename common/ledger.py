@@ -152,3 +152,23 @@ class PairLedger:
         record |= {name: getattr(self, name) for name in ("time_skew_ns", "offset_ns", "uncertainty_ns")}
         record |= {"host_exposed_ns": self.host.exposed_ns, "host_grabbed_ns": self.host.grabbed_ns}
         return json.dumps(record, separators=(",", ":"))
+
+
+def ledger_of(text: str) -> PairLedger:
+    """Read a line of delays.jsonl.
+
+    Raises:
+        ValueError: it is none.
+    """
+    try:
+        record = json.loads(text)
+        same = {name: record[name] for name in PairLedger.__dataclass_fields__ if name in record}
+        return PairLedger(
+            **same,
+            board=BoardMarks(**{name: record[name] for name in ("exposed_ns", "grabbed_ns", "sent_ns")}),
+            previous_done_ns=record["queued_ns"] - record["starvation_ns"],
+            stages=StageTimes(**record["stages_ns"]),
+            host=HostMarks(exposed_ns=record["host_exposed_ns"], grabbed_ns=record["host_grabbed_ns"]),
+        )
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"no line of delays.jsonl: {error}") from error

@@ -64,6 +64,11 @@ class StandstillWatch:
         return slept_ns, jumped
 
 
+def unix_offset_ns() -> int:
+    """Unix time minus CLOCK_MONOTONIC, ns. For files that others read; nothing of ours is computed from it."""
+    return time.time_ns() - time.monotonic_ns()
+
+
 def wall_time() -> str:
     """Local wall time as ISO 8601 to the second. For reports only; nothing is ever computed from it."""
     return time.strftime("%Y-%m-%dT%H:%M:%S%z")

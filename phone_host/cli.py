@@ -20,8 +20,10 @@ from phone_host.verbs.keys import arguments as keys
 from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
 from phone_host.verbs.quality import arguments as quality
+from phone_host.verbs.record import arguments as record
 from phone_host.verbs.run import arguments as run
 from phone_host.verbs.serve import arguments as serve
+from phone_host.verbs.sessions import arguments as sessions
 from phone_host.verbs.settings import arguments as settings
 from phone_host.verbs.stereo import arguments as stereo
 from phone_host.verbs.target import arguments as target
@@ -41,6 +43,8 @@ _VERBS: Final[dict[str, Arguments]] = {
     "demo": demo,
     "serve": serve,
     "run": run,
+    "record": record,
+    "sessions": sessions,
     "target": target,
     "calibrate": calibrate,
     "calibrate-time": calibrate_time,

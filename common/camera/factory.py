@@ -55,7 +55,7 @@ class _Kind:
 
 
 _KINDS: Final = {
-    "replay": _Kind("common.camera.replay_uri:replay_settings", "common.camera.replay:ReplayCamera"),
+    "replay": _Kind("common.camera.replay_uri:replay_settings", "common.camera.replay_uri:open_replay"),
     "v4l2": _Kind("common.camera.v4l2_uri:v4l2_settings", "common.camera.v4l2:V4l2Camera"),
 }
 

@@ -21,7 +21,9 @@ from phone_host.measure.image_trust import ImageTrust
 from phone_host.measure.no_depth import no_depth
 from phone_host.measure.numbers import ImageEvidence, blamed, number_concerns, with_cause
 from phone_host.measure.orient_words import with_final_options
+from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.regime import RunFigures
+from phone_host.measure.replay_facts import ReplayFacts
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.spoiled import SpoiledCounts, spoiled_concerns
 from phone_host.measure.trouble import Trouble
@@ -82,6 +84,8 @@ class RunSnapshot:
         matcher_is_fastest: whether none of ours is faster than the one that runs.
         budget: how the time budget for each pair was held; None: there is none, or no pair yet.
         drift: how the rig departs from its calibration; None: there is no rig.
+        recording: what became of the images that were to be recorded; None: nobody asked for it.
+        replay: the recording that is played; None: the cameras are live.
     """
 
     ended: str
@@ -132,6 +136,8 @@ class RunSnapshot:
     matcher_is_fastest: bool = False
     budget: BudgetAccount | None = None
     drift: Drift | None = None
+    recording: RecordingAccount | None = None
+    replay: ReplayFacts | None = None
 
     @property
     def shortfall(self) -> str:

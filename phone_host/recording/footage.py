@@ -7,11 +7,9 @@ cameras gave them; `board/orientation` holds the options that make them upright,
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
 from typing import Final
 from urllib.parse import parse_qsl
 
-from common import now
 from common.camera.base import Camera
 from common.camera.imagefile import SUFFIXES, load
 from common.errors import DataError, SettingsError
@@ -24,13 +22,10 @@ from phone_host.calibration.timing.shots import Shot
 from phone_host.model import BoardFrame
 from phone_host.output.atomic import write_bytes
 from phone_host.output.listed import ListedFolder
+from phone_host.recording.filming import take_frames
 from phone_host.stereo.raw_images import EncodedImage
-from phone_host.stream.await_board import BoardPatience, await_board
-from phone_host.stream.demand_clock import DemandClock, has_own_time
-from phone_host.stream.own_camera import OwnCamera
-from phone_host.stream.receiver import Receiver
+from phone_host.sync.clock import ClockEstimate
 
-_STEP_S: Final = 0.05
 _ENOUGH_BYTES: Final = 400 * 1024 * 1024
 """Half a minute of raw 640x480 images of both cameras; limited by a phone's memory."""
 
@@ -81,6 +76,19 @@ class _Keeper:
 
     def tick(self) -> None:
         """See FrameSink."""
+
+    @property
+    def begun_ns(self) -> int | None:
+        """When the board's first frame was exposed."""
+        return self.board[0].exposed_ns if self.board else None
+
+    @property
+    def is_full(self) -> bool:
+        """Whether memory for more is not allowed."""
+        return self.kept_bytes >= _ENOUGH_BYTES
+
+    def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
+        """The stamps are all that counts."""
 
     def add_board(self, frame: BoardFrame) -> None:
         """Keep a frame of the board."""
@@ -137,46 +145,9 @@ def film(
         DataError: the board shows images on demand and so has no time stamps.
         SettingsError: the same of the own camera.
     """
-    pacing = camera.description.pacing
-    if not has_own_time(pacing):
-        camera.close()
-        for link in links:
-            link.close()
-        raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
     keeper = _Keeper(camera.description.orientation)
-    own = OwnCamera(camera, keeper.add_host, DemandClock(pacing))
-    receiver = Receiver(links, now.random_id(), keeper)
-
-    def frames_came() -> bool:
-        _check(receiver, own)
-        return bool(keeper.board)
-
-    receiver.start()
-    own.start()
-    waiting = Event()
-    try:
-        has_begun = await_board(receiver, BoardPatience(wait_ns, now.monotonic_ns()), frames_came, stop)
-        while has_begun and not stop():
-            _check(receiver, own)
-            done = (now.monotonic_ns() - keeper.board[0].exposed_ns) / 1e9 / seconds
-            advance(min(1.0, done))
-            if done >= 1.0 or receiver.ended or own.ended or keeper.kept_bytes >= _ENOUGH_BYTES:
-                break
-            waiting.wait(_STEP_S)
-    finally:
-        own.stop()
-        receiver.stop()
+    take_frames(links, camera, keeper, seconds, wait_ns, stop=stop, advance=advance)
     return Footage(tuple(keeper.board), tuple(keeper.host))
-
-
-def _check(receiver: Receiver, own: OwnCamera) -> None:
-    """Raise a thread's failure, and DataError for a board whose stamps are not times."""
-    for failure in (receiver.failure, own.failure):
-        if failure is not None:
-            raise failure
-    hello = receiver.hello
-    if hello is not None and not has_own_time(hello.camera.pacing):
-        raise DataError("the board's camera has pace=demand and so has no clock", "give it fps= or pace=clock")
 
 
 def keep(footage: Footage, folder: Path) -> None:

@@ -12,6 +12,7 @@ from phone_host.measure.doubt_history import Episode, saved_pairs, told_past
 from phone_host.measure.headline import headline
 from phone_host.measure.image_trust import ImageFigures
 from phone_host.measure.regime import Judgement, judge
+from phone_host.measure.replay_facts import ReplayFacts
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures, history
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
@@ -71,6 +72,19 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
         "sinks": {sink.name: _sink(sink) for sink in run.sinks},
         "unwritten": asdict(run.unwritten),
+        "recording": None if run.recording is None else asdict(run.recording),
+        "replay": None if run.replay is None else _replay(run.replay),
+    }
+
+
+def _replay(replay: ReplayFacts) -> dict[str, object]:
+    """Return what was played, and the delays of then."""
+    return {
+        "file": replay.file,
+        "pace": replay.pace,
+        "recorded_pairs": replay.pairs,
+        "recorded_delays_ms": {name: spread_ms(replay.delays.spread(name)) for name in DELAYS},
+        "recorded_time_skew_ms": spread_ms(replay.delays.spread("time_skew")),
     }
 
 

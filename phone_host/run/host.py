@@ -14,10 +14,14 @@ from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import Pacing
 from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
+from phone_host.measure.replay_facts import ReplayFacts, replay_facts
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.model import Processed, Result, Side
+from phone_host.output.cameras_json import CAMERAS_NAME
+from phone_host.recording.playback import Playback
+from phone_host.recording.recorder import Recorder
 from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.drift_keeper import DriftKeeper
 from phone_host.run.file_sink import FileSink
@@ -27,8 +31,10 @@ from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pair_budget import PairBudget
 from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
+from phone_host.run.recording_sink import RecordingSink
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
+from phone_host.run.sources import streams
 from phone_host.run.time_limit import TimeLimit
 from phone_host.run.trust_sink import PERIOD_NS, TrustSink
 from phone_host.run.worker import Worker
@@ -37,10 +43,9 @@ from phone_host.stereo.interpolate import Interpolator
 from phone_host.stream.await_board import BoardPatience, refusal_error
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.one_kind import require_one_kind
-from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
-from phone_host.stream.receiver import Receiver
 from phone_host.stream.refusals import BoardRefusal, refusal_text
+from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.stills import Stills
 
 _STEP_S: Final = 0.05
@@ -51,6 +56,9 @@ _LAST_PARTNER_NS: Final = 1_000_000_000
 _STOP_S: Final = 0.4
 """A stopped run gives its current pair this long: Ctrl-C ends within a second, and the goodbye takes 0.3 s of it."""
 
+_UNHURRIED: Final = FifoSettings(1000, Overflow.BLOCK)
+"""A replay on demand waits for the worker: nothing is dropped."""
+
 _RECENT: Final = 60
 """While it runs, the latest 60 pairs are judged: two seconds at 30 pairs per second."""
 
@@ -60,34 +68,43 @@ class Host:
 
     Args:
         settings: settings of the run.
-        camera: the host camera, open.
-        links: open links to the board, the preferred one first.
+        camera: the host camera, open; or a recording of both cameras.
+        links: open links to the board, the preferred one first; none beside a recording.
         core: the stereo core; None to measure pairs and delays only.
         sinks: take the results, in addition to the sink that writes to disk.
+        recorder: sees every frame; None: nothing is recorded. The host ends it.
     """
 
     def __init__(
         self,
         settings: HostSettings,
-        camera: Camera,
+        camera: Camera | Playback,
         links: Sequence[Link],
         core: StereoCore | None,
         sinks: Sequence[Sink] = (),
+        *,
+        recorder: Recorder | None = None,
     ) -> None:
         self._settings = settings
         self._own = camera.description
+        self._playback = camera if isinstance(camera, Playback) else None
+        self._recorder = recorder
         files = camera if isinstance(camera, ShowsFiles) else None
-        demand = DemandClock(self._own.pacing, None if files is None else Stills(files.images, files.numbers))
+        demand = DemandClock(
+            self._own.pacing,
+            None if files is None else Stills(files.images, files.numbers),
+            is_timeless=self._playback is not None and self._playback.is_timeless,
+        )
         self.started_ns = now.monotonic_ns()
         self._motion = MotionMeter()
         self._files = FileSink(
             settings.out,
             settings.save_every,
-            waits=bool(settings.pairs) or demand.paces_own_camera,
+            waits=bool(settings.pairs) or demand.is_timeless,
             settings=settings.resolved,
             axes=settings.axes,
         )
-        is_timeless = demand.paces_own_camera
+        is_timeless = demand.is_timeless
         self._keeper = (
             None
             if core is None or core.rig is None
@@ -102,17 +119,19 @@ class Host:
         )
         self._trust = TrustSink(core, period_ns=0 if is_timeless else PERIOD_NS, keeper=self._keeper)
         motion = FunctionSink(_MOTION, self._measure_motion)
-        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *sinks)
+        recording = () if recorder is None else (RecordingSink(recorder),)
+        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *recording, *sinks)
         self._queue = PairQueue(
-            settings.fifo,
+            _UNHURRIED if self._playback is not None and is_timeless else settings.fifo,
             settings.tolerance_ns,
             self._own.period_ns,
             demand=demand,
             time_offset_ns=settings.time_offset.offset_ns,
             own_images=None if files is None else files.images,
+            clock=now.monotonic_ns if self._playback is None else self._playback.clock_ns,
+            marking=now.monotonic_ns,
         )
-        self._camera = OwnCamera(camera, self._queue.add_host, demand, self._queue.own_image_missing)
-        self._receiver = Receiver(links, now.random_id(), self._queue)
+        self._camera, self._receiver = streams(camera, links, self._queue, demand, recorder)
         rig = None if core is None else core.rig
         self._matcher_is_fastest = core is not None and core.matcher_is_fastest
         self._rig_rejected = rig is not None and rig.is_rejected
@@ -148,6 +167,9 @@ class Host:
         self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
         self._refusal: BoardRefusal | None = None
         self._ended_ns = 0
+        self._replay: ReplayFacts | None = None
+        if (played := self._playback) is not None:
+            self._replay = replay_facts(str(played.file), "demand" if played.is_timeless else "clock", played.ledgers())
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
@@ -194,6 +216,7 @@ class Host:
         self._worker.finished.set()
         with ExitStack() as ending:  # callbacks run in reverse order
             ending.callback(self._raise_failures)
+            ending.callback(self._end_recording)
             for sink in reversed(self._sinks):
                 ending.callback(sink.finish)
             ending.callback(self._receiver.stop)  # after the worker, because the worker wakes the receiver
@@ -201,9 +224,17 @@ class Host:
             ending.callback(self._queue.finish)
             ending.callback(self._camera.stop)
 
+    def _end_recording(self) -> None:
+        """Write the rest of the recording; what is known of the cameras is known now."""
+        if self._recorder is not None:
+            cameras = self._cameras.text()
+            self._recorder.finish({CAMERAS_NAME: cameras.encode()} if cameras else {})
+
     def abandon(self) -> None:
         """Release the results folder of a host that will not `run`."""
         self._files.close({})
+        if self._recorder is not None:
+            self._recorder.finish()
 
     def write_report(self, report: dict[str, object], page: str = "") -> bool:
         """Write the report of the run into its results folder, if there is one. Call this after `run`.
@@ -309,6 +340,8 @@ class Host:
             matcher_is_fastest=self._matcher_is_fastest,
             budget=None if self._budget is None else self._budget.account,
             drift=None if self._keeper is None else self._keeper.drift,
+            recording=None if self._recorder is None else self._recorder.account,
+            replay=self._replay,
         )
 
     def _is_unneeded(self, account: SinkAccount) -> bool:
@@ -352,6 +385,8 @@ class Host:
             self._cameras.look()
             self._steering.update(now_ns)
             self._doubts.look(now_ns)
+            if self._recorder is not None:
+                self._recorder.clock(self._receiver.estimate, now_ns)
             if watch is not None:
                 watch()
             if stop():

@@ -4,9 +4,8 @@ import logging
 
 from common.program.logs import event
 from common.protocol.message import Steering
-from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
-from phone_host.stream.receiver import Receiver
+from phone_host.stream.streams import BoardStream, OwnStream
 from phone_host.sync.phase import Alignment, PhaseController, Whose
 
 _LOG = logging.getLogger(__name__)
@@ -22,7 +21,7 @@ class PhaseSteering:
         queue: measures the phase.
     """
 
-    def __init__(self, steered: frozenset[Whose], receiver: Receiver, camera: OwnCamera, queue: PairQueue) -> None:
+    def __init__(self, steered: frozenset[Whose], receiver: BoardStream, camera: OwnStream, queue: PairQueue) -> None:
         self._steered, self._receiver, self._camera, self._queue = steered, receiver, camera, queue
         self._controller: PhaseController | None = None
         self._session = ""

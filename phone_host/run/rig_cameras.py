@@ -8,8 +8,7 @@ from common.protocol.message import BoardHello, CameraDescription, Locks
 from phone_host.measure.camera_match import LockMiss, misses, require_camera, state_of
 from phone_host.model import Rig, Side
 from phone_host.output.cameras_json import cameras_text
-from phone_host.stream.own_camera import OwnCamera
-from phone_host.stream.receiver import Receiver
+from phone_host.stream.streams import BoardStream, OwnStream
 
 _LOG = logging.getLogger(__name__)
 
@@ -26,7 +25,7 @@ class RigCameras:
     """
 
     def __init__(
-        self, rig: Rig | None, board_side: Side, camera: CameraDescription, own: OwnCamera, receiver: Receiver
+        self, rig: Rig | None, board_side: Side, camera: CameraDescription, own: OwnStream, receiver: BoardStream
     ) -> None:
         states = {Side.LEFT: rig.left_camera, Side.RIGHT: rig.right_camera} if rig is not None else {}
         self._side = board_side

@@ -40,13 +40,14 @@ class DemandClock:
     Args:
         own: the host camera's pacing.
         stills: the host camera's images; None if it is no replay. Then its images count from 0.
+        is_timeless: whether the stamps are those of another day, though both cameras had a clock then.
     """
 
-    def __init__(self, own: Pacing, stills: Stills | None = None) -> None:
+    def __init__(self, own: Pacing, stills: Stills | None = None, *, is_timeless: bool = False) -> None:
         self._stills = stills
         self.paces_own_camera = not has_own_time(own)
         """Whether the host camera shows an image only when one is wanted."""
-        self.is_timeless = self.paces_own_camera
+        self.is_timeless = self.paces_own_camera or is_timeless
         """Whether stamps of this run are labels, or ever were. No clock can tell the age of a label."""
         self.labels_board = False
         """Whether the stamps of the present board session are labels."""

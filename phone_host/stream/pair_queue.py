@@ -53,7 +53,8 @@ class PairQueue:
         demand: says what stamps mean, and is told of each board frame; None: the host camera has a clock.
         time_offset_ns: added to the board's stamps before they are compared with the host's.
         own_images: the images that the host camera replays; None if it does not.
-        clock: monotonic, ns.
+        clock: monotonic, ns: by which frames are given up.
+        marking: monotonic, ns: the time of a pair's marks.
     """
 
     def __init__(
@@ -66,8 +67,9 @@ class PairQueue:
         time_offset_ns: int = 0,
         own_images: ImageNumbers | None = None,
         clock: Callable[[], int] = now.monotonic_ns,
+        marking: Callable[[], int] | None = None,
     ) -> None:
-        self._clock = clock
+        self._clock, self._marking = clock, marking or clock
         self._settings = fifo
         self._fifo: Fifo[FramePair] = Fifo(fifo)
         self._tolerance_ns = tolerance_ns
@@ -159,6 +161,11 @@ class PairQueue:
         with self._changed:
             if self._meter is not None:
                 self._meter.restart()
+
+    def has_waiting(self) -> bool:
+        """Whether a pair waits to be processed."""
+        with self._changed:
+            return len(self._fifo) > 0
 
     def free_slots(self) -> int:
         """Return how many more board frames have room in the FIFO. Held board frames count as occupying a place."""
@@ -364,7 +371,7 @@ class PairQueue:
                 case Paired(board, host, time_skew_ns):
                     self._host_bytes -= len(host.payload)
                     self._board_bytes -= len(board.message.payload)
-                    paired_ns = self._clock()
+                    paired_ns = self._marking()
                     self._paired += 1
                     self._films.pair(board.message.sequence, host.sequence)
                     pair = FramePair(
@@ -372,7 +379,7 @@ class PairQueue:
                         host=host,
                         time_skew_ns=time_skew_ns,
                         paired_ns=paired_ns,
-                        queued_ns=self._clock(),
+                        queued_ns=self._marking(),
                         before=self._before(board),
                     )
                     self._dropped += len(self._fifo.put(pair))

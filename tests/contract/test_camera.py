@@ -27,6 +27,7 @@ from tests.support.novice.hands import write_plan
 from tests.support.novice.head import Novice
 from tests.support.page_source import PageSource
 from tests.support.pictures import encoded, jpeg, picture
+from tests.support.recorded import recording_file
 from tests.support.scripted_browser import LUMA, Script, ScriptedBrowser, Shot
 
 CLOCK = "board:test"
@@ -135,12 +136,27 @@ def held(folder: Path) -> Set:
     return Set(NoviceCamera(request), now.monotonic_ns())
 
 
+def recorded(options: str) -> Callable[[Path], Set]:
+    """A recording, opened with these options."""
+
+    def made(folder: Path) -> Set:
+        folder.mkdir()
+        path = recording_file(folder, IMAGES)
+        uri = f"replay:{path}?topic=/left/image/compressed&{options}"
+        return Set(open_camera(uri, CLOCK, START_NS), START_NS)
+
+    return made
+
+
 CAMERAS: dict[str, Callable[[Path], Set]] = {
     "replay clock loop": replay("fps=30&loop=1"),
     "replay clock": replay("fps=30"),
     "replay demand loop": replay("fps=30&loop=1&pace=demand"),
     "replay demand": replay("fps=24&pace=demand"),
     "replay of a turned camera": replay("fps=30&loop=1&rotate=90&flip=h"),
+    "recording clock": recorded("pace=clock"),
+    "recording clock loop": recorded("pace=clock&loop=1"),
+    "recording demand": recorded("pace=demand"),
     "mjpeg over http": served,
     "painted by another package": held,
     "browser, jpeg": browser("jpeg"),

@@ -31,6 +31,7 @@ _HARDWARE: Final = (
     "BOARD",
     "host.toml",
     "wall",
+    "session.mcap",
     "opencv-bm",
     "phone-host serve",  # until it is stopped; tests/system/test_serve.py
     "--serve",

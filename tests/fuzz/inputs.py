@@ -1,6 +1,7 @@
 """Fuzz targets: input from users, drivers, servers and disks. Each takes any bytes and raises only if something is wrong."""
 
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 from common.camera import v4l2_abi as abi
@@ -14,6 +15,8 @@ from common.keys import KeyFolder
 from common.link.factory import parse_link
 from common.program.settings import resolve
 from common.protocol.wire import MAX_PAYLOAD_BYTES
+from common.recording.opened import inflate
+from common.recording.recorded import read_recorded
 from phone_host.camera.factory import check_camera
 from phone_host.camera.jpegs import MAX_IMAGE_BYTES, JpegStream
 from phone_host.camera.jpegs import Whole as WholeImage
@@ -26,6 +29,7 @@ from phone_host.stereo.images import decode_file, examine
 from tests.fuzz.target import is_one_line
 from tests.support.bombs import SMALL_BOMB, black_png, progressive
 from tests.support.pictures import encoded, jpeg, picture
+from tests.support.recorded import recording
 
 
 def uri(data: bytes) -> None:
@@ -55,6 +59,20 @@ def uri_seeds() -> list[bytes]:
         b"http://user:pass@phone:8080/video?latency_ms=120",
         b"browser:?w=640&h=480&fps=30&encoding=luma&quality=0.9&rotate=90",
     ]
+
+
+def recordings(data: bytes) -> None:
+    """What a disk may give back as a recording. Expected: whatever is whole, never an exception, and no more than the file holds."""
+    found = read_recorded(memoryview(data), inflate)
+    held = sum(len(shown.image.payload) for stream in found.images.values() for shown in stream)
+    assert held <= len(data), "images longer than the file"
+    for topic in found.images:
+        with suppress(SpoiledImageError):
+            found.camera(topic)
+
+
+def recordings_seeds() -> list[bytes]:
+    return [recording(1), recording(2, missing=frozenset({0}))]
 
 
 def v4l2(data: bytes) -> None:

@@ -16,6 +16,8 @@ COMMANDS = [
         for verb in (
             "demo",
             "run",
+            "record",
+            "sessions",
             "calibrate",
             "calibrate-time",
             "stereo",

@@ -13,8 +13,11 @@ from common.protocol.message import BoardCounts, DropReason
 from phone_host.bench.report import as_json
 from phone_host.measure.absence import Away
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
+from phone_host.measure.recording_account import RecordingAccount
+from phone_host.measure.replay_facts import replay_facts
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
+from phone_host.measure.trouble import Trouble
 from phone_host.model import CutCounts, DepthAccount, DepthLimits, Drift, MatchReport, Search, TemporalAccount
 from phone_host.report.quality_json import quality_json
 from phone_host.report.run_json import build
@@ -79,6 +82,8 @@ def _eventful_run() -> RunSnapshot:
             ),
         ),
         own_future=4,
+        recording=RecordingAccount(file="s.mcap", frames=9, dropped=1, lost=0, size_bytes=7, failure=Trouble("p", "r")),
+        replay=replay_facts("s.mcap", "clock", []),
         budget=budget_accounts.ACCOUNT,
         depth=DepthAccount(
             cut=CutCounts(kept=5),

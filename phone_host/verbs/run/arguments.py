@@ -17,6 +17,9 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase    # both cameras expose together
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --budget 30ms    # coarser depth rather than slower
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --serve    # shows the page of this run
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --record session.mcap    # to compute it again later
+  phone-host run --replay session.mcap --calibration rig.yaml --out again
+  phone-host run --replay 'session.mcap?pace=clock' --calibration rig.yaml --fifo 2:drop-newest --out again
   phone-host run --camera 'replay:right?loop=1' --pairs 300 --json    # no depth: pairs and delays only
 """
 
@@ -100,6 +103,17 @@ def _add_ends(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_results(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="FILE.mcap",
+        help="keep what both cameras give as it comes, also what finds no partner; any program for ROS 2 recordings reads it",
+    )
+    parser.add_argument(
+        "--replay",
+        metavar="FILE.mcap[?pace=clock]",
+        help="play a recording in place of --link and --camera: every frame with the same partner each time; with pace=clock at the times of then",
+    )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json, index.html and saved pairs"
     )

@@ -25,6 +25,11 @@ from phone_host.declared_settings import PhoneHostSettings
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.model import Side, TimeOffset
+from phone_host.output.json_text import json_text
+from phone_host.recording.begin import begin_recording
+from phone_host.recording.opened import open_playback
+from phone_host.recording.playback import Playback
+from phone_host.recording.recorder import Recorder
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
 from phone_host.run.file_sink import NAMES
@@ -52,7 +57,7 @@ class Opened:
     Attributes:
         options: of `run`.
         found: its settings.
-        camera: of this machine.
+        camera: of this machine; or a recording of both.
         links: to the board.
         named: its addresses.
         keys: folder that remembers it.
@@ -62,7 +67,7 @@ class Opened:
 
     options: argparse.Namespace
     found: Resolved[PhoneHostSettings]
-    camera: Camera
+    camera: Camera | Playback
     links: Sequence[Link]
     named: tuple[str, ...]
     keys: Path
@@ -82,14 +87,29 @@ class Opened:
             DataError: the overlay belongs to another rig.
         """
         with ExitStack() as opened:
-            opened.enter_context(closing(self.camera))
+            if not isinstance(self.camera, Playback):
+                opened.enter_context(closing(self.camera))
             for link in self.links:
                 opened.enter_context(closing(link))
             if self.options.out is not None:
                 keep_other_report(self.options.out, "run")
-            host = Host(_host_settings(self, words), self.camera, self.links, self.core, sinks)
+            settings = _host_settings(self, words)
+            recorder = self._recorder(settings)
+            host = Host(settings, self.camera, self.links, self.core, sinks, recorder=recorder)
             opened.pop_all()
         return PreparedRun(host, self.named, self.keys, self.board_side, self.options.out)
+
+    def _recorder(self, settings: HostSettings) -> Recorder | None:
+        """Begin the recording that was asked for."""
+        if self.options.record is None or isinstance(self.camera, Playback):
+            return None
+        rig = self.found.values.calibration
+        attached = {"settings.json": json_text(dict(settings.resolved or {}), indent=1).encode()}
+        known = None if self.core is None else self.core.rig
+        if rig:
+            attached[Path(rig).name if known is None else "rig.yaml"] = Path(rig).read_bytes()
+        camera = self.camera.description
+        return begin_recording(self.options.record, camera, self.board_side, known, attached)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,9 +168,14 @@ class PreparedRun:
 
     def _written(self, snapshot: RunSnapshot) -> Ended:
         report = build(snapshot)
+        recording = snapshot.recording
         page = "" if self.out is None else _page(self.host, snapshot, self.board_side, self.out)
         is_complete = self.host.write_report(report, page)
-        return Ended(snapshot, report, is_complete, self.host.missing_files)
+        missing = [self.host.missing_files] if self.host.missing_files else []
+        if recording is not None and not recording.is_whole:
+            missing.append(f"the whole of {recording.file}")
+            is_complete = False
+        return Ended(snapshot, report, is_complete, ", ".join(missing))
 
 
 def checked(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
@@ -189,6 +214,8 @@ def open_run(
         DataError: the rig or the camera's images cannot be used.
     """
     settings = found.values
+    if options.replay is not None:
+        return _open_replay(options, found, tell)
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     if options.out is not None:
@@ -209,6 +236,25 @@ def open_run(
     if core is not None and options.complete and (options.out is None or not options.save_every):
         tell("--complete does nothing here: no pair is saved; give --out DIR and --save-every N")
     return Opened(options, found, camera, links, tuple(named), keys.path, core, board_side)
+
+
+def _open_replay(
+    options: argparse.Namespace, found: Resolved[PhoneHostSettings], tell: Callable[[str], None]
+) -> Opened:
+    """Open the recording that a run plays, and the core."""
+    settings = found.values
+    for name in ("link", "camera", "record", "align_phase"):
+        if getattr(options, name, None) is not None:
+            raise SettingsError(f"--{name.replace('_', '-')} beside --replay", "leave one of them out")
+    playback = open_playback(options.replay, options.board_side)
+    if options.out is not None:
+        spare(options.out, "", settings.calibration, options.overlay)
+        spare_inputs(options.out, NAMES, {"--replay": playback.file})
+    size_px = playback.description.upright_px
+    core, board_side = _core(options, replace(settings, camera=""), size_px, tell, playback.board_side)
+    overlay_of(options, core)
+    budget_wanted(options, found, core)
+    return Opened(options, found, playback, (), (str(playback.file),), key_folder(settings.keys).path, core, board_side)
 
 
 def replayed(uri: str) -> str:
@@ -251,9 +297,13 @@ def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str
 
 
 def _core(
-    options: argparse.Namespace, settings: PhoneHostSettings, size_px: tuple[int, int], tell: Callable[[str], None]
+    options: argparse.Namespace,
+    settings: PhoneHostSettings,
+    size_px: tuple[int, int],
+    tell: Callable[[str], None],
+    usual: Side = Side.LEFT,
 ) -> tuple[StereoCore | None, Side]:
-    """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else left."""
+    """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else the usual one."""
     images = replayed(settings.camera)
     core, rig_side = build_core(
         options,
@@ -263,7 +313,7 @@ def _core(
         Path(images) if images else None,
         temporal=settings.temporal,
     )
-    board_side = Side(options.board_side) if options.board_side else rig_side or Side.LEFT
+    board_side = Side(options.board_side) if options.board_side else rig_side or usual
     if rig_side not in {None, board_side}:
         raise SettingsError(
             f"--board-side {board_side.value} contradicts {settings.calibration}",

@@ -1,0 +1,107 @@
+"""A recording on disk that is being written: safe against a crash at any moment. Used by one thread."""
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO, Final
+
+from common.errors import UnavailableError
+from common.frame import Buffer
+from common.recording.layout import topics
+from common.recording.mcap_writer import McapWriter, Topic
+from common.versions import PACKAGE_VERSION
+
+_BUFFER_BYTES: Final = 8192
+"""Smaller than an image, so that an image goes to the system without a copy: 37 us a frame of 51 KB in place of 50."""
+
+
+class RecordingFile:
+    """A recording that is being written.
+
+    Attributes:
+        path: the file.
+
+    Args:
+        path: the file; it must not exist.
+        channels: its topics.
+
+    Raises:
+        UnavailableError: the file exists or cannot be made.
+    """
+
+    def __init__(self, path: Path, channels: tuple[Topic, ...] | None = None) -> None:
+        self.path = path
+        try:
+            self._file: BinaryIO = path.open("xb", buffering=_BUFFER_BYTES)
+        except FileExistsError:
+            raise UnavailableError(f"{path} exists already", "name another file, or delete it") from None
+        except OSError as error:
+            raise UnavailableError(f"{path} cannot be written ({error.strerror})", "name another file") from None
+        self._is_dirty = True
+        self._writer = McapWriter(self._file.write, f"tandemscan {PACKAGE_VERSION}", channels or topics())
+
+    @property
+    def size_bytes(self) -> int:
+        """How long the file is, bytes; what has not filled its chunk does not count. Safe from any thread."""
+        return self._writer.size
+
+    def tell(self, name: str, values: dict[str, str]) -> None:
+        """Add values by name.
+
+        Raises:
+            OSError: the disk is full, or gone.
+        """
+        self._writer.tell(name, values)
+        self._is_dirty = True
+
+    def attach(self, name: str, kind: str, data: bytes, at_ns: int) -> None:
+        """Add a file; see McapWriter.
+
+        Raises:
+            OSError: the disk is full, or gone.
+        """
+        self._writer.attach(name, kind, data, at_ns)
+        self._is_dirty = True
+
+    def add(self, topic: str, *parts: Buffer, sequence: int, log_ns: int, publish_ns: int) -> None:
+        """Add a message; see McapWriter. A chunk that is full goes to the operating system at once.
+
+        Raises:
+            OSError: the disk is full, or gone.
+        """
+        before = self._writer.size
+        self._writer.add(topic, *parts, sequence=sequence, log_ns=log_ns, publish_ns=publish_ns)
+        self._is_dirty = True
+        if self._writer.size != before:
+            self._file.flush()
+
+    def sync(self) -> None:
+        """Bring onto the disk what came until now. May take long.
+
+        Raises:
+            OSError: the disk is full, or gone.
+        """
+        if not self._is_dirty:
+            return
+        self._writer.end_chunk()
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._is_dirty = False
+
+    def abandon(self) -> None:
+        """Leave the file as it is. Whatever is whole in it can be read."""
+        with suppress(OSError):
+            self._file.close()
+
+    def close(self) -> None:
+        """End the file in order.
+
+        Raises:
+            OSError: the disk is full, or gone; what was written until then can be read.
+        """
+        try:
+            self._writer.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        finally:
+            self.abandon()

@@ -1,0 +1,200 @@
+"""The ROS 2 messages of a recording: images as they were encoded, and what is known of the cameras. Pure.
+
+Their bytes are those that ROS 2 itself writes, so that its tools, Foxglove and Rerun read them.
+Source: common_interfaces, sensor_msgs/msg/CompressedImage, Image and CameraInfo; std_msgs/msg/Header; builtin_interfaces/msg/Time.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from common.frame import Buffer, PixelFormat
+from common.recording.cdr import BrokenMessageError, CdrReader, CdrWriter
+
+NS: Final = 1_000_000_000
+_MOST_SECONDS: Final = 2**31 - 1
+
+_LINE: Final = "=" * 80
+_HEADER: Final = f"""
+{_LINE}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{_LINE}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+COMPRESSED_IMAGE: Final = "sensor_msgs/msg/CompressedImage"
+IMAGE: Final = "sensor_msgs/msg/Image"
+CAMERA_INFO: Final = "sensor_msgs/msg/CameraInfo"
+
+SCHEMAS: Final[dict[str, str]] = {
+    COMPRESSED_IMAGE: f"std_msgs/Header header\nstring format\nuint8[] data{_HEADER}",
+    IMAGE: "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data"
+    + _HEADER,
+    CAMERA_INFO: "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\n"
+    f"float64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi{_HEADER}{_LINE}\n"
+    "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n",
+}
+"""The definition of each message with all that it holds, as `ros2msg` writes them."""
+
+_COMPRESSED: Final = {PixelFormat.MJPEG: "jpeg", PixelFormat.PNG: "png"}
+_RAW: Final = {PixelFormat.GREY: ("mono8", 1), PixelFormat.YUYV: ("yuv422_yuy2", 2), PixelFormat.NV12: ("nv12", 1)}
+_FORMAT_OF: Final = {name: form for form, name in _COMPRESSED.items()}
+_FORMAT_OF_RAW: Final = {name: form for form, (name, _) in _RAW.items()}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedImage:
+    """An image of a recording.
+
+    Attributes:
+        stamp_ns: exposure mid-point, ns since 1970.
+        frame_id: whose image it is: left or right.
+        pixel_format: its encoding.
+        size_px: width and height; (0, 0): the image itself says it.
+        payload: the image as its camera gave it.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    pixel_format: PixelFormat
+    size_px: tuple[int, int]
+    payload: Buffer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraInfo:
+    """What is known of one camera of a rectified pair.
+
+    Attributes:
+        stamp_ns: ns since 1970.
+        frame_id: left or right.
+        size_px: width and height of its images.
+        model: plumb_bob, rational_polynomial or equidistant.
+        distortion: its coefficients, as ROS orders them.
+        matrix: K, 3 x 3 in rows, px.
+        rotation: R into the rectified frame, 3 x 3 in rows.
+        projection: P of the rectified images, 3 x 4 in rows, px; the right one's P[3] is -f·b.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    size_px: tuple[int, int]
+    model: str
+    distortion: Sequence[float]
+    matrix: Sequence[float]
+    rotation: Sequence[float]
+    projection: Sequence[float]
+
+
+def image_type(pixel_format: PixelFormat) -> str:
+    """Return the name of the message that holds images of this encoding."""
+    return COMPRESSED_IMAGE if pixel_format in _COMPRESSED else IMAGE
+
+
+def image_message(image: RecordedImage) -> bytes:
+    """Write an image."""
+    return b"".join(image_parts(image))
+
+
+def image_parts(image: RecordedImage) -> tuple[bytes, Buffer]:
+    """Write an image in two pieces, the second of which is its own bytes: copies of them would cost more than all else."""
+    writer = CdrWriter()
+    _write_header(writer, image.stamp_ns, image.frame_id)
+    if image.pixel_format in _COMPRESSED:
+        writer.text(_COMPRESSED[image.pixel_format])
+    else:
+        width, height = image.size_px
+        encoding, bytes_per_column = _RAW[image.pixel_format]
+        writer.number("I", height)
+        writer.number("I", width)
+        writer.text(encoding)
+        writer.number("B", 0)
+        writer.number("I", width * bytes_per_column)
+    writer.number("I", len(image.payload))
+    return writer.done(), image.payload
+
+
+def read_image(kind: str, data: "bytes | memoryview") -> RecordedImage:
+    """Read an image.
+
+    Args:
+        kind: name of its message, COMPRESSED_IMAGE or IMAGE.
+        data: the message.
+
+    Raises:
+        BrokenMessageError: it is none, or of an encoding that no camera of ours has.
+    """
+    reader = CdrReader(data)
+    stamp_ns, frame_id = _read_header(reader)
+    if kind == COMPRESSED_IMAGE:
+        name = reader.text()
+        pixel_format = _FORMAT_OF.get(_short(name))
+        size_px = (0, 0)
+    else:
+        height, width = int(reader.number("I")), int(reader.number("I"))
+        name = reader.text()
+        pixel_format, size_px = _FORMAT_OF_RAW.get(name), (width, height)
+        reader.number("B")
+        reader.number("I")
+    if pixel_format is None:
+        raise BrokenMessageError(f"an image is encoded as {name!r}")
+    return RecordedImage(stamp_ns, frame_id, pixel_format, size_px, reader.data())
+
+
+def camera_info_message(info: CameraInfo) -> bytes:
+    """Write what is known of a camera."""
+    writer = CdrWriter()
+    _write_header(writer, info.stamp_ns, info.frame_id)
+    width, height = info.size_px
+    writer.number("I", height)
+    writer.number("I", width)
+    writer.text(info.model)
+    writer.doubles(info.distortion, counted=True)
+    for values in (info.matrix, info.rotation, info.projection):
+        writer.doubles(values, counted=False)
+    for _ in range(6):  # binning, and a region of interest that is the whole image
+        writer.number("I", 0)
+    writer.number("B", 0)
+    return writer.done()
+
+
+def read_camera_info(data: "bytes | memoryview") -> CameraInfo:
+    """Read what is known of a camera.
+
+    Raises:
+        BrokenMessageError: it is no such message.
+    """
+    reader = CdrReader(data)
+    stamp_ns, frame_id = _read_header(reader)
+    height, width = int(reader.number("I")), int(reader.number("I"))
+    model = reader.text()
+    return CameraInfo(
+        stamp_ns=stamp_ns,
+        frame_id=frame_id,
+        size_px=(width, height),
+        model=model,
+        distortion=reader.doubles(),
+        matrix=reader.doubles(9),
+        rotation=reader.doubles(9),
+        projection=reader.doubles(12),
+    )
+
+
+def _short(name: str) -> str:
+    """Return the encoding itself: image_transport writes `bgr8; jpeg compressed bgr8`."""
+    return next((each for each in _FORMAT_OF if each in name.lower()), name)
+
+
+def _write_header(writer: CdrWriter, stamp_ns: int, frame_id: str) -> None:
+    seconds, rest = divmod(stamp_ns, NS)
+    writer.number("i", min(seconds, _MOST_SECONDS))
+    writer.number("I", rest)
+    writer.text(frame_id)
+
+
+def _read_header(reader: CdrReader) -> tuple[int, str]:
+    seconds, rest = int(reader.number("i")), int(reader.number("I"))
+    return seconds * NS + rest, reader.text()

@@ -1,0 +1,94 @@
+"""Writes a recording anew: what is whole in a broken one, or a part of it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from common.errors import UnavailableError
+from common.recording.layout import topics
+from common.recording.mcap_writer import Topic
+from common.recording.opened import inflate, mapped
+from common.recording.recording_file import RecordingFile
+from common.recording.ros_messages import SCHEMAS
+from common.recording.salvage import CHANNELS, Attachment, Channel, Damage, Message, Metadata, Salvage
+
+_JSON: Final = "json"
+
+
+class CopyAccount:
+    """What became of the messages of a recording that was copied.
+
+    Attributes:
+        messages: how many were copied.
+        left_out: topics whose messages this program cannot write, with their number.
+        damages: where something was missing.
+    """
+
+    def __init__(self) -> None:
+        self.messages = 0
+        self.left_out: dict[str, int] = {}
+        self.damages: list[Damage] = []
+
+
+def copy_recording(
+    source: Path, out: Path, wanted: Callable[[Message], bool] = lambda _: True, *, with_captions: bool = True
+) -> CopyAccount:
+    """Write what is whole in a recording into another file.
+
+    Args:
+        source: the recording.
+        out: the new file; it must not exist.
+        wanted: whether a message is copied.
+        with_captions: whether metadata and attachments are.
+
+    Raises:
+        UnavailableError: a file cannot be read or made, or the disk is full.
+        DataError: the source is no MCAP file.
+    """
+    data = mapped(source)
+    channels = {topic.name: topic for topic in topics()}
+    account = CopyAccount()
+    for record in Salvage(data, inflate).records():
+        if isinstance(record, Message) and record.channel is not None and record.channel.topic not in channels:
+            topic = _topic(record.channel)
+            if topic is not None:
+                channels[topic.name] = topic
+    file = RecordingFile(out, tuple(channels.values()))
+    try:
+        for record in Salvage(data, inflate).records():
+            match record:
+                case Message() if wanted(record):
+                    _copy(file, record, channels, account)
+                case Metadata(name, values) if with_captions and name != CHANNELS:
+                    file.tell(name, dict(values))
+                case Attachment(name, content) if with_captions:
+                    file.attach(name, "application/octet-stream", bytes(content), 0)
+                case Damage():
+                    account.damages.append(record)
+                case _:
+                    pass
+        file.close()
+    except OSError as error:
+        file.abandon()
+        raise UnavailableError(
+            f"{out} cannot be written ({error.strerror})", "make room, or name another disk"
+        ) from None
+    return account
+
+
+def _copy(file: RecordingFile, message: Message, channels: dict[str, Topic], account: CopyAccount) -> None:
+    topic = message.channel.topic if message.channel is not None else "unknown"
+    if message.channel is None or topic not in channels:
+        account.left_out[topic] = account.left_out.get(topic, 0) + 1
+        return
+    file.add(topic, message.data, sequence=message.sequence, log_ns=message.log_ns, publish_ns=message.publish_ns)
+    account.messages += 1
+
+
+def _topic(channel: Channel) -> Topic | None:
+    """Return what this program writes for a channel; None: its message is none that it knows."""
+    if channel.encoding == _JSON and not channel.kind:
+        return Topic(channel.topic, _JSON)
+    if channel.kind in SCHEMAS and channel.encoding == "cdr":
+        return Topic(channel.topic, "cdr", channel.kind, "ros2msg", SCHEMAS[channel.kind].encode())
+    return None

@@ -1,0 +1,42 @@
+"""Where the frames of a run come from: a board and this machine's camera, with or without a recorder beside them; or a recording of both."""
+
+from collections.abc import Sequence
+
+from common import now
+from common.camera.base import Camera
+from common.frame import Frame
+from common.link.base import Link
+from phone_host.recording.playback import Playback
+from phone_host.recording.recorder import Recorder
+from phone_host.recording.tap import Tap
+from phone_host.stream.demand_clock import DemandClock
+from phone_host.stream.own_camera import OwnCamera
+from phone_host.stream.pair_queue import PairQueue
+from phone_host.stream.receiver import Receiver
+from phone_host.stream.streams import BoardStream, OwnStream
+
+
+def streams(
+    camera: Camera | Playback, links: Sequence[Link], queue: PairQueue, demand: DemandClock, recorder: Recorder | None
+) -> tuple[OwnStream, BoardStream]:
+    """Return both sides of a run, not started.
+
+    Args:
+        camera: this machine's, open; or a recording.
+        links: open links to the board; none beside a recording.
+        queue: takes the frames.
+        demand: says when a demand-paced camera shows an image.
+        recorder: sees every frame; None: nothing is recorded.
+    """
+    if isinstance(camera, Playback):
+        return camera.into(queue)
+    if recorder is None:
+        own = OwnCamera(camera, queue.add_host, demand, queue.own_image_missing)
+        return own, Receiver(links, now.random_id(), queue)
+
+    def seen(frame: Frame) -> None:
+        recorder.own_frame(frame)
+        queue.add_host(frame)
+
+    own = OwnCamera(camera, seen, demand, queue.own_image_missing)
+    return own, Receiver(links, now.random_id(), Tap(queue, recorder))

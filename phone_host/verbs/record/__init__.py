@@ -1,0 +1,1 @@
+"""phone-host record: its options (light), and its command."""

@@ -1,0 +1,91 @@
+"""phone-host record: keep what both cameras give, without computing anything."""
+
+import argparse
+import math
+import sys
+from contextlib import ExitStack, closing
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+
+from common import now
+from common.errors import SettingsError
+from common.link.factory import open_links, parse_link, tell_insecure
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.settings import log_level, with_origins
+from common.program.signals import StopSignals
+from common.program.terminal import fitted
+from common.stamp import HOST_CLOCK
+from common.versions import REPORT_FORMAT
+from phone_host.boards.discovery import find_board_and_say
+from phone_host.camera.examples import EXAMPLE
+from phone_host.camera.factory import open_camera
+from phone_host.measure.recording_account import RecordingAccount
+from phone_host.model import Rig, Side
+from phone_host.output.json_text import json_text
+from phone_host.output.rig_files.imported import read_own_rig
+from phone_host.recording.begin import begin_recording
+from phone_host.recording.filming import take_frames
+from phone_host.recording.unpaired import UnpairedFrames
+from phone_host.run.progress_bar import step_bar
+from phone_host.run.recording_words import recording_words
+from phone_host.settings import check, key_folder, resolve_settings
+
+_BAD_DATA = 4
+
+
+def run(options: argparse.Namespace) -> int:
+    """Record until stopped, until the time is over, or until a stream ends."""
+    found = resolve_settings(options)
+    settings = found.values
+    check(settings)
+    if not settings.camera:
+        raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    if not (math.isfinite(options.seconds) and options.seconds >= 0):
+        raise SettingsError(f"--seconds is {options.seconds:g}", "give 0 (no limit) or more seconds")
+    logs.set_up(log_level(settings.log_level))
+    attached = {"settings.json": json_text(with_origins(found, vars(options), sys.argv), indent=1).encode()}
+    rig: Rig | None = None
+    if settings.calibration:
+        rig = read_own_rig(Path(settings.calibration))
+        attached["rig.yaml"] = Path(settings.calibration).read_bytes()
+    side = Side(options.board_side) if options.board_side else rig.board_side if rig is not None else Side.LEFT
+    signals = StopSignals()
+    with ExitStack() as opened:
+        camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
+        opened.enter_context(closing(camera))
+        keys = key_folder(settings.keys)
+        named = settings.link or (find_board_and_say(keys.path, options.wait),)
+        uris = [parse_link(uri, listens_by_default=False) for uri in named]
+        for uri in uris:
+            tell_insecure(uri)
+        links = open_links(uris, keys)
+        for link in links:
+            opened.enter_context(closing(link))
+        recorder = begin_recording(options.out, camera.description, side, rig, attached)
+        opened.pop_all()
+    wait_ns = None if options.wait is None else round(options.wait * 1e9)
+    try:
+        with step_bar("waiting for the board", None, Console(stderr=True)) as bar:
+
+            def advance(_: float) -> None:
+                bar.say(recording_words(recorder.account))
+
+            seconds = options.seconds or math.inf
+            frames = UnpairedFrames(recorder)
+            take_frames(links, camera, frames, seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
+    finally:
+        account = recorder.finish()
+    return _tell(account, as_json=options.json, is_interrupted=signals.interrupted)
+
+
+def _tell(account: RecordingAccount, *, as_json: bool, is_interrupted: bool) -> int:
+    if as_json:
+        print(json_text({"format_version": REPORT_FORMAT, "command": "record", **asdict(account)}))
+    else:
+        print(fitted(account.words))
+    if is_interrupted:
+        return INTERRUPTED
+    return 0 if account.is_whole else _BAD_DATA

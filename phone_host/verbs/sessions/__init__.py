@@ -1,0 +1,1 @@
+"""phone-host sessions: its options (light), and its command."""

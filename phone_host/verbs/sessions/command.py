@@ -1,0 +1,153 @@
+"""phone-host sessions: look into recordings, mend and cut them, and turn them into folders and back."""
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from common.errors import SettingsError
+from common.places import make_folder
+from common.program.terminal import fitted
+from common.recording.layout import CAPTURE
+from common.recording.opened import is_recording, open_recorded
+from common.recording.salvage import Message
+from common.versions import REPORT_FORMAT
+from common.words import counted
+from phone_host.output.atomic import write_text
+from phone_host.output.json_text import json_text
+from phone_host.recording.copied import CopyAccount, copy_recording
+from phone_host.recording.folders import export_folders, import_folders
+from phone_host.recording.other_topics import import_topics
+from phone_host.recording.session_info import SessionInfo, session_info
+from phone_host.run.progress_bar import busy_bar
+from phone_host.verbs.output_folders import unwritable
+from phone_host.verbs.sessions.page import info_page
+
+_BAD_DATA: Final = 4
+Told = tuple[Mapping[str, object], str, int]
+"""What is printed: as JSON, and as text; and the exit code."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do one task."""
+    _check(options)
+    tasks: dict[str, Callable[[argparse.Namespace], Told]] = {
+        "info": _info,
+        "repair": _repair,
+        "cut": _cut,
+        "export": _export,
+        "import": _import,
+    }
+    with busy_bar(f"sessions {options.task}"):
+        values, text, code = tasks[options.task](options)
+    if options.json:
+        print(json_text({"format_version": REPORT_FORMAT, "command": "sessions", "task": options.task, **values}))
+    else:
+        print(fitted(text))
+    return code
+
+
+def _check(options: argparse.Namespace) -> None:
+    if options.task != "import" and len(options.paths) != 1:
+        raise SettingsError(f"sessions {options.task} takes one recording", "name one")
+    if options.task != "info" and options.out is None:
+        raise SettingsError(f"sessions {options.task} needs --out", "add --out PATH")
+    if options.last is not None and options.last <= options.first:
+        raise SettingsError("--to is not behind --from", "give a later time, s after the first image")
+    if options.task != "import" and (options.times is not None or options.topics is not None):
+        raise SettingsError("--times and --topics are for import", "leave them out")
+
+
+def _info(options: argparse.Namespace) -> Told:
+    path: Path = options.paths[0]
+    recorded = open_recorded(path)
+    info = session_info(recorded)
+    page = None
+    if options.out is not None:
+        page = options.out / "index.html"
+        try:
+            make_folder(options.out)
+            write_text(page, info_page(path.name, recorded, info))
+        except OSError as error:
+            raise unwritable(options.out, error) from error
+    lines = _lines(path, info) + ([f"plots: {page}"] if page else [])
+    return {**asdict(info), "page": None if page is None else str(page)}, "\n".join(lines), 0
+
+
+def _lines(path: Path, info: SessionInfo) -> list[str]:
+    lines = [f"{path}: {info.seconds:.1f} s, {info.size_bytes / 1e6:.1f} MB"]
+    for one in info.streams:
+        missing = sum(gap.missing for gap in one.gaps)
+        gaps = (
+            f", {missing} missing in {counted(len(one.gaps), 'gap')}, the longest {one.gaps[0].seconds:.2f} s"
+            if one.gaps
+            else ""
+        )
+        size = f"{one.size_px[0]}x{one.size_px[1]}"
+        lines.append(f"  {one.topic}: {counted(one.images, 'image')} {size}, {one.rate_hz:.2f} /s{gaps} ({one.camera})")
+    if info.skew is not None:
+        lines.append(
+            f"  time skew of the two cameras: {info.skew.median_ms:+.2f} ms, 95 % below {info.skew.far_ms:.2f} ms"
+        )
+    others = [f"{topic} {count}" for topic, count in info.messages if topic not in {one.topic for one in info.streams}]
+    lines.append(f"  also: {', '.join([*others, *(name for name, _ in info.attachments)]) or 'nothing'}")
+    lines += [f"  missing: {words}" for words in info.damages]
+    if not info.is_complete or info.damages:
+        lines.append(
+            f"  it was not ended in order; phone-host sessions repair {path} --out whole.mcap writes a whole file"
+        )
+    return lines
+
+
+def _repair(options: argparse.Namespace) -> Told:
+    return _copied(options, copy_recording(options.paths[0], options.out))
+
+
+def _cut(options: argparse.Namespace) -> Told:
+    recorded = open_recorded(options.paths[0])
+    zero_ns = min(shown.image.stamp_ns for stream in recorded.images.values() for shown in stream)
+    first_ns = zero_ns + round(options.first * 1e9)
+    last_ns = None if options.last is None else zero_ns + round(options.last * 1e9)
+    del recorded
+
+    def wanted(message: Message) -> bool:
+        topic = "" if message.channel is None else message.channel.topic
+        return (
+            topic == CAPTURE
+            or topic.endswith("camera_info")
+            or (first_ns <= message.log_ns and (last_ns is None or message.log_ns < last_ns))
+        )
+
+    return _copied(options, copy_recording(options.paths[0], options.out, wanted))
+
+
+def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
+    lines = [f"{counted(account.messages, 'message')} written to {options.out}"]
+    lines += [f"  missing: at byte {one.at}: {one.words}; {one.lost} bytes passed over" for one in account.damages]
+    lines += [
+        f"  left out: {count} of {topic}, a message that is not known here" for topic, count in account.left_out.items()
+    ]
+    values = {
+        "file": str(options.out),
+        "messages": account.messages,
+        "damages": [asdict(one) for one in account.damages],
+        "left_out": account.left_out,
+    }
+    return values, "\n".join(lines), 0 if account.messages else _BAD_DATA
+
+
+def _export(options: argparse.Namespace) -> Told:
+    counts = export_folders(open_recorded(options.paths[0]), options.out)
+    text = f"{counts['left']} left and {counts['right']} right images written to {options.out}"
+    return {"folder": str(options.out), "images": counts}, text, 0
+
+
+def _import(options: argparse.Namespace) -> Told:
+    first: Path = options.paths[0]
+    if len(options.paths) == 1 and is_recording(str(first)):
+        counts = import_topics(first, options.topics, options.out)
+    else:
+        counts = import_folders(options.paths, options.times, options.out)
+    text = f"{counts['left']} left and {counts['right']} right images written to {options.out}"
+    return {"file": str(options.out), "images": counts}, text, 0

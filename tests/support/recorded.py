@@ -1,0 +1,56 @@
+"""Small recordings of known content."""
+
+from pathlib import Path
+
+from common.frame import PixelFormat
+from common.recording.layout import ABOUT, CAPTURE, About, topics
+from common.recording.mcap_writer import McapWriter
+from common.recording.ros_messages import RecordedImage, image_message
+from tests.support.pictures import jpeg
+
+PERIOD_NS = 40_000_000
+ZERO_NS = 1_700_000_000_000_000_000
+LATE_NS = 3_000_000
+"""Each right image is exposed this much after the left one of its number."""
+
+
+def payload(number: int) -> bytes:
+    """The image of that number."""
+    return jpeg(32, 24, seed=number % 4)
+
+
+def recording(pairs: int, *, missing: frozenset[int] = frozenset(), chunk_each: int = 4) -> bytes:
+    """A recording of so many pairs, the left images of which come from the board; some left images are missing.
+
+    Args:
+        pairs: how many.
+        missing: numbers of left images that are not in it.
+        chunk_each: pairs in a chunk.
+    """
+    data = bytearray()
+    writer = McapWriter(data.extend, "a test", topics())
+    writer.tell(ABOUT, About(unix_ns=ZERO_NS, board_side="left").values())
+    writer.attach("rig.yaml", "text/yaml", b"a: 1\n" * 50, ZERO_NS)
+    for number in range(pairs):
+        for side, late_ns in (("left", 0), ("right", LATE_NS)):
+            if side == "left" and number in missing:
+                continue
+            at_ns = ZERO_NS + number * PERIOD_NS + late_ns
+            image = RecordedImage(at_ns, side, PixelFormat.MJPEG, (0, 0), payload(number))
+            log_ns = at_ns + 12_000_000
+            topic = f"/{side}/image/compressed"
+            writer.add(topic, image_message(image), sequence=number, log_ns=log_ns, publish_ns=at_ns + 5_000_000)
+        if number % chunk_each == chunk_each - 1:
+            writer.end_chunk()
+    captured = f"[[0,{[2_000_000] * pairs}]]".replace(" ", "").encode()
+    end_ns = ZERO_NS + pairs * PERIOD_NS
+    writer.add(CAPTURE, captured, sequence=0, log_ns=end_ns, publish_ns=end_ns)
+    writer.finish()
+    return bytes(data)
+
+
+def recording_file(folder: Path, pairs: int, *, missing: frozenset[int] = frozenset()) -> Path:
+    """The same as a file."""
+    path = folder / "session.mcap"
+    path.write_bytes(recording(pairs, missing=missing))
+    return path

@@ -1,0 +1,180 @@
+"""A recording's bytes: messages as ROS 2 writes them, and a file of which all that is whole is read, whatever happened to it."""
+
+import random
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.frame import PixelFormat
+from common.recording.cdr import BrokenMessageError
+from common.recording.opened import inflate
+from common.recording.ros_messages import (
+    COMPRESSED_IMAGE,
+    IMAGE,
+    CameraInfo,
+    RecordedImage,
+    camera_info_message,
+    image_message,
+    image_type,
+    read_camera_info,
+    read_image,
+)
+from common.recording.salvage import Attachment, Damage, Message, Metadata, Record, Salvage, is_mcap
+from tests.support.recorded import recording
+
+PAIRS = 24
+WHOLE = recording(PAIRS)
+CHUNK_MESSAGES = 8
+SIZES = st.integers(1, 4000)
+
+
+def _read(data: bytes) -> tuple[list[Record], bool]:
+    salvage = Salvage(memoryview(data), inflate)
+    return list(salvage.records()), salvage.is_complete
+
+
+def _messages(records: list[Record]) -> list[Message]:
+    return [record for record in records if isinstance(record, Message)]
+
+
+def test_a_compressed_image_has_the_bytes_of_ros() -> None:
+    """OMG DDSI-RTPS 2.5, 10.5 and CORBA 3.4 part 2, 9.3: the header, then each value aligned to its size behind it."""
+    image = RecordedImage(5_000_000_007, "left", PixelFormat.MJPEG, (0, 0), b"\xff\xd8\xff")
+    by_hand = (
+        b"\x00\x01\x00\x00"
+        b"\x05\x00\x00\x00"
+        b"\x07\x00\x00\x00"
+        b"\x05\x00\x00\x00left\x00"
+        b"\x00\x00\x00"
+        b"\x05\x00\x00\x00jpeg\x00"
+        b"\x00\x00\x00"
+        b"\x03\x00\x00\x00\xff\xd8\xff"
+    )
+    assert image_message(image) == by_hand
+
+
+IMAGES = st.builds(
+    RecordedImage,
+    st.integers(0, 2**31 * 10**9 - 1),
+    st.sampled_from(["left", "right", ""]),
+    st.sampled_from(list(PixelFormat)),
+    st.tuples(SIZES, SIZES),
+    st.binary(),
+)
+
+
+@given(IMAGES)
+def test_images_come_back_as_they_were(image: RecordedImage) -> None:
+    """Any image is read as it was written; a compressed one tells its size itself."""
+    kind = image_type(image.pixel_format)
+    back = read_image(kind, image_message(image))
+    assert (back.stamp_ns, back.frame_id, back.pixel_format) == (image.stamp_ns, image.frame_id, image.pixel_format)
+    assert bytes(back.payload) == image.payload
+    assert back.size_px == (image.size_px if kind == IMAGE else (0, 0))
+
+
+def test_camera_info_comes_back_as_it_was() -> None:
+    """Every number of it."""
+    info = CameraInfo(
+        stamp_ns=7,
+        frame_id="right",
+        size_px=(640, 480),
+        model="plumb_bob",
+        distortion=(0.1, -0.2, 0.0, 0.0, 0.5),
+        matrix=tuple(map(float, range(9))),
+        rotation=tuple(map(float, range(9, 18))),
+        projection=tuple(map(float, range(12))),
+    )
+    assert read_camera_info(camera_info_message(info)) == info
+
+
+@given(st.binary(max_size=200))
+def test_other_bytes_are_no_image(data: bytes) -> None:
+    """Any bytes are read as an image, or refused with the one error there is."""
+    for kind in (COMPRESSED_IMAGE, IMAGE):
+        try:
+            read = read_image(kind, data)
+        except BrokenMessageError:
+            continue
+        assert read.pixel_format in PixelFormat
+
+
+def test_a_whole_file_is_read_whole() -> None:
+    """All messages, the attachment and the metadata, and that it was ended in order."""
+    records, is_complete = _read(WHOLE)
+    assert is_complete
+    assert len(_messages(records)) == 2 * PAIRS + 1
+    assert [record.name for record in records if isinstance(record, Attachment)] == ["rig.yaml"]
+    assert [record.name for record in records if isinstance(record, Metadata)] == ["channels", "tandemscan"]
+    assert not [record for record in records if isinstance(record, Damage)]
+
+
+def test_a_file_that_was_cut_gives_every_whole_chunk() -> None:
+    """At any byte: what lies before the cut is read, in order; the file does not count as ended."""
+    whole = [(one.log_ns, bytes(one.data)) for one in _messages(_read(WHOLE)[0])]
+    random_ = random.Random(1)
+    fewest = 0
+    for cut in sorted(random_.sample(range(9, len(WHOLE) - 200), 60)):
+        records, _ = _read(WHOLE[:cut])
+        found = [(one.log_ns, bytes(one.data)) for one in _messages(records)]
+        assert found == whole[: len(found)]
+        assert len(found) >= fewest, "a later cut leaves no less"
+        fewest = len(found)
+    assert fewest >= len(whole) - CHUNK_MESSAGES - 1
+
+
+def test_a_flipped_bit_costs_at_most_one_chunk() -> None:
+    """Wherever it is: no exception, no message that is not of the file, and only its own chunk is missing."""
+    whole = {(one.log_ns, bytes(one.data)) for one in _messages(_read(WHOLE)[0])}
+    random_ = random.Random(2)
+    for at in random_.sample(range(len(WHOLE)), 80):
+        spoiled = bytearray(WHOLE)
+        spoiled[at] ^= 1 << random_.randrange(8)
+        found = _messages(_read(bytes(spoiled))[0])
+        assert {(one.log_ns, bytes(one.data)) for one in found} <= whole
+        assert len(found) >= len(whole) - CHUNK_MESSAGES, at
+        assert all(one.channel is not None for one in found)
+
+
+def test_a_missing_summary_is_not_missed() -> None:
+    """All that counts stands before it."""
+    records, is_complete = _read(WHOLE[:-300])
+    assert is_complete
+    assert len(_messages(records)) == 2 * PAIRS + 1
+
+
+@pytest.mark.parametrize("data", [b"", b"\x89PNG\r\n\x1a\n", b"words"])
+def test_other_files_are_no_mcap(data: bytes) -> None:
+    """They are told apart by their first bytes."""
+    assert is_mcap(memoryview(WHOLE))
+    assert not is_mcap(memoryview(data))
+
+
+def _record(opcode: int, content: bytes) -> bytes:
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        _record(0x00, b"x"),
+        _record(0x06, b"short"),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 0, 4) + b"zstd" + struct.pack("<Q", 3) + b"abc"),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 0, 0) + struct.pack("<Q", 7) + b"abc"),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 1, 0) + struct.pack("<Q", 9) + bytes(9)),
+        _record(0x06, struct.pack("<QQQII", 0, 1, 9, 0, 0) + struct.pack("<Q", 9) + struct.pack("<BQ", 5, 4)),
+        _record(0x09, bytes(16) + struct.pack("<I", 1) + b"a" + struct.pack("<IQ", 0, 9) + bytes(4)),
+        _record(0x0C, struct.pack("<I", 1) + b"a" + struct.pack("<I", 9)),
+        _record(0x0C, struct.pack("<I", 2) + b"\xff\xff" + struct.pack("<I", 0)),
+        _record(0x0C, struct.pack("<I", 99) + b"a"),
+    ],
+)
+def test_a_spoiled_record_is_passed_over(spoiled: bytes) -> None:
+    """Whatever is wrong with one record before the others: it is told, and the rest is read."""
+    at = WHOLE.index(b"\x0c")
+    records, is_complete = _read(WHOLE[:at] + spoiled + WHOLE[at:])
+    assert is_complete
+    assert len(_messages(records)) == 2 * PAIRS + 1
+    assert [record for record in records if isinstance(record, Damage)]
