@@ -35,6 +35,8 @@ _HARDWARE: Final = (
     "opencv-bm",
     "phone-host serve",  # until it is stopped; tests/system/test_serve.py
     "--serve",
+    "browser:",  # somebody has to open the page
+    "sudo board-agent",  # on the board
     "XDG_RUNTIME_DIR",  # two programs in two terminals; tests/system runs such pairs
 )
 """Stands for a device, an address or a name of the reader's own. `wall` has its own test (test_contributing.py)."""
