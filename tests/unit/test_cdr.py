@@ -11,7 +11,7 @@ def test_an_empty_sequence_is_its_count_alone() -> None:
     writer.doubles((), counted=True)
     writer.doubles((), counted=False)
     writer.number("B", 7)
-    data = writer.bytes()
+    data = writer.done()
     assert data == HEADER + bytes(4) + b"\7"
     reader = CdrReader(data)
     assert reader.doubles() == ()
