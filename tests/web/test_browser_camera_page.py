@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.web.answers import Answers
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Choice, StepName
-from tests.support.camera_stand_in import BUSY, CameraStandIn
+from tests.support.played_feed import BUSY, PlayedFeed
 from tests.web.conftest import LAPTOP, OTHER_NAME, PHONE, TOKEN, Complaints, Opener
 from tests.web.played import CAMERAS, Played
 
@@ -20,28 +19,21 @@ BROWSERS = Choice(uri="browser:", name="A browser's camera")
 
 
 @pytest.fixture
-def camera(monkeypatch: pytest.MonkeyPatch) -> CameraStandIn:
-    """The program's half of the wire, in the real server."""
-    stand_in = CameraStandIn(TOKEN)
-    own = Answers.routes
-    monkeypatch.setattr(
-        Answers,
-        "routes",
-        lambda self: [*(each for each in own(self) if not each.path.startswith("/ws/camera")), *stand_in.routes()],
-    )
-    return stand_in
+def camera() -> PlayedFeed:
+    """What the real server hands the browser's camera to."""
+    return PlayedFeed()
 
 
 @pytest.fixture
-def program() -> Played:
+def program(camera: PlayedFeed) -> Played:
     """A program whose camera is to be a browser's."""
-    return Played((), settings={"camera": "browser:"}, cameras=(*CAMERAS, BROWSERS), done={StepName.BOARD})
+    cameras = (*CAMERAS, BROWSERS)
+    return Played((), settings={"camera": "browser:"}, cameras=cameras, done={StepName.BOARD}, feed=camera)
 
 
 @pytest.fixture
-def server(program: Played, camera: CameraStandIn) -> Iterator[PageServer]:
-    """The real server with the played wire; it is known by another name, too."""
-    del camera
+def server(program: Played) -> Iterator[PageServer]:
+    """The real server; it is known by another name, too."""
     serving = PageServer(program, PageSettings(port=0, token=TOKEN, names=(OTHER_NAME,)))
     serving.start()
     yield serving
@@ -60,7 +52,7 @@ def started(opened: Opener, *, permissions: tuple[str, ...] = ("camera",), scrip
     return page
 
 
-def focus(camera: CameraStandIn) -> dict[str, Any]:
+def focus(camera: PlayedFeed) -> dict[str, Any]:
     """What the page has told of the focus last: asked and got."""
     told = camera.of_kind("locked")
     values: dict[str, Any] = told[-1]["groups"]["focus"] if told else {"asked": {}, "got": {}}
@@ -74,7 +66,7 @@ def says(page: Any, words: str) -> str:
 
 
 def test_frames_arrive_whole_in_order_and_with_stamps_of_their_own(
-    camera: CameraStandIn, opened: Opener, complaints: Complaints
+    camera: PlayedFeed, opened: Opener, complaints: Complaints
 ) -> None:
     """Sequences grow, JPEG and luma have the size that was asked for, stamps are in the order of events and the camera's are even; the clock's echoes map them to this machine."""
     camera.welcome = {"want": {"encoding": "jpeg", "quality": 0.9}, "locks": None}
@@ -112,7 +104,7 @@ def test_frames_arrive_whole_in_order_and_with_stamps_of_their_own(
     assert complaints == []
 
 
-def test_without_credit_nothing_is_sent_and_what_is_dropped_is_counted(camera: CameraStandIn, opened: Opener) -> None:
+def test_without_credit_nothing_is_sent_and_what_is_dropped_is_counted(camera: PlayedFeed, opened: Opener) -> None:
     """The page sends exactly what was granted; each frame's count of dropped ones is what its sequence says."""
     camera.window = None
     page = started(opened)
@@ -133,7 +125,7 @@ def test_without_credit_nothing_is_sent_and_what_is_dropped_is_counted(camera: C
     says(page, "Turned: frames are not used")
 
 
-def test_settings_are_held_group_by_group_and_read_back(camera: CameraStandIn, opened: Opener) -> None:
+def test_settings_are_held_group_by_group_and_read_back(camera: PlayedFeed, opened: Opener) -> None:
     """Focus and exposure settle, are held and read back; the program's own values are set; what the camera does not have is refused by name; a group that cannot be let go is told."""
     page = started(opened)
     camera.until(lambda: focus(camera)["asked"])
@@ -155,7 +147,7 @@ def test_settings_are_held_group_by_group_and_read_back(camera: CameraStandIn, o
     assert camera.frames[-1].exposure_us == 100 * held["groups"]["exposure"]["got"]["exposureTime"]
 
 
-def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: CameraStandIn, opened: Opener) -> None:
+def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: PlayedFeed, opened: Opener) -> None:
     """Not allowed: how to allow it, and Start is offered again. Taken by another program: it is tried again, and comes by itself."""
     failing = """const own = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices), names = ['NotAllowedError', 'NotReadableError'];
     navigator.mediaDevices.getUserMedia = async wish => { if (names.length) throw new DOMException('', names.shift()); return own(wish); };"""
@@ -206,7 +198,7 @@ def test_each_state_has_words_of_its_own_and_what_to_do(opened: Opener) -> None:
     assert without == ["turned"]  # the program's own words, whole
 
 
-def test_one_browser_feeds_and_a_second_is_told_so_until_the_first_stops(camera: CameraStandIn, opened: Opener) -> None:
+def test_one_browser_feeds_and_a_second_is_told_so_until_the_first_stops(camera: PlayedFeed, opened: Opener) -> None:
     """The second shows the program's words and becomes the camera by itself once the first has stopped, which says goodbye."""
     first = started(opened)
     says(first, "Streaming")
@@ -219,7 +211,7 @@ def test_one_browser_feeds_and_a_second_is_told_so_until_the_first_stops(camera:
     assert len({each["track"] for each in camera.of_kind("hello")}) == 2
 
 
-def test_when_the_program_goes_and_comes_the_same_camera_goes_on(camera: CameraStandIn, opened: Opener) -> None:
+def test_when_the_program_goes_and_comes_the_same_camera_goes_on(camera: PlayedFeed, opened: Opener) -> None:
     """The page says that nobody answers, comes back by itself, and goes on with its numbers; a page that is loaded again is the camera again."""
     page = started(opened)
     camera.until(lambda: len(camera.frames) > 5)
@@ -240,7 +232,7 @@ def test_when_the_program_goes_and_comes_the_same_camera_goes_on(camera: CameraS
 
 
 def test_a_browser_without_frame_streams_hands_over_frames_all_the_same(
-    camera: CameraStandIn, opened: Opener, complaints: Complaints
+    camera: PlayedFeed, opened: Opener, complaints: Complaints
 ) -> None:
     """Without MediaStreamTrackProcessor frames come by way of a video: in order, in size, with the time of their capture; also from another step of the page."""
     camera.welcome = {"want": {"encoding": "luma"}, "locks": None}
@@ -262,7 +254,7 @@ def test_a_browser_without_frame_streams_hands_over_frames_all_the_same(
     assert complaints == []
 
 
-def test_another_size_is_another_track_and_a_size_it_lacks_is_told(camera: CameraStandIn, opened: Opener) -> None:
+def test_another_size_is_another_track_and_a_size_it_lacks_is_told(camera: PlayedFeed, opened: Opener) -> None:
     """The program's size counts; the person's choice, too; frames of one connection have one size."""
     page = started(opened)
     camera.until(lambda: camera.frames)
