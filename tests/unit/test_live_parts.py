@@ -17,8 +17,8 @@ from common import now
 from common.errors import DataError, SettingsError, UnavailableError
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.calibration import moving_board
 from phone_host.calibration.board_names import named_board
+from phone_host.calibration.board_size import whole_size_seen
 from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.snapshot import before_board
@@ -31,6 +31,7 @@ from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spok
 from phone_host.live.newest import Newest
 from phone_host.live.view_folders import Pictures, ViewFolders
 from phone_host.live.voice import Voice, speech_program
+from phone_host.model import Image
 from phone_host.run.host_settings import HostSettings
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.command import exit_code, run
@@ -71,12 +72,24 @@ def test_the_boards_size_is_found_and_a_wrong_one_is_named() -> None:
         check.missed(*_PAIR)
 
 
-def test_a_row_that_every_picture_hides_from_the_quick_look_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is counted may be a part: the board's own size is looked for before it is believed."""
-    monkeypatch.setattr(moving_board, "whole_size_seen", lambda _grey: (9, 5))
+def test_a_row_that_glare_hides_from_the_quick_look_is_found() -> None:
+    """A window's light lies on the first column in both pictures, so that a smaller board seems whole: its own size is looked for before that is believed."""
+    left, right = (_lit(image) for image in _PAIR)
+    assert (whole_size_seen(left), whole_size_seen(right)) == ((8, 6), (8, 6))
     finder = SizeFinder(0.025)
-    found = [finder.find(*_PAIR) for _ in range(3)]
+    found = [finder.find(left, right) for _ in range(3)]
     assert found[-1] == BOARD
+
+
+def _lit(image: Image) -> Image:
+    """Half as bright again towards white: a soft stripe along the outermost squares of one side."""
+    grid = find_corners(image, BOARD).reshape(BOARD.rows, BOARD.columns, 2)
+    across, along = grid[:, 1] - grid[:, 0], grid[1] - grid[0]
+    outer, inner = grid[:, 0] - 1.6 * across, grid[:, 0] + 0.5 * across
+    ends = [side + along[0] * by for side, by in ((outer[0], -1), (outer[-1], 1), (inner[-1], 1), (inner[0], -1))]
+    stripe = cv2.fillConvexPoly(np.zeros(image.shape, np.uint8), np.array(ends).astype(np.int32), 255)
+    light = cv2.GaussianBlur(stripe, (0, 0), 6) / 255.0
+    return np.asarray(image + (255 - image) * light * 0.5, np.uint8)
 
 
 def test_a_board_of_marks_is_not_taken_for_a_chessboard() -> None:
