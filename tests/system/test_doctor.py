@@ -12,10 +12,10 @@ from tests.support.numbered import write_film
 from tests.support.programs import board, free_port, until
 
 
-def doctor(module: str, *arguments: str) -> tuple[int, dict[str, Any]]:
-    """Run a doctor to its end; return the exit code, and the checks by what they checked."""
+def doctor(module: str, *arguments: str, **more: str) -> tuple[int, dict[str, Any]]:
+    """Run a doctor to its end; return the exit code, and the checks by what they checked. `more`: of its environment."""
     command = [sys.executable, "-P", "-m", module, "doctor", "--json", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env={**os.environ, **more})
     assert "Traceback" not in done.stderr
     found: dict[str, Any] = {}
     for check in json.loads(done.stdout)["checks"]:
@@ -133,3 +133,26 @@ def test_two_wheels_of_opencv_are_found(tmp_path: Path) -> None:
     assert done.returncode == 4, done.stderr
     (check,) = (check for check in json.loads(done.stdout)["checks"] if check["what"] == "cv2")
     assert "side by side" in check["finding"]
+
+
+def test_on_android_what_android_keeps_away_is_said(tmp_path: Path) -> None:
+    """With the platform's value that Python has there: no finding fails, links that cannot be do, and each remedy names a way that works."""
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.platform = 'android'\n")
+    asked = "from pathlib import Path; from phone_host.boards.discovery import _why_not; from phone_host.stereo.native.library import load; "
+    asked += f"print(load(Path({str(tmp_path)!r})).remedy, _why_not(), sep='|')"  # no library lies there
+    android = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True, env=android).stdout
+    assert "termux-install.sh" in told
+    assert told.endswith("|, which Android keeps from Termux\n")
+    code, checks = doctor("phone_host.cli", PYTHONPATH=str(tmp_path))
+    assert code == 0
+    assert "Android" in checks["phone"]["finding"]
+    assert "browser is the camera" in checks["camera"]["finding"]
+    assert "Ethernet over USB" in checks["usb"]["finding"]
+    assert "needs a laptop" in checks["bluetooth"]["finding"]
+    links = ("--link", "serial:/dev/ttyACM0", "--link", "rfcomm://00:11:22:33:44:55", "--wait", "0")
+    code, checks = doctor("phone_host.cli", *links, PYTHONPATH=str(tmp_path))
+    assert code == 4
+    assert {checks[name]["verdict"] for name in ("usb", "bluetooth")} == {"fail"}
+    assert "tcp://192.168.7.2" in checks["usb"]["remedy"]
+    assert checks["bluetooth"]["remedy"]

@@ -4,16 +4,13 @@ import sys
 
 import pytest
 
-from common.android import is_android
 from common.doctor import machine
 from common.doctor.finding import Grade
 from common.doctor.network_checks import ACCESS_POINT, CABLE_BOARD, Card, check_dialling, check_listening
 from common.doctor.network_probe import examine_network
 from common.groups import group_name, group_of_one
 from common.link.uri import parse_link
-from phone_host.boards import discovery
 from phone_host.doctor.android_checks import Phone, check_bluetooth, check_camera, check_phone, check_usb
-from phone_host.stereo.native.library import load
 
 OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
 CABLE = Card("usb0", CABLE_BOARD, is_up=True)
@@ -94,15 +91,6 @@ def test_a_phone_is_told_what_android_keeps_from_it() -> None:
     assert check_usb((), ("serial:/dev/ttyACM0",)).verdict is FAIL
     assert (check_bluetooth(()).verdict, check_bluetooth(("rfcomm://x",)).verdict) == (OK, FAIL)
     assert "needs a laptop" in check_bluetooth(()).text
-
-
-def test_android_is_told_by_the_interpreter(monkeypatch: pytest.MonkeyPatch, tmp_path: object) -> None:
-    """With Android's value of sys.platform, remedies are Termux's."""
-    assert not is_android()
-    monkeypatch.setattr(sys, "platform", "android")
-    assert is_android()
-    assert "termux-install.sh" in load(tmp_path).remedy  # type: ignore[union-attr, arg-type]  # nothing lies there
-    assert discovery._why_not() == ", which Android keeps from Termux"
 
 
 def test_groups_without_names(monkeypatch: pytest.MonkeyPatch) -> None:
