@@ -7,7 +7,6 @@ from typing import Final
 from common import now
 from common.camera.base import Camera
 from common.camera.image_numbers import ShowsFiles
-from common.errors import AbsentBoardError
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.orientation import UPRIGHT, Orientation
@@ -22,6 +21,7 @@ from phone_host.model import Processed, Result, Side
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.recording.playback import Playback
 from phone_host.recording.recorder import Recorder
+from phone_host.run.course import Course
 from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.drift_keeper import DriftKeeper
 from phone_host.run.file_sink import FileSink
@@ -35,24 +35,17 @@ from phone_host.run.recording_sink import RecordingSink
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
 from phone_host.run.sources import streams
-from phone_host.run.time_limit import TimeLimit
 from phone_host.run.trust_sink import PERIOD_NS, TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
-from phone_host.stream.await_board import BoardPatience, refusal_error
 from phone_host.stream.demand_clock import DemandClock
-from phone_host.stream.one_kind import require_one_kind
 from phone_host.stream.pair_queue import PairQueue
-from phone_host.stream.refusals import BoardRefusal, refusal_text
+from phone_host.stream.refusals import refusal_text
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.stills import Stills
 
-_STEP_S: Final = 0.05
 _MOTION: Final = "motion"
-_LAST_PARTNER_NS: Final = 1_000_000_000
-"""After one stream has ended, the other gets this long to deliver the last partners."""
-
 _STOP_S: Final = 0.4
 """A stopped run gives its current pair this long: Ctrl-C ends within a second, and the goodbye takes 0.3 s of it."""
 
@@ -163,9 +156,17 @@ class Host:
             taken=self._receiver.wake,
         )
         self._doubts = DoubtLog(lambda: concerns(self.snapshot()))
-        self._time_limit = TimeLimit(settings.seconds_ns)
         self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
-        self._refusal: BoardRefusal | None = None
+        self._course = Course(
+            settings,
+            self._own,
+            (self._camera, self._receiver),
+            queue=self._queue,
+            worker=self._worker,
+            ledgerer=self._ledgerer,
+            step=self._step,
+            raise_failures=self._raise_failures,
+        )
         self._ended_ns = 0
         self._replay: ReplayFacts | None = None
         if (played := self._playback) is not None:
@@ -190,7 +191,7 @@ class Host:
             self._worker.start()
             self._receiver.start()
             self._camera.start()
-            ended = self._watch(stop, watch)
+            ended = self._course.follow(stop, watch)
         except BaseException:
             with suppress(Exception):  # report what ended the run, not its consequences
                 self._end(_STOP_S)
@@ -277,7 +278,7 @@ class Host:
     @property
     def refused(self) -> Trouble | None:
         """Why the board refuses this host, now or at the end of the run; None: it does not, or is silent."""
-        return None if self._refusal is None else Trouble(*refusal_text(self._refusal))
+        return None if self._course.refusal is None else Trouble(*refusal_text(self._course.refusal))
 
     def sample(self) -> Sequence[PairLedger]:
         """Return ledgers for plots, in order: those of all pairs, or an evenly spaced sample."""
@@ -375,74 +376,13 @@ class Host:
         seen = result.processed.pair.right if self._settings.board_side is Side.LEFT else result.processed.pair.left
         self._motion.add(seen, result.ledger.host.exposed_ns, result.ledger.done_ns)
 
-    def _watch(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
-        patience = BoardPatience(self._settings.wait_ns, now.monotonic_ns())
-        ending_since_ns: int | None = None
-        while not self._worker.finished.wait(_STEP_S):
-            now_ns = now.monotonic_ns()
-            self._raise_failures()
-            self._check_kinds()
-            self._cameras.look()
-            self._steering.update(now_ns)
-            self._doubts.look(now_ns)
-            if self._recorder is not None:
-                self._recorder.clock(self._receiver.estimate, now_ns)
-            if watch is not None:
-                watch()
-            if stop():
-                return EndReason.STOPPED
-            present = self._receiver.connected or self._receiver.ended
-            patience.look(now_ns, None if present else self._receiver.refused, present=present)
-            self._refusal = patience.refused
-            if self._time_limit.is_over(now_ns, has_met_board=self.has_met_board, begun_ns=self.first_done_ns):
-                return self._drain(stop, watch, EndReason.SECONDS_OVER)
-            if self._receiver.ended or self._camera.ended:
-                ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
-                if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
-                    if self._receiver.ended:
-                        self._queue.board_ended()
-                    return self._drain(stop, watch, EndReason.STREAM_ENDED)
-        self._raise_failures()
-        return EndReason.PAIRS_REACHED
-
-    def _check_kinds(self) -> None:
-        """Refuse a board that shows stills beside a camera with a clock, or the reverse.
-
-        Only the first board is a mistake of the user's. Frames of a later one with another kind of camera are refused
-        by the pair queue, because a board must not be able to end a run.
-
-        Raises:
-            SettingsError: the two kinds are mixed.
-            AbsentBoardError: this machine's camera has shown its last image before a board came.
-            BusyBoardError: the same, because the board talks to another host.
-        """
-        hello = self._receiver.hello
-        if hello is not None:
-            if sum(bool(account.session) for account in tuple(self._receiver.account.sessions)) == 1:
-                require_one_kind(self._own, hello.camera)
-        elif self._camera.ended:
-            if self._refusal is not None:
-                raise refusal_error(self._refusal)
-            raise AbsentBoardError(
-                "no board came before this machine's camera had shown its last image",
-                "start board-agent first, or give loop=1 in --camera",
-            )
-
-    def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None, ended: EndReason) -> EndReason:
-        """Let the worker finish the waiting pairs. No frame will follow."""
-        self._queue.finish()
-        while not self._worker.has_ended(_STEP_S):
-            if watch is not None:
-                watch()
-            if stop():
-                return EndReason.STOPPED
-        self._raise_failures()
-        reached = self._settings.pairs and self._ledgerer.processed >= self._settings.pairs
-        return EndReason.PAIRS_REACHED if reached else ended
-
-    def _all_paired(self) -> bool:
-        counts = self._queue.counts
-        return self._receiver.ended and (counts.held_board == 0 or (self._camera.ended and counts.held_host == 0))
+    def _step(self, now_ns: int) -> None:
+        """Do what is done several times a second."""
+        self._cameras.look()
+        self._steering.update(now_ns)
+        self._doubts.look(now_ns)
+        if self._recorder is not None:
+            self._recorder.clock(self._receiver.estimate, now_ns)
 
     def _raise_failures(self) -> None:
         of_sinks = (sink.failure for sink in self._sinks)
