@@ -7,12 +7,12 @@ decides what is believed, `common/camera/life.py` when the camera is given up an
 
 import logging
 from collections import Counter
+from dataclasses import replace
 from typing import Final
 
 from common import now
-from common.camera.base import CameraHealth, Grab, Mode, Offers, Spoiled, StampOrigin
-from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
-from common.camera.v4l2_stamps import RateMeter
+from common.camera.base import CameraHealth, Grab, Spoiled, StampOrigin
+from common.camera.life import Life, Loss, Standing, Step
 from common.errors import UnavailableError
 from common.frame import Frame, FrameFault
 from common.imagesize.head import size_text
@@ -25,35 +25,17 @@ from phone_host.camera.browser_feed import BrowserFeed, Seat
 from phone_host.camera.browser_locks import locks_of
 from phone_host.camera.browser_uri import BrowserSettings
 from phone_host.camera.browser_wire import Hello
-from phone_host.camera.waiting_grabs import WaitingGrabs
+from phone_host.camera.far import LIFE, MEASURE_FRAMES, MEASURE_NS, SECOND_NS, FarCamera
 
 _LOG = logging.getLogger(__name__)
 
-_S: Final = 1_000_000_000
-_MEASURE_FRAMES: Final = 9
-_MEASURE_NS: Final = 3 * _S
-"""As for other cameras without a rate of their own: the median of eight intervals, or what came in this time."""
-
 _STEP_S: Final = 0.05
-
-_LIFE: Final = LifeSettings(
-    # A phone that opens its camera anew for another size takes some seconds.
-    start_ns=10 * _S,
-    first_frame_ns=3 * _S,
-    # Wi-Fi delays packets by a second now and then.
-    silence_ns=2 * _S,
-    silence_periods=10,
-    lost_rest_ns=_S // 10,
-    rest_ns=_S // 10,
-    longest_rest_ns=_S,
-    # The browser is told that nobody needs frames, and goes on with its preview.
-    unwanted=Unwanted.IS_CLOSED,
-)
+_LIFE: Final = replace(LIFE, first_frame_ns=3 * SECOND_NS)  # it opens its camera only now
 
 _TURNED: Final = "turned after the first image: nothing is used until it is turned back"
 
 
-class BrowserCamera:
+class BrowserCamera(FarCamera):
     """A browser's camera while one run uses it.
 
     Args:
@@ -66,18 +48,16 @@ class BrowserCamera:
     """
 
     def __init__(self, settings: BrowserSettings, feed: BrowserFeed, now_ns: int) -> None:
+        super().__init__()
         self.settings: Final = settings
         self._feed, self._lock = feed, feed.changed
-        self._waiting = WaitingGrabs()
         self._border = BrowserBorder(settings.size_px)
         self._life = Life(_LIFE, now_ns)
-        self._rate = RateMeter()
         self._sequence = self._missed = self._believed = self._unplugged_before = 0
         self._faults: Counter[FrameFault] = Counter()
         self._newest: Frame | None = None
         self._first_ns = self._asleep_ns = 0
         self._told = ""
-        self._is_told_lost = False
         self._held: Locks = ()
         self._description: CameraDescription | None = None
         with self._lock:
@@ -103,21 +83,6 @@ class BrowserCamera:
         assert self._description is not None
         return self._description
 
-    @property
-    def pollable(self) -> int | None:
-        """Readable when something has come."""
-        return self._waiting.pollable
-
-    @property
-    def offers(self) -> Offers:
-        """No modes: what is not wanted is dropped in the browser."""
-        return Offers()
-
-    def due_ns(self, now_ns: int) -> int:
-        """Return NEVER_NS: nothing is due by time alone."""
-        del now_ns
-        return NEVER_NS
-
     def read(self, now_ns: int) -> list[Grab]:
         """Return what has come: at most one frame, the newest. Ask for the next ones."""
         with self._lock:
@@ -126,15 +91,6 @@ class BrowserCamera:
             if self._life.phase is Standing.STREAMING:
                 self._feed.grant(self._rate.period_ns or 0)
         return grabs
-
-    def anchor(self, exposed_ns: int, index: int) -> None:
-        """Do nothing: a browser's camera has its own clock."""
-
-    def steer(self, later_ns: int, now_ns: int) -> None:
-        """Do nothing: it cannot be steered."""
-
-    def adapt(self, mode: Mode, now_ns: int) -> None:
-        """Do nothing: it offers no modes."""
 
     @property
     def health(self) -> CameraHealth:
@@ -235,8 +191,8 @@ class BrowserCamera:
             now_ns = now.monotonic_ns()
             self._tick(now_ns)
             newest, seat = self._newest, feed.seat
-            slow = self._believed >= 2 and now_ns - self._first_ns >= _MEASURE_NS
-            if newest is not None and seat is not None and (self._believed >= _MEASURE_FRAMES or slow):
+            slow = self._believed >= 2 and now_ns - self._first_ns >= MEASURE_NS
+            if newest is not None and seat is not None and (self._believed >= MEASURE_FRAMES or slow):
                 break
             if feed.has_ended or (feed.patience_ns is not None and now_ns - began_ns > feed.patience_ns):
                 raise self._absent()
@@ -303,16 +259,13 @@ class BrowserCamera:
     def _shut(self, problem: str) -> None:
         self._life.closed()
         self._waiting.tell()
-        if self._life.is_lost and not self._is_told_lost:
-            self._is_told_lost = True
-            _LOG.warning(event("camera_lost", camera=self.description.name, problem=problem))
+        if self._life.is_lost:
+            self._log_lost(self.description.name, problem)
 
     def _deliver(self, believed: Believed, arrived_ns: int) -> None:
         image, exposed = believed.image, believed.exposed
         self._life.heard(arrived_ns, self._rate.period_ns or 0)
-        if self._is_told_lost:
-            self._is_told_lost = False
-            _LOG.info(event("camera_back", camera=self.description.name))
+        self._log_back("" if self._description is None else self._description.name)
         self._tell("")
         sequence, self._sequence = self._sequence, self._sequence + 1
         self._first_ns, self._believed = self._first_ns or exposed.ns, self._believed + 1

@@ -12,8 +12,8 @@ import threading
 from typing import Final
 
 from common import now
-from common.camera.base import CameraHealth, Grab, Mode, Offers, Spoiled
-from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
+from common.camera.base import CameraHealth, Grab, Spoiled
+from common.camera.life import Life, Loss, Standing, Step
 from common.camera.v4l2_stamps import RateMeter
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat
@@ -22,41 +22,19 @@ from common.program.logs import event
 from common.protocol.message import CameraDescription, Pacing
 from common.stamp import Stamp
 from phone_host.camera.arrivals import Arrivals
+from phone_host.camera.far import LIFE, MEASURE_FRAMES, MEASURE_NS, SECOND_NS, FarCamera
 from phone_host.camera.http_client import Connection
 from phone_host.camera.http_uri import HttpSettings
 from phone_host.camera.jpegs import JpegStream, Whole
-from phone_host.camera.waiting_grabs import WaitingGrabs
 
 _LOG = logging.getLogger(__name__)
 
-_S: Final = 1_000_000_000
-
-_MEASURE_FRAMES: Final = 9
-_MEASURE_NS: Final = 3 * _S
-"""The period is the median of eight intervals. If these take longer, the images that came until then are used."""
-
 _PATIENCE_S: Final = 5.0
-
-_LIFE: Final = LifeSettings(
-    # If a phone's camera must wake up, the first image takes some seconds.
-    start_ns=10 * _S,
-    # Wi-Fi occasionally delays packets by a second. Without an image for ten periods, at least two seconds, reconnect.
-    first_frame_ns=2 * _S,
-    silence_ns=2 * _S,
-    silence_periods=10,
-    # Between two attempts, doubled each time: a phone that is back is found within a second (DESIGN, section 7).
-    lost_rest_ns=_S // 10,
-    rest_ns=_S // 10,
-    longest_rest_ns=_S,
-    # The phone may rest, too.
-    unwanted=Unwanted.IS_CLOSED,
-)
-
 _LONGEST_WAIT_S: Final = 3600.0
 """A lock's timeout has a limit, and the far future is beyond it."""
 
 
-class HttpCamera:
+class HttpCamera(FarCamera):
     """The images of one server.
 
     Args:
@@ -67,18 +45,17 @@ class HttpCamera:
     """
 
     def __init__(self, settings: HttpSettings) -> None:
+        super().__init__()
         self._settings = settings
         self._lock = threading.Condition()
-        self._waiting = WaitingGrabs()
         self._connection: Connection | None = None
-        self._life = Life(_LIFE, now.monotonic_ns())
-        self._is_told_lost = False
+        self._life = Life(LIFE, now.monotonic_ns())
         self._problem: TandemError | None = None
         self._failure: Exception | None = None
         self._sequence = 0
         self._first_ns = self._heard_ns = 0
         self._size_px = self._asked_px = (0, 0)
-        self._rate, self._arrivals = RateMeter(), Arrivals()
+        self._arrivals = Arrivals()
         self._faults: dict[FrameFault, int] = {}
         self._turns = 0
         self._thread = threading.Thread(target=self._run, name="mjpeg", daemon=True)
@@ -104,21 +81,6 @@ class HttpCamera:
             )
         )
 
-    @property
-    def pollable(self) -> int | None:
-        """Readable when something has come."""
-        return self._waiting.pollable
-
-    @property
-    def offers(self) -> Offers:
-        """No modes: a server's images cannot be changed."""
-        return Offers()
-
-    def due_ns(self, now_ns: int) -> int:
-        """Return NEVER_NS: nothing is due by time alone."""
-        del now_ns
-        return NEVER_NS
-
     def read(self, now_ns: int) -> list[Grab]:
         """Return what has come: at most one frame, the newest."""
         del now_ns  # an image is grabbed when its last byte arrives
@@ -127,15 +89,6 @@ class HttpCamera:
             if self._failure is not None:
                 raise self._failure
         return grabs
-
-    def anchor(self, exposed_ns: int, index: int) -> None:
-        """Do nothing: a server has its own clock."""
-
-    def steer(self, later_ns: int, now_ns: int) -> None:
-        """Do nothing: a server cannot be steered."""
-
-    def adapt(self, mode: Mode, now_ns: int) -> None:
-        """Do nothing: it offers no modes."""
 
     @property
     def health(self) -> CameraHealth:
@@ -195,8 +148,8 @@ class HttpCamera:
                 gives_up = self._life.gives_up(now_ns)
                 if (failure := self._failure or self._problem) is not None:
                     raise failure
-                slow = self._sequence >= 2 and now_ns - self._first_ns >= _MEASURE_NS
-                if self._sequence >= _MEASURE_FRAMES or slow:
+                slow = self._sequence >= 2 and now_ns - self._first_ns >= MEASURE_NS
+                if self._sequence >= MEASURE_FRAMES or slow:
                     period_ns = self._rate.period_ns or (self._heard_ns - self._first_ns) // (self._sequence - 1)
                     self._asked_px = self._size_px
                     self._sequence = 0
@@ -210,7 +163,7 @@ class HttpCamera:
                 self._lock.wait(0.05)
 
     def _no_images(self) -> UnavailableError:
-        shown, patience_s = self._settings.shown, _LIFE.start_ns // _S
+        shown, patience_s = self._settings.shown, LIFE.start_ns // SECOND_NS
         if self._sequence:
             return UnavailableError(f"camera {shown} sent one image in {patience_s} s", "give the video's own address")
         if not self._life.counts.opened:
@@ -239,7 +192,7 @@ class HttpCamera:
                 now_ns = now.monotonic_ns()
                 if self._life.due(now_ns) is Step.OPEN:
                     return True
-                self._lock.wait(min(_LONGEST_WAIT_S, max(0, self._life.due_ns - now_ns) / _S))
+                self._lock.wait(min(_LONGEST_WAIT_S, max(0, self._life.due_ns - now_ns) / SECOND_NS))
             return False
 
     def _visit(self) -> None:
@@ -299,7 +252,7 @@ class HttpCamera:
             now_ns = now.monotonic_ns()
             if self._life.due(now_ns) is Step.CLOSE:
                 self._tell_lost("no image came any more")
-            return max(0, self._life.due_ns - now_ns) / _S if self._life.phase is Standing.STREAMING else 0.0
+            return max(0, self._life.due_ns - now_ns) / SECOND_NS if self._life.phase is Standing.STREAMING else 0.0
 
     def _lose(self, loss: Loss, problem: str) -> None:
         with self._lock:
@@ -307,9 +260,8 @@ class HttpCamera:
                 self._tell_lost(problem)
 
     def _tell_lost(self, problem: str) -> None:
-        if self._life.is_lost and self._life.is_wanted and not self._is_told_lost:
-            self._is_told_lost = True
-            _LOG.warning(event("camera_lost", camera=self._settings.shown, problem=problem))
+        if self._life.is_lost and self._life.is_wanted:
+            self._log_lost(self._settings.shown, problem)
 
     def _deliver(self, image: Whole) -> None:
         with self._lock:
@@ -323,9 +275,8 @@ class HttpCamera:
                 return
             self._life.heard(now.monotonic_ns(), self._rate.period_ns or 0)
             sequence, self._sequence = self._sequence, self._sequence + 1
-            if self._is_told_lost and not self._life.is_lost:
-                self._is_told_lost = False
-                _LOG.info(event("camera_back", camera=self._settings.shown))
+            if not self._life.is_lost:
+                self._log_back(self._settings.shown)
             self._first_ns, self._heard_ns = self._first_ns or image.began_ns, image.began_ns
             self._rate.add(image.began_ns, sequence)
             self._arrivals.add(sequence, image.began_ns)
