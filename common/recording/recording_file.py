@@ -1,7 +1,8 @@
 """A recording on disk that is being written: safe against a crash at any moment. Used by one thread."""
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 
@@ -105,3 +106,25 @@ class RecordingFile:
             os.fsync(self._file.fileno())
         finally:
             self.abandon()
+
+
+@contextmanager
+def written(path: Path, channels: tuple[Topic, ...] | None = None) -> Iterator[RecordingFile]:
+    """Write a recording while the block runs, and end it in order.
+
+    Args:
+        path: the file; it must not exist.
+        channels: its topics.
+
+    Raises:
+        UnavailableError: it exists, or cannot be written; what was written until then can be read.
+    """
+    file = RecordingFile(path, channels)
+    try:
+        yield file
+        file.close()
+    except OSError as error:
+        file.abandon()
+        raise UnavailableError(
+            f"{path} cannot be written ({error.strerror})", "make room, or name another disk"
+        ) from None

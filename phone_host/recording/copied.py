@@ -4,11 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from common.errors import UnavailableError
 from common.recording.layout import topics
 from common.recording.mcap_writer import Topic
 from common.recording.opened import inflate, mapped
-from common.recording.recording_file import RecordingFile
+from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import SCHEMAS
 from common.recording.salvage import CHANNELS, Attachment, Channel, Damage, Message, Metadata, Salvage
 
@@ -53,8 +52,7 @@ def copy_recording(
             topic = _topic(record.channel)
             if topic is not None:
                 channels[topic.name] = topic
-    file = RecordingFile(out, tuple(channels.values()))
-    try:
+    with written(out, tuple(channels.values())) as file:
         for record in Salvage(data, inflate).records():
             match record:
                 case Message() if wanted(record):
@@ -67,12 +65,6 @@ def copy_recording(
                     account.damages.append(record)
                 case _:
                     pass
-        file.close()
-    except OSError as error:
-        file.abandon()
-        raise UnavailableError(
-            f"{out} cannot be written ({error.strerror})", "make room, or name another disk"
-        ) from None
     return account
 
 

@@ -18,7 +18,7 @@ from common.files import read_whole
 from common.frame import PixelFormat
 from common.recording.layout import ABOUT, About, image_topic
 from common.recording.recorded import Recorded, size_px
-from common.recording.recording_file import RecordingFile
+from common.recording.recording_file import written
 from common.recording.ros_messages import RecordedImage, image_message, image_type
 from common.versions import all_versions
 from phone_host.output.atomic import write_bytes, write_text
@@ -117,8 +117,7 @@ def import_folders(paths: Sequence[Path], times: Path | None, out: Path) -> dict
     """
     folders, times = _folders(paths, times)
     sides = [_timed(folder, times) for folder in folders]
-    file = RecordingFile(out)
-    try:
+    with written(out) as file:
         file.tell(ABOUT, About(versions=all_versions()).values())
         for side, sequence, timed in _in_order(sides):
             image = load(timed.path)
@@ -126,12 +125,6 @@ def import_folders(paths: Sequence[Path], times: Path | None, out: Path) -> dict
             recorded = RecordedImage(timed.stamp_ns, side, image.pixel_format, size, image.payload)
             topic, at_ns = image_topic(side, image_type(image.pixel_format)), timed.stamp_ns
             file.add(topic, image_message(recorded), sequence=sequence, log_ns=at_ns, publish_ns=at_ns)
-        file.close()
-    except OSError as error:
-        file.abandon()
-        raise UnavailableError(
-            f"{out} cannot be written ({error.strerror})", "make room, or name another disk"
-        ) from None
     return dict(zip(_SIDES, map(len, sides), strict=True))
 
 

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from common.errors import DataError, UnavailableError
+from common.errors import DataError
 from common.recording.layout import ABOUT, About, image_topic
 from common.recording.opened import open_recorded
-from common.recording.recording_file import RecordingFile
+from common.recording.recording_file import written
 from common.recording.ros_messages import RecordedImage, image_message, image_type
 from common.versions import all_versions
 
@@ -34,9 +34,8 @@ def import_topics(source: Path, names: Sequence[str] | None, out: Path) -> dict[
         raise DataError(
             f"{source} holds no two such image topics: {', '.join(sorted(found.images))}", "give --topics LEFT RIGHT"
         )
-    file = RecordingFile(out)
     every = [(shown, side) for side, topic in zip(_SIDES, chosen, strict=True) for shown in found.images[topic]]
-    try:
+    with written(out) as file:
         file.tell(ABOUT, About(versions=all_versions()).values())
         for shown, side in sorted(every, key=lambda item: item[0].log_ns):
             image = shown.image
@@ -44,10 +43,4 @@ def import_topics(source: Path, names: Sequence[str] | None, out: Path) -> dict[
             topic = image_topic(side, image_type(image.pixel_format))
             times = {"log_ns": shown.log_ns, "publish_ns": shown.publish_ns}
             file.add(topic, image_message(moved), sequence=shown.sequence, **times)
-        file.close()
-    except OSError as error:
-        file.abandon()
-        raise UnavailableError(
-            f"{out} cannot be written ({error.strerror})", "make room, or name another disk"
-        ) from None
     return {side: len(found.images[topic]) for side, topic in zip(_SIDES, chosen, strict=True)}

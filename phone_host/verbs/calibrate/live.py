@@ -13,7 +13,6 @@ from typing import Final, Protocol
 
 from common import now
 from common.errors import DataError, SettingsError
-from common.link.factory import open_links, parse_link, tell_insecure
 from common.orientation import UPRIGHT
 from common.program import logs
 from common.program.settings import log_level
@@ -21,7 +20,7 @@ from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.stamp import HOST_CLOCK
 from common.words import counted
-from phone_host.boards.discovery import find_board_and_say
+from phone_host.boards.opened import open_named
 from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.board_views import BoardViews, Size
 from phone_host.calibration.causes.looks import SeenLook
@@ -203,11 +202,7 @@ def prepare_views(options: argparse.Namespace, asked: Asked, feed: BrowserFeed |
         camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels, feed)
         opened.enter_context(closing(camera))
         keys = key_folder(options.keys or "")
-        named = tuple(options.link or (find_board_and_say(keys.path, options.wait),))
-        uris = [parse_link(uri, listens_by_default=False) for uri in named]
-        for uri in uris:
-            tell_insecure(uri)
-        links = open_links(uris, keys)
+        named, links = open_named(options.link or (), keys, options.wait)
         for link in links:
             opened.enter_context(closing(link))
         try:

@@ -12,7 +12,6 @@ import numpy as np
 from common import now
 from common.errors import SettingsError
 from common.frame import SpoiledImageError
-from common.link.factory import open_links, parse_link, tell_insecure
 from common.places import make_folder
 from common.program import logs
 from common.program.commandline import INTERRUPTED
@@ -21,7 +20,7 @@ from common.program.signals import StopSignals
 from common.program.terminal import fitted
 from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
-from phone_host.boards.discovery import find_board_and_say
+from phone_host.boards.opened import open_named
 from phone_host.calibration.misfit_plot import misfit_svg
 from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
 from phone_host.calibration.timing.screen import PatternReader, counted, measure_screen
@@ -102,9 +101,7 @@ def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     keys = key_folder(options.keys or "")
     with camera_page(options.camera, keys.path) as feed:
         camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
-        uri = parse_link(options.link or find_board_and_say(keys.path, options.wait), listens_by_default=False)
-        tell_insecure(uri)
-        links = open_links([uri], keys)
+        _, links = open_named((options.link,) if options.link else (), keys, options.wait)
         wait_ns = None if options.wait is None else round(options.wait * 1e9)
         with share_bar("waiting for the board", then="filming") as advance:
             footage = film(links, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)

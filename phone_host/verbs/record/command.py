@@ -11,7 +11,6 @@ from rich.console import Console
 
 from common import now
 from common.errors import SettingsError
-from common.link.factory import open_links, parse_link, tell_insecure
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level, with_origins
@@ -19,7 +18,7 @@ from common.program.signals import StopSignals
 from common.program.terminal import fitted
 from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
-from phone_host.boards.discovery import find_board_and_say
+from phone_host.boards.opened import open_named
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.measure.recording_account import RecordingAccount
@@ -57,11 +56,7 @@ def run(options: argparse.Namespace) -> int:
         camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
         opened.enter_context(closing(camera))
         keys = key_folder(settings.keys)
-        named = settings.link or (find_board_and_say(keys.path, options.wait),)
-        uris = [parse_link(uri, listens_by_default=False) for uri in named]
-        for uri in uris:
-            tell_insecure(uri)
-        links = open_links(uris, keys)
+        _, links = open_named(settings.link, keys, options.wait)
         for link in links:
             opened.enter_context(closing(link))
         recorder = begin_recording(options.out, camera.description, side, rig, attached)

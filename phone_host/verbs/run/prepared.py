@@ -12,11 +12,11 @@ from common import now
 from common.camera.base import Camera, upright_px
 from common.errors import SettingsError
 from common.link.base import Link
-from common.link.factory import open_links, parse_link, tell_insecure
 from common.places import Kind, kind_of, resolved
 from common.program.settings import Resolved, with_origins
 from common.stamp import HOST_CLOCK
-from phone_host.boards.discovery import find_board_and_say, remember
+from phone_host.boards.discovery import remember
+from phone_host.boards.opened import open_named
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
@@ -227,11 +227,7 @@ def open_run(
         overlay_of(options, core)
         budget_wanted(options, found, core)
         keys = key_folder(settings.keys)
-        named = settings.link or (find_board_and_say(keys.path, patience_s(options.wait, options.seconds)),)
-        uris = [parse_link(uri, listens_by_default=False) for uri in named]
-        for uri in uris:
-            tell_insecure(uri)
-        links = open_links(uris, keys)
+        named, links = open_named(settings.link, keys, patience_s(options.wait, options.seconds))
         opened.pop_all()
     if core is not None and options.complete and (options.out is None or not options.save_every):
         tell("--complete does nothing here: no pair is saved; give --out DIR and --save-every N")
