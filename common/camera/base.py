@@ -256,6 +256,11 @@ def lockable(camera: Camera) -> LockableCamera | None:
     return cast("LockableCamera", camera) if hasattr(camera, "hold") and hasattr(camera, "held_locks") else None
 
 
+def software_of(camera: Camera) -> str:
+    """Return the program that makes a camera's images out of what its device gives, such as a browser; empty: none."""
+    return str(getattr(camera, "software", ""))
+
+
 def held_locks(camera: Camera) -> Locks:
     """Return the controls of any camera that are held now, with their values."""
     holder = lockable(camera)

@@ -57,7 +57,7 @@ class BrowserCamera(FarCamera):
         self._faults: Counter[FrameFault] = Counter()
         self._newest: Frame | None = None
         self._first_ns = self._asleep_ns = 0
-        self._told = ""
+        self._told = self._software = ""
         self._held: Locks = ()
         self._description: CameraDescription | None = None
         with self._lock:
@@ -82,6 +82,11 @@ class BrowserCamera(FarCamera):
         """See Camera. Its identity is what the browser tells: a label, and an id that belongs to this page in this browser."""
         assert self._description is not None
         return self._description
+
+    @property
+    def software(self) -> str:
+        """The browser with which the run began: it makes the images, and another version may make others."""
+        return self._software
 
     def read(self, now_ns: int) -> list[Grab]:
         """Return what has come: at most one frame, the newest. Ask for the next ones."""
@@ -198,6 +203,7 @@ class BrowserCamera(FarCamera):
                 raise self._absent()
             self._grant()
             self._lock.wait(_STEP_S)
+        self._software = seat.hello.software
         period_ns = self._rate.period_ns or (newest.exposed.ns - self._first_ns) // (self._believed - 1)
         self._sequence = self._missed = 0
         # A browser that opens its camera anew for what is wanted leaves once.

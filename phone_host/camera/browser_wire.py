@@ -17,6 +17,7 @@ from common.imagesize.jpeg import jpeg_head
 from common.orientation import UPRIGHT
 from common.plain_text import printable
 from common.protocol.wire_fields import MAX_SIZE_PX
+from phone_host.camera.browser_name import browser_name
 from phone_host.camera.browser_uri import BrowserSettings
 
 VERSION: Final = 1
@@ -52,6 +53,7 @@ class Hello:
     Attributes:
         identity: which camera it is, as far as a browser tells.
         track: changes whenever the camera was opened anew: numbers, and perhaps the stamps' epoch, begin again.
+        software: name and version of the browser, as far as it tells; empty: unknown.
         is_phone: whether its images' stamps are those of Android's camera: the beginning of the exposure.
         resolution_ns: how far a reading of the browser's clock may be off: browsers blur it.
         is_other_version: whether it speaks another version of this.
@@ -59,6 +61,7 @@ class Hello:
 
     identity: CameraIdentity
     track: str
+    software: str
     is_phone: bool
     resolution_ns: int
     is_other_version: bool = False
@@ -301,6 +304,7 @@ def _hello(said: Mapping[str, Any]) -> Hello:
     return Hello(
         identity=identity,
         track=_plain(said.get("track"))[:_TRACK_LETTERS],
+        software=browser_name(browser),
         is_phone="Android" in browser,
         # Blurred to 5 us (Chromium) or 20 us (Firefox) in a page that is isolated, else to 0.1 ms or 1 ms.
         resolution_ns=20_000 if said.get("isolated") is True else 1_000_000,

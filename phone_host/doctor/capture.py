@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from common import now
-from common.camera.base import Camera
+from common.camera.base import Camera, software_of
 from common.doctor.finding import Finding, ok, warn
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame
@@ -37,10 +37,11 @@ _SILENCE_S: Final = 8.0
 _TICK_S: Final = 0.2
 
 
-def source_of(camera: CameraDescription) -> CaptureSource:
+def source_of(camera: Camera) -> CaptureSource:
     """Return whose images a camera's are."""
-    width_px, height_px = camera.upright_px
-    return CaptureSource(camera=camera.identity, width_px=width_px, height_px=height_px)
+    said = camera.description
+    width_px, height_px = said.upright_px
+    return CaptureSource(camera=said.identity, software=software_of(camera), width_px=width_px, height_px=height_px)
 
 
 def lens_for(rig: Rig | None, source: CaptureSource) -> CameraModel | None:
@@ -83,7 +84,7 @@ def film_capture(
         raise DataError(
             "this camera shows images on demand, so they have no time", "replay:PATH?fps=30 shows them as a film"
         )
-    source = source_of(said)
+    source = source_of(camera)
     asked_hz = 1e9 / said.period_ns if said.period_ns else math.nan
     filming = _Filming(camera, CaptureCheck(source, asked_hz, lens_for(rig, source), plan))
     return filming.run(stopped, tell)

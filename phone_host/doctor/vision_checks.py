@@ -131,4 +131,4 @@ def check_kept_capture(calibration: str, camera: str, feed: BrowserFeed | None) 
     except TandemError:
         return []  # the camera's own finding says so
     opened.close()
-    return [stored_finding(kept, source_of(opened.description))]
+    return [stored_finding(kept, source_of(opened))]

@@ -13,7 +13,7 @@ from phone_host.camera.browser_wire import EchoAsked, EchoHeard, Hello, Locked, 
 from tests.support.pictures import jpeg
 from tests.support.scripted_browser import LUMA, Shot
 
-_HELLO = Hello(identity=CameraIdentity(), track="t", is_phone=True, resolution_ns=20_000)
+_HELLO = Hello(identity=CameraIdentity(), track="t", software="", is_phone=True, resolution_ns=20_000)
 _PERIOD_NS = 33_333_333
 _START_NS = 10**12
 _PIXELS = Shot(payload=bytes(4), width=2, height=2, encoding=LUMA)

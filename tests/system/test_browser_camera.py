@@ -23,6 +23,7 @@ from common.frame import Frame, FrameFault, PixelFormat
 from phone_host.camera.browser import BrowserCamera
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.factory import open_camera
+from phone_host.doctor.capture import source_of
 from phone_host.web.server import PageServer
 from phone_host.web.settings import LIMITS, Limits, PageSettings
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, draw, saved_numbers, write_film
@@ -239,6 +240,7 @@ def test_the_wish_of_the_address_reaches_the_browser() -> None:
             assert (shown.width_px, shown.height_px, shown.pixel_format) == (32, 24, PixelFormat.GREY)
             assert shown.period_ns == pytest.approx(1e9 / 30, rel=0.01)
             assert (shown.identity.name, shown.identity.serial) == ("camera2 0, facing back", "d0")
+            assert source_of(camera).software == "Chrome 156 on Linux"
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,9 @@ PERIOD = 33_333_333
 ORIGIN = 1_700_000_000 * S
 """Browser's clock minus host's clock."""
 ASLEEP = 3600 * S
-HELLO = Hello(identity=CameraIdentity("browser", "cam", "id"), track="t", is_phone=False, resolution_ns=20_000)
+HELLO = Hello(
+    identity=CameraIdentity("browser", "cam", "id"), track="t", software="", is_phone=False, resolution_ns=20_000
+)
 SHOT = Shot(payload=bytes(4), width=2, height=2, encoding=LUMA)
 START = 1000 * S
 

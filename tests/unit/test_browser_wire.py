@@ -122,7 +122,7 @@ def test_each_word_is_understood() -> None:
         device={"id": "i" * 99, "label": "back\x1b[0m"},
     )
     assert isinstance(hello, Hello)
-    assert (hello.track, hello.is_phone, hello.resolution_ns) == ("t", True, 20_000)
+    assert (hello.track, hello.software, hello.is_phone, hello.resolution_ns) == ("t", "Android", True, 20_000)
     assert (hello.identity.driver, hello.identity.name, hello.identity.serial) == ("browser", "back\\x1b[0m", "i" * 48)
     assert not hello.is_other_version
     other = word(kind="hello", version=2)
