@@ -334,15 +334,7 @@ class CameraLine:
     seat: Seat
 
     def heard(self, said: str | bytes, now_ns: int) -> str:
-        """Take a message.
-
-        Args:
-            said: text or bytes.
-            now_ns: when it came, ns.
-
-        Returns:
-            What to answer at once; here nothing.
-        """
+        """Take a message that came at `now_ns`; answer nothing (see web.source.Hearer)."""
         self.feed.heard(self.seat, said, now_ns)
         return ""
 
@@ -359,15 +351,7 @@ class ClockLine:
     seat: Seat
 
     def heard(self, said: str | bytes, now_ns: int) -> str:
-        """Take a message.
-
-        Args:
-            said: text or bytes.
-            now_ns: when it came, ns.
-
-        Returns:
-            What to answer at once; empty: nothing.
-        """
+        """Take a message that came at `now_ns`; return what to answer at once (see web.source.Hearer)."""
         word = read_word(said) if isinstance(said, str) else None
         with self.feed.changed:
             self.seat.heard_ns = now_ns
