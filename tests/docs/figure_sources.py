@@ -325,6 +325,7 @@ SOURCES: Final = (
     Source("guide", Topic.CALIBRATION, "A simulated novice who follows the words of `calibrate --live`, with two painted cameras and a real link.", f"{_BENCH}bench_guide --jobs 2 --json", _verdicts, 900),
     Source("page", Topic.PAGE, "A run with `--serve`, with nobody, with readers of 20 KB/s and with viewers that show every pair, in turn.", f"{_BENCH}bench_page --json", _page, 400),
     Source("drift", Topic.CALIBRATION, "A rig that turns while it runs, and rigs that stand.", f"{_BENCH}bench_drift --json", _verdicts, 600),
+    Source("browser", Topic.PAGE, "Stamps of a browser's camera against the moment at which Chromium's fake camera read the image from its file.", f"{_BENCH}bench_browser --json", _verdicts, 150),
     Source("capture", Topic.CALIBRATION, "Films with and without stabilisation, told apart.", f"{_BENCH}bench_capture --json", _verdicts, 300),
     Source("measure", Topic.DEPTH, "Points of rendered rooms, measured as `phone-host measure` does: does the truth lie within what is stated?", f"{_BENCH}bench_measure --json", _verdicts, 300),
     Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),
