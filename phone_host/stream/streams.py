@@ -9,7 +9,22 @@ from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
 
 
-class OwnStream(Protocol):
+class Stream(Protocol):
+    """What both sides have."""
+
+    @property
+    def ended(self) -> bool:
+        """Whether the last frame has come."""
+
+    @property
+    def failure(self) -> Exception | None:
+        """What ended it."""
+
+    def start(self) -> None:
+        """Let frames come."""
+
+
+class OwnStream(Stream, Protocol):
     """This machine's camera; see OwnCamera."""
 
     @property
@@ -23,14 +38,6 @@ class OwnStream(Protocol):
     @property
     def from_the_future(self) -> int:
         """Images whose stamp had not come yet."""
-
-    @property
-    def ended(self) -> bool:
-        """Whether the last frame has come."""
-
-    @property
-    def failure(self) -> Exception | None:
-        """What ended it."""
 
     @property
     def health(self) -> CameraHealth:
@@ -54,19 +61,12 @@ class OwnStream(Protocol):
     def steer(self, later_ns: int) -> None:
         """Let the camera expose later."""
 
-    def start(self) -> None:
-        """Let frames come."""
-
     def stop(self) -> None:
         """Let none come any more."""
 
 
-class BoardStream(Protocol):
+class BoardStream(Stream, Protocol):
     """The board; see Receiver."""
-
-    @property
-    def failure(self) -> Exception | None:
-        """What ended it."""
 
     @property
     def account(self) -> LinkAccount:
@@ -95,13 +95,6 @@ class BoardStream(Protocol):
     @property
     def estimate(self) -> ClockEstimate | None:
         """The clock estimate now."""
-
-    @property
-    def ended(self) -> bool:
-        """Whether the last frame has come."""
-
-    def start(self) -> None:
-        """Let frames come."""
 
     def wake(self) -> None:
         """There is room for a frame."""
