@@ -72,7 +72,8 @@ def loads(url: str) -> tuple[Load, ...]:
             began_ms = time.time_ns() / 1e6
             page.goto(f"{url}#run", wait_until="commit")
             depth_ms, cloud_ms = (
-                page.wait_for_function(f"() => window.{name}ShownAt").json_value() - began_ms for name in ("views", "cloud")
+                page.wait_for_function(f"() => window.{name}ShownAt").json_value() - began_ms
+                for name in ("views", "cloud")
             )
             taken.append(Load(depth_s=depth_ms / 1e3, cloud_s=cloud_ms / 1e3, kilobytes=sum(sizes) / 1e3))
             context.close()
