@@ -46,6 +46,15 @@ class RecordingFile:
         """How long the file is, bytes; what has not filled its chunk does not count. Safe from any thread."""
         return self._writer.size
 
+    @property
+    def left_bytes(self) -> int | None:
+        """Room that is left on its disk, bytes; None: not known. Safe from any thread."""
+        try:
+            disk = os.statvfs(self.path.parent)
+        except OSError:
+            return None
+        return disk.f_bavail * disk.f_frsize
+
     def tell(self, name: str, values: dict[str, str]) -> None:
         """Add values by name.
 

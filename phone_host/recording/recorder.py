@@ -84,7 +84,8 @@ class Recorder:
         self._file, self._unix_ns = file, unix_ns
         self._board, self._own = board_side.value, board_side.other.value
         self._camera: CameraDescription | None = None
-        self._began_ns = 0
+        self._began_ns = self._ended_ns = 0
+        self._begun_ns = now.monotonic_ns()
         self._session = ""
         self._clock: ClockEstimate | None = None
         self._captured: list[tuple[int, list[int]]] = []
@@ -101,6 +102,7 @@ class Recorder:
     @property
     def account(self) -> RecordingAccount:
         """What became of the images so far."""
+        left_bytes = self._file.left_bytes  # before the lock, for which frames would wait: a disk may be slow
         with self._changed:
             return RecordingAccount(
                 file=str(self._file.path),
@@ -108,6 +110,9 @@ class Recorder:
                 dropped=self._dropped,
                 lost=self._lost,
                 size_bytes=self._file.size_bytes,
+                seconds=((self._ended_ns or now.monotonic_ns()) - self._begun_ns) / 1e9,
+                left_bytes=left_bytes,
+                is_over=self._ended_ns > 0,
                 failure=self._failure,
             )
 
@@ -160,6 +165,8 @@ class Recorder:
             self._is_closing = True
             self._changed.notify()
         self._thread.join()
+        with self._changed:
+            self._ended_ns = self._ended_ns or now.monotonic_ns()
         return self.account
 
     def _put(self, item: _Item) -> None:
@@ -209,7 +216,7 @@ class Recorder:
             event("recording_ended_early", file=self._file.path, cause=cause, remedy="make room; the run goes on")
         )
         with self._changed:
-            self._failure = failure
+            self._failure, self._ended_ns = failure, now.monotonic_ns()
             self._lost += unwritten + sum(isinstance(each, _Image) for each in self._queue)
             self._queue.clear()
             self._queued_bytes = 0

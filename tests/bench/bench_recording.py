@@ -21,20 +21,18 @@ from typing import Any
 
 from rich.console import Console
 
-from common.frame import Frame, PixelFormat
-from common.ledger import BoardMarks
-from common.orientation import UPRIGHT
-from common.protocol.message import CameraDescription, FrameMessage, Pacing
+from common.frame import PixelFormat
+from common.protocol.message import CameraDescription, Pacing
 from common.recording.opened import inflate
 from common.recording.recording_file import RecordingFile
 from common.recording.salvage import Message, Salvage
-from common.stamp import HOST_CLOCK, Stamp
-from phone_host.model import BoardFrame, Side
+from phone_host.model import Side
 from phone_host.recording.recorder import Recorder
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.payloads import write_jpegs
 from tests.support.programs import board, host, ledgers
+from tests.support.recorded import board_frame, own_frame
 
 _FPS = 30
 _FRAME_BYTES = 51_283
@@ -76,42 +74,8 @@ def _record(folder: Path, seconds: int) -> tuple[float, float, float]:
     for number in range(_FPS * seconds):
         time.sleep(max(0.0, began + number / _FPS - time.monotonic()))
         at_ns = time.monotonic_ns()
-        marks = BoardMarks(exposed_ns=at_ns - 30_000_000, grabbed_ns=at_ns - 20_000_000, sent_ns=at_ns - 10_000_000)
-        message = FrameMessage(
-            session="s",
-            sent_index=number,
-            sequence=number,
-            width_px=640,
-            height_px=480,
-            pixel_format=form,
-            exposure_ns=None,
-            marks=marks,
-            payload=image,
-        )
-        recorder.board_frame(
-            BoardFrame(
-                message=message,
-                link="tcp",
-                marks=marks,
-                received_ns=at_ns,
-                offset_ns=0,
-                uncertainty_ns=0,
-                orientation=UPRIGHT,
-            )
-        )
-        stamp = Stamp(at_ns - 20_000_000, HOST_CLOCK)
-        recorder.own_frame(
-            Frame(
-                sequence=number,
-                exposed=stamp,
-                grabbed=stamp,
-                width_px=640,
-                height_px=480,
-                pixel_format=form,
-                exposure_ns=None,
-                payload=image,
-            )
-        )
+        recorder.board_frame(board_frame(number, image, at_ns))
+        recorder.own_frame(own_frame(number, image, at_ns))
     used = time.clock_gettime(clock) - before
     account = recorder.finish()
     between = [b - a for a, b in zip([began, *file.synced], file.synced, strict=False)]

@@ -1,14 +1,18 @@
-"""Small recordings of known content."""
+"""Small recordings of known content, and frames to be recorded."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from common.frame import PixelFormat
-from common.protocol.message import CameraDescription
+from common.frame import Frame, PixelFormat
+from common.ledger import BoardMarks
+from common.orientation import UPRIGHT
+from common.protocol.message import CameraDescription, FrameMessage
 from common.recording.layout import ABOUT, CAPTURE, About, camera_name, camera_values, topics
 from common.recording.mcap_writer import McapWriter
 from common.recording.ros_messages import RecordedImage, image_message
+from common.stamp import HOST_CLOCK, Stamp
+from phone_host.model import BoardFrame
 from tests.support.pictures import jpeg
 
 PERIOD_NS = 40_000_000
@@ -68,3 +72,49 @@ def recording_file(folder: Path, pairs: int, *, missing: frozenset[int] = frozen
     path = folder / "session.mcap"
     path.write_bytes(recording(pairs, missing=missing))
     return path
+
+
+def board_frame(number: int, image: bytes, at_ns: int) -> BoardFrame:
+    """A frame of the board that was received just now, exposed 30 ms ago.
+
+    Args:
+        number: its sequence.
+        image: its bytes, JPEG.
+        at_ns: now.
+    """
+    marks = BoardMarks(exposed_ns=at_ns - 30_000_000, grabbed_ns=at_ns - 20_000_000, sent_ns=at_ns - 10_000_000)
+    message = FrameMessage(
+        session="s",
+        sent_index=number,
+        sequence=number,
+        width_px=32,
+        height_px=24,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        marks=marks,
+        payload=image,
+    )
+    return BoardFrame(
+        message=message,
+        link="tcp",
+        marks=marks,
+        received_ns=at_ns,
+        offset_ns=0,
+        uncertainty_ns=0,
+        orientation=UPRIGHT,
+    )
+
+
+def own_frame(number: int, image: bytes, at_ns: int) -> Frame:
+    """A frame of the own camera, exposed 20 ms ago; see `board_frame`."""
+    stamp = Stamp(at_ns - 20_000_000, HOST_CLOCK)
+    return Frame(
+        sequence=number,
+        exposed=stamp,
+        grabbed=stamp,
+        width_px=32,
+        height_px=24,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        payload=image,
+    )

@@ -84,7 +84,10 @@ def test_still_pictures_of_both_sides_are_paired_by_the_recording(tmp_path: Path
     assert [name for name, *_ in files.pairs] == ["0", "1"]
     for side, written in zip(("left", "right"), files.pairs[0][1:], strict=True):
         truth = cv2.imdecode(np.frombuffer(_moving(side, _STILL[0]), np.uint8), cv2.IMREAD_GRAYSCALE)
-        assert np.array_equal(cv2.imread(str(written), cv2.IMREAD_GRAYSCALE), truth)
+        shown = cv2.imread(str(written), cv2.IMREAD_GRAYSCALE)
+        assert shown is not None
+        assert truth is not None
+        assert np.array_equal(shown, truth)
     assert cameras_beside(files, (Orientation(), Orientation())) is None  # the recording tells of none
 
 

@@ -29,7 +29,7 @@ from phone_host.output.json_text import json_text
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.opened import open_playback
 from phone_host.recording.playback import Playback
-from phone_host.recording.recorder import Recorder
+from phone_host.recording.switch import RecordingSwitch
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
 from phone_host.run.file_sink import NAMES
@@ -94,14 +94,14 @@ class Opened:
             if self.options.out is not None:
                 keep_other_report(self.options.out, "run")
             settings = _host_settings(self, words)
-            recorder = self._recorder(settings)
-            host = Host(settings, self.camera, self.links, self.core, sinks, recorder=recorder)
+            recording = self._recording(settings)
+            host = Host(settings, self.camera, self.links, self.core, sinks, recording=recording)
             opened.pop_all()
         return PreparedRun(host, self.named, self.keys, self.board_side, self.options.out)
 
-    def _recorder(self, settings: HostSettings) -> Recorder | None:
-        """Begin the recording that was asked for."""
-        if self.options.record is None or isinstance(self.camera, Playback):
+    def _recording(self, settings: HostSettings) -> RecordingSwitch | None:
+        """Return what records, begun if that was asked for; None: a recording is played."""
+        if isinstance(self.camera, Playback):
             return None
         rig = self.found.values.calibration
         attached = {"settings.json": json_text(dict(settings.resolved or {}), indent=1).encode()}
@@ -109,7 +109,10 @@ class Opened:
         if rig:
             attached[Path(rig).name if known is None else "rig.yaml"] = Path(rig).read_bytes()
         camera = self.camera.description
-        return begin_recording(self.options.record, camera, self.board_side, known, attached)
+        recording = RecordingSwitch(lambda path: begin_recording(path, camera, self.board_side, known, attached))
+        if self.options.record is not None:
+            recording.begin(self.options.record)
+        return recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
