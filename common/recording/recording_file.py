@@ -85,6 +85,15 @@ class RecordingFile:
         if self._writer.size != before:
             self._file.flush()
 
+    def end_chunk(self) -> None:
+        """Hand what came until now to the operating system: a crash of this program loses none of it.
+
+        Raises:
+            OSError: the disk is full, or gone.
+        """
+        self._writer.end_chunk()
+        self._file.flush()
+
     def sync(self) -> None:
         """Bring onto the disk what came until now. May take long.
 
@@ -93,8 +102,7 @@ class RecordingFile:
         """
         if not self._is_dirty:
             return
-        self._writer.end_chunk()
-        self._file.flush()
+        self.end_chunk()
         os.fsync(self._file.fileno())
         self._is_dirty = False
 

@@ -17,6 +17,7 @@ from common.ledger import PairLedger
 from common.program.logs import event
 from common.protocol.message import CameraDescription
 from common.recording.layout import CAPTURE, CLOCK, DELAYS, camera_name, camera_values, image_topic
+from common.recording.mcap_writer import CHUNK_BYTES
 from common.recording.recording_file import RecordingFile
 from common.recording.ros_messages import RecordedImage, image_parts, image_type
 from phone_host.measure.recording_account import RecordingAccount
@@ -32,8 +33,11 @@ _MOST_BYTES: Final = 64 << 20
 _TEXT_BYTES: Final = 1000
 """What a message that is no image takes, roughly."""
 
-_SYNC_NS: Final = 800_000_000
-"""A power cut takes a second at most: this, and the time that the disk takes."""
+_GATHER_S: Final = 0.1
+"""So long an image waits for others with which it makes a chunk. To wake the writer for each would cost more than to write it."""
+
+_SYNC_NS: Final = 700_000_000
+"""A power cut takes a second at most: this, what waits, and the time that the disk takes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,20 +183,26 @@ class Recorder:
             else:
                 self._queue.append(item)
                 self._queued_bytes += size
-                self._changed.notify()
+                if self._queued_bytes >= CHUNK_BYTES:
+                    self._changed.notify()
 
     def _write_all(self) -> None:
         synced_ns, waiting = now.monotonic_ns(), 0
         try:
             while (taken := self._next()) is not None:
-                waiting = sum(isinstance(item, _Image) for item in taken)
+                waiting = images = sum(isinstance(item, _Image) for item in taken)
                 for item in taken:
                     self._write(item)
                     waiting -= isinstance(item, _Image)
                 now_ns = now.monotonic_ns()
-                if now_ns - synced_ns >= _SYNC_NS:  # counted from the begin of one to the begin of the next
+                is_due = now_ns - synced_ns >= _SYNC_NS  # counted from the begin of one to the begin of the next
+                if is_due:
                     synced_ns = now_ns
                     self._write_captured()
+                self._file.end_chunk()
+                with self._changed:
+                    self._frames += images
+                if is_due:
                     self._file.sync()
             self._end()
         except Exception as error:  # noqa: BLE001 - a thread's root: the run goes on, and its account says what is missing
@@ -209,9 +219,7 @@ class Recorder:
 
     def _fail(self, error: Exception, unwritten: int) -> None:
         cause = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
-        failure = Trouble(
-            f"the recording {self._file.path} ended early ({cause})", "make room; what is in it can be used"
-        )
+        failure = Trouble(f"it ended early ({cause})", "make room; what is in it can be used")
         _LOG.error(
             event("recording_ended_early", file=self._file.path, cause=cause, remedy="make room; the run goes on")
         )
@@ -223,10 +231,9 @@ class Recorder:
         self._file.abandon()
 
     def _next(self) -> list[_Item] | None:
-        """Wait for what came, at most for a second; None: nothing will."""
+        """Wait until there is enough for a chunk, but not long; None: nothing will come."""
         with self._changed:
-            if not self._queue and not self._is_closing:
-                self._changed.wait(_SYNC_NS / 1e9)
+            self._changed.wait_for(lambda: self._is_closing or self._queued_bytes >= CHUNK_BYTES, _GATHER_S)
             if not self._queue and self._is_closing:
                 return None
             taken = list(self._queue)
@@ -241,8 +248,6 @@ class Recorder:
                 self._add(topic, image_parts(image), sequence, log_ns, publish_ns)
                 if capture_ns is not None:
                     self._note_capture(sequence, capture_ns)
-                with self._changed:
-                    self._frames += 1
             case _Text(topic, text, sequence, at_ns):
                 self._add(topic, (text.encode(),), sequence, at_ns, at_ns)
             case _Told(name, values):

@@ -381,7 +381,7 @@ def test_a_recording_is_begun_watched_and_ended(
     """Nothing to record without a run; then one button begins and ends it, and its line tells time, size and space, or that the disk is full."""
     page = opened("run", size)
     page.wait_for_selector("#record[aria-disabled=true]")
-    page.click("#record")
+    page.click("#record", force=True)
     program.change(activity=Activity.RUNNING)
     program.emit()
     page.wait_for_selector("#record[aria-disabled=false]")
