@@ -124,7 +124,7 @@ class _Player:
         began = told.get("began_ns", "")
         self._began_ns = int(began) if began.isdecimal() else 0  # the board said hello; 0: before all frames
         self._shift_ns = 0  # from the times of the recording to those of this run
-        self._estimates = _estimates(self._recorded)
+        self._estimates = estimates(self._recorded)
         self._last_sequence = -1
         self._stop, self._changed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="playback", daemon=True)
@@ -283,7 +283,8 @@ class _Player:
         self._sink.change_period(self._camera.period_ns)
 
 
-def _estimates(recorded: Recorded) -> list[tuple[int, ClockEstimate]]:
+def estimates(recorded: Recorded) -> list[tuple[int, ClockEstimate]]:
+    """Return what was known of the board's clock, each with the time from which on, ns since 1970."""
     found = []
     for message in recorded.texts.get(CLOCK, []):
         try:
