@@ -7,7 +7,7 @@ import json
 import logging
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -30,8 +30,8 @@ _LOG = logging.getLogger(__name__)
 _MOST_BYTES: Final = 64 << 20
 """What may wait for the disk, and as much again may be under way to it: 10 s of both cameras at 3 MB/s, and a phone has memory for it."""
 
-_TEXT_BYTES: Final = 1000
-"""What a message that is no image takes, roughly."""
+_TOLD_BYTES: Final = 1000
+"""What values by name take, roughly."""
 
 _GATHER_S: Final = 0.1
 """So long an image waits for others with which it makes a chunk. To wake the writer for each would cost more than to write it."""
@@ -55,11 +55,11 @@ class _Image:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Text:
-    """A message in JSON on its way."""
+class _Message:
+    """A message that is no image of a camera on its way, in pieces."""
 
     topic: str
-    text: str
+    parts: tuple[Buffer, ...]
     sequence: int
     at_ns: int
 
@@ -72,7 +72,7 @@ class _Told:
     values: dict[str, str]
 
 
-_Item = _Image | _Text | _Told
+_Item = _Image | _Message | _Told
 
 
 class Recorder:
@@ -150,13 +150,25 @@ class Recorder:
 
     def delays(self, ledger: PairLedger) -> None:
         """Take the ledger of a pair. Never waits."""
-        self._put(_Text(DELAYS, ledger.to_json(), ledger.sequence, ledger.done_ns))
+        self._put(_Message(DELAYS, (ledger.to_json().encode(),), ledger.sequence, ledger.done_ns))
 
     def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
         """Take a clock estimate; one that is not new is left out. Never waits."""
         if estimate is not None and estimate != self._clock:
             self._clock = estimate
-            self._put(_Text(CLOCK, json.dumps(asdict(estimate), separators=(",", ":")), 0, at_ns))
+            text = json.dumps(asdict(estimate), separators=(",", ":"))
+            self._put(_Message(CLOCK, (text.encode(),), 0, at_ns))
+
+    def computed(self, topic: str, write: Callable[[int], tuple[Buffer, ...]], ledger: PairLedger, at_ns: int) -> None:
+        """Take what was computed of a pair. Never waits.
+
+        Args:
+            topic: where it goes.
+            write: makes the message, in pieces, with its stamp in ns since 1970.
+            ledger: of the pair.
+            at_ns: when the image was exposed that it belongs to.
+        """
+        self._put(_Message(topic, write(self._unix_ns + at_ns), ledger.sequence, ledger.done_ns))
 
     def finish(self, attached: Mapping[str, bytes] | None = None) -> RecordingAccount:
         """Write what waits, end the file in order, and return what became of the images.
@@ -248,8 +260,8 @@ class Recorder:
                 self._add(topic, image_parts(image), sequence, log_ns, publish_ns)
                 if capture_ns is not None:
                     self._note_capture(sequence, capture_ns)
-            case _Text(topic, text, sequence, at_ns):
-                self._add(topic, (text.encode(),), sequence, at_ns, at_ns)
+            case _Message(topic, parts, sequence, at_ns):
+                self._add(topic, parts, sequence, at_ns, at_ns)
             case _Told(name, values):
                 self._file.tell(name, values)
 
@@ -274,4 +286,10 @@ class Recorder:
 
 
 def _size(item: _Item) -> int:
-    return len(item.image.payload) if isinstance(item, _Image) else _TEXT_BYTES
+    match item:
+        case _Image(image):
+            return len(image.payload)
+        case _Message(_, parts):
+            return sum(map(len, parts))
+        case _Told():
+            return _TOLD_BYTES

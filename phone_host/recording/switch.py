@@ -5,7 +5,7 @@ from pathlib import Path
 from threading import Lock
 
 from common.errors import SettingsError
-from common.frame import Frame
+from common.frame import Buffer, Frame
 from common.ledger import PairLedger
 from common.protocol.message import CameraDescription
 from phone_host.measure.recording_account import RecordingAccount
@@ -34,6 +34,11 @@ class RecordingSwitch:
         """The account of the present recording, else of the last one; None: there was none."""
         recorder = self._recorder
         return self._last if recorder is None else recorder.account
+
+    @property
+    def is_on(self) -> bool:
+        """Whether there is a recorder."""
+        return self._recorder is not None
 
     def begin(self, path: Path) -> None:
         """Begin a recording.
@@ -90,6 +95,11 @@ class RecordingSwitch:
         """See Recorder."""
         if (recorder := self._recorder) is not None:
             recorder.delays(ledger)
+
+    def computed(self, topic: str, write: Callable[[int], tuple[Buffer, ...]], ledger: PairLedger, at_ns: int) -> None:
+        """See Recorder."""
+        if (recorder := self._recorder) is not None:
+            recorder.computed(topic, write, ledger, at_ns)
 
     def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
         """See Recorder."""
