@@ -13,7 +13,7 @@ from common.frame import PixelFormat
 from common.orientation import UPRIGHT, Orientation, orientation_of
 from common.protocol.message import CameraDescription, Pacing, Steering
 from common.recording.mcap_writer import Topic
-from common.recording.ros_messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, SCHEMAS
+from common.recording.ros_messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, POINT_CLOUD, SCHEMAS
 
 FORMAT_VERSION: Final = 1
 SIDES: Final = ("left", "right")
@@ -21,6 +21,11 @@ DELAYS: Final = "/delays"
 CLOCK: Final = "/clock_estimate"
 CAPTURE: Final = "/board_capture"
 """How long after its exposure each frame of the board was grabbed: the one mark for which an image's message has no place."""
+
+DEPTH: Final = "/depth"
+CLOUD: Final = "/cloud"
+COMPUTED: Final = (DEPTH, CLOUD)
+"""What a run has computed, if that was asked for. Nobody here reads it: a replay computes it again."""
 
 ABOUT: Final = "tandemscan"
 """Name of the metadata that tell of the whole."""
@@ -52,6 +57,7 @@ def topics() -> tuple[Topic, ...]:
     """Return all topics of a recording."""
     told = [(image_topic(side, kind), kind) for kind in _IMAGE for side in SIDES]
     told += [(camera_info_topic(side), CAMERA_INFO) for side in SIDES]
+    told += [(DEPTH, IMAGE), (CLOUD, POINT_CLOUD)]
     ros = [Topic(name, "cdr", kind, "ros2msg", SCHEMAS[kind].encode()) for name, kind in told]
     return (*ros, *(Topic(name, "json") for name in (DELAYS, CLOCK, CAPTURE)))
 

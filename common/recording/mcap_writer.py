@@ -1,7 +1,7 @@
 """Writes an MCAP file: records in, bytes out. Pure.
 
-Chunks are not compressed: their images are. Each has its checksum, so a reader knows which are whole. What tells the channels stands in the
-first chunk and, for the case that this one is lost, in a metadata record before it.
+Chunks are not compressed: their images are. Each has its checksum, so a reader knows which are whole. What tells a channel stands before its
+first message and, for the case that this chunk is lost, in a metadata record before all; a channel without messages is not told otherwise.
 Our own, because the library mcap needs two compressors in C that a phone would have to build, and the board has no package of it (decision 0064).
 Source: the MCAP specification, version 0, section Records (https://mcap.dev/spec).
 """
@@ -78,25 +78,16 @@ class McapWriter:
         self._write = write
         self.size = 0
         self._groups: dict[int, list[bytes]] = {}  # of the summary, by opcode
-        self._counts = dict.fromkeys(range(1, len(topics) + 1), 0)
+        self._counts: dict[int, int] = {}
         self._chunks = self._attachments = self._metadata = 0
         self._start_ns = self._end_ns = 0
-        self._numbers = {topic.name: number for number, topic in enumerate(topics, start=1)}
+        self._topics = {topic.name: (number, topic) for number, topic in enumerate(topics, start=1)}
+        self._kinds: dict[str, int] = {}
         self._put(MAGIC)
         self._put(_record(_HEADER, _text("ros2") + _text(library)))
-        kinds: dict[str, int] = {}
-        head = []
-        for number, topic in enumerate(topics, start=1):
-            if topic.kind and topic.kind not in kinds:
-                kinds[topic.kind] = len(kinds) + 1
-                head.append(self._summed(_SCHEMA, _schema(kinds[topic.kind], topic)))
-            head.append(self._summed(_CHANNEL, _channel(number, kinds.get(topic.kind, 0), topic)))
-        self._schemas = len(kinds)
         told = {str(number): f"{t.name} {t.kind} {t.encoding}" for number, t in enumerate(topics, start=1)}
         self.tell(CHANNELS, told)
         self._chunk = _empty()
-        for record in head:
-            self._chunk.add(record)
 
     def tell(self, name: str, values: Mapping[str, str]) -> None:
         """Write values by name, outside of chunks.
@@ -136,7 +127,10 @@ class McapWriter:
             log_ns: when it was received, ns since 1970.
             publish_ns: when it was sent, ns since 1970.
         """
-        number, chunk = self._numbers[topic], self._chunk
+        number, told = self._topics[topic]
+        chunk = self._chunk
+        if number not in self._counts:
+            self._introduce(number, told)
         chunk.index.setdefault(number, []).append((log_ns, chunk.size))
         length = _MESSAGE_HEAD.size - _HEAD.size + sum(map(len, parts))
         chunk.add(_MESSAGE_HEAD.pack(_MESSAGE, length, number, sequence & 0xFFFF_FFFF, log_ns, publish_ns))
@@ -179,7 +173,7 @@ class McapWriter:
         totals = struct.pack(
             "<QHIIIIQQI",
             sum(self._counts.values()),
-            self._schemas,
+            len(self._kinds),
             len(self._counts),
             self._attachments,
             self._metadata,
@@ -198,6 +192,14 @@ class McapWriter:
         footer = struct.pack("<BQQQ", _FOOTER, 20, start, at)
         checksum = zlib.crc32(footer, zlib.crc32(summary + offsets))
         self._put(summary + offsets + footer + struct.pack("<I", checksum) + MAGIC)
+
+    def _introduce(self, number: int, topic: Topic) -> None:
+        """Write what a channel is, before its first message."""
+        self._counts[number] = 0
+        if topic.kind and topic.kind not in self._kinds:
+            self._kinds[topic.kind] = len(self._kinds) + 1
+            self._chunk.add(self._summed(_SCHEMA, _schema(self._kinds[topic.kind], topic)))
+        self._chunk.add(self._summed(_CHANNEL, _channel(number, self._kinds.get(topic.kind, 0), topic)))
 
     def _summed(self, opcode: int, content: bytes) -> bytes:
         """Make a record that the summary repeats."""

@@ -14,7 +14,7 @@ from typing import Final
 from common.imagesize.read import read_head
 from common.protocol.message import CameraDescription
 from common.recording.cdr import BrokenMessageError
-from common.recording.layout import ABOUT, CAPTURE, SIDES, About, about_of, camera_name, camera_of, side_of
+from common.recording.layout import ABOUT, CAPTURE, COMPUTED, SIDES, About, about_of, camera_name, camera_of, side_of
 from common.recording.ros_messages import COMPRESSED_IMAGE, IMAGE, RecordedImage, read_image
 from common.recording.salvage import Attachment, Damage, Inflate, Message, Metadata, Salvage
 
@@ -161,6 +161,8 @@ def _take(found: Recorded, message: Message, captured: dict[int, int], lost: dic
         lost[message.number] += 1
         return
     found.kinds[channel.topic] = found.kinds.get(channel.topic, 0) + 1
+    if channel.topic in COMPUTED:
+        return
     kind = channel.kind.replace("sensor_msgs/C", "sensor_msgs/msg/C").replace("sensor_msgs/I", "sensor_msgs/msg/I")
     if kind in {COMPRESSED_IMAGE, IMAGE}:
         try:

@@ -1,7 +1,7 @@
-"""The ROS 2 messages of a recording: images as they were encoded, and what is known of the cameras. Pure.
+"""The ROS 2 messages of a recording: images as they were encoded, what is known of the cameras, and what was computed. Pure.
 
 Their bytes are those that ROS 2 itself writes, so that its tools, Foxglove and Rerun read them.
-Source: common_interfaces, sensor_msgs/msg/CompressedImage, Image and CameraInfo; std_msgs/msg/Header; builtin_interfaces/msg/Time.
+Source: common_interfaces, sensor_msgs/msg/CompressedImage, Image, CameraInfo, PointCloud2 and PointField; std_msgs/msg/Header; builtin_interfaces/msg/Time.
 """
 
 from collections.abc import Sequence
@@ -28,6 +28,7 @@ uint32 nanosec
 COMPRESSED_IMAGE: Final = "sensor_msgs/msg/CompressedImage"
 IMAGE: Final = "sensor_msgs/msg/Image"
 CAMERA_INFO: Final = "sensor_msgs/msg/CameraInfo"
+POINT_CLOUD: Final = "sensor_msgs/msg/PointCloud2"
 
 SCHEMAS: Final[dict[str, str]] = {
     COMPRESSED_IMAGE: f"std_msgs/Header header\nstring format\nuint8[] data{_HEADER}",
@@ -36,11 +37,19 @@ SCHEMAS: Final[dict[str, str]] = {
     CAMERA_INFO: "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\n"
     f"float64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi{_HEADER}{_LINE}\n"
     "MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n",
+    POINT_CLOUD: "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\nbool is_bigendian\n"
+    f"uint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense{_HEADER}{_LINE}\n"
+    "MSG: sensor_msgs/PointField\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n",
 }
 """The definition of each message with all that it holds, as `ros2msg` writes them."""
 
 _COMPRESSED: Final = {PixelFormat.MJPEG: "jpeg", PixelFormat.PNG: "png"}
 _RAW: Final = {PixelFormat.GREY: ("mono8", 1), PixelFormat.YUYV: ("yuv422_yuy2", 2), PixelFormat.NV12: ("nv12", 1)}
+_FLOAT32: Final = 7  # PointField's number for it
+_FIELDS: Final = ("x", "y", "z", "rgb")
+POINT_BYTES: Final = 4 * len(_FIELDS)
+"""A point of a cloud: x, y, z, m, and its colour 0x00RRGGBB in the place of a number, as ROS has it."""
+
 _FORMAT_OF: Final = {name: form for form, name in _COMPRESSED.items()}
 _FORMAT_OF_RAW: Final = {name: form for form, (name, _) in _RAW.items()}
 
@@ -106,15 +115,51 @@ def image_parts(image: RecordedImage) -> tuple[bytes, Buffer]:
     if image.pixel_format in _COMPRESSED:
         writer.text(_COMPRESSED[image.pixel_format])
     else:
-        width, height = image.size_px
-        encoding, bytes_per_column = _RAW[image.pixel_format]
-        writer.number("I", height)
-        writer.number("I", width)
-        writer.text(encoding)
-        writer.number("B", 0)
-        writer.number("I", width * bytes_per_column)
+        _write_raw(writer, image.size_px, *_RAW[image.pixel_format])
     writer.number("I", len(image.payload))
     return writer.done(), image.payload
+
+
+def depth_parts(stamp_ns: int, frame_id: str, size_px: tuple[int, int], data: Buffer) -> tuple[Buffer, ...]:
+    """Write a picture of depths, in two pieces (ROS Enhancement Proposal 118).
+
+    Args:
+        stamp_ns: when it was exposed, ns since 1970.
+        frame_id: whose picture it is.
+        size_px: width and height.
+        data: the depths in rows, uint16, little endian, mm; 0: none.
+    """
+    writer = CdrWriter()
+    _write_header(writer, stamp_ns, frame_id)
+    _write_raw(writer, size_px, "16UC1", 2)
+    writer.number("I", len(data))
+    return writer.done(), data
+
+
+def cloud_parts(stamp_ns: int, frame_id: str, data: Buffer) -> tuple[Buffer, ...]:
+    """Write a point cloud, in three pieces.
+
+    Args:
+        stamp_ns: when it was exposed, ns since 1970.
+        frame_id: whose coordinates they are: x right, y down, z forward.
+        data: the points, `POINT_BYTES` each, little endian.
+    """
+    count = len(data) // POINT_BYTES
+    writer = CdrWriter()
+    _write_header(writer, stamp_ns, frame_id)
+    writer.number("I", 1)
+    writer.number("I", count)
+    writer.number("I", len(_FIELDS))
+    for place, name in enumerate(_FIELDS):
+        writer.text(name)
+        writer.number("I", 4 * place)
+        writer.number("B", _FLOAT32)
+        writer.number("I", 1)
+    writer.number("B", 0)
+    writer.number("I", POINT_BYTES)
+    writer.number("I", POINT_BYTES * count)
+    writer.number("I", len(data))
+    return writer.done(), data, b"\1"  # every point is one
 
 
 def read_image(kind: str, data: "bytes | memoryview") -> RecordedImage:
@@ -181,6 +226,16 @@ def read_camera_info(data: "bytes | memoryview") -> CameraInfo:
         rotation=reader.doubles(9),
         projection=reader.doubles(12),
     )
+
+
+def _write_raw(writer: CdrWriter, size_px: tuple[int, int], encoding: str, bytes_per_column: int) -> None:
+    """Write what stands between the header and the data of an image that is not encoded."""
+    width, height = size_px
+    writer.number("I", height)
+    writer.number("I", width)
+    writer.text(encoding)
+    writer.number("B", 0)
+    writer.number("I", width * bytes_per_column)
 
 
 def _short(name: str) -> str:

@@ -31,6 +31,7 @@ EXAMPLES = """examples:
   delay-bench --emulate usb-serial,bluetooth,wifi --size 320x240 --quality 50 --fps 10 --out interfaces
   delay-bench --links tcp://192.168.7.2:5555 --seconds 30 --json
   delay-bench --size 320x240,640x480 --predict size=1280x720,fps=30 --predict link=bluetooth,processing=4
+  delay-bench --replay session.mcap --predict fps=60 --out predicted    # from a recorded run, without running anything
   delay-bench --emulate list
 
 For each link, size, quality and rate, the command runs a board-agent process and the host, and prints the median, 95th and 99th
@@ -66,6 +67,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="CHANGES",
         help="predict the delays of a setting without running it, for example fps=60,size=640x480,kB=40,fifo=4:block,processing=0.5,link=wifi",
+    )
+    parser.add_argument(
+        "--replay",
+        type=Path,
+        metavar="FILE.mcap",
+        help="run nothing: tell the delays of a run that was recorded (`phone-host run --record`), and predict from them",
     )
     parser.add_argument("--matcher", metavar="NAME", help=f"stereo matcher ({default_words()})")
     parser.add_argument(

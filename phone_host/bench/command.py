@@ -18,11 +18,12 @@ from common.program.terminal import fitted
 from common.words import counted
 from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import Interface, cases, interfaces, parse_links, parse_qualities, parse_rates, parse_sizes
-from phone_host.bench.changes import parse_changes
+from phone_host.bench.changes import Change, parse_changes
 from phone_host.bench.emulate import parse_profiles
 from phone_host.bench.links import why_not_measurable
 from phone_host.bench.matrix import measure, remote_cases
 from phone_host.bench.page import figure, page
+from phone_host.bench.recorded import recorded_run
 from phone_host.bench.report import PERCENTILES, Conditions, as_json, conditions, grouped, most_compared
 from phone_host.bench.runs import CaseResult, RunSettings
 from phone_host.bench.tables import (
@@ -37,6 +38,7 @@ from phone_host.bench.tables import (
 from phone_host.bench.trace import TracedRun, trace_json
 from phone_host.output.atomic import write_text
 from phone_host.output.listed import claim
+from phone_host.run.progress_bar import busy_bar
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.sync.fifo import FifoSettings
@@ -47,7 +49,10 @@ _FILES = ("delay-bench.json", "delay-bench.html", "trace.json", "delay-bench.svg
 
 def run(options: argparse.Namespace) -> int:
     """Run the cases that the options ask for, print their delays, write the files."""
-    settings, changes = _settings(options), parse_changes(options.predict)
+    changes = parse_changes(options.predict)
+    if options.replay is not None:
+        return _run_recorded(options, changes)
+    settings = _settings(options)
     asked = _interfaces(options)
     matrix = parse_sizes(options.size), parse_qualities(options.quality), parse_rates(options.fps)
     here, not_run = _available(asked)
@@ -72,6 +77,29 @@ def run(options: argparse.Namespace) -> int:
         print(f"delay-bench: {how} after {len(outcome.results)} of {counted(len(planned), 'run')}", file=sys.stderr)
         return INTERRUPTED if signals.interrupted else 0
     return 0 if all(result.ledgers for result in outcome.results) else _NOTHING_MEASURED
+
+
+def _run_recorded(options: argparse.Namespace, changes: Sequence[Change]) -> int:
+    """Tell the delays of a recorded run, and predict from them."""
+    for name in ("links", "emulate"):
+        if getattr(options, name) is not None:
+            raise SettingsError(
+                f"--{name} beside --replay", "leave one of them out; --predict link=wifi predicts another link"
+            )
+    if options.out is not None:
+        _make_folder(options.out)
+    with busy_bar("reading the recording"):
+        run = recorded_run(options.replay)
+    under = Conditions(
+        machine=f"recording {options.replay}",
+        date=run.begun,
+        matcher=run.matcher,
+        fifo=run.fifo,
+        seconds=round(run.result.measured_s, 1),
+        recording=str(options.replay),
+    )
+    _tell(options, [run.result], under, analyse([run.result], run.fifo, changes))
+    return 0
 
 
 def _interfaces(options: argparse.Namespace) -> tuple[Interface, ...]:
@@ -166,7 +194,7 @@ def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis)
             for line in regime_lines(result, under.fifo):
                 print(fitted(f"  {line}"))
         print()
-    for line in (*fit_lines(analysis), *prediction_lines(analysis)):
+    for line in (*fit_lines(analysis), *prediction_lines(analysis, every=bool(under.recording))):
         print(fitted(line))
 
 

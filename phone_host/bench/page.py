@@ -121,6 +121,11 @@ def _method(results: Sequence[CaseResult], under: Conditions) -> str:
         if shaped
         else ""
     )
+    if under.recording:
+        return (
+            f"The run of the recording {escape(under.recording)}, {under.seconds:g} s of it after a first {WARM_UP_S:g} s that is left out. Delays are on the "
+            "host's clock; propagation carries the clocks' uncertainty. A board frame whose number is missing counts as replaced by a newer one."
+        )
     return (
         f"Two real programs over rendered films, {under.seconds:g} s for each run after a warm-up of {WARM_UP_S:g} s that is left out. Delays are on the "
         f"host's clock; propagation carries the clocks' uncertainty.{emulated}"

@@ -36,6 +36,7 @@ class Conditions:
         fifo: depth and policy of the queue before it.
         seconds: length of each run after its warm-up, s.
         not_run: interfaces that could not be measured, and why.
+        recording: the recording whose run this is; empty: the runs were made for this.
     """
 
     machine: str
@@ -44,6 +45,7 @@ class Conditions:
     fifo: FifoSettings
     seconds: float
     not_run: tuple[tuple[Interface, str], ...] = ()
+    recording: str = ""
 
 
 def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) -> Conditions:
@@ -70,6 +72,7 @@ def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis
     """
     return {
         "command": "delay-bench",
+        "recording": under.recording or None,
         "machine": under.machine,
         "date": under.date,
         "matcher": under.matcher,

@@ -222,8 +222,13 @@ def fit_lines(analysis: Analysis) -> list[str]:
     return lines
 
 
-def prediction_lines(analysis: Analysis) -> list[str]:
-    """List each run beside its prediction from the other runs, and the predictions that the user asked for, for the terminal."""
+def prediction_lines(analysis: Analysis, *, every: bool = False) -> list[str]:
+    """List each run beside its prediction from the other runs, and settings that were not run, for the terminal.
+
+    Args:
+        analysis: conclusions from the runs.
+        every: not only the settings that the user asked for; and how well the queues alone foretell a single run.
+    """
     lines = []
     if len(analysis.checked) > 1:
         lines = ["", "end-to-end p50 and pairs/s, measured and predicted from the other runs:"]
@@ -234,8 +239,8 @@ def prediction_lines(analysis: Analysis) -> list[str]:
             lines.append(f"{found}no prediction: {said.reason}")
         else:
             lines.append(f"{found}{duration_text(said.end_to_end_p50_ns)}, {said.pairs_per_s:.1f}/s")
-    lines += error_lines(analysis) if lines else []
-    asked = [one for one in analysis.what_ifs if one.asked_for]
+    lines += error_lines(analysis) if lines or every else []
+    asked = [one for one in analysis.what_ifs if one.asked_for or every]
     if asked:
         lines += ["", "predicted, not run:"]
     for what_if in asked:

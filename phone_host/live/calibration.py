@@ -28,9 +28,9 @@ from phone_host.calibration.guide.words import Words
 from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target import Board, Corners
 from phone_host.live.newest import Newest
-from phone_host.live.view_folders import Pictures, ViewFolders
 from phone_host.measure.unused import unused
 from phone_host.model import Image, Result
+from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.report.summary import camera_troubles
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings

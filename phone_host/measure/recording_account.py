@@ -1,4 +1,4 @@
-"""What became of the frames that were to be recorded."""
+"""What became of the frames that were to be recorded. Pure."""
 
 from dataclasses import dataclass
 
@@ -15,6 +15,9 @@ class RecordingAccount:
         dropped: images that came faster than the disk takes them.
         lost: images that came after it had ended early.
         size_bytes: how long the file is.
+        seconds: how long it lasted.
+        left_bytes: room on its disk; None: not known.
+        is_over: whether it has ended.
         failure: what ended it early; None: nothing did.
     """
 
@@ -23,6 +26,9 @@ class RecordingAccount:
     dropped: int
     lost: int
     size_bytes: int
+    seconds: float = 0.0
+    left_bytes: int | None = None
+    is_over: bool = True
     failure: Trouble | None = None
 
     @property
@@ -32,7 +38,17 @@ class RecordingAccount:
 
     @property
     def words(self) -> str:
-        """For people, one line."""
+        """For people, one line: while it grows what there is and what room is left, then what became of it."""
+        return self._ended() if self.is_over else self._growing()
+
+    def _growing(self) -> str:
+        minutes, seconds = divmod(int(self.seconds), 60)
+        dropped = f", {self.dropped} dropped: the disk is too slow" if self.dropped else ""
+        left = "" if self.left_bytes is None else f", {self.left_bytes / 1e9:.1f} GB left"
+        told = f"{minutes}:{seconds:02d}, {self.frames} images, {self.size_bytes / 1e6:.0f} MB"
+        return f"recording: {told}{left}{dropped}"
+
+    def _ended(self) -> str:
         missing = [
             f"{count} {why}"
             for count, why in ((self.dropped, "too fast for the disk"), (self.lost, "came after its end"))

@@ -17,13 +17,14 @@ from common.errors import DataError, SettingsError, UnavailableError
 from common.files import read_whole
 from common.frame import PixelFormat
 from common.recording.layout import ABOUT, About, image_topic
-from common.recording.recorded import Recorded, size_px
+from common.recording.recorded import Recorded
 from common.recording.recording_file import written
 from common.recording.ros_messages import RecordedImage, image_message, image_type
 from common.versions import all_versions
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.preview import write_png
-from phone_host.stereo.raw_images import EncodedImage, decode_frame
+from phone_host.recording.both_sides import encoded
+from phone_host.stereo.raw_images import decode_frame
 
 _SIDES: Final = ("left", "right")
 _SUFFIX: Final = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}
@@ -73,16 +74,7 @@ def _export(recorded: Recorded, topic: str, folder: Path) -> int:
         suffix = _SUFFIX.get(image.pixel_format)
         name = f"{image.stamp_ns}{suffix or '.png'}"
         if suffix is None:
-            width, height = size_px(image)
-            encoded = EncodedImage(
-                payload=bytes(image.payload),
-                pixel_format=image.pixel_format,
-                width_px=width,
-                height_px=height,
-                name=name,
-                orientation=recorded.camera(topic).orientation,
-            )
-            write_png(folder / name, decode_frame(encoded))
+            write_png(folder / name, decode_frame(encoded(shown, recorded.camera(topic), name)))
         else:
             write_bytes(folder / name, memoryview(image.payload))
         rows.append((image.stamp_ns, name))

@@ -1,10 +1,11 @@
-"""Keeps frames of both cameras with their stamps for a while: from a board and the own camera, or from folders of an earlier run.
+"""Keeps frames of both cameras with their stamps for a while: from a board and the own camera, from folders of an earlier run, or from a recording.
 
 In a folder a frame's file name is its stamp: `board/<ns>.jpg` and `host/<ns>.jpg`, ns on the host's clock. The files are as the
 cameras gave them; `board/orientation` holds the options that make them upright, such as `rotate=180&flip=h`, if there are any.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,14 +15,17 @@ from common.camera.base import Camera
 from common.camera.imagefile import SUFFIXES, load
 from common.errors import DataError, SettingsError
 from common.files import read_whole
-from common.frame import Frame, PixelFormat
+from common.frame import Frame, PixelFormat, SpoiledImageError
 from common.link.base import Link
 from common.orientation import UPRIGHT, Orientation, orientation_of
 from common.protocol.message import CameraDescription, FrameMessage
+from common.recording.opened import open_recorded
+from common.recording.recorded import Recorded
 from phone_host.calibration.timing.shots import Shot
-from phone_host.model import BoardFrame
+from phone_host.model import BoardFrame, Side
 from phone_host.output.atomic import write_bytes
 from phone_host.output.listed import ListedFolder
+from phone_host.recording.both_sides import encoded, topics_of
 from phone_host.recording.filming import take_frames
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.sync.clock import ClockEstimate
@@ -201,6 +205,27 @@ def read(folder: Path) -> Footage:
             shots.append(Shot(int(path.stem), encoded))
         sides.append(tuple(sorted(shots, key=lambda shot: shot.exposed_ns)))
     return Footage(*sides)
+
+
+def read_recording(file: Path) -> Footage:
+    """Read the frames of a recording. Their bytes stay on the disk; spoiled ones are left out.
+
+    Raises:
+        UnavailableError: the file cannot be read.
+        DataError: it is no recording of two cameras.
+    """
+    recorded = open_recorded(file)
+    topics, board = topics_of(recorded, file), Side(recorded.about.board_side)
+    return Footage(_shots(recorded, topics[board], "board"), _shots(recorded, topics[board.other], "host"))
+
+
+def _shots(recorded: Recorded, topic: str, whose: str) -> tuple[Shot, ...]:
+    camera = recorded.camera(topic)
+    shots: list[Shot] = []
+    for shown in sorted(recorded.images[topic], key=lambda each: each.image.stamp_ns):
+        with suppress(SpoiledImageError):
+            shots.append(Shot(shown.image.stamp_ns, encoded(shown, camera, f"{whose} frame {shown.sequence}")))
+    return tuple(shots)
 
 
 def _orientation(path: Path) -> Orientation:

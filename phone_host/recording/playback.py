@@ -12,7 +12,6 @@ from typing import Final, Protocol
 
 from common import now
 from common.camera.base import CameraHealth
-from common.errors import DataError
 from common.frame import Frame, SpoiledImageError, find_fault
 from common.ledger import BoardMarks, PairLedger, ledger_of
 from common.protocol.message import (
@@ -31,6 +30,7 @@ from common.recording.recorded import Recorded, Shown, size_px
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.model import BoardFrame, Side
+from phone_host.recording.both_sides import topics_of
 from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
@@ -74,10 +74,7 @@ class Playback:
         self.file, self.pacing = file, pacing
         self.recorded = open_recorded(file)
         self.board_side = board_side or Side(self.recorded.about.board_side)
-        topics = {side: self.recorded.topic_of(side.value) for side in Side}
-        if not all(topics.values()):
-            held = ", ".join(sorted(self.recorded.images))
-            raise DataError(f"{file} holds the images of one camera only ({held})", "record both cameras")
+        topics = topics_of(self.recorded, file)
         self.board = self.recorded.camera(topics[self.board_side])
         self.description = self.recorded.camera(topics[self.board_side.other])
         board = [(each, True) for each in self.recorded.images[topics[self.board_side]]]
@@ -127,7 +124,7 @@ class _Player:
         began = told.get("began_ns", "")
         self._began_ns = int(began) if began.isdecimal() else 0  # the board said hello; 0: before all frames
         self._shift_ns = 0  # from the times of the recording to those of this run
-        self._estimates = _estimates(self._recorded)
+        self._estimates = estimates(self._recorded)
         self._last_sequence = -1
         self._stop, self._changed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="playback", daemon=True)
@@ -286,7 +283,8 @@ class _Player:
         self._sink.change_period(self._camera.period_ns)
 
 
-def _estimates(recorded: Recorded) -> list[tuple[int, ClockEstimate]]:
+def estimates(recorded: Recorded) -> list[tuple[int, ClockEstimate]]:
+    """Return what was known of the board's clock, each with the time from which on, ns since 1970."""
     found = []
     for message in recorded.texts.get(CLOCK, []):
         try:

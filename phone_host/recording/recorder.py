@@ -7,7 +7,7 @@ import json
 import logging
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -17,6 +17,7 @@ from common.ledger import PairLedger
 from common.program.logs import event
 from common.protocol.message import CameraDescription
 from common.recording.layout import CAPTURE, CLOCK, DELAYS, camera_name, camera_values, image_topic
+from common.recording.mcap_writer import CHUNK_BYTES
 from common.recording.recording_file import RecordingFile
 from common.recording.ros_messages import RecordedImage, image_parts, image_type
 from phone_host.measure.recording_account import RecordingAccount
@@ -29,11 +30,14 @@ _LOG = logging.getLogger(__name__)
 _MOST_BYTES: Final = 64 << 20
 """What may wait for the disk, and as much again may be under way to it: 10 s of both cameras at 3 MB/s, and a phone has memory for it."""
 
-_TEXT_BYTES: Final = 1000
-"""What a message that is no image takes, roughly."""
+_TOLD_BYTES: Final = 1000
+"""What values by name take, roughly."""
 
-_SYNC_NS: Final = 800_000_000
-"""A power cut takes a second at most: this, and the time that the disk takes."""
+_GATHER_S: Final = 0.1
+"""So long an image waits for others with which it makes a chunk. To wake the writer for each would cost more than to write it."""
+
+_SYNC_NS: Final = 700_000_000
+"""A power cut takes a second at most: this, what waits, and the time that the disk takes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,11 +55,11 @@ class _Image:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Text:
-    """A message in JSON on its way."""
+class _Message:
+    """A message that is no image of a camera on its way, in pieces."""
 
     topic: str
-    text: str
+    parts: tuple[Buffer, ...]
     sequence: int
     at_ns: int
 
@@ -68,7 +72,7 @@ class _Told:
     values: dict[str, str]
 
 
-_Item = _Image | _Text | _Told
+_Item = _Image | _Message | _Told
 
 
 class Recorder:
@@ -84,7 +88,8 @@ class Recorder:
         self._file, self._unix_ns = file, unix_ns
         self._board, self._own = board_side.value, board_side.other.value
         self._camera: CameraDescription | None = None
-        self._began_ns = 0
+        self._began_ns = self._ended_ns = 0
+        self._begun_ns = now.monotonic_ns()
         self._session = ""
         self._clock: ClockEstimate | None = None
         self._captured: list[tuple[int, list[int]]] = []
@@ -101,6 +106,7 @@ class Recorder:
     @property
     def account(self) -> RecordingAccount:
         """What became of the images so far."""
+        left_bytes = self._file.left_bytes  # before the lock, for which frames would wait: a disk may be slow
         with self._changed:
             return RecordingAccount(
                 file=str(self._file.path),
@@ -108,6 +114,9 @@ class Recorder:
                 dropped=self._dropped,
                 lost=self._lost,
                 size_bytes=self._file.size_bytes,
+                seconds=((self._ended_ns or now.monotonic_ns()) - self._begun_ns) / 1e9,
+                left_bytes=left_bytes,
+                is_over=self._ended_ns > 0,
                 failure=self._failure,
             )
 
@@ -141,13 +150,25 @@ class Recorder:
 
     def delays(self, ledger: PairLedger) -> None:
         """Take the ledger of a pair. Never waits."""
-        self._put(_Text(DELAYS, ledger.to_json(), ledger.sequence, ledger.done_ns))
+        self._put(_Message(DELAYS, (ledger.to_json().encode(),), ledger.sequence, ledger.done_ns))
 
     def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
         """Take a clock estimate; one that is not new is left out. Never waits."""
         if estimate is not None and estimate != self._clock:
             self._clock = estimate
-            self._put(_Text(CLOCK, json.dumps(asdict(estimate), separators=(",", ":")), 0, at_ns))
+            text = json.dumps(asdict(estimate), separators=(",", ":"))
+            self._put(_Message(CLOCK, (text.encode(),), 0, at_ns))
+
+    def computed(self, topic: str, write: Callable[[int], tuple[Buffer, ...]], ledger: PairLedger, at_ns: int) -> None:
+        """Take what was computed of a pair. Never waits.
+
+        Args:
+            topic: where it goes.
+            write: makes the message, in pieces, with its stamp in ns since 1970.
+            ledger: of the pair.
+            at_ns: when the image was exposed that it belongs to.
+        """
+        self._put(_Message(topic, write(self._unix_ns + at_ns), ledger.sequence, ledger.done_ns))
 
     def finish(self, attached: Mapping[str, bytes] | None = None) -> RecordingAccount:
         """Write what waits, end the file in order, and return what became of the images.
@@ -160,6 +181,8 @@ class Recorder:
             self._is_closing = True
             self._changed.notify()
         self._thread.join()
+        with self._changed:
+            self._ended_ns = self._ended_ns or now.monotonic_ns()
         return self.account
 
     def _put(self, item: _Item) -> None:
@@ -172,20 +195,26 @@ class Recorder:
             else:
                 self._queue.append(item)
                 self._queued_bytes += size
-                self._changed.notify()
+                if self._queued_bytes >= CHUNK_BYTES:
+                    self._changed.notify()
 
     def _write_all(self) -> None:
         synced_ns, waiting = now.monotonic_ns(), 0
         try:
             while (taken := self._next()) is not None:
-                waiting = sum(isinstance(item, _Image) for item in taken)
+                waiting = images = sum(isinstance(item, _Image) for item in taken)
                 for item in taken:
                     self._write(item)
                     waiting -= isinstance(item, _Image)
                 now_ns = now.monotonic_ns()
-                if now_ns - synced_ns >= _SYNC_NS:  # counted from the begin of one to the begin of the next
+                is_due = now_ns - synced_ns >= _SYNC_NS  # counted from the begin of one to the begin of the next
+                if is_due:
                     synced_ns = now_ns
                     self._write_captured()
+                self._file.end_chunk()
+                with self._changed:
+                    self._frames += images
+                if is_due:
                     self._file.sync()
             self._end()
         except Exception as error:  # noqa: BLE001 - a thread's root: the run goes on, and its account says what is missing
@@ -202,24 +231,21 @@ class Recorder:
 
     def _fail(self, error: Exception, unwritten: int) -> None:
         cause = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
-        failure = Trouble(
-            f"the recording {self._file.path} ended early ({cause})", "make room; what is in it can be used"
-        )
+        failure = Trouble(f"it ended early ({cause})", "make room; what is in it can be used")
         _LOG.error(
             event("recording_ended_early", file=self._file.path, cause=cause, remedy="make room; the run goes on")
         )
         with self._changed:
-            self._failure = failure
+            self._failure, self._ended_ns = failure, now.monotonic_ns()
             self._lost += unwritten + sum(isinstance(each, _Image) for each in self._queue)
             self._queue.clear()
             self._queued_bytes = 0
         self._file.abandon()
 
     def _next(self) -> list[_Item] | None:
-        """Wait for what came, at most for a second; None: nothing will."""
+        """Wait until there is enough for a chunk, but not long; None: nothing will come."""
         with self._changed:
-            if not self._queue and not self._is_closing:
-                self._changed.wait(_SYNC_NS / 1e9)
+            self._changed.wait_for(lambda: self._is_closing or self._queued_bytes >= CHUNK_BYTES, _GATHER_S)
             if not self._queue and self._is_closing:
                 return None
             taken = list(self._queue)
@@ -234,10 +260,8 @@ class Recorder:
                 self._add(topic, image_parts(image), sequence, log_ns, publish_ns)
                 if capture_ns is not None:
                     self._note_capture(sequence, capture_ns)
-                with self._changed:
-                    self._frames += 1
-            case _Text(topic, text, sequence, at_ns):
-                self._add(topic, (text.encode(),), sequence, at_ns, at_ns)
+            case _Message(topic, parts, sequence, at_ns):
+                self._add(topic, parts, sequence, at_ns, at_ns)
             case _Told(name, values):
                 self._file.tell(name, values)
 
@@ -262,4 +286,10 @@ class Recorder:
 
 
 def _size(item: _Item) -> int:
-    return len(item.image.payload) if isinstance(item, _Image) else _TEXT_BYTES
+    match item:
+        case _Image(image):
+            return len(image.payload)
+        case _Message(_, parts):
+            return sum(map(len, parts))
+        case _Told():
+            return _TOLD_BYTES

@@ -2,7 +2,7 @@
 
 from common.protocol.message import CameraDescription
 from phone_host.model import BoardFrame
-from phone_host.recording.recorder import Recorder
+from phone_host.recording.switch import RecordingSwitch
 from phone_host.stream.frame_sink import FrameSink
 from phone_host.sync.quarantine import Disbelief
 
@@ -15,7 +15,7 @@ class Tap:
         recorder: sees them first.
     """
 
-    def __init__(self, sink: FrameSink, recorder: Recorder) -> None:
+    def __init__(self, sink: FrameSink, recorder: RecordingSwitch) -> None:
         self._sink, self._recorder = sink, recorder
 
     def begin(self, camera: CameraDescription) -> None:

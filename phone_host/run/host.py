@@ -18,9 +18,8 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.model import Processed, Result, Side
-from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.recording.playback import Playback
-from phone_host.recording.recorder import Recorder
+from phone_host.recording.switch import RecordingSwitch
 from phone_host.run.course import Course
 from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.drift_keeper import DriftKeeper
@@ -59,13 +58,16 @@ _RECENT: Final = 60
 class Host:
     """One run of the host.
 
+    Attributes:
+        recording: sees every frame; None: nothing can be recorded.
+
     Args:
         settings: settings of the run.
         camera: the host camera, open; or a recording of both cameras.
         links: open links to the board, the preferred one first; none beside a recording.
         core: the stereo core; None to measure pairs and delays only.
         sinks: take the results, in addition to the sink that writes to disk.
-        recorder: sees every frame; None: nothing is recorded. The host ends it.
+        recording: see above; the host ends it.
     """
 
     def __init__(
@@ -76,12 +78,12 @@ class Host:
         core: StereoCore | None,
         sinks: Sequence[Sink] = (),
         *,
-        recorder: Recorder | None = None,
+        recording: RecordingSwitch | None = None,
     ) -> None:
         self._settings = settings
         self._own = camera.description
         self._playback = camera if isinstance(camera, Playback) else None
-        self._recorder = recorder
+        self.recording = recording
         files = camera if isinstance(camera, ShowsFiles) else None
         demand = DemandClock(
             self._own.pacing,
@@ -112,8 +114,8 @@ class Host:
         )
         self._trust = TrustSink(core, period_ns=0 if is_timeless else PERIOD_NS, keeper=self._keeper)
         motion = FunctionSink(_MOTION, self._measure_motion)
-        recording = () if recorder is None else (RecordingSink(recorder),)
-        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *recording, *sinks)
+        recorded = () if recording is None else (RecordingSink(recording),)
+        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *recorded, *sinks)
         self._queue = PairQueue(
             _UNHURRIED if self._playback is not None and is_timeless else settings.fifo,
             settings.tolerance_ns,
@@ -124,7 +126,7 @@ class Host:
             clock=now.monotonic_ns if self._playback is None else self._playback.clock_ns,
             marking=now.monotonic_ns,
         )
-        self._camera, self._receiver = streams(camera, links, self._queue, demand, recorder)
+        self._camera, self._receiver = streams(camera, links, self._queue, demand, recording)
         rig = None if core is None else core.rig
         self._matcher_is_fastest = core is not None and core.matcher_is_fastest
         self._rig_rejected = rig is not None and rig.is_rejected
@@ -227,15 +229,14 @@ class Host:
 
     def _end_recording(self) -> None:
         """Write the rest of the recording; what is known of the cameras is known now."""
-        if self._recorder is not None:
-            cameras = self._cameras.text()
-            self._recorder.finish({CAMERAS_NAME: cameras.encode()} if cameras else {})
+        if self.recording is not None:
+            self.recording.end(self._cameras.text())
 
     def abandon(self) -> None:
         """Release the results folder of a host that will not `run`."""
         self._files.close({})
-        if self._recorder is not None:
-            self._recorder.finish()
+        if self.recording is not None:
+            self.recording.end()
 
     def write_report(self, report: dict[str, object], page: str = "") -> bool:
         """Write the report of the run into its results folder, if there is one. Call this after `run`.
@@ -341,7 +342,7 @@ class Host:
             matcher_is_fastest=self._matcher_is_fastest,
             budget=None if self._budget is None else self._budget.account,
             drift=None if self._keeper is None else self._keeper.drift,
-            recording=None if self._recorder is None else self._recorder.account,
+            recording=None if self.recording is None else self.recording.account,
             replay=self._replay,
         )
 
@@ -381,8 +382,8 @@ class Host:
         self._cameras.look()
         self._steering.update(now_ns)
         self._doubts.look(now_ns)
-        if self._recorder is not None:
-            self._recorder.clock(self._receiver.estimate, now_ns)
+        if self.recording is not None:
+            self.recording.clock(self._receiver.estimate, now_ns)
 
     def _raise_failures(self) -> None:
         of_sinks = (sink.failure for sink in self._sinks)

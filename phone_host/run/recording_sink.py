@@ -2,7 +2,7 @@
 
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import Result
-from phone_host.recording.recorder import Recorder
+from phone_host.recording.switch import RecordingSwitch
 
 
 class RecordingSink:
@@ -15,7 +15,7 @@ class RecordingSink:
         recorder: writes.
     """
 
-    def __init__(self, recorder: Recorder) -> None:
+    def __init__(self, recorder: RecordingSwitch) -> None:
         self._recorder = recorder
         self.failure: Exception | None = None
 

@@ -7,7 +7,7 @@ from common.camera.base import Camera
 from common.frame import Frame
 from common.link.base import Link
 from phone_host.recording.playback import Playback
-from phone_host.recording.recorder import Recorder
+from phone_host.recording.switch import RecordingSwitch
 from phone_host.recording.tap import Tap
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.own_camera import OwnCamera
@@ -17,7 +17,11 @@ from phone_host.stream.streams import BoardStream, OwnStream
 
 
 def streams(
-    camera: Camera | Playback, links: Sequence[Link], queue: PairQueue, demand: DemandClock, recorder: Recorder | None
+    camera: Camera | Playback,
+    links: Sequence[Link],
+    queue: PairQueue,
+    demand: DemandClock,
+    recorder: RecordingSwitch | None,
 ) -> tuple[OwnStream, BoardStream]:
     """Return both sides of a run, not started.
 

@@ -20,7 +20,6 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
 from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.report.summary import camera_troubles, corrected_lines, depth_lines, phase_lines
-from phone_host.run.recording_words import recording_words
 from phone_host.run.redrawn import Part, Redrawn
 
 _REFRESH_S: Final = 0.25
@@ -97,7 +96,7 @@ class LiveTable(Redrawn):
                     *temporal_lines(run.depth.temporal),
                 )
             ),
-            *([] if run.recording is None else [Part(4, Text(recording_words(run.recording)))]),
+            *([] if run.recording is None else [Part(4, Text(run.recording.words))]),
             Part(2, _table(run, self._rate, width)),
             Part(6, _stages(run)),
             Part(7, Text(judge(figures(run)).sentence, style="dim")),

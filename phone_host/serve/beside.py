@@ -1,4 +1,4 @@
-"""The page beside an ordinary `run`: it shows the run, may stop it and take snapshots. All else needs a run of its own."""
+"""The page beside an ordinary `run`: it shows the run, may stop it, record it and take snapshots. All else needs a run of its own."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -11,9 +11,11 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.output.axes import Axes
+from phone_host.run.host import Host
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.program import Choices
+from phone_host.serve.recordings import Recordings
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.stereo.core import StereoCore
@@ -32,11 +34,15 @@ class BesideRun:
         choices: the run's options, as they may be shown.
         command: makes the command line of such options.
         snapshots: folder for snapshots.
+        recordings: folder for recordings.
         axes: of the points in them.
     """
 
-    def __init__(self, choices: Choices, command: Callable[[Choices], str], *, snapshots: Path, axes: Axes) -> None:
-        self._command, self._snapshots, self._axes = command, snapshots, axes
+    def __init__(
+        self, choices: Choices, command: Callable[[Choices], str], *, snapshots: Path, recordings: Path, axes: Axes
+    ) -> None:
+        self._command, self._snapshots, self._folder, self._axes = command, snapshots, recordings, axes
+        self._recordings = Recordings()
         self._shelf = Shelf()
         self._memory = Memory(choices)
         self.feed: Final = BrowserFeed(None)
@@ -53,13 +59,14 @@ class BesideRun:
         self._memory.choose({**self._memory.choices, "link": " ".join(links)})
         return PageSink(self._shelf, core)
 
-    def watch(self, ask: Callable[[], RunSnapshot]) -> None:
-        """Begin to show the run.
+    def watch(self, host: Host) -> None:
+        """Begin to show the run, which may be recorded from now on.
 
         Args:
-            ask: returns its snapshot.
+            host: the run.
         """
-        self._memory.watch(ask)
+        self._memory.watch(host.snapshot)
+        self._recordings.watch(host)
 
     def stopped(self) -> bool:
         """Whether the page has stopped the run."""
@@ -95,10 +102,16 @@ class BesideRun:
             self.feed.end()
             self._shelf.tell()
             return Answer(words="it is ending")
-        if command.do is not Do.SNAPSHOT:
-            return Answer(trouble=_NEEDS_SERVE)
         try:
-            return keep_newest(self._shelf, self._snapshots, self._axes)
+            match command.do:
+                case Do.SNAPSHOT:
+                    return keep_newest(self._shelf, self._snapshots, self._axes)
+                case Do.RECORD:
+                    return self._recordings.begin(self._folder)
+                case Do.END_RECORDING:
+                    return self._recordings.end()
+                case _:
+                    return Answer(trouble=_NEEDS_SERVE)
         except TandemError as error:
             return Answer(trouble=trouble_of(error))
 

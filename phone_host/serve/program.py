@@ -148,3 +148,6 @@ class Program(Protocol):
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """Return the folder of the snapshots, and the axes of their points."""
+
+    def recordings(self, choices: Choices) -> Path:
+        """Return the folder of the recordings that are begun on the page."""

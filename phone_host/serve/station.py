@@ -28,6 +28,7 @@ from phone_host.serve.capture_guide import CaptureGuide
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.program import Choices, Program, ReadyRun
+from phone_host.serve.recordings import Recordings
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.stereo.core import StereoCore
@@ -54,6 +55,7 @@ class Station:
         self._program = program
         self._shelf = Shelf()
         self._memory = Memory(program.kept())
+        self._recordings = Recordings()
         self._activities = Activities(self._begins, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
             Do.FIND: self._find,
@@ -65,6 +67,8 @@ class Station:
             Do.RUN: self._run,
             Do.STOP: self._stop,
             Do.SNAPSHOT: self._snapshot,
+            Do.RECORD: self._record,
+            Do.END_RECORDING: self._end_recording,
         }
 
     @property
@@ -257,7 +261,7 @@ class Station:
 
     def _watched(self, task: Task, ready: ReadyRun) -> RunSnapshot:
         """Run, show it, and write its report; return its last snapshot."""
-        with task.held(), self._memory.live(ready.host.snapshot):
+        with task.held(), self._memory.live(ready.host.snapshot), self._recordings.beside(ready.host):
             try:
                 ended = ready.host.run(task.stopped)
             except Exception as error:
@@ -281,6 +285,14 @@ class Station:
     def _snapshot(self, values: Choices) -> Answer:
         del values
         return keep_newest(self._shelf, *self._program.snapshots(self._memory.choices))
+
+    def _record(self, values: Choices) -> Answer:
+        del values
+        return self._recordings.begin(self._program.recordings(self._memory.choices))
+
+    def _end_recording(self, values: Choices) -> Answer:
+        del values
+        return self._recordings.end()
 
     def _sinks(self, core: StereoCore | None) -> tuple[PageSink, ...]:
         return (PageSink(self._shelf, core, self._memory.begun),)

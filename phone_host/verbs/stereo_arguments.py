@@ -15,7 +15,7 @@ A nearer limit costs time: the number of disparities is proportional to 1 / z.""
 
 PAIRED: Final = (
     "two files, two folders or two globs; images of folders and globs are paired by the number in the name, else by equal names,"
-    " else in name order"
+    " else in name order. Or a recording, FILE.mcap: its stillest pair of each second, at most a hundred, written to DIR/views"
 )
 """How LEFT and RIGHT are given, for the verbs that take pairs of images."""
 

@@ -23,6 +23,13 @@ _REFUSED: Final = (401, 403, 421, 429)
 """What any request may be answered: no token, another site, another name, too often."""
 
 
+_DO: Final = (
+    "`record` begins a recording (MCAP) beside the run that goes on, in a new file of the folder `recordings`; `end_recording` ends it."
+    " How it goes stands in the state: `live.recording`. `snapshot` saves the newest pair. `set` takes options of `phone-host run` as"
+    " values, `enrol` link and code, `calibrate` board and square; the others take none."
+)
+
+
 def description() -> _Json:
     """Return the description."""
     return {
@@ -98,7 +105,7 @@ def _schemas() -> _Json:
         "Report": {"type": "object"},
         "Problem": _object(problem=_TEXT, remedy=_TEXT),
         "Pairs": _object(pairs={"type": "array", "items": pair}),
-        "Command": _object(("do",), do={"enum": [each.value for each in Do]}, values=values)
+        "Command": _object(("do",), do={"enum": [each.value for each in Do], "description": _DO}, values=values)
         | {"additionalProperties": False},
         "Done": _object(words=_TEXT),
         "Points": _object(("points",), points=points, number=number) | {"additionalProperties": False},

@@ -130,6 +130,8 @@ class Do(Enum):
     RUN = "run"
     STOP = "stop"
     SNAPSHOT = "snapshot"
+    RECORD = "record"
+    END_RECORDING = "end_recording"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

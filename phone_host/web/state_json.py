@@ -5,11 +5,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 from common.ledger import PairLedger
 from phone_host.measure.headline import Grade, headline
+from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.unused import unused
@@ -172,7 +173,13 @@ def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step], no
             for sink in run.sinks
         ],
         "carrier": run.carrier,
+        "recording": None if run.recording is None else _recording(run.recording),
     }
+
+
+def _recording(account: RecordingAccount) -> dict[str, object]:
+    failure = None if account.failure is None else trouble_values(account.failure)
+    return {**asdict(account), "failure": failure, "words": account.words}
 
 
 def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:

@@ -1,11 +1,18 @@
-"""Small recordings of known content."""
+"""Small recordings of known content, and frames to be recorded."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
-from common.frame import PixelFormat
-from common.recording.layout import ABOUT, CAPTURE, About, topics
+from common.frame import Frame, PixelFormat
+from common.ledger import BoardMarks
+from common.orientation import UPRIGHT
+from common.protocol.message import CameraDescription, FrameMessage
+from common.recording.layout import ABOUT, CAPTURE, About, camera_name, camera_values, topics
 from common.recording.mcap_writer import McapWriter
 from common.recording.ros_messages import RecordedImage, image_message
+from common.stamp import HOST_CLOCK, Stamp
+from phone_host.model import BoardFrame
 from tests.support.pictures import jpeg
 
 PERIOD_NS = 40_000_000
@@ -19,27 +26,38 @@ def payload(number: int) -> bytes:
     return jpeg(32, 24, seed=number % 4)
 
 
-def recording(pairs: int, *, missing: frozenset[int] = frozenset(), chunk_each: int = 4) -> bytes:
+def recording(
+    pairs: int,
+    *,
+    missing: frozenset[int] = frozenset(),
+    chunk_each: int = 4,
+    image: Callable[[str, int], bytes] = lambda _, number: payload(number),
+    cameras: Mapping[str, CameraDescription] = MappingProxyType({}),
+) -> bytes:
     """A recording of so many pairs, the left images of which come from the board; some left images are missing.
 
     Args:
         pairs: how many.
         missing: numbers of left images that are not in it.
         chunk_each: pairs in a chunk.
+        image: the image of a side and a number, as JPEG.
+        cameras: what is told of the camera of a side.
     """
     data = bytearray()
     writer = McapWriter(data.extend, "a test", topics())
     writer.tell(ABOUT, About(unix_ns=ZERO_NS, board_side="left").values())
     writer.attach("rig.yaml", "text/yaml", b"a: 1\n" * 50, ZERO_NS)
+    for side, camera in cameras.items():
+        writer.tell(camera_name(side), camera_values(camera))
     for number in range(pairs):
         for side, late_ns in (("left", 0), ("right", LATE_NS)):
             if side == "left" and number in missing:
                 continue
             at_ns = ZERO_NS + number * PERIOD_NS + late_ns
-            image = RecordedImage(at_ns, side, PixelFormat.MJPEG, (0, 0), payload(number))
+            shown = RecordedImage(at_ns, side, PixelFormat.MJPEG, (0, 0), image(side, number))
             log_ns = at_ns + 12_000_000
             topic = f"/{side}/image/compressed"
-            writer.add(topic, image_message(image), sequence=number, log_ns=log_ns, publish_ns=at_ns + 5_000_000)
+            writer.add(topic, image_message(shown), sequence=number, log_ns=log_ns, publish_ns=at_ns + 5_000_000)
         if number % chunk_each == chunk_each - 1:
             writer.end_chunk()
     captured = f"[[0,{[2_000_000] * pairs}]]".replace(" ", "").encode()
@@ -54,3 +72,49 @@ def recording_file(folder: Path, pairs: int, *, missing: frozenset[int] = frozen
     path = folder / "session.mcap"
     path.write_bytes(recording(pairs, missing=missing))
     return path
+
+
+def board_frame(number: int, image: bytes, at_ns: int) -> BoardFrame:
+    """A frame of the board that was received just now, exposed 30 ms ago.
+
+    Args:
+        number: its sequence.
+        image: its bytes, JPEG.
+        at_ns: now.
+    """
+    marks = BoardMarks(exposed_ns=at_ns - 30_000_000, grabbed_ns=at_ns - 20_000_000, sent_ns=at_ns - 10_000_000)
+    message = FrameMessage(
+        session="s",
+        sent_index=number,
+        sequence=number,
+        width_px=32,
+        height_px=24,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        marks=marks,
+        payload=image,
+    )
+    return BoardFrame(
+        message=message,
+        link="tcp",
+        marks=marks,
+        received_ns=at_ns,
+        offset_ns=0,
+        uncertainty_ns=0,
+        orientation=UPRIGHT,
+    )
+
+
+def own_frame(number: int, image: bytes, at_ns: int) -> Frame:
+    """A frame of the own camera, exposed 20 ms ago; see `board_frame`."""
+    stamp = Stamp(at_ns - 20_000_000, HOST_CLOCK)
+    return Frame(
+        sequence=number,
+        exposed=stamp,
+        grabbed=stamp,
+        width_px=32,
+        height_px=24,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        payload=image,
+    )

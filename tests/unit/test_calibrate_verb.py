@@ -11,9 +11,13 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
+from common.frame import PixelFormat
+from common.recording.layout import ABOUT, About, image_topic
+from common.recording.recording_file import written
+from common.recording.ros_messages import COMPRESSED_IMAGE, RecordedImage, image_message
 from phone_host.calibration.causes.mistakes import Finding, Mistake
 from phone_host.calibration.verdict import Assessment, Verdict
-from phone_host.model import Image
+from phone_host.model import Image, Side
 from phone_host.output.rig_yaml import read_rig
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.cause import with_cause
@@ -46,12 +50,12 @@ def _shaken(image: Image) -> Image:
     return np.asarray(cv2.remap(image, columns.astype(np.float32), moved, cv2.INTER_LINEAR), np.uint8)
 
 
-def _calibrate(folder: Path, *options: str) -> tuple[int, dict[str, Any]]:
-    """Exit code and report.json."""
+def _calibrate(folder: Path, *options: str, images: tuple[str, ...] = ()) -> tuple[int, dict[str, Any]]:
+    """Exit code and report.json; `images` in place of the folders left and right."""
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     parser.add_argument("--json", action="store_true")
-    given = [str(folder / "left"), str(folder / "right"), "--board", "9x6", "--square", "25mm", *options]
+    given = [*(images or (str(folder / "left"), str(folder / "right"))), "--board", "9x6", "--square", "25mm", *options]
     code = run(parser.parse_args([*given, "--out", str(folder / "rig.yaml")]))
     report: dict[str, Any] = json.loads((folder / "report.json").read_text())
     return code, report
@@ -204,3 +208,23 @@ def test_a_good_rig_has_no_remedy_though_a_mistake_was_found(verdict: Verdict, r
     told = summary(calibration_report(Judged(calibration(), judgement, finding)), Path("rig.yaml"))
     assert ("note     the board is blurred; the light is poor" in told) == (verdict is Verdict.GOOD)
     assert [line for line in told if line.startswith("remedy")] == ([f"remedy   {remedy}"] if remedy else [])
+
+
+def test_a_recording_gives_the_rig_of_its_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same pictures, a second apart: the same figures as from folders, and the board's side is that of the recording."""
+    folders = _calibrate(_folders(tmp_path, lambda image: encoded(".png", image)))[1]
+    path = tmp_path / "again" / "s.mcap"
+    path.parent.mkdir()
+    with written(path) as file:
+        file.tell(ABOUT, About(board_side="right").values())
+        for number, pair in enumerate(_PAIRS):
+            for side, image in zip(("left", "right"), pair, strict=True):
+                at_ns = (1000 + number) * 10**9
+                shown = RecordedImage(at_ns, side, PixelFormat.PNG, (0, 0), encoded(".png", image))
+                topic = image_topic(side, COMPRESSED_IMAGE)
+                file.add(topic, image_message(shown), sequence=number, log_ns=at_ns, publish_ns=at_ns)
+    recorded = _calibrate(path.parent, images=(str(path),))[1]
+    assert read_rig(path.parent / "rig.yaml").board_side is Side.RIGHT
+    for key in ("pairs", "views", "baseline_mm", "rms_px", "verdict"):
+        assert recorded[key] == folders[key]
+    capsys.readouterr()

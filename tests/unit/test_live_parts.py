@@ -29,9 +29,9 @@ from phone_host.camera.factory import open_camera
 from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken
 from phone_host.live.newest import Newest
-from phone_host.live.view_folders import Pictures, ViewFolders
 from phone_host.live.voice import Voice, speech_program
 from phone_host.model import Image
+from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.run.host_settings import HostSettings
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.command import exit_code, run

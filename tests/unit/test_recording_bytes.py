@@ -16,6 +16,8 @@ from common.recording.ros_messages import (
     CameraInfo,
     RecordedImage,
     camera_info_message,
+    cloud_parts,
+    depth_parts,
     image_message,
     image_type,
     read_camera_info,
@@ -53,6 +55,41 @@ def test_a_compressed_image_has_the_bytes_of_ros() -> None:
         b"\x03\x00\x00\x00\xff\xd8\xff"
     )
     assert image_message(image) == by_hand
+
+
+def test_depth_and_cloud_have_the_bytes_of_ros() -> None:
+    """A depth of 1 x 2 and a cloud of one point, value by value; strings and numbers are aligned as above."""
+    stamp = b"\x00\x01\x00\x00\x05\x00\x00\x00\x07\x00\x00\x00\x05\x00\x00\x00left\x00"
+    depth = (
+        b"\x00\x00\x00"
+        b"\x01\x00\x00\x00"
+        b"\x02\x00\x00\x00"  # height, width
+        b"\x06\x00\x00\x0016UC1\x00"
+        b"\x00"
+        b"\x00"
+        b"\x04\x00\x00\x00"  # little endian; aligned; bytes of a row
+        b"\x04\x00\x00\x00"
+        b"\xe8\x03\x00\x00"
+    )
+    assert b"".join(depth_parts(5_000_000_007, "left", (2, 1), b"\xe8\x03\x00\x00")) == stamp + depth
+
+    def field(name: bytes, offset: int) -> bytes:
+        return (
+            b"\x02\x00\x00\x00"
+            + name
+            + b"\x00\x00\x00"
+            + bytes([offset, 0, 0, 0])
+            + b"\x07\x00\x00\x00"
+            + b"\x01\x00\x00\x00"
+        )
+
+    cloud = (
+        b"\x00\x00\x00" b"\x01\x00\x00\x00" b"\x01\x00\x00\x00" b"\x04\x00\x00\x00"  # height, width, fields
+        + field(b"x", 0) + field(b"y", 4) + field(b"z", 8)
+        + b"\x04\x00\x00\x00rgb\x00" b"\x0c\x00\x00\x00" b"\x07\x00\x00\x00" b"\x01\x00\x00\x00"
+        + b"\x00\x00\x00\x00" b"\x10\x00\x00\x00" b"\x10\x00\x00\x00" b"\x10\x00\x00\x00" + bytes(16) + b"\x01"
+    )  # fmt: skip
+    assert b"".join(cloud_parts(5_000_000_007, "left", bytes(16))) == stamp + cloud
 
 
 IMAGES = st.builds(

@@ -17,6 +17,7 @@ from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot
 from phone_host.calibration.guide.wants import Want
 from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.measure.image_trust import ImageFigures, ImageTrust
+from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.trust import Concern
 from phone_host.model import Processed, Result
@@ -53,6 +54,18 @@ BOARDS = (
 CAMERAS = (
     Choice(uri="v4l2:/dev/video0?size=640x480&fps=30", name="Integrated Camera"),
     Choice(uri="http://127.0.0.1:8080/video", name="IP Webcam", note="no stamps"),
+)
+
+
+RECORDING = RecordingAccount(
+    file="/home/me/.local/share/tandemscan/recordings/2026-11-23-221918.mcap",
+    frames=720,
+    dropped=0,
+    lost=0,
+    size_bytes=36_900_000,
+    seconds=12.0,
+    left_bytes=41_200_000_000,
+    is_over=False,
 )
 
 
@@ -94,6 +107,7 @@ class Played:
     guide: GuideSnapshot | None = None
     trouble: Trouble | None = None
     concerns: tuple[Concern, ...] = ()
+    recording: RecordingAccount | None = None
     folder: str = ""
     begun: int = 0
     commands: list[Command] = field(default_factory=list)
@@ -183,6 +197,10 @@ class Played:
                 self.change(activity=Activity.IDLE)
             case Do.ENROL:
                 self.change(stranger="")
+            case Do.RECORD:
+                self.change(recording=RECORDING)
+            case Do.END_RECORDING:
+                self.change(recording=replace(RECORDING, is_over=True))
             case Do.CALIBRATE:
                 self.change(activity=Activity.CALIBRATING)
             case _:
@@ -254,6 +272,7 @@ class Played:
             estimate=estimate,
             images=images,
             depth=replace(base.depth, limits=limits),
+            recording=self.recording,
         )
 
 

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from common.recording.opened import open_recorded
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.demo_scene import plane_scene
@@ -16,7 +17,7 @@ from phone_host.scene.scene import render, rig_poses
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.numbered import BITS, write_film
 from tests.support.page_client import page
-from tests.support.programs import board
+from tests.support.programs import board, until
 from tests.web.conftest import PHONE
 
 DEPTH_M = 1.2
@@ -95,14 +96,22 @@ def test_from_nothing_to_true_depth_on_the_page_alone(browser: Any, wall: Path, 
             shown.wait_for_function("was => +document.querySelector('#views').dataset.pair > was + 2", arg=before)
             shown.click("#snapshot")
             shown.wait_for_function("() => document.querySelector('#run-answer').textContent.includes('pair-')")
+            shown.click("#record")
+            shown.wait_for_function("() => /: 0:0[1-9]/.test(document.querySelector('#recording').textContent)")
             shown.reload()
             shown.wait_for_selector("#views[data-pair]")
+            shown.wait_for_selector("#recording[data-on=yes]")
             shown.click("#go")
             shown.wait_for_function("() => document.querySelector('#go').textContent === 'Start'")
         assert ours.stop() == 0
         shown.wait_for_selector("body[data-line=ended]")
     assert errors == []
     shown.close()
+    [recording] = (tmp_path / "data" / "tandemscan" / "recordings").glob("*.mcap")
+    recorded = open_recorded(recording)  # the run has ended it
+    assert recorded.is_complete
+    assert all(len(images) > 3 for images in recorded.images.values())
+    assert {"rig.yaml", "settings.json", "cameras.json"} <= recorded.attachments.keys()
 
 
 def test_the_pairs_on_the_page_beside_a_run_are_pairs(browser: Any, tmp_path: Path) -> None:
@@ -127,6 +136,11 @@ def test_the_pairs_on_the_page_beside_a_run_are_pairs(browser: Any, tmp_path: Pa
             if shown.get_attribute("#views", "data-pair") == seen[-1]:
                 assert left == right
         assert len(set(seen)) == 6
+        assert client.do("record")["words"].startswith("recording to ")
+        assert client.do("record")["problem"] == "a recording is going on"
+        until(lambda: client.state()["live"]["recording"]["frames"] > 2, "recorded frames")
+        assert "recorded: " in client.do("end_recording")["words"]
+        assert client.do("end_recording")["words"] == "nothing is recorded"
         shown.wait_for_selector("#trust[data-level=bad], #trust[data-level=warning]")  # twice the same image
         assert "same" in shown.text_content("#trust").lower()
         running.stop(signal.SIGKILL)

@@ -14,6 +14,7 @@ EXAMPLES = """  phone-host calibrate --live --link tcp://192.168.7.2:5555 --came
   phone-host calibrate left/ right/ --board 9x6 --square 25mm --out rig.yaml
   phone-host calibrate 'views/left*.png' 'views/right*.png' --board 9x6 --square 25mm --out rig.yaml --json
   phone-host calibrate left/ right/ --board 9x6 --square 25mm --rotate-right 180 --out rig.yaml    # right camera on its head
+  phone-host calibrate session.mcap --square 25mm --out rig.yaml    # a recording of both cameras that see the board
   phone-host calibrate more-left/ more-right/ --from rig.yaml --out rig.yaml    # adds pictures to an earlier calibration
   phone-host calibrate left/ right/ --from rig.yaml --pose-only --out rig.yaml    # a camera was moved, its lens is the same
   phone-host calibrate --import camchain.yaml --out rig.yaml    # the calibration of another program; rig.yaml needs no pictures
@@ -31,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="LEFT RIGHT",
         help="pictures of the left and of the right camera: two folders or two globs; each left picture is paired with the"
-        " right one that has the same number in its name. Pictures are turned upright by their EXIF orientation. With --live:"
+        " right one that has the same number in its name. Pictures are turned upright by their EXIF orientation."
+        " Or a recording, FILE.mcap: its stillest pair of each second, at most a hundred, written to views/ beside --out. With --live:"
         " two folders for the pictures it takes (default: views/left and views/right beside --out)",
     )
     _add_live_arguments(parser)

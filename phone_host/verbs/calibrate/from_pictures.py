@@ -13,6 +13,7 @@ from phone_host.calibration.board_views import Mounted, look_for_boards
 from phone_host.calibration.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.guide.unseen import guessed_corners, with_corners
 from phone_host.calibration.series_snapshot import Taken
+from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.run.progress_bar import step_bar
@@ -38,7 +39,7 @@ from phone_host.verbs.calibrate.report_json import report_values
 from phone_host.verbs.calibrate.rig_file import replace_rig, require_own
 from phone_host.verbs.calibrate.solving import Solved, solve_series
 from phone_host.verbs.calibrate.summary import pairing_notes, passed_over_notes, summary
-from phone_host.verbs.globs import two_lists
+from phone_host.verbs.given_pictures import GivenPictures, given_pictures
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import (
     PAGE,
@@ -99,7 +100,12 @@ def calibrate_pictures(
         UnavailableError: a file cannot be read or written.
     """
     mounted, out = orientations(options), options.out
-    files = pair_files(*(live.folders if live is not None else two_lists(options.images)))
+    if live is not None:
+        given = GivenPictures((str(live.left),), (str(live.right),))
+    else:
+        given = given_pictures(options.images, out.parent, _limit(options))
+        options = _with_board_side(options, given.board_side)
+    files = pair_files(given.left, given.right)
     require_first_sizes(files, asked, options, mounted)
     keep_other_report(out.parent, "calibrate")
     claim_names(out.parent, out, REPORT, PAGE)
@@ -120,7 +126,7 @@ def calibrate_pictures(
     )
     order = [name for name, _, _ in files.pairs]
     taken = Taken(order=order, views=views, pairs=solved.pairs, seen=solved.seen, board=series.board)
-    lines = _file_notes(files, options)
+    lines = _file_notes(files, given)
     if isinstance(result, DataError):
         report = replace(report, earlier_rig=replace_rig(out, None, None))
         page, more = series_of_failure(taken, result), []
@@ -143,6 +149,13 @@ def calibrate_pictures(
     write_page(out, page)
     _write_report(out, report)
     return Made(report, [*lines, known.as_line(), *summary(report, out), *more])
+
+
+def _with_board_side(options: argparse.Namespace, told: Side | None) -> argparse.Namespace:
+    """Return the options with what a recording tells of the board's side; what the user says counts more."""
+    if told is None or options.board_side is not None:
+        return options
+    return argparse.Namespace(**{**vars(options), "board_side": told.value})
 
 
 def _limit(options: argparse.Namespace) -> int:
@@ -176,9 +189,9 @@ def _judged(
     return Judged(found=found, judgement=judgement, finding=finding, hint=hint)
 
 
-def _file_notes(files: ViewFiles, options: argparse.Namespace) -> list[str]:
-    given = () if options.live else two_lists(options.images)
-    return [*passed_over_notes(tuple(path for side in given for path in passed_over(side))), *pairing_notes(files)]
+def _file_notes(files: ViewFiles, given: GivenPictures) -> list[str]:
+    beside = tuple(path for side in (given.left, given.right) for path in passed_over(side))
+    return [*passed_over_notes(beside), *pairing_notes(files)]
 
 
 def _write_report(out: Path, report: CalibrationReport) -> None:

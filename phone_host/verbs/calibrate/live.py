@@ -48,6 +48,7 @@ from phone_host.verbs.calibrate.cause import assessed
 from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated, every_pair
 from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.hints import arrangement_hint
+from phone_host.verbs.given_pictures import VIEWS
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_folder, unwritable
 from phone_host.verbs.units import baseline_mm
@@ -305,7 +306,7 @@ def _least_views(options: argparse.Namespace) -> int:
 def _settings(options: argparse.Namespace, asked: Asked) -> LiveSettings:
     rig = asked.rig
     side = Side(options.board_side) if options.board_side else Side.LEFT if rig is None else rig.board_side
-    beside = options.out.parent / "views"
+    beside = options.out.parent / VIEWS
     left, right = map(Path, options.images) if options.images else (beside / "left", beside / "right")
     return LiveSettings(
         host=HostSettings(

@@ -12,6 +12,7 @@ EXAMPLES = """  phone-host calibrate-time --pattern pattern.html    # open it fu
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
   phone-host calibrate-time --by lamp --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
   phone-host calibrate-time --by scene --frames timing --calibration rig.yaml --out timing
+  phone-host calibrate-time --by scene --frames session.mcap --calibration rig.yaml --out timing    # of a recording
 """
 
 
@@ -31,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--frames",
         type=Path,
-        metavar="DIR",
-        help="use the frames that an earlier run kept with --keep, instead of --link and --camera",
+        metavar="DIR|FILE.mcap",
+        help="use the frames that an earlier run kept with --keep, or those of a recording, instead of --link and --camera",
     )
     parser.add_argument(
         "--seconds", type=reading(seconds, "--seconds"), default=20.0, metavar="S", help="seconds to film (default 20)"

@@ -18,6 +18,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import fitted
+from common.recording.opened import is_recording
 from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
 from phone_host.boards.opened import open_named
@@ -34,7 +35,7 @@ from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.output.rig_yaml import write_time_offset
-from phone_host.recording.footage import Footage, film, keep, read
+from phone_host.recording.footage import Footage, film, keep, read, read_recording
 from phone_host.run.progress_bar import share_bar
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
@@ -70,7 +71,8 @@ def run(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> None:
     if (options.frames is None) == (options.camera is None):
         raise SettingsError(
-            "give either --camera or --frames", f"--camera {EXAMPLE}, or --frames DIR of an earlier --keep"
+            "give either --camera or --frames",
+            f"--camera {EXAMPLE}, --frames DIR of an earlier --keep, or --frames FILE.mcap",
         )
     if options.by == "scene" and options.calibration is None:
         raise SettingsError(
@@ -97,7 +99,7 @@ def _write_pattern(options: argparse.Namespace) -> int:
 
 def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
     if options.frames is not None:
-        return read(options.frames)
+        return (read_recording if is_recording(str(options.frames)) else read)(options.frames)
     keys = key_folder(options.keys or "")
     with camera_page(options.camera, keys.path) as feed:
         camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)

@@ -11,6 +11,7 @@ SUMMARY = "measure how good a rig's depth is, on a flat wall or board"
 EXAMPLES = """  phone-host quality left.png right.png --calibration rig.yaml --distance 1.2m --out quality
   phone-host quality left/ right/ --calibration rig.yaml --board 9x6 --square 25mm --out quality    # the board gives the true distance
   phone-host quality left/ right/ --calibration rig.yaml --distance 500mm,1m,2m --out quality    # one distance for each pair, in name order
+  phone-host quality session.mcap --calibration rig.yaml --distance 1.2m --out quality    # a recording of the wall
   phone-host quality left.png right.png --calibration rig.yaml --roi 0,0,640,480 --out quality    # RMS and fill rate alone
 """
 

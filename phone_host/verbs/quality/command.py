@@ -16,7 +16,7 @@ from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.view_files import ViewFiles, pair_files
-from phone_host.verbs.globs import two_lists
+from phone_host.verbs.given_pictures import given_pictures
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
@@ -37,7 +37,9 @@ def run(options: argparse.Namespace) -> int:
     board = _board(options)
     roi = None if options.roi is None else crop_of(options.roi, "--roi")
     matcher = options.matcher or default_matcher().value
-    files = pair_files(*two_lists(options.images))
+    limit = most_pixels(None, options.max_megapixels)
+    given = given_pictures(options.images, options.out, limit)
+    files = pair_files(given.left, given.right)
     distances_m = _distances_m(options, files)
     require_place(options.out, files, NAMES, "quality")
     job = QualityJob(
@@ -49,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
         distances_m=distances_m,
         board=board,
         roi=roi,
-        most_pixels=most_pixels(None, options.max_megapixels),
+        most_pixels=limit,
         mounted=orientations(options),
     )
     count = len(files.pairs)

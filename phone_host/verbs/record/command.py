@@ -29,7 +29,6 @@ from phone_host.recording.begin import begin_recording
 from phone_host.recording.filming import take_frames
 from phone_host.recording.unpaired import UnpairedFrames
 from phone_host.run.progress_bar import step_bar
-from phone_host.run.recording_words import recording_words
 from phone_host.settings import check, key_folder, resolve_settings
 
 _BAD_DATA = 4
@@ -66,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
         with step_bar("waiting for the board", None, Console(stderr=True)) as bar:
 
             def advance(_: float) -> None:
-                bar.say(recording_words(recorder.account))
+                bar.say(recorder.account.words)
 
             seconds = options.seconds or math.inf
             frames = UnpairedFrames(recorder)

@@ -18,6 +18,7 @@ EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:ri
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --budget 30ms    # coarser depth rather than slower
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --serve    # shows the page of this run
   phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --record session.mcap    # to compute it again later
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --record session.mcap --record-topics depth,cloud    # for other programs
   phone-host run --replay session.mcap --calibration rig.yaml --out again
   phone-host run --replay 'session.mcap?pace=clock' --calibration rig.yaml --fifo 2:drop-newest --out again
   phone-host run --camera 'replay:right?loop=1' --pairs 300 --json    # no depth: pairs and delays only
@@ -108,6 +109,11 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE.mcap",
         help="keep what both cameras give as it comes, also what finds no partner; any program for ROS 2 recordings reads it",
+    )
+    parser.add_argument(
+        "--record-topics",
+        metavar="NAMES",
+        help="with --record: also what was computed, at most once a second: depth, cloud, or depth,cloud",
     )
     parser.add_argument(
         "--replay",

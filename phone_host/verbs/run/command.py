@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
         signals = StopSignals()
         prepared = opened.prepared(sys.argv, () if page is None else (page.sink(opened.core, opened.named),))
         if page is not None:
-            page.watch(prepared.host.snapshot)
+            page.watch(prepared.host)
 
         def stopped() -> bool:
             return signals.stop or (page is not None and page.stopped())

@@ -18,7 +18,7 @@ from phone_host.serve.beside import BesideRun
 from phone_host.settings import key_folder
 from phone_host.verbs.serve.choices import choices_of, shown_words
 from phone_host.verbs.serve.page import own_settings, served
-from phone_host.verbs.serve.places import snapshot_folder
+from phone_host.verbs.serve.places import recording_folder, snapshot_folder
 
 
 @contextmanager
@@ -35,7 +35,13 @@ def camera_page(uri: str, keys: Path) -> Iterator[BrowserFeed | None]:
     if not is_browser(uri):
         yield None
         return
-    page = BesideRun({"camera": uri}, lambda _: "", snapshots=snapshot_folder(None), axes=Axes.CAMERA)
+    page = BesideRun(
+        {"camera": uri},
+        lambda _: "",
+        snapshots=snapshot_folder(None),
+        recordings=recording_folder(None),
+        axes=Axes.CAMERA,
+    )
     with served(page, own_settings(None, keys)) as server:
         _tell(server.url, uri)
         yield page.feed
@@ -65,6 +71,7 @@ def page_beside(options: argparse.Namespace, found: Resolved[PhoneHostSettings])
         choices,
         lambda chosen: command_line("phone-host", "run", *shown_words(chosen)),
         snapshots=snapshot_folder(options.out),
+        recordings=recording_folder(options.out),
         axes=Axes(options.axes),
     )
     with served(beside, own_settings(options.serve, key_folder(values.keys).path)) as server:

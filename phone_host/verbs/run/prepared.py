@@ -29,9 +29,10 @@ from phone_host.output.json_text import json_text
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.opened import open_playback
 from phone_host.recording.playback import Playback
-from phone_host.recording.recorder import Recorder
+from phone_host.recording.switch import RecordingSwitch
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
+from phone_host.run.computed_sink import Computed, ComputedSink
 from phone_host.run.file_sink import NAMES
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
@@ -94,14 +95,17 @@ class Opened:
             if self.options.out is not None:
                 keep_other_report(self.options.out, "run")
             settings = _host_settings(self, words)
-            recorder = self._recorder(settings)
-            host = Host(settings, self.camera, self.links, self.core, sinks, recorder=recorder)
+            recording = self._recording(settings)
+            computed = computed_wanted(self.options)
+            if recording is not None and computed:
+                sinks = (*sinks, ComputedSink(recording, computed, self.board_side))
+            host = Host(settings, self.camera, self.links, self.core, sinks, recording=recording)
             opened.pop_all()
         return PreparedRun(host, self.named, self.keys, self.board_side, self.options.out)
 
-    def _recorder(self, settings: HostSettings) -> Recorder | None:
-        """Begin the recording that was asked for."""
-        if self.options.record is None or isinstance(self.camera, Playback):
+    def _recording(self, settings: HostSettings) -> RecordingSwitch | None:
+        """Return what records, begun if that was asked for; None: a recording is played."""
+        if isinstance(self.camera, Playback):
             return None
         rig = self.found.values.calibration
         attached = {"settings.json": json_text(dict(settings.resolved or {}), indent=1).encode()}
@@ -109,7 +113,10 @@ class Opened:
         if rig:
             attached[Path(rig).name if known is None else "rig.yaml"] = Path(rig).read_bytes()
         camera = self.camera.description
-        return begin_recording(self.options.record, camera, self.board_side, known, attached)
+        recording = RecordingSwitch(lambda path: begin_recording(path, camera, self.board_side, known, attached))
+        if self.options.record is not None:
+            recording.begin(self.options.record)
+        return recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,6 +198,7 @@ def checked(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
     check(found.values)
     _check_numbers(options)
     depth_wanted(options)
+    computed_wanted(options)
     return found
 
 
@@ -239,7 +247,7 @@ def _open_replay(
 ) -> Opened:
     """Open the recording that a run plays, and the core."""
     settings = found.values
-    for name in ("link", "camera", "record", "align_phase"):
+    for name in ("link", "camera", "record", "record_topics", "align_phase"):
         if getattr(options, name, None) is not None:
             raise SettingsError(f"--{name.replace('_', '-')} beside --replay", "leave one of them out")
     playback = open_playback(options.replay, options.board_side)
@@ -320,6 +328,11 @@ def _core(
             "--temporal without --calibration or --rectified, so no depth is computed",
             "add one of them, or leave it out",
         )
+    if options.record_topics is not None and (core is None or core.geometry is None):
+        raise SettingsError(
+            "--record-topics without depth in metres",
+            "add --calibration rig.yaml, or leave it out: a replay computes depth",
+        )
     if core is None:
         tell("no --calibration and not --rectified: pairs and delays only, no depth")
     return core, board_side
@@ -349,6 +362,23 @@ def _host_settings(opened: Opened, words: Sequence[str]) -> HostSettings:
         budget=budget_wanted(options, found, core),
         overlay=overlay_of(options, core),
     )
+
+
+def computed_wanted(options: argparse.Namespace) -> frozenset[Computed]:
+    """Read --record-topics.
+
+    Raises:
+        SettingsError: a name is unknown, or nothing is recorded.
+    """
+    if options.record_topics is None:
+        return frozenset()
+    if options.record is None:
+        raise SettingsError("--record-topics without --record", "add --record FILE.mcap, or leave it out")
+    known = {each.value: each for each in Computed}
+    names = [name.strip() for name in options.record_topics.split(",")]
+    if not set(names) <= known.keys():
+        raise SettingsError(f"--record-topics {options.record_topics!r}", "give depth, cloud, or depth,cloud")
+    return frozenset(known[name] for name in names)
 
 
 def _check_numbers(options: argparse.Namespace) -> None:

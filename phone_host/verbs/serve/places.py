@@ -18,3 +18,12 @@ def snapshot_folder(out: Path | None) -> Path:
         out: folder for the results of runs; None: none.
     """
     return (out or data_folder()) / "snapshots"
+
+
+def recording_folder(out: Path | None) -> Path:
+    """Return the folder of the recordings that are begun on the page.
+
+    Args:
+        out: folder for the results of runs; None: none.
+    """
+    return (out or data_folder()) / "recordings"

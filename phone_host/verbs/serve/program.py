@@ -44,7 +44,7 @@ from phone_host.verbs.serve.choices import (
     without_depth,
 )
 from phone_host.verbs.serve.kept_choices import keep, kept
-from phone_host.verbs.serve.places import data_folder, snapshot_folder
+from phone_host.verbs.serve.places import data_folder, recording_folder, snapshot_folder
 from phone_host.verbs.stereo_options import refuse_rejected
 
 _TRIAL_S: Final = 2.5
@@ -168,6 +168,11 @@ class Commands:
         """See Program."""
         out = choices.get("out", "")
         return snapshot_folder(Path(out) if out else None), Axes(choices.get("axes", Axes.CAMERA.value))
+
+    def recordings(self, choices: Choices) -> Path:
+        """See Program."""
+        out = choices.get("out", "")
+        return recording_folder(Path(out) if out else None)
 
     def _options(self, choices: Choices) -> argparse.Namespace:
         return run_options([*self._fixed, *run_words(choices)])

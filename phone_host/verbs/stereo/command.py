@@ -21,7 +21,7 @@ from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.view_files import pair_files
-from phone_host.verbs.globs import two_lists
+from phone_host.verbs.given_pictures import given_pictures
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
@@ -39,7 +39,9 @@ def run(options: argparse.Namespace) -> int:
             "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N",
         )
     matcher = options.matcher or default_matcher().value
-    files = pair_files(*two_lists(options.images))
+    limit = most_pixels(None, options.max_megapixels)
+    given = given_pictures(options.images, options.out, limit)
+    files = pair_files(given.left, given.right)
     require_place(options.out, files, NAMES, "stereo")
     job = StereoJob(
         files=files,
@@ -48,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
         matcher=matcher,
         matcher_note="" if options.matcher else default_note(),
         axes=output_options(options).axes,
-        most_pixels=most_pixels(None, options.max_megapixels),
+        most_pixels=limit,
         mounted=orientations(options),
         commands=partial(next_commands, _typed(options)),
     )

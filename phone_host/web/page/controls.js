@@ -1,7 +1,7 @@
-// What steers a run: start and stop, snapshot, matcher, near and far, crop.
+// What steers a run: start and stop, snapshot, recording, matcher, near and far, crop.
 
 import { begin, command } from './connection.js';
-import { byId, data, follow, onPress, options, show, tell, text } from './dom.js';
+import { byId, data, follow, onPress, options, say, sentence, show, tell, text } from './dom.js';
 
 /** @typedef {import('./pointing.js').Spot} Spot */
 
@@ -31,6 +31,7 @@ export class Controls {
     this.answer = byId('run-answer');
     onPress(byId('go'), () => (this.isRunning() ? command('stop') : begin('run')), this.answer);
     onPress(byId('snapshot'), () => command('snapshot'), this.answer);
+    onPress(byId('record'), () => this.record(), this.answer);
     byId('matcher').addEventListener('change', (event) => this.set('matcher', /** @type {HTMLSelectElement} */ (event.target).value));
     for (const name of NAMES) this.field(name);
     byId('crop-draw').addEventListener('click', () => this.draw(!this.drawing));
@@ -43,6 +44,17 @@ export class Controls {
 
   isRunning() {
     return this.state()?.activity === 'running' || this.state()?.activity === 'ending';
+  }
+
+  isRecording() {
+    const told = this.state()?.live?.recording;
+    return this.isRunning() && !!told && !told.is_over;
+  }
+
+  /** Begin or end a recording. What goes on stands in its own line, with every state; only what was refused is answered. */
+  async record() {
+    const answer = await command(this.isRecording() ? 'end_recording' : 'record');
+    return answer.problem ? answer : {};
   }
 
   /** @param {string} name */
@@ -98,6 +110,21 @@ export class Controls {
     }
   }
 
+  /** @param {?{words: string, is_over: boolean, failure: ?object}} told - null: nothing was recorded */
+  showRecording(told) {
+    const on = this.isRecording();
+    const line = byId('recording');
+    text(byId('record'), on ? 'End recording' : 'Record');
+    data(byId('record'), 'on', on ? 'yes' : 'no');
+    byId('record').setAttribute('aria-disabled', String(!this.isRunning()));
+    show(line, !!told);
+    if (!told) return;
+    text(line, sentence(told.words));
+    if (told.is_over && line.dataset.on === 'yes') say(told.words);
+    data(line, 'on', told.is_over ? 'no' : 'yes');
+    line.classList.toggle('bad', !!told.failure);
+  }
+
   /** @param {any} state */
   show(state) {
     const running = this.isRunning();
@@ -105,6 +132,7 @@ export class Controls {
     show(byId('go'), running || state.steps.length > 0);
     data(byId('go'), 'running', running ? 'yes' : 'no');
     byId('snapshot').setAttribute('aria-disabled', String(!running));
+    this.showRecording(state.live?.recording ?? null);
     const names = state.matchers.map((/** @type {string} */ name) => ({ value: name, words: name }));
     options(byId('matcher'), [{ value: '', words: 'the default' }, ...names], state.settings.matcher ?? '');
     for (const name of NAMES) follow(byId(name), state.settings[name] ?? '');

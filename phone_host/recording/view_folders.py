@@ -1,4 +1,4 @@
-"""The pictures of a live calibration: left/NN.png and right/NN.png, upright, lossless, as `calibrate` reads them."""
+"""Pictures taken from both cameras, or chosen from a recording: left/NN.png and right/NN.png, upright, lossless, as `calibrate` reads them."""
 
 import re
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from phone_host.output.listed import ListedFolder
 from phone_host.stereo.view_files import SUFFIXES
 
 CAMERAS: Final = "cameras.json"
-_NAMES: Final = r"[0-9]{2,3}\.png|cameras\.json"
+_NAMES: Final = r"[0-9]{2,6}\.png|cameras\.json"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,14 +33,14 @@ class Pictures:
 
 
 class ViewFolders:
-    """Writes the views of one live calibration. What an earlier one left there is removed; other pictures are refused.
+    """Writes the views of one calibration. What an earlier one left there is removed; other pictures are refused.
 
     Args:
         left: folder for the left images.
         right: folder for the right ones.
 
     Raises:
-        UnavailableError: a folder holds pictures that an earlier live calibration did not write.
+        UnavailableError: a folder holds pictures that an earlier one did not write.
         OSError: as the operating system reports it.
     """
 

@@ -1,0 +1,144 @@
+"""Chooses pictures from a recording: pairs of its own images at moments at which nothing moved, as folders that calibrate and quality read.
+
+A picture is named by the second at which it was taken, counted from the first pair: the seconds of `sessions cut`.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+
+from common.errors import DataError
+from common.frame import SpoiledImageError
+from common.protocol.message import CameraDescription
+from common.recording.layout import camera_name
+from common.recording.numbering import pairs_of_two
+from common.recording.opened import open_recorded
+from common.recording.recorded import Recorded, Shown, period_ns, size_px
+from phone_host.measure.camera_match import state_of
+from phone_host.model import Image, Side
+from phone_host.output.cameras_json import CAMERAS_NAME, cameras_text
+from phone_host.recording.both_sides import encoded, topics_of
+from phone_host.recording.stillest import NS, stillest
+from phone_host.recording.view_folders import Pictures, ViewFolders
+from phone_host.stereo.images import to_grey
+from phone_host.stereo.raw_images import decode_frame
+
+_SMALL_PX: Final = (160, 120)
+"""Enough to see that something moves, and little enough that noise is not seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenViews:
+    """Where the pictures are.
+
+    Attributes:
+        left: folder of the left ones.
+        right: folder of the right ones.
+        board_side: which view the board's camera gave; None: not told.
+    """
+
+    left: Path
+    right: Path
+    board_side: Side | None
+
+
+class _Stream:
+    """The images of one side that have its camera's full size, in the order of their exposure.
+
+    Raises:
+        SpoiledImageError: the first image is none.
+    """
+
+    def __init__(self, recorded: Recorded, topic: str) -> None:
+        self.camera: CameraDescription = recorded.camera(topic)
+        full_px = self.camera.width_px, self.camera.height_px
+        whole = [shown for shown in recorded.images[topic] if _size(shown) == full_px]
+        self.shown = sorted(whole, key=lambda shown: shown.image.stamp_ns)
+        self.stamps_ns = [shown.image.stamp_ns for shown in self.shown]
+
+    def decoded(self, place: int, most_pixels: int, reduction: int = 1) -> Image:
+        shown = self.shown[place]
+        name = f"image {shown.sequence} of {self.camera.name}"
+        return decode_frame(encoded(shown, self.camera, name), most_pixels, reduction)
+
+
+def choose_views(
+    file: Path, folder: Path, most_pixels: int, advance: Callable[[float], None] = lambda _: None
+) -> ChosenViews:
+    """Write the stillest pair of each second, at most a hundred, into `left` and `right`.
+
+    Args:
+        file: the recording.
+        folder: of both.
+        most_pixels: an image that claims more is passed over.
+        advance: called with the share that is done, 0 to 1.
+
+    Raises:
+        UnavailableError: the recording cannot be read, or the folders hold other pictures.
+        DataError: it is no recording of two cameras, or has no two images of one moment.
+        OSError: the folders cannot be written to.
+    """
+    recorded = open_recorded(file)
+    topics = topics_of(recorded, file)
+    left, right = (_Stream(recorded, topics[side]) for side in (Side.LEFT, Side.RIGHT))
+    most_ns = max(period_ns(left.shown), period_ns(right.shown)) // 2
+    pairs = pairs_of_two(left.stamps_ns, right.stamps_ns, most_ns)
+    chosen = _chosen(left, right, pairs, most_pixels, advance)
+    if not chosen:
+        raise DataError(f"{file} has no two images of the same moment", "look at it: phone-host sessions info")
+    views = ViewFolders(folder / Side.LEFT.value, folder / Side.RIGHT.value)
+    try:
+        for place in chosen:
+            at, mate = pairs[place]
+            second = (left.stamps_ns[at] - left.stamps_ns[pairs[0][0]]) // NS
+            pictures = left.decoded(at, most_pixels), right.decoded(mate, most_pixels)
+            views.write(Pictures(f"{second:03d}", *pictures))
+    finally:
+        views.close(_cameras(recorded, left.camera, right.camera))
+    board_side = Side(recorded.about.board_side) if recorded.is_ours else None
+    return ChosenViews(views.left, views.right, board_side)
+
+
+def _chosen(
+    left: _Stream, right: _Stream, pairs: list[tuple[int, int]], most_pixels: int, advance: Callable[[float], None]
+) -> list[int]:
+    """Return the places of the pairs that are worth a picture; spoiled images are none."""
+    whole: list[int] = []
+    changes: list[float] = []
+    before: list[Image] = []
+    for place, (at, mate) in enumerate(pairs):
+        try:
+            small = [_small(left.decoded(at, most_pixels, 4)), _small(right.decoded(mate, most_pixels, 4))]
+        except SpoiledImageError:
+            continue
+        whole.append(place)
+        changes.append(
+            max((float(np.mean(cv2.absdiff(a, b))) for a, b in zip(before, small, strict=False)), default=math.nan)
+        )
+        before = small
+        advance((place + 1) / len(pairs))
+    return [whole[place] for place in stillest([left.stamps_ns[pairs[place][0]] for place in whole], changes)]
+
+
+def _cameras(recorded: Recorded, left: CameraDescription, right: CameraDescription) -> str:
+    """Return cameras.json: the run's own, which also knows what was held, else what is told of both; empty: nothing is."""
+    if CAMERAS_NAME in recorded.attachments:
+        return bytes(recorded.attachments[CAMERAS_NAME]).decode("utf-8", "replace")
+    is_told = all(camera_name(side.value) in recorded.metadata for side in Side)
+    return cameras_text(state_of(left, ()), state_of(right, ())) if is_told else ""
+
+
+def _small(image: Image) -> Image:
+    return np.asarray(cv2.resize(to_grey(image), _SMALL_PX, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _size(shown: Shown) -> tuple[int, int]:
+    try:
+        return size_px(shown.image)
+    except SpoiledImageError:
+        return 0, 0
