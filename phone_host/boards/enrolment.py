@@ -216,6 +216,8 @@ def _refusal(word: Refuse) -> TandemError:
         case Denial.BUSY:
             return UnavailableError("another host is being paired", wait)
         case Denial.WRONG:
-            return DataError("the code was wrong", f"{wait} with the new code that the board then shows")
+            return DataError(
+                "the code was wrong", f"{wait} with the new code that `sudo board-agent pair` then shows there"
+            )
         case _:
             assert_never(word.reason)

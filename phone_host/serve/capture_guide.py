@@ -27,4 +27,4 @@ class CaptureGuide:
             return
         self._shown = now
         done = f"{100 * now[1] // _STEPS} % done, {min(progress.told, ENOUGH)} of {ENOUGH} stretches of film told something"
-        self._show([Checked("film", "ok", f"{now[0]} ({done})")])
+        self._show([Checked("film", "ok", now[0], done)])

@@ -55,7 +55,9 @@ def browser_choice(words: str) -> Choice:
     Args:
         words: what is known of it; empty: none gives it yet.
     """
-    return Choice(uri=SCHEME, name="A browser's camera", note=words or "start it on the page that the phone has open")
+    name = words[:1].upper() + words[1:]
+    note = "" if words else "start it on the page: here, or on the phone"
+    return Choice(uri=SCHEME, name=name or "A browser's camera", note=note)
 
 
 def find_cameras() -> tuple[Choice, ...]:

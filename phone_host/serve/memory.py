@@ -119,7 +119,7 @@ class Memory:
 
     @contextmanager
     def live(self, ask: Callable[[], RunSnapshot]) -> Iterator[None]:
-        """While the block runs, the run can be asked.
+        """While the block runs, the run can be asked; after it nothing is shown of it, unless `last` took its end.
 
         Args:
             ask: returns the run's snapshot.
@@ -130,15 +130,27 @@ class Memory:
         finally:
             with self._lock:
                 if self._ask is ask:
-                    self._ask = None
+                    self._ask = self._run = None
 
     def last(self, snapshot: RunSnapshot) -> None:
         """Take the last snapshot of a run."""
         with self._lock:
             self._ask, self._run = None, snapshot
 
+    def forget_run(self) -> None:
+        """Show nothing of the last run: it was none whose depth matters."""
+        with self._lock:
+            self._run = None
+
     def state(
-        self, activity: Activity, settings: Choices, command: str, *, matchers: tuple[str, ...] = (), stranger: str = ""
+        self,
+        activity: Activity,
+        settings: Choices,
+        command: str,
+        *,
+        matchers: tuple[str, ...] = (),
+        stranger: str = "",
+        browser: Choice | None = None,
     ) -> PageState:
         """Return everything.
 
@@ -148,6 +160,7 @@ class Memory:
             command: the command line that does the same.
             matchers: names of the matchers.
             stranger: the chosen board that has to be enrolled first.
+            browser: the camera of whichever browser gives one; None: no browser can.
         """
         with self._lock:
             run = self._fresh()
@@ -160,13 +173,14 @@ class Memory:
                 is_running=activity is Activity.RUNNING,
             )
             told = steps(facts)
+            cameras = self._cameras if browser is None else (*(self._cameras or ()), browser)
             here = (
                 activity,
                 told,
                 command,
                 settings,
                 self._boards,
-                self._cameras,
+                cameras,
                 stranger,
                 self._checks,
                 self._trouble,
@@ -179,7 +193,7 @@ class Memory:
                 command=command,
                 settings=settings,
                 boards=self._boards,
-                cameras=self._cameras,
+                cameras=cameras,
                 stranger=stranger,
                 matchers=matchers,
                 run=run,

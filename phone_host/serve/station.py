@@ -85,6 +85,7 @@ class Station:
             self._program.command(choices) if choices.get("camera") else "",
             matchers=self._program.matchers,
             stranger=self._stranger(choices.get("link", "")),
+            browser=find.browser_choice(self.feed.words),
         )
 
     def newest(self) -> Newest | None:
@@ -137,7 +138,7 @@ class Station:
     def _find(self, values: Choices) -> Answer:
         del values
         boards, cameras = find.find_boards(self._program.keys), find.find_cameras()
-        self._memory.found(boards, (*cameras, find.browser_choice(self.feed.words)))
+        self._memory.found(boards, cameras)
         taken = [
             name
             for name, there in (("link", boards), ("camera", cameras))
@@ -198,6 +199,7 @@ class Station:
                 self._memory.fail(trouble)
                 return
             over = self._watched(task, self._program.trial(choices, self._sinks))
+            self._memory.forget_run()
             if task.stopped():
                 return
             if told := check.seen(over):

@@ -28,7 +28,7 @@ const colour = (name) => getComputedStyle(document.documentElement).getPropertyV
 const axis = () => ({ stroke: colour('--ink2'), grid: { stroke: colour('--line'), width: 1 }, ticks: { stroke: colour('--line'), width: 1 }, font: '12px system-ui, sans-serif' });
 
 /** @param {?number | undefined} value @param {string} unit @param {number} digits */
-const shown = (value, unit, digits) => (value === null || value === undefined || Number.isNaN(value) ? NONE : `${value.toFixed(digits)} ${unit}`);
+const shown = (value, unit, digits) => (value === null || value === undefined || Number.isNaN(value) ? NONE : `${value.toFixed(digits).replace(/^-(?=[0.]*$)/, '')} ${unit}`);
 
 /** Values between two gaps, which no line shows. @param {Column} column @returns {?number[]} */
 function alone(column) {

@@ -22,6 +22,12 @@ export function parsedCrop(words) {
   return numbers.length === 4 && numbers.every((v) => Number.isFinite(v)) ? /** @type {any} */ (numbers) : null;
 }
 
+/** Fields are named as they stand on the page, not as options. @param {{words?: string, problem?: string, remedy?: string}} answer */
+function inWordsOfThePage(answer) {
+  const named = (/** @type {string} */ words) => words.replace(/--(near|far|crop|matcher)\b/g, (_, name) => `${name[0].toUpperCase()}${name.slice(1)}`);
+  return { ...answer, problem: named(answer.problem ?? ''), remedy: named(answer.remedy ?? '') };
+}
+
 export class Controls {
   /** @param {() => any} state @param {() => ?{width: number, height: number}} size - of the left image */
   constructor(state, size) {
@@ -29,6 +35,7 @@ export class Controls {
     this.size = size;
     this.drawing = false;
     this.answer = byId('run-answer');
+    this.settingsAnswer = byId('settings-answer');
     onPress(byId('go'), () => (this.isRunning() ? command('stop') : begin('run')), this.answer);
     onPress(byId('snapshot'), () => command('snapshot'), this.answer);
     onPress(byId('record'), () => this.record(), this.answer);
@@ -71,7 +78,7 @@ export class Controls {
     // What was refused stays as it was typed, to be mended.
     data(byId(name), 'dirty', answer.problem ? 'yes' : 'no');
     byId(name).setAttribute('aria-invalid', String(!!answer.problem));
-    tell(this.answer, answer);
+    tell(this.settingsAnswer, inWordsOfThePage(answer));
     if (this.state()) this.show(this.state());
   }
 
@@ -80,7 +87,7 @@ export class Controls {
     this.drawing = on;
     byId('crop-draw').setAttribute('aria-pressed', String(on));
     data(byId('views'), 'drawing', on ? 'yes' : 'no');
-    tell(this.answer, { words: on ? 'draw a rectangle on the depth or the left picture' : '' });
+    tell(this.settingsAnswer, { words: on ? 'draw a rectangle on the depth or the left picture' : '' });
     if (!on && this.state()) this.show(this.state());
   }
 

@@ -106,8 +106,9 @@ export function tell(place, answer) {
   if (words.trim()) say(words);
 }
 
-/** With a capital letter and a full stop, but for addresses and file names: those stay as they are typed. @param {string} words @returns {string} */
+/** With a capital letter and a full stop, but for addresses, commands and file names: those stay as they are typed. @param {string} words @returns {string} */
 export function sentence(words) {
-  const whole = words.replace(/^[a-z](?=[a-z'-]*([\s,;]|:\s|$))/, (first) => first.toUpperCase());
+  const plain = words.replace(/`([^`]*)`/g, '\u201c$1\u201d');
+  const whole = /^(sudo|phone-host|board-agent)\b/.test(plain) ? plain : plain.replace(/^[a-z](?=[a-z'-]*([\s,;]|:\s|$))/, (first) => first.toUpperCase());
   return !words || /[.!?:]$|\S[/:.\\]\S*$/.test(whole) ? whole : `${whole}.`;
 }

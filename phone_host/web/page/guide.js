@@ -50,7 +50,7 @@ export function figuresOf(guide) {
     ['views', `${guide.views} of at most ${guide.most_views}`],
     ['depth error at 1 m', error === null ? 'not known yet' : `${error.toFixed(2)} mm`],
     ['after the next view', after === null ? 'not known yet' : `${after.toFixed(2)} mm`],
-    ['board', guide.board ?? 'not recognised yet'],
+    ['chessboard', guide.board ?? 'not recognised yet'],
   ];
 }
 
@@ -61,8 +61,10 @@ export function showGuide(state) {
   const guide = state.guide;
   show(byId('guide'), !!guide);
   if (!guide) return;
-  text(byId('guide-words'), sentence(guide.result || guide.words || 'show the board to both cameras'));
-  text(byId('guide-note'), sentence(guide.note ?? ''));
+  const isOver = !!guide.result;
+  text(byId('guide-words'), isOver ? (guide.verdict ? `Done: ${guide.verdict}.` : 'Ended.') : sentence(guide.words || 'show the board to both cameras'));
+  text(byId('guide-note'), sentence(guide.result || guide.note || ''));
+  show(byId('guide-wish'), !isOver);
   if (state.activity === 'calibrating' && guide.words) say(guide.words);
   const verdict = byId('guide-verdict');
   data(verdict, 'level', VERDICTS[guide.verdict ?? ''] ?? 'unknown');
@@ -73,7 +75,7 @@ export function showGuide(state) {
     const canvas = /** @type {HTMLCanvasElement} */ (byId(`guide-${side}`));
     show(/** @type {HTMLElement} */ (canvas.parentElement), !!camera);
     if (!camera) continue;
-    paint(canvas, camera);
+    paint(canvas, isOver ? { ...camera, board_now: [] } : camera);
     canvas.setAttribute('aria-label', `${side} picture: ${Math.round(100 * coveredShare(camera))} percent of it covered`);
   }
   keep(byId('guide-figures'), figuresOf(guide), ([name]) => name, () => make('div', '', make('dt'), make('dd')), (item, [name, value]) => {

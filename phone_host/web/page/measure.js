@@ -56,6 +56,8 @@ export class Measure {
     /** @type {Spot[]} */
     this.spots = [];
     this.asked = 0;
+    /** Whether the next tap begins anew: a length is whole, or a place has no depth. */
+    this.isOver = false;
     this.clear();
   }
 
@@ -77,7 +79,8 @@ export class Measure {
   /** @param {?Pair} pair @param {Spot} at */
   async tap(pair, at) {
     if (!pair) return;
-    this.spots = this.spots.length === 2 ? [{ ...at }] : [...this.spots, { ...at }];
+    this.spots = this.isOver || this.spots.length === 2 ? [{ ...at }] : [...this.spots, { ...at }];
+    this.isOver = false;
     this.mark(pair.head);
     const asked = ++this.asked;
     const count = this.spots.length;
@@ -86,8 +89,10 @@ export class Measure {
     const measured = await post('/api/measure', { points: this.spots.map(({ x, y }) => [x, y]), number: pair.head.number });
     if (asked !== this.asked) return;
     if (!measured.problem) {
-      text(this.readout, measuredWords(measured, count));
+      // Pictures go on; the marks and the value belong to this pair.
+      text(this.readout, `${measuredWords(measured, count)} (pair ${pair.head.number})`);
       this.readout.dataset.from = 'program';
+      this.isOver = count === 2 || measured.distances_m?.[0] == null;
     }
     say(this.readout.textContent ?? '');
   }

@@ -7,8 +7,9 @@ import { byId, data, follow, keep, make, onPress, sentence, show, tell, text } f
 
 const NONE = {
   link: 'None. Plug the board in, or bring it into the same network.',
-  camera: "None. A phone's camera app that serves MJPEG works by its address.",
+  camera: "None on this machine. A phone's camera app that serves MJPEG works by its address.",
 };
+const BROWSER = 'browser:';
 const NOT_LOOKED = 'Nobody has looked yet: press Find.';
 
 /** Give a command and show what became of it. @param {HTMLElement} place @param {string} name @param {Record<string, string>} [values] */
@@ -26,8 +27,8 @@ function radio(choice, option, answer) {
   return make('label', 'choice', input, make('span', 'name'), make('code'), make('span', 'note'));
 }
 
-/** @param {'link' | 'camera'} option @param {?Choice[]} found - null: nobody has looked yet @param {string} chosen */
-function showChoices(option, found, chosen) {
+/** @param {'link' | 'camera'} option @param {?Choice[]} found @param {string} chosen @param {boolean} hasLooked */
+function showChoices(option, found, chosen, hasLooked) {
   const choices = found ?? [];
   const list = byId(`${option}-choices`);
   keep(list, choices, (one) => one.uri, (one) => radio(one, option, byId(`${option}-answer`)), (label, one) => {
@@ -38,8 +39,9 @@ function showChoices(option, found, chosen) {
     text(note, one.note);
     show(note, !!one.note);
   });
-  show(byId(`${option}-none`), choices.length === 0);
-  text(byId(`${option}-none`), found ? NONE[option] : NOT_LOOKED);
+  // A browser's camera is always there.
+  show(byId(`${option}-none`), choices.every((one) => one.uri === BROWSER));
+  text(byId(`${option}-none`), hasLooked ? NONE[option] : NOT_LOOKED);
   follow(byId(`${option}-typed`), choices.some((one) => one.uri === chosen) ? '' : chosen);
 }
 
@@ -61,7 +63,7 @@ function showChecks(checks) {
       sign.setAttribute('role', 'img');
       text(what, one.what);
       text(words, one.words);
-      text(remedy, one.grade === 'ok' ? '' : sentence(one.remedy));
+      text(remedy, one.grade === 'ok' ? '' : one.what === 'capture' ? 'Press \u201cCheck the film\u201d.' : sentence(one.remedy));
     },
   );
 }
@@ -79,15 +81,19 @@ function isFilming(state) {
 
 /** @param {any} state */
 export function showSetup(state) {
-  showChoices('link', state.boards, state.settings.link ?? '');
-  showChoices('camera', state.cameras, state.settings.camera ?? '');
+  const hasLooked = state.boards !== null;
+  showChoices('link', state.boards, state.settings.link ?? '', hasLooked);
+  showChoices('camera', state.cameras, state.settings.camera ?? '', hasLooked);
   show(byId('enrol'), !!boardOf(state));
   // A board that forgot this machine asks again: the field stays at hand.
   if (state.stranger !== stranger) /** @type {HTMLDetailsElement} */ (byId('enrol')).open = !!(stranger = state.stranger);
   const isLooking = state.activity === 'checking' && !isFilming(state);
   text(byId('check-words'), isLooking ? 'Looking at the machine, the board and both cameras \u2026' : '');
+  const [film] = isFilming(state) ? state.checks : [];
+  text(byId('film-words'), film ? sentence(film.words) : '');
+  text(byId('film-done'), film ? sentence(film.remedy) : '');
   text(byId('capture-go'), isFilming(state) ? 'Stop' : 'Check the film');
-  showChecks(state.checks ?? []);
+  showChecks(film ? [] : state.checks ?? []);
   text(byId('calibrate-go'), state.activity === 'calibrating' ? 'Stop' : 'Start live calibration');
   follow(byId('calibration-typed'), state.settings.calibration ?? '');
   text(byId('command'), state.command || 'not enough is chosen yet');

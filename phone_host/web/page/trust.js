@@ -10,15 +10,34 @@ const SIGNS = /** @type {Record<string, string>} */ ({ good: '\u2713', warning: 
 /** What is said before there is a run. @param {any} state @returns {Trust} */
 export function before(state) {
   if (state.activity === 'running') return { level: 'unknown', headline: 'No pair has been processed yet', concerns: [] };
-  const next = state.steps.find((/** @type {any} */ step) => !step.done);
+  const done = state.steps.map((/** @type {any} */ step) => step.done);
+  // A step that was left out is not asked for again.
+  const next = state.steps.slice(done.lastIndexOf(true) + 1).find((/** @type {any} */ step) => !step.done) ?? state.steps[done.indexOf(false)];
   const todo = state.trouble ? 'Read what went wrong' : next ? `Next: ${next.words}` : state.steps.length ? 'Everything is set: start a run' : 'The run has ended';
   return { level: 'unknown', headline: `No depth yet. ${todo}`, concerns: [] };
 }
 
+/** What is said while something else than a run goes on: its pairs say nothing about depth. */
+const DOING = /** @type {Record<string, string>} */ ({
+  checking: 'Checking: what is found stands below', calibrating: 'Calibrating: do what the words below say',
+});
+
+/** The run whose doubts are shown, and how tall they have been in it, px: what comes and goes must not move the pictures. */
+const seen = { begun: -1, width: 0, height: 0 };
+
+/** @param {HTMLElement} box @param {any} state */
+function keepHeight(box, state) {
+  const { width, height } = box.getBoundingClientRect();
+  if (state.begun !== seen.begun || width !== seen.width || state.activity !== 'running') Object.assign(seen, { begun: state.begun, width, height: 0 });
+  else seen.height = Math.max(seen.height, height);
+  box.style.minHeight = seen.height ? `${seen.height}px` : '';
+}
+
 /** @param {any} state */
 export function showTrust(state) {
+  const doing = DOING[state.activity];
   /** @type {Trust} */
-  const trust = state.live?.trust ?? before(state);
+  const trust = doing ? { level: 'unknown', headline: doing, concerns: [] } : state.live?.trust ?? before(state);
   const box = byId('trust');
   data(box, 'level', trust.level);
   text(byId('trust-sign'), SIGNS[trust.level] ?? '?');
@@ -30,6 +49,7 @@ export function showTrust(state) {
     text(item.children[0], sentence(one.problem));
     text(item.children[1], sentence(one.remedy));
   });
+  keepHeight(box, state);
   const trouble = byId('trouble');
   show(trouble, !!state.trouble);
   if (state.trouble) text(trouble, `${sentence(state.trouble.problem)} ${sentence(state.trouble.remedy)}`);
