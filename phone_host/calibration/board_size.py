@@ -7,7 +7,7 @@ because a board may be held either way.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -140,6 +140,17 @@ def whole_size_seen(grey: Image) -> Inner | None:
     sides = (grid, grid[::-1], grid.transpose(1, 0, 2), grid[:, ::-1].transpose(1, 0, 2))
     margins = (_levels(small, side[0] + _MARGIN * (side[0] - side[1])) for side in sides)
     return size if all((levels > limit).mean() >= _LEAST_MARGIN for levels in margins) else None
+
+
+def size_in_pictures(pictures: Sequence[Image]) -> Inner | None:
+    """Return the inner corners of the chessboard that pictures show, as `size_in_files` counts them; None if they do not tell.
+
+    Args:
+        pictures: (H, W) uint8 grey each, as different as can be.
+    """
+    seen = [_Seen(small, _size_of(_lattice(small))) for small in map(small_for_sizes, pictures)]
+    vote = Vote(len(seen), Counter(each.size for each in seen if each.size is not None))
+    return _fitting(vote, _fits_of(seen), None)
 
 
 def small_for_sizes(grey: Image) -> Image:

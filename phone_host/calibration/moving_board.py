@@ -12,7 +12,14 @@ import numpy as np
 
 from common.errors import DataError, SettingsError
 from phone_host.calibration.board_fits import ENOUGH, Fits, Inner
-from phone_host.calibration.board_size import Vote, size_text, small_for_sizes, whole_size_seen
+from phone_host.calibration.board_size import (
+    Vote,
+    size_in_pictures,
+    size_seen,
+    size_text,
+    small_for_sizes,
+    whole_size_seen,
+)
 from phone_host.calibration.marks_seen import find_marks, require_marks
 from phone_host.calibration.small_picture import shrunk
 from phone_host.calibration.target import Board, Corners, agree, find_corners, order_by_colour
@@ -91,8 +98,16 @@ class BoardFinder:
         return (ordered + 0.5) / factors - 0.5
 
 
+_APART_LOOKS: Final = 8
+_PICTURES: Final = 12
+"""A board whose margin is never seen, as it may have none, is counted in so many pictures that are so many looks apart: some ten seconds."""
+
+
 class SizeFinder:
-    """Finds out which chessboard a person shows, from pair after pair. Only whole boards count: the first one that is seen is often half outside.
+    """Finds out which chessboard a person shows, from pair after pair.
+
+    Whole boards count: the first one that is seen is often half outside. A board without a white margin never looks whole; it is
+    counted as in files, once there are enough pictures of it.
 
     Args:
         square_m: side of its squares, m.
@@ -102,6 +117,8 @@ class SizeFinder:
         self._square_m = square_m
         self._vote = Vote(0, Counter())
         self._seen: deque[Image] = deque(maxlen=ENOUGH)
+        self._looks = 0
+        self._pictures: list[Image] = []
 
     def find(self, left: Image, right: Image) -> Board | None:
         """Look at a pair; return the board once enough of them agree.
@@ -116,14 +133,25 @@ class SizeFinder:
         sizes = side_by_side(whole_size_seen, (left, right))
         self._vote = Vote(self._vote.asked + 2, self._vote.sizes + Counter(size for size in sizes if size is not None))
         self._seen.extend(small_for_sizes(grey) for grey, size in zip((left, right), sizes, strict=True) if size)
-        size = self._vote.leader if self._vote.is_over else None
+        size = self._vote.leader if self._vote.is_over else self._without_margin(left)
         if size is None:
             return None
         # What grows a lattice ends at glare or a hand, and in picture after picture at the same row.
-        size = Fits(tuple(self._seen)).grown(size)
+        if self._seen:
+            size = Fits(tuple(self._seen)).grown(size)
         if marks := find_marks([left, right]):
             raise DataError(f"this is no chessboard: it has {marks.words}", "name that board with --board; see --help")
         return Board(*size, self._square_m)
+
+    def _without_margin(self, grey: Image) -> Inner | None:
+        self._looks += 1
+        if self._looks % _APART_LOOKS or size_seen(grey) is None:
+            return None
+        self._pictures.append(small_for_sizes(grey))
+        if len(self._pictures) < _PICTURES:
+            return None
+        pictures, self._pictures = self._pictures, []
+        return size_in_pictures(pictures)
 
 
 class SizeCheck:

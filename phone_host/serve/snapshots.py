@@ -8,7 +8,7 @@ from common.errors import DataError, UnavailableError
 from phone_host.model import Result
 from phone_host.output.axes import Axes
 from phone_host.output.listed import ListedFolder
-from phone_host.output.pair_files import RUN_FILES, write_pair
+from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
 from phone_host.serve.shelf import Shelf
 from phone_host.web.source import Answer
 
@@ -34,13 +34,15 @@ def keep_newest(shelf: Shelf, folder: Path, axes: Axes) -> Answer:
         saved = _save(newest.newest.result, folder, axes)
     except OSError as error:
         cause = error.strerror or str(error)
-        raise UnavailableError(f"{folder} cannot be written to ({cause})", "make room, or choose another out") from None
+        raise UnavailableError(
+            f"{folder} cannot be written to ({cause})", "make room, or choose another folder for results"
+        ) from None
     return Answer(words=f"saved as {saved}")
 
 
 def _save(result: Result, folder: Path, axes: Axes) -> Path:
     """Save a pair, whole or not at all; return its folder."""
-    listed = ListedFolder(folder, "(?!)")
+    listed = ListedFolder(folder, "(?!)", inner=PAIR_NAMES)
     try:
         name = f"pair-{_next(folder):06d}"
         with ThreadPoolExecutor(_WRITERS) as writers, listed.new_folder(name, writers.map) as inner:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Final
 
+from common.doctor.machine import read_cards
 from common.errors import UnavailableError
 from phone_host.web.settings import Credentials
 
@@ -17,13 +18,15 @@ _ANYWHERE: Final = (("192.0.2.1", socket.AF_INET), ("2001:db8::1", socket.AF_INE
 def own_names() -> tuple[str, ...]:
     """Return the names and addresses by which this machine's network knows it, the likeliest first.
 
-    The address of the way out is found by asking the kernel for the route; no packet is sent.
+    The address of the way out is found by asking the kernel for the route; no packet is sent. A network without a way out, such as a
+    board's own, is known by its card alone.
     """
     found: list[str] = []
     for address, family in _ANYWHERE:
         with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asking:
             asking.connect((address, 9))
             found.append(asking.getsockname()[0])
+    found += [card.address for card in read_cards()]
     name = socket.gethostname().partition(".")[0].lower()
     with suppress(OSError, UnicodeError):
         found += [str(entry[4][0]) for entry in socket.getaddrinfo(name, None, type=socket.SOCK_STREAM)]

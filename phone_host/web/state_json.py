@@ -9,11 +9,13 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from common.ledger import PairLedger
+from common.words import counted
 from phone_host.measure.headline import Grade, headline
 from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.unused import unused
+from phone_host.model import Unwritten
 from phone_host.output.json_text import json_text
 from phone_host.report.run_json import concern_values
 from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
@@ -174,7 +176,15 @@ def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step], no
         ],
         "carrier": run.carrier,
         "recording": None if run.recording is None else _recording(run.recording),
+        "unsaved": _unsaved(run.unwritten),
     }
+
+
+def _unsaved(unwritten: Unwritten) -> dict[str, object] | None:
+    if not unwritten.cause:
+        return None
+    lost = f"{counted(unwritten.pairs, 'pair')} could not be saved" if unwritten.pairs else "delays could not be saved"
+    return trouble_values(Trouble(f"{lost} ({unwritten.cause})", "make room, or end the run and give another folder"))
 
 
 def _recording(account: RecordingAccount) -> dict[str, object]:
@@ -184,7 +194,7 @@ def _recording(account: RecordingAccount) -> dict[str, object]:
 
 def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
     if not run.processed and run.ended == "running" and run.failure is None:
-        return {"level": "unknown", "headline": "No pair has been processed yet.", "concerns": []}
+        return {"level": "unknown", "headline": _no_pair(run), "concerns": []}
     said = headline(run)
     if said.grade is Grade.GOOD and not run.images.wants_depth:
         words = f"No depth in this run, only pairs and delays. {_next(steps)}"
@@ -194,6 +204,15 @@ def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
         "headline": said.sentence,
         "concerns": [concern_values(item) | {"problem": item.sentence} for item in concerns(run)],
     }
+
+
+def _no_pair(run: RunSnapshot) -> str:
+    """Say that there is no pair yet, and why if that is known."""
+    if run.refused is not None:
+        return f"No pair yet: {run.refused.problem}. Then: {run.refused.remedy}."
+    if _link(run)["up"]:
+        return "No pair has been processed yet."
+    return "No pair yet: no board answers. Start board-agent there, and check its power, its network and its address."
 
 
 def _next(steps: Sequence[Step]) -> str:

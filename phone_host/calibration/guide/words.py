@@ -14,7 +14,7 @@ class Words(Enum):
     SHOW_RIGHT = "the right camera sees too little of the board: to the right, or farther away"
     PART = "show more of the board"
     SAME = "both cameras show the same picture: name two cameras"
-    HELP = "no board found: more light, no glare, the whole board with its white margin"
+    HELP = "no board found: more light, no glare, the whole board with its white margin; or name its inner corners"
     STILL = "hold still"
     BLURRED = "too blurred: hold still, more light"
     GLARE = "glare: turn the board a little"

@@ -26,6 +26,18 @@ def usual_file() -> Path:
     return default_folder(os.environ, service=False) / NAME
 
 
+def is_there(file: Path) -> bool:
+    """Return whether the settings file exists.
+
+    Raises:
+        SettingsError: its folder cannot be looked into.
+    """
+    try:
+        return file.exists()
+    except OSError as error:
+        raise SettingsError(f"{file} cannot be read ({error.strerror})", "name another file with --config") from None
+
+
 def kept(file: Path) -> tuple[dict[str, str], list[str]]:
     """Read the choices.
 
@@ -38,7 +50,7 @@ def kept(file: Path) -> tuple[dict[str, str], list[str]]:
     Raises:
         SettingsError: it cannot be read, or is not TOML.
     """
-    if not file.exists():
+    if not is_there(file):
         return {}, []
     content = read_file(file)
     found = {name: _as_words(content[key]) for name, key in _NAMES.items() if key in content}
@@ -59,7 +71,7 @@ def keep(file: Path, choices: Mapping[str, str]) -> None:
     Raises:
         SettingsError: the file is written in a way that cannot be changed, or cannot be written.
     """
-    text = file.read_text(encoding="utf-8") if file.exists() else ""
+    text = file.read_text(encoding="utf-8") if is_there(file) else ""
     options = vars(run_options(run_words(choices)))
     keys: dict[str, Value | None] = {}
     for name, key in _NAMES.items():

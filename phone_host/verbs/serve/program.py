@@ -43,7 +43,7 @@ from phone_host.verbs.serve.choices import (
     with_changes,
     without_depth,
 )
-from phone_host.verbs.serve.kept_choices import keep, kept
+from phone_host.verbs.serve.kept_choices import is_there, keep, kept
 from phone_host.verbs.serve.places import data_folder, recording_folder, snapshot_folder
 from phone_host.verbs.stereo_options import refuse_rejected
 
@@ -78,7 +78,7 @@ class Commands:
         self.feed: Final = BrowserFeed(_BROWSER_NS)
         self._kept, others = kept(file)
         self._fixed = [*others, *(("--keys", keys) if keys else ())]
-        self.keys: KeyFolder = chosen_keys(file if file.exists() else None, keys)
+        self.keys: KeyFolder = chosen_keys(file if is_there(file) else None, keys)
         self.matchers: tuple[str, ...] = (*(name.value for name in usable_matchers()), *registered_names(MATCHERS))
 
     @property

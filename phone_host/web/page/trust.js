@@ -25,6 +25,13 @@ const DOING = /** @type {Record<string, string>} */ ({
 /** The run whose doubts are shown, and how tall they have been in it, px: what comes and goes must not move the pictures. */
 const seen = { begun: -1, width: 0, height: 0 };
 
+/** What was said of the run that goes on, or of the last one. @param {any} state @returns {?Trust} */
+function last(state) {
+  const trust = state.live?.trust ?? null;
+  const isOver = trust && state.steps?.length && state.activity === 'idle' && state.live.pairs > 0;
+  return isOver ? { ...trust, level: trust.level === 'good' ? 'unknown' : trust.level, headline: `The last run: ${trust.headline}` } : trust;
+}
+
 /** @param {HTMLElement} box @param {any} state */
 function keepHeight(box, state) {
   const { width, height } = box.getBoundingClientRect();
@@ -37,7 +44,7 @@ function keepHeight(box, state) {
 export function showTrust(state) {
   const doing = DOING[state.activity];
   /** @type {Trust} */
-  const trust = doing ? { level: 'unknown', headline: doing, concerns: [] } : state.live?.trust ?? before(state);
+  const trust = doing ? { level: 'unknown', headline: doing, concerns: [] } : last(state) ?? before(state);
   const box = byId('trust');
   data(box, 'level', trust.level);
   text(byId('trust-sign'), SIGNS[trust.level] ?? '?');
@@ -51,6 +58,7 @@ export function showTrust(state) {
   });
   keepHeight(box, state);
   const trouble = byId('trouble');
-  show(trouble, !!state.trouble);
-  if (state.trouble) text(trouble, `${sentence(state.trouble.problem)} ${sentence(state.trouble.remedy)}`);
+  const wrong = state.trouble ?? state.live?.unsaved;
+  show(trouble, !!wrong);
+  if (wrong) text(trouble, `${sentence(wrong.problem)} ${sentence(wrong.remedy)}`);
 }
