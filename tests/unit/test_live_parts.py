@@ -17,6 +17,7 @@ from common import now
 from common.errors import DataError, SettingsError, UnavailableError
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
+from phone_host.calibration import moving_board
 from phone_host.calibration.board_names import named_board
 from phone_host.calibration.board_size import whole_size_seen
 from phone_host.calibration.causes.looks import BoardLook
@@ -70,6 +71,30 @@ def test_the_boards_size_is_found_and_a_wrong_one_is_named() -> None:
         check.missed(*_PAIR)
     with pytest.raises(SettingsError, match="this board has 9x6 inner corners, --board says 8x6"):
         check.missed(*_PAIR)
+
+
+def test_a_board_without_a_margin_is_counted_in_some_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A board that is black to its edge never looks whole: it is counted as in files, in pictures that are some looks apart."""
+    monkeypatch.setattr(moving_board, "_APART_LOOKS", 2)
+    monkeypatch.setattr(moving_board, "_PICTURES", 3)
+    left, right = (_cut_out(image) for image in _PAIR)
+    assert (whole_size_seen(left), whole_size_seen(right)) == (None, None)
+    finder = SizeFinder(0.025)
+    assert [finder.find(left, right) for _ in range(6)] == [None] * 5 + [BOARD]
+
+
+def _cut_out(image: Image) -> Image:
+    """The board's squares before a black background."""
+    grid = find_corners(image, BOARD).reshape(BOARD.rows, BOARD.columns, 2)
+    down, across = grid[1, 0] - grid[0, 0], grid[0, 1] - grid[0, 0]
+    edge = [
+        grid[0, 0] - down - across,
+        grid[0, -1] - down + across,
+        grid[-1, -1] + down + across,
+        grid[-1, 0] + down - across,
+    ]
+    board = cv2.fillConvexPoly(np.zeros(image.shape, np.uint8), np.rint(edge).astype(np.int32), 255)
+    return np.where(board > 0, image, 10).astype(np.uint8)
 
 
 def test_a_row_that_glare_hides_from_the_quick_look_is_found() -> None:

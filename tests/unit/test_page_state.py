@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.measure.trouble import Trouble
-from phone_host.model import PairCounts
+from phone_host.model import PairCounts, Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.web.openapi import description
 from phone_host.web.source import Activity, Answer, Measured, PageState, Step, StepName
@@ -72,6 +72,29 @@ def test_a_run_without_pairs_is_not_judged_yet() -> None:
     assert isinstance(ended, dict)
     assert ended["trust"]["level"] == "bad"
     assert ended["pairs_per_s"] is None
+
+
+def test_why_there_is_no_pair_and_what_was_not_saved_are_told() -> None:
+    """A board that is silent or refuses stands in the headline, a full disk beside it."""
+    waiting = replace(run(0), ended="running")
+    up = replace(waiting, link=LinkAccount([], links=(LinkTally("tcp", is_up=True),)))
+    refused = replace(waiting, refused=Trouble("another host has the board", "stop it"))
+    for state, words in (
+        (waiting, "no board answers"),
+        (up, "No pair has been"),
+        (refused, "another host has the board"),
+    ):
+        live = told(PageState(activity=Activity.RUNNING, run=state))["live"]
+        assert isinstance(live, dict)
+        assert words in live["trust"]["headline"]
+        assert live["unsaved"] is None
+    for unwritten, words in (
+        (Unwritten(pairs=2, cause="full"), "2 pairs could not"),
+        (Unwritten(lines=9, cause="full"), "delays could"),
+    ):
+        live = told(PageState(activity=Activity.RUNNING, run=replace(waiting, unwritten=unwritten)))["live"]
+        assert isinstance(live, dict)
+        assert live["unsaved"]["problem"].startswith(words)
 
 
 def test_rate_of_an_ended_run_is_that_of_all_of_it() -> None:
