@@ -30,7 +30,7 @@ _ANDROID: Final = {
     "python_full_version": "3.14.0",
 }
 
-PATIENCE_S: Final = 1200.0
+PATIENCE_S: Final = 2400.0
 """Installing and compiling take minutes each, emulated, and more on a busy machine."""
 
 
@@ -89,6 +89,9 @@ class Phone:
         try:
             yield process
         finally:
+            # The child that `unshare --kill-child` is to take along has changed its user since, which ends that promise (prctl(2)).
+            for child in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
+                os.kill(int(child), signal.SIGKILL)
             process.kill()
             process.wait()
 

@@ -3,16 +3,18 @@
 import json
 import re
 import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.phone.phone import Phone, image, interrupt
+from common import now
+from tests.phone.phone import PATIENCE_S, Phone, image, interrupt
 from tests.support.numbered import saved_numbers, write_film
 from tests.support.page_client import PageClient
-from tests.support.programs import board, free_port, until
+from tests.support.programs import board, free_port
 
 pytestmark = pytest.mark.timeout(3600)  # everything is emulated
 
@@ -114,13 +116,17 @@ def test_the_page_opens_keeps_the_phone_awake_and_pairs(phone: Phone, board_outs
     port, log = free_port(), tmp_path / "page.log"
     before = len(phone.calls())
     with phone.running(f"{RUN} 127.0.0.1:{port}", log) as script:
-        until(lambda: any(call.startswith("termux-open-url") for call in phone.calls()[before:]), "the page is opened")
+        until_long(
+            lambda: any(call.startswith("termux-open-url") for call in phone.calls()[before:]),
+            "the page is opened",
+            log,
+        )
         lock, opened = phone.calls()[before:]
         assert lock.strip() == "termux-wake-lock"
         client = PageClient(opened.split()[1])
         client.do("set", link=board_outside, camera="replay:../film?fps=4&loop=1")
         assert client.do("run")["words"]
-        until(lambda: client.pairs() >= 3, "three pairs on the page")
+        until_long(lambda: client.pairs() >= 3, "three pairs on the page", log)
         assert client.state()["trouble"] is None
         interrupt(script, "termux-run.sh", "phone-host")
         assert script.wait(60) == 130, log.read_text()
@@ -159,15 +165,11 @@ def test_the_service_serves_the_page_and_starts_with_the_phone(phone: Phone, tmp
 
 
 def until_long(condition: Any, what: str, log: Path) -> None:
-    """Wait for something that is emulated, up to four times as long as usual."""
-    for attempt in range(4):
-        try:
-            until(condition, what)
-        except AssertionError as late:
-            if attempt == 3:
-                raise AssertionError(f"{late}\n{log.read_text()}") from None
-        else:
-            return
+    """Wait for something that is emulated; fail with its log."""
+    deadline = now.monotonic_ns() + round(PATIENCE_S * 1e9)
+    while not condition():
+        assert now.monotonic_ns() < deadline, f"not within {PATIENCE_S:.0f} s: {what}\n{log.read_text()}"
+        time.sleep(0.2)
 
 
 def _answers() -> bool:
