@@ -115,9 +115,10 @@ fuzz: .venv/.ready-fuzz ## feed pairs to the native matcher, requests to the pag
 	@$(BIN)/python -m pip -qq --no-input install --require-hashes --only-binary :all: -r requirements/fuzz.txt
 	@touch $@
 
-oracles: $(READY) ## install what judges recordings, other programs' readers of MCAP, into build/oracles
+oracles: $(READY) ## install what judges recordings, other programs' readers of MCAP, into build/oracles (850 MB, of which Rerun 750)
 	@$(BIN)/python -m venv build/oracles
-	@build/oracles/bin/python -m pip -qq --no-input install "mcap-ros2-support>=0.5" "rosbags>=0.10"
+	@build/oracles/bin/python -m pip -qq --no-input install "mcap-ros2-support>=0.5" "rosbags>=0.10" "rerun-sdk>=0.41"
+	@build/oracles/bin/rerun analytics disable
 
 vendor: ## build the page's libraries and the static pages' scripts again (after changing phone_host/web/page; needs node; FETCH=1: take npm's files, too)
 	@$(if $(FETCH),node .ci/vendor.mjs fetch &&) node .ci/vendor.mjs build
