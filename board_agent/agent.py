@@ -1,12 +1,12 @@
 """The board's composition root: camera -> outbox -> session -> links, in one poll loop."""
 
 import logging
-import select
 import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from board_agent.camera_watch import CameraWatch
 from board_agent.outbox import Outbox
 from board_agent.rate_control import RateControl
 from board_agent.sd_notify import Notifier
@@ -141,7 +141,7 @@ class Agent:
         self._refused = 0
         self._stopping = False
         self._waiter = Waiter([wake, *(item for link in links for item in link.pollables)])
-        self._camera_fd: int | None = None
+        self._camera_watch = CameraWatch(camera, self._waiter)
 
     def run(self) -> Summary:
         """Serve until a signal comes or the camera ends; then say goodbye.
@@ -209,30 +209,22 @@ class Agent:
         Returns:
             Whether the camera's descriptor is readable.
         """
-        self._watch_camera()
+        self._camera_watch.look()
         due_ns = min(due_ns, *(link.due_ns for link in self._links))
         wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
         ready = self._waiter.wait(wait_ms)
         if self._wake.fileno() in ready:
             self._stopping = True
-        if any(fd != self._camera_fd for fd in ready) or now.monotonic_ns() >= min(link.due_ns for link in self._links):
+        if any(fd != self._camera_watch.fd for fd in ready) or now.monotonic_ns() >= min(
+            link.due_ns for link in self._links
+        ):
             self._receive()
-        return self._camera_fd in ready
+        return self._camera_watch.fd in ready
 
     def _receive(self) -> None:
         """Receive all packets."""
         for index, incoming in self._several.receive():
             self._take(index, incoming)
-
-    def _watch_camera(self) -> None:
-        """Wait on the camera's descriptor, which changes when a device is lost and comes back."""
-        if self._camera.pollable == self._camera_fd:
-            return
-        if self._camera_fd is not None:
-            self._waiter.remove(self._camera_fd)
-        self._camera_fd = self._camera.pollable
-        if self._camera_fd is not None:
-            self._waiter.add(self._camera_fd, select.POLLIN | select.POLLPRI)
 
     def _take(self, index: int, incoming: Packet | Broken | Garbage) -> None:
         arrived_ns = now.monotonic_ns()

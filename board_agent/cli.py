@@ -12,7 +12,7 @@ from common.camera.options import EXAMPLE
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 from common.program.interrupts import interruptible
 from common.program.invocation import as_found
-from common.program.quantities import frames_per_second, reading, seconds
+from common.program.quantities import file_size, frames_per_second, reading, seconds
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,6 +49,9 @@ def parser() -> argparse.ArgumentParser:
     add_version_option(made)
     verbs = made.add_subparsers(dest="verb", metavar="VERB")
     run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=examples.RUN)
+    record = verbs.add_parser(
+        "record", help="keep the camera's frames on this board's disk, without a host", description=examples.RECORD
+    )
     show = verbs.add_parser(
         "settings", help="print each setting, its value and where the value comes from", description=examples.SETTINGS
     )
@@ -65,17 +68,25 @@ def parser() -> argparse.ArgumentParser:
     )
     pair = verbs.add_parser("pair", help="show a code that lets a new host in", description=examples.PAIR)
     _add_keys_options(keys, pair)
-    for verb in (run, show, cameras, doctor, keys, pair):
+    _add_record_options(record)
+    for verb in (run, record, show, cameras, doctor, keys, pair):
         add_version_option(verb)
         verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         verb.add_argument("--debug", action="store_true", help="show tracebacks")
-    for verb in (run, show, doctor, keys, pair):
+    for verb in (run, record, show, doctor, keys, pair):
         verb.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
+    for verb in (run, show, doctor, keys, pair):
         verb.add_argument(
             "--keys", metavar="DIR", help="folder of keys (default /var/lib/tandemscan or ~/.config/tandemscan)"
         )
-    for verb in (run, show, doctor):
+    for verb in (run, record, show, doctor):
         verb.add_argument("--camera", metavar="URI", help=EXAMPLE.replace("%", "%%"))
+        verb.add_argument(
+            "--log-level",
+            choices=("debug", "info", "warning", "error"),
+            help="least important messages that are logged to stderr",
+        )
+    for verb in (run, show, doctor):
         verb.add_argument(
             "--link",
             action="append",
@@ -93,12 +104,32 @@ def parser() -> argparse.ArgumentParser:
             metavar="FPS",
             help="never lower the frame rate below FPS (default: never lower the rate)",
         )
-        verb.add_argument(
-            "--log-level",
-            choices=("debug", "info", "warning", "error"),
-            help="least important messages that are logged to stderr",
-        )
     return made
+
+
+def _add_record_options(record: argparse.ArgumentParser) -> None:
+    record.add_argument("--out", type=Path, required=True, metavar="FILE.mcap", help="the recording; it must not exist")
+    bound = record.add_mutually_exclusive_group()
+    bound.add_argument(
+        "--most",
+        type=reading(file_size, "--most"),
+        metavar="SIZE",
+        help="end at this size, for example 2GB (default: nine tenths of what is free on its disk)",
+    )
+    bound.add_argument(
+        "--ring",
+        type=reading(file_size, "--ring"),
+        metavar="SIZE",
+        help="keep the newest SIZE: parts FILE-000001.mcap and so on, the oldest of which give way",
+    )
+    record.add_argument(
+        "--seconds",
+        type=reading(seconds, "--seconds"),
+        default=0.0,
+        metavar="S",
+        help="end after S seconds (default: when it is stopped)",
+    )
+    record.set_defaults(keys=None, link=None, adapt=None, least_fps=None)
 
 
 def _add_keys_options(keys: argparse.ArgumentParser, pair: argparse.ArgumentParser) -> None:

@@ -25,6 +25,7 @@ every verb and its options:
 GENERAL: Final = """examples:
   board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
   board-agent run --config /etc/tandemscan/board-agent.toml
+  board-agent record --camera v4l2:auto --out walk.mcap
   board-agent cameras
   board-agent doctor
   sudo board-agent pair
@@ -37,6 +38,13 @@ RUN: Final = """examples:
   board-agent run --camera 'replay:frames?pace=demand' --link ipc://$XDG_RUNTIME_DIR/board
   board-agent run --camera 'v4l2:auto?fps=30' --link 'rfcomm://*' --adapt quality,rate --least-fps 5
   board-agent run --config /etc/tandemscan/board-agent.toml
+"""
+
+RECORD: Final = """examples:
+  board-agent record --camera v4l2:auto --out walk.mcap    # until Ctrl-C, or until nine tenths of the disk are full
+  board-agent record --camera v4l2:auto --out drive.mcap --ring 2GB    # the newest 2 GB: drive-000001.mcap and so on
+  board-agent record --camera 'replay:frames?fps=30' --seconds 60 --out minute.mcap
+  board-agent record --config /etc/tandemscan/board-agent.toml --out walk.mcap --most 500MB    # first: sudo systemctl stop tandemscan-board
 """
 
 SETTINGS: Final = """examples:

@@ -22,6 +22,7 @@ _DECIMAL: Final = re.compile(r"\s*[+-]?([0-9]{1,18}\.?[0-9]{0,18}|\.[0-9]{1,18})
 """Python itself also takes 1_000 and the digits of other scripts, which nobody means."""
 
 _SECONDS: Final = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "min": 60.0, "h": 3600.0}
+_BYTES: Final = {"b": 1.0, "kb": 1e3, "mb": 1e6, "gb": 1e9, "kib": 2.0**10, "mib": 2.0**20, "gib": 2.0**30}
 _RATES: Final = {"": 1.0, "fps": 1.0, "hz": 1.0, "/s": 1.0}
 
 Reader = Callable[[str], float]
@@ -65,6 +66,19 @@ def frames_per_second(text: str, option: str) -> float:
         SettingsError: it is no rate.
     """
     return _read(text, _RATES, option, "give a rate in frames per second, for example 30 or 30fps")
+
+
+def file_size(text: str, option: str) -> float:
+    """Read a size in bytes: 500MB, 2GB or 1.5GiB; a number alone means MB.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+
+    Raises:
+        SettingsError: it is no size.
+    """
+    return _read(text, {"": 1e6, **_BYTES}, option, "give a size, for example 500MB or 2GB")
 
 
 def image_size(text: str, option: str) -> tuple[int, int]:

@@ -67,15 +67,17 @@ class About:
     """What a recording tells of the whole.
 
     Attributes:
-        unix_ns: Unix time minus the host's monotonic clock when it began, ns.
+        unix_ns: Unix time minus the monotonic clock of whoever recorded when it began, ns.
         board_side: left or right: which images came over the link.
         host_boot_id: of which boot of the host that clock is.
+        board_boot_id: a board recorded alone, and the clock is that of this boot of it; empty: a host recorded.
         versions: of package, protocol and files, for people.
     """
 
     unix_ns: int = 0
     board_side: str = "left"
     host_boot_id: str = ""
+    board_boot_id: str = ""
     versions: str = ""
 
     def values(self) -> dict[str, str]:
@@ -85,6 +87,7 @@ class About:
             "unix_ns": str(self.unix_ns),
             "board_side": self.board_side,
             "host_boot_id": self.host_boot_id,
+            "board_boot_id": self.board_boot_id,
             "versions": self.versions,
         }
 
@@ -96,6 +99,7 @@ def about_of(values: Mapping[str, str]) -> About:
         unix_ns=_whole(values, "unix_ns"),
         board_side=side if side in SIDES else "left",
         host_boot_id=values.get("host_boot_id", ""),
+        board_boot_id=values.get("board_boot_id", ""),
         versions=values.get("versions", ""),
     )
 

@@ -24,6 +24,11 @@ _ATTACHMENT, _ATTACHMENT_INDEX, _STATISTICS, _METADATA, _METADATA_INDEX, _SUMMAR
 _HEAD: Final = struct.Struct("<BQ")
 _MESSAGE_HEAD: Final = struct.Struct("<BQHIQQ")
 _INDEX_ENTRY: Final = struct.Struct("<QQ")
+_END_BYTES: Final = 600
+"""Heads of the last chunk and of its index, end of data, statistics, offsets of the summary's groups, footer and magic."""
+
+_CHANNEL_BYTES: Final = 35
+"""What each channel adds to those: 15 in the chunk's indexes, 10 in the chunk's entry, 10 in the statistics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +72,7 @@ class McapWriter:
 
     Attributes:
         size: how many bytes were written; the chunk that is being filled does not count.
+        ended_size: how long the file would be if it were ended now, at most.
 
     Args:
         write: takes the bytes, in their order.
@@ -78,6 +84,7 @@ class McapWriter:
         self._write = write
         self.size = 0
         self._groups: dict[int, list[bytes]] = {}  # of the summary, by opcode
+        self._summary_size = 0
         self._counts: dict[int, int] = {}
         self._chunks = self._attachments = self._metadata = 0
         self._start_ns = self._end_ns = 0
@@ -88,6 +95,13 @@ class McapWriter:
         told = {str(number): f"{t.name} {t.kind} {t.encoding}" for number, t in enumerate(topics, start=1)}
         self.tell(CHANNELS, told)
         self._chunk = _empty()
+
+    @property
+    def ended_size(self) -> int:
+        """See the class."""
+        chunk = self._chunk
+        entries = sum(map(len, chunk.index.values())) * _INDEX_ENTRY.size
+        return self.size + chunk.size + entries + self._summary_size + _END_BYTES + _CHANNEL_BYTES * len(self._topics)
 
     def tell(self, name: str, values: Mapping[str, str]) -> None:
         """Write values by name, outside of chunks.
@@ -205,6 +219,7 @@ class McapWriter:
         """Make a record that the summary repeats."""
         record = _record(opcode, content)
         self._groups.setdefault(opcode, []).append(record)
+        self._summary_size += len(record)
         return record
 
     def _put(self, data: Buffer) -> None:

@@ -142,7 +142,7 @@ def read_recorded(data: memoryview, inflate: Inflate) -> Recorded:
     found.is_ours = ABOUT in found.metadata
     found.about = about_of(found.metadata.get(ABOUT, {}))
     for topic, shown in found.images.items():
-        is_board = side_of(topic) == found.about.board_side
+        is_board = side_of(topic) == found.about.board_side and not found.about.board_boot_id
         whole = [_marked(each, captured if is_board else None, is_ours=found.is_ours) for each in shown]
         found.images[topic] = sorted(whole, key=lambda each: each.log_ns)
     return found

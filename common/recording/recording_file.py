@@ -56,6 +56,11 @@ class RecordingFile:
             return None
         return disk.f_bavail * disk.f_frsize
 
+    @property
+    def ended_bytes(self) -> int:
+        """How long the file would be if it were ended now, at most, bytes."""
+        return self._writer.ended_size
+
     def tell(self, name: str, values: dict[str, str]) -> None:
         """Add values by name.
 
