@@ -21,7 +21,8 @@ from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up
 from phone_host.children.board_process import BoardAccount
 from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.model import PairCounts
-from phone_host.recording.playback import Playback, estimates
+from phone_host.recording.clock_messages import told_clocks
+from phone_host.recording.playback import Playback
 from phone_host.sync.fifo import FifoSettings
 
 _LEAST: Final = 10
@@ -68,7 +69,7 @@ def recorded_run(file: Path) -> RecordedRun:
     size, rate_hz = Size(camera.width_px, camera.height_px), max(1, round(1e9 / camera.period_ns))
     board, counts = _accounts(playback, ledgers)
     session = SessionAccount("", BoardCounts(), BoardCounts(), received=counts.received)
-    known = estimates(recorded)
+    known = [(told.log_ns, told.estimate) for told in told_clocks(recorded)]
     last = known[-1][1] if known else None
     result = CaseResult(
         case=Case(interface=interface, size=size, quality_percent=BOARD_SETS, rate_hz=rate_hz),

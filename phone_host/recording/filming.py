@@ -9,6 +9,7 @@ from common.camera.base import Camera
 from common.errors import DataError, SettingsError
 from common.frame import Frame
 from common.link.base import Link
+from phone_host.recording.clock_messages import boot_of
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.demand_clock import DemandClock, has_own_time
 from phone_host.stream.frame_sink import FrameSink
@@ -33,8 +34,8 @@ class Taker(FrameSink, Protocol):
     def add_host(self, frame: Frame) -> None:
         """Take a frame of this machine's camera."""
 
-    def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
-        """Take note of what is known of the board's clock."""
+    def clock(self, estimate: ClockEstimate | None, boot_id: str, at_ns: int) -> None:
+        """Take note of what is known of the board's clock, and of which boot it is."""
 
 
 def take_frames(
@@ -83,7 +84,7 @@ def take_frames(
         has_begun = await_board(receiver, BoardPatience(wait_ns, now.monotonic_ns()), frames_came, stop)
         while has_begun and not stop():
             _check(receiver, own)
-            taker.clock(receiver.estimate, now.monotonic_ns())
+            taker.clock(receiver.estimate, boot_of(receiver.hello), now.monotonic_ns())
             done = (now.monotonic_ns() - (taker.begun_ns or 0)) / 1e9 / seconds
             advance(min(1.0, done))
             if done >= 1.0 or receiver.ended or own.ended or taker.is_full:
@@ -92,6 +93,34 @@ def take_frames(
     finally:
         own.stop()
         receiver.stop()
+
+
+def take_alone(
+    camera: Camera, taker: Taker, seconds: float, *, stop: Callable[[], bool], advance: Callable[[float], None]
+) -> None:
+    """Take the frames of the own camera only, while the board records its own.
+
+    Args:
+        camera: the own camera, open; this function closes it.
+        taker: takes the frames.
+        seconds: for how long; infinite: until it is stopped.
+        stop: asked repeatedly; True ends it early.
+        advance: called with the share that is done, 0 to 1.
+    """
+    own = OwnCamera(camera, taker.add_host, DemandClock(camera.description.pacing))
+    waiting, begun_ns = Event(), now.monotonic_ns()
+    own.start()
+    try:
+        while not (stop() or own.ended or taker.is_full):
+            if own.failure is not None:
+                raise own.failure
+            done = (now.monotonic_ns() - begun_ns) / 1e9 / seconds
+            advance(min(1.0, done))
+            if done >= 1.0:
+                return
+            waiting.wait(_STEP_S)
+    finally:
+        own.stop()
 
 
 def _check(receiver: Receiver, own: OwnCamera) -> None:

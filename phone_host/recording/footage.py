@@ -91,7 +91,7 @@ class _Keeper:
         """Whether memory for more is not allowed."""
         return self.kept_bytes >= _ENOUGH_BYTES
 
-    def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
+    def clock(self, estimate: ClockEstimate | None, boot_id: str, at_ns: int) -> None:
         """The stamps are all that counts."""
 
     def add_board(self, frame: BoardFrame) -> None:

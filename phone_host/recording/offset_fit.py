@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.recording.course import QUANTITIES, Course, Rates, Times, rates_at
+from phone_host.recording.sight import QUANTITIES, Rates, Sight, Times, rates_at
 
 Floats = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class _Matter:
         bell_s: how they are smoothed.
     """
 
-    first: Course
+    first: Sight
     seen: Rates
     moments: Times
     middle_s: float
@@ -104,7 +104,7 @@ class _Matter:
         """Return the pull at an offset and drift, of all moments within reach of the middle."""
         offsets = offset_s + drift * self.away_s
         clock = self.first.at_s - np.interp(self.first.at_s, self.moments + offsets, offsets)
-        moved = rates_at(Course(clock, self.first.totals), self.moments, self.bell_s)
+        moved = rates_at(Sight(clock, self.first.totals), self.moments, self.bell_s)
         use = moved.known & self.seen.known & (np.abs(self.away_s) <= reach_s)
         return _pull(moved.values[use], moved.slopes[use], self.seen.values[use], self.away_s[use], weights)
 
@@ -130,7 +130,7 @@ def _pull(values: Floats, slopes: Floats, seen: Floats, away_s: Times, weights: 
     return _Pull(pulls, shares, weights, float(1 - left.var(axis=0).min()))
 
 
-def fit_offset(first: Course, second: Course, start_s: float) -> Offset:
+def fit_offset(first: Sight, second: Sight, start_s: float) -> Offset:
     """Measure the offset.
 
     Args:

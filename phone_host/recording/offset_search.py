@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.recording.course import QUANTITIES, Course, Rates, Series, Times, rates_at
+from phone_host.recording.sight import QUANTITIES, Rates, Series, Sight, Times, rates_at
 
 LEAST_S: Final = 5.0
 """Least overlap: shorter ones fit by chance."""
@@ -52,7 +52,7 @@ class Found:
     nats: float
 
 
-def search_offset(first: Course, second: Course, within_s: tuple[float, float] | None = None) -> Found | Unclear:
+def search_offset(first: Sight, second: Sight, within_s: tuple[float, float] | None = None) -> Found | Unclear:
     """Find the offset between two recordings, to about a period.
 
     Args:
@@ -61,10 +61,10 @@ def search_offset(first: Course, second: Course, within_s: tuple[float, float] |
         within_s: the least and the greatest offset that are possible; None: any.
     """
     step_s = max(first.period_s, second.period_s)
-    grids = [_grid(course, step_s) for course in (first, second)]
+    grids = [_grid(sight, step_s) for sight in (first, second)]
     if min(map(len, grids)) * step_s < LEAST_S:
         return Unclear.SHORT
-    rates = [rates_at(course, grid, step_s) for course, grid in zip((first, second), grids, strict=True)]
+    rates = [rates_at(sight, grid, step_s) for sight, grid in zip((first, second), grids, strict=True)]
     for each, unclear in zip(rates, (Unclear.STILL_FIRST, Unclear.STILL_SECOND), strict=True):
         if not each.known.any() or not (_spread(each) > _LEAST_SIGHT).any():
             return unclear
@@ -80,8 +80,8 @@ def search_offset(first: Course, second: Course, within_s: tuple[float, float] |
     return _decided(offsets_s, nats, step_s, is_bounded=within_s is not None)
 
 
-def _grid(course: Course, step_s: float) -> Times:
-    return np.arange(course.at_s[0], course.at_s[-1], step_s, dtype=np.float64)
+def _grid(sight: Sight, step_s: float) -> Times:
+    return np.arange(sight.at_s[0], sight.at_s[-1], step_s, dtype=np.float64)
 
 
 def _spread(rates: Rates) -> NDArray[np.float64]:

@@ -4,7 +4,6 @@ With pace=clock each comes as long after the first as it did then, so that pairi
 pace=demand each comes when the one before it is done with, and time for pairing is the time of then: every run gives the same pairs.
 """
 
-import json
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -24,13 +23,14 @@ from common.protocol.message import (
     Rung,
     Steering,
 )
-from common.recording.layout import CLOCK, DELAYS, camera_name
+from common.recording.layout import DELAYS, camera_name
 from common.recording.opened import open_recorded
-from common.recording.recorded import Recorded, Shown, size_px
+from common.recording.recorded import Shown, size_px
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
 from phone_host.model import BoardFrame, Side
 from phone_host.recording.both_sides import topics_of
+from phone_host.recording.clock_messages import told_clocks
 from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
@@ -124,7 +124,7 @@ class _Player:
         began = told.get("began_ns", "")
         self._began_ns = int(began) if began.isdecimal() else 0  # the board said hello; 0: before all frames
         self._shift_ns = 0  # from the times of the recording to those of this run
-        self._estimates = estimates(self._recorded)
+        self._estimates = [(told.log_ns, told.estimate) for told in told_clocks(self._recorded)]
         self._last_sequence = -1
         self._stop, self._changed = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="playback", daemon=True)
@@ -281,17 +281,6 @@ class _Player:
         )
         self._sink.begin(self._camera)
         self._sink.change_period(self._camera.period_ns)
-
-
-def estimates(recorded: Recorded) -> list[tuple[int, ClockEstimate]]:
-    """Return what was known of the board's clock, each with the time from which on, ns since 1970."""
-    found = []
-    for message in recorded.texts.get(CLOCK, []):
-        try:
-            found.append((message.log_ns, ClockEstimate(**json.loads(bytes(message.data)))))
-        except (ValueError, TypeError):
-            continue
-    return found
 
 
 class PlayedCamera:

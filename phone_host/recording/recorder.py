@@ -3,7 +3,6 @@
 Whoever brings a frame never waits: it goes into a bounded queue, which a thread empties. A disk that is full ends the recording, not the run.
 """
 
-import json
 import logging
 import threading
 from collections import deque
@@ -16,6 +15,7 @@ from common.frame import Buffer, Frame
 from common.ledger import PairLedger
 from common.program.logs import event
 from common.protocol.message import CameraDescription
+from common.recording.capture_runs import CaptureRuns
 from common.recording.layout import CAPTURE, CLOCK, DELAYS, camera_name, camera_values, image_topic
 from common.recording.mcap_writer import CHUNK_BYTES
 from common.recording.recording_file import RecordingFile
@@ -23,6 +23,7 @@ from common.recording.ros_messages import RecordedImage, image_parts, image_type
 from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.model import BoardFrame, Side
+from phone_host.recording.clock_messages import clock_text
 from phone_host.sync.clock import ClockEstimate
 
 _LOG = logging.getLogger(__name__)
@@ -92,7 +93,7 @@ class Recorder:
         self._begun_ns = now.monotonic_ns()
         self._session = ""
         self._clock: ClockEstimate | None = None
-        self._captured: list[tuple[int, list[int]]] = []
+        self._captured = CaptureRuns()
         self._queue: deque[_Item] = deque()
         self._queued_bytes = 0
         self._changed = threading.Condition()
@@ -152,12 +153,11 @@ class Recorder:
         """Take the ledger of a pair. Never waits."""
         self._put(_Message(DELAYS, (ledger.to_json().encode(),), ledger.sequence, ledger.done_ns))
 
-    def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
-        """Take a clock estimate; one that is not new is left out. Never waits."""
+    def clock(self, estimate: ClockEstimate | None, boot_id: str, at_ns: int) -> None:
+        """Take a clock estimate and the boot of the board whose clock it is; one that is not new is left out. Never waits."""
         if estimate is not None and estimate != self._clock:
             self._clock = estimate
-            text = json.dumps(asdict(estimate), separators=(",", ":"))
-            self._put(_Message(CLOCK, (text.encode(),), 0, at_ns))
+            self._put(_Message(CLOCK, (clock_text(estimate, boot_id).encode(),), 0, at_ns))
 
     def computed(self, topic: str, write: Callable[[int], tuple[Buffer, ...]], ledger: PairLedger, at_ns: int) -> None:
         """Take what was computed of a pair. Never waits.
@@ -259,7 +259,7 @@ class Recorder:
                 topic = image_topic(image.frame_id, image_type(image.pixel_format))
                 self._add(topic, image_parts(image), sequence, log_ns, publish_ns)
                 if capture_ns is not None:
-                    self._note_capture(sequence, capture_ns)
+                    self._captured.note(sequence, capture_ns)
             case _Message(topic, parts, sequence, at_ns):
                 self._add(topic, parts, sequence, at_ns, at_ns)
             case _Told(name, values):
@@ -269,20 +269,11 @@ class Recorder:
         unix_ns = self._unix_ns
         self._file.add(topic, *parts, sequence=sequence, log_ns=unix_ns + log_ns, publish_ns=unix_ns + publish_ns)
 
-    def _note_capture(self, sequence: int, capture_ns: int) -> None:
-        first, values = self._captured[-1] if self._captured else (sequence, [])
-        if not self._captured or first + len(values) != sequence:
-            values = []
-            self._captured.append((sequence, values))
-        values.append(capture_ns)
-
     def _write_captured(self) -> None:
         """Write the board's marks of the last second in one message: one for each image would be a fifth of all that is not image."""
-        if self._captured:
-            text = json.dumps(self._captured, separators=(",", ":"))
+        if text := self._captured.take():
             at_ns = now.monotonic_ns()
-            self._add(CAPTURE, (text.encode(),), 0, at_ns, at_ns)
-            self._captured = []
+            self._add(CAPTURE, (text,), 0, at_ns, at_ns)
 
 
 def _size(item: _Item) -> int:

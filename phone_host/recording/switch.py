@@ -101,7 +101,7 @@ class RecordingSwitch:
         if (recorder := self._recorder) is not None:
             recorder.computed(topic, write, ledger, at_ns)
 
-    def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
+    def clock(self, estimate: ClockEstimate | None, boot_id: str, at_ns: int) -> None:
         """See Recorder."""
         if (recorder := self._recorder) is not None:
-            recorder.clock(estimate, at_ns)
+            recorder.clock(estimate, boot_id, at_ns)

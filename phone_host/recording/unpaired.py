@@ -51,6 +51,6 @@ class UnpairedFrames:
         """Take a frame of the own camera."""
         self._recorder.own_frame(frame)
 
-    def clock(self, estimate: ClockEstimate | None, at_ns: int) -> None:
+    def clock(self, estimate: ClockEstimate | None, boot_id: str, at_ns: int) -> None:
         """Take what is known of the board's clock."""
-        self._recorder.clock(estimate, at_ns)
+        self._recorder.clock(estimate, boot_id, at_ns)

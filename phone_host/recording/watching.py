@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from common.frame import SpoiledImageError
 from common.recording.recorded import Shown, size_px
-from phone_host.recording.course import QUANTITIES, Course
+from phone_host.recording.sight import QUANTITIES, Sight
 from phone_host.stereo.images import to_grey
 from phone_host.stereo.raw_images import EncodedImage, decode_frame
 
@@ -20,12 +20,12 @@ _LONG_PX: Final = 96
 _DARKEST: Final = 1.0
 
 
-def watch(shown: Sequence[Shown], zero_ns: int, advance: Callable[[float], None]) -> Course:
+def watch(shown: Sequence[Shown], zero_ns: int, advance: Callable[[float], None]) -> Sight:
     """Watch a camera's images. Spoiled ones are left out.
 
     Args:
         shown: the images in the order of their exposure.
-        zero_ns: from when the course counts, ns.
+        zero_ns: from when the sight counts, ns.
         advance: called with the share that is done, 0 to 1.
     """
     at_s: list[float] = []
@@ -44,7 +44,7 @@ def watch(shown: Sequence[Shown], zero_ns: int, advance: Callable[[float], None]
             rows.append(rows[-1] + _change(before, small, window))
         before = small
         at_s.append(moment_s)
-    return Course(np.array(at_s, np.float64), np.array(rows, np.float64).reshape(-1, QUANTITIES))
+    return Sight(np.array(at_s, np.float64), np.array(rows, np.float64).reshape(-1, QUANTITIES))
 
 
 def _small(shown: Shown) -> NDArray[np.float32] | None:

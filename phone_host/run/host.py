@@ -18,6 +18,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.model import Processed, Result, Side
+from phone_host.recording.clock_messages import boot_of
 from phone_host.recording.playback import Playback
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.run.course import Course
@@ -383,7 +384,7 @@ class Host:
         self._steering.update(now_ns)
         self._doubts.look(now_ns)
         if self.recording is not None:
-            self.recording.clock(self._receiver.estimate, now_ns)
+            self.recording.clock(self._receiver.estimate, boot_of(self._receiver.hello), now_ns)
 
     def _raise_failures(self) -> None:
         of_sinks = (sink.failure for sink in self._sinks)

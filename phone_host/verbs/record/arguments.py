@@ -10,6 +10,7 @@ SUMMARY = "record what both cameras give, without computing anything, to replay 
 
 EXAMPLES = """  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --out session.mcap
   phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --seconds 60 --out session.mcap    # run --replay computes depth from it
+  phone-host record --alone --camera v4l2:/dev/video0 --out host.mcap    # the board runs board-agent record; then sessions join
 """
 
 
@@ -17,6 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML)")
     add_source_arguments(parser)
+    parser.add_argument(
+        "--alone",
+        action="store_true",
+        help="record this machine's camera only, while the board records its own; sessions join puts both together",
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.mcap", help="the recording; it must not exist")
     parser.add_argument(
         "--seconds",

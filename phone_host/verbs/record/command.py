@@ -26,7 +26,7 @@ from phone_host.model import Rig, Side
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.recording.begin import begin_recording
-from phone_host.recording.filming import take_frames
+from phone_host.recording.filming import take_alone, take_frames
 from phone_host.recording.unpaired import UnpairedFrames
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings
@@ -41,6 +41,8 @@ def run(options: argparse.Namespace) -> int:
     check(settings)
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    if options.alone and options.link:
+        raise SettingsError("--alone records without a board, and --link names one", "leave one of both out")
     if not (math.isfinite(options.seconds) and options.seconds >= 0):
         raise SettingsError(f"--seconds is {options.seconds:g}", "give 0 (no limit) or more seconds")
     logs.set_up(log_level(settings.log_level))
@@ -55,21 +57,24 @@ def run(options: argparse.Namespace) -> int:
         camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
         opened.enter_context(closing(camera))
         keys = key_folder(settings.keys)
-        _, links = open_named(settings.link, keys, options.wait)
+        links = () if options.alone else open_named(settings.link, keys, options.wait)[1]
         for link in links:
             opened.enter_context(closing(link))
         recorder = begin_recording(options.out, camera.description, side, rig, attached)
         opened.pop_all()
     wait_ns = None if options.wait is None else round(options.wait * 1e9)
     try:
-        with step_bar("waiting for the board", None, Console(stderr=True)) as bar:
+        with step_bar("recording" if options.alone else "waiting for the board", None, Console(stderr=True)) as bar:
 
             def advance(_: float) -> None:
                 bar.say(recorder.account.words)
 
             seconds = options.seconds or math.inf
             frames = UnpairedFrames(recorder)
-            take_frames(links, camera, frames, seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
+            if options.alone:
+                take_alone(camera, frames, seconds, stop=lambda: signals.stop, advance=advance)
+            else:
+                take_frames(links, camera, frames, seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
     finally:
         account = recorder.finish()
     return _tell(account, as_json=options.json, is_interrupted=signals.interrupted)

@@ -5,11 +5,13 @@ from pathlib import Path
 
 from common.program.quantities import reading, seconds
 
-SUMMARY = "look into recordings, mend them, cut them, and turn them into folders and back"
+SUMMARY = "look into recordings, mend, cut and join them, and turn them into folders and back"
 
 EXAMPLES = """  phone-host sessions info session.mcap --out info    # what is inside, gaps, rates; info/index.html shows plots
   phone-host sessions repair broken.mcap --out whole.mcap
   phone-host sessions cut session.mcap --from 10 --to 25 --out part.mcap
+  phone-host sessions join board.mcap host.mcap --out joined.mcap    # what a board and a host recorded, each alone
+  phone-host sessions join drive-0000*.mcap host.mcap --clock earlier.mcap --out joined.mcap
   phone-host sessions export session.mcap --out folder    # left/, right/, times in ns; as EuRoC and TUM have them
   phone-host sessions import kitti/sequences/00 --out kitti.mcap
   phone-host sessions import MH_01_easy/mav0 --out euroc.mcap
@@ -17,7 +19,7 @@ EXAMPLES = """  phone-host sessions info session.mcap --out info    # what is in
   phone-host sessions import bag.mcap --topics /cam0/image_raw /cam1/image_raw --out two.mcap
 """
 
-TASKS = ("info", "repair", "cut", "export", "import")
+TASKS = ("info", "repair", "cut", "join", "export", "import")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE.mcap",
-        help="the recording; for import, a folder or file of another program, or two folders",
+        help="the recording; for join, the host's and the board's or all parts of it; for import, a folder or file of another program, or two folders",
     )
     parser.add_argument("--out", type=Path, metavar="PATH", help="the new recording; for export and info, a folder")
     parser.add_argument(
@@ -45,6 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=reading(seconds, "--to"),
         metavar="S",
         help="cut: end S seconds after the first image (default: with the last)",
+    )
+    parser.add_argument(
+        "--clock",
+        type=Path,
+        metavar="FILE.mcap",
+        help="join: another recording of the same host, made over the link since both machines were switched on (default: the host's own, else what both cameras saw)",
     )
     parser.add_argument(
         "--times",

@@ -6,6 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
+from rich.console import Console
+
 from common.errors import SettingsError
 from common.places import make_folder
 from common.program.terminal import fitted
@@ -14,13 +16,15 @@ from common.recording.opened import is_recording, open_recorded
 from common.recording.salvage import Message
 from common.versions import REPORT_FORMAT
 from common.words import counted
+from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.recording.copied import CopyAccount, copy_recording
 from phone_host.recording.folders import export_folders, import_folders
+from phone_host.recording.joining import JoinAccount, join_recordings
 from phone_host.recording.other_topics import import_topics
 from phone_host.recording.session_info import SessionInfo, session_info
-from phone_host.run.progress_bar import busy_bar
+from phone_host.run.progress_bar import busy_bar, share_bar
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.sessions.page import info_page
 
@@ -39,8 +43,11 @@ def run(options: argparse.Namespace) -> int:
         "export": _export,
         "import": _import,
     }
-    with busy_bar(f"sessions {options.task}"):
-        values, text, code = tasks[options.task](options)
+    if options.task == "join":
+        values, text, code = _join(options)
+    else:
+        with busy_bar(f"sessions {options.task}"):
+            values, text, code = tasks[options.task](options)
     if options.json:
         print(json_text({"format_version": REPORT_FORMAT, "command": "sessions", "task": options.task, **values}))
     else:
@@ -49,12 +56,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    if options.task != "import" and len(options.paths) != 1:
+    if options.task == "join" and len(options.paths) < 2:
+        raise SettingsError("sessions join takes two recordings or more", "name the board's and the host's")
+    if options.task not in {"join", "import"} and len(options.paths) != 1:
         raise SettingsError(f"sessions {options.task} takes one recording", "name one")
     if options.task != "info" and options.out is None:
         raise SettingsError(f"sessions {options.task} needs --out", "add --out PATH")
     if options.last is not None and options.last <= options.first:
         raise SettingsError("--to is not behind --from", "give a later time, s after the first image")
+    if options.task != "join" and options.clock is not None:
+        raise SettingsError("--clock is for join", "leave it out")
     if options.task != "import" and (options.times is not None or options.topics is not None):
         raise SettingsError("--times and --topics are for import", "leave them out")
 
@@ -135,6 +146,39 @@ def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
         "left_out": account.left_out,
     }
     return values, "\n".join(lines), 0 if account.messages else _BAD_DATA
+
+
+def _join(options: argparse.Namespace) -> Told:
+    with share_bar("sessions join", "watching what both saw", Console(stderr=True)) as bar:
+        account = join_recordings(options.paths, options.out, options.clock, bar)
+    relation = account.relation
+    values = {
+        "file": str(options.out),
+        "by": relation.by.value,
+        "offset_ns": relation.clock.offset_ns,
+        "skew": relation.clock.skew,
+        "uncertainty_ns": relation.uncertainty_ns,
+        "content": None if relation.content is None else asdict(relation.content),
+        "seconds": account.seconds,
+        "images": {side.value: count for side, count in account.images.items()},
+        "left_out": account.left_out,
+    }
+    return values, "\n".join(_join_lines(options.out, account)), 0
+
+
+def _join_lines(out: Path, account: JoinAccount) -> list[str]:
+    relation, images = account.relation, account.images
+    written = (
+        f"{images[Side.LEFT]} left and {images[Side.RIGHT]} right images of {account.seconds:.1f} s written to {out}"
+    )
+    known = f"known to +-{relation.uncertainty_ns / 1e6:.2f} ms (95 %)"
+    if relation.content is None:
+        how = f"joined by the clock exchange that the host stored, {known}"
+    else:
+        seen = relation.content
+        how = f"joined by what both saw in {seen.overlap_s:.0f} s, {known}; drift {-seen.drift * 1e6:+.0f} ppm, {seen.likeness:.0%} of the movement agrees"
+    left_out = f"; {counted(account.left_out, 'image')} that only one camera has left out" if account.left_out else ""
+    return [written + left_out, f"  {how}"]
 
 
 def _export(options: argparse.Namespace) -> Told:

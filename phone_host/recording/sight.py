@@ -25,7 +25,7 @@ _REACH: Final = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class Sight:
     """What a camera saw over time.
 
     Attributes:
@@ -44,7 +44,7 @@ class Course:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rates:
-    """Smoothed rates of a course at moments of equal distance.
+    """Smoothed rates of a sight at moments of equal distance.
 
     Attributes:
         values: (M, 4) per s; 0 where not known.
@@ -57,14 +57,14 @@ class Rates:
     known: NDArray[np.bool_]
 
 
-def rates_at(course: Course, moments_s: Times, bell_s: float) -> Rates:
-    """Return a course's rates, smoothed.
+def rates_at(sight: Sight, moments_s: Times, bell_s: float) -> Rates:
+    """Return a sight's rates, smoothed.
 
     Totals lie on straight lines between exposures: a rate is the mean of an interval, smoothed by a bell. Both act alike before and after, so
     neither shifts anything in time. A bell of a period leaves nothing that would depend on where the exposures lie between the moments.
 
     Args:
-        course: what a camera saw.
+        sight: what a camera saw.
         moments_s: (M,) ascending in steps much shorter than the bell, s.
         bell_s: sigma of the bell, s.
     """
@@ -78,21 +78,21 @@ def rates_at(course: Course, moments_s: Times, bell_s: float) -> Rates:
     turning = (ticks**2 / bell_s**4 - 1 / bell_s**2) * bell / step_s
     turning -= turning.mean()
     turning /= (turning * ticks**2).sum() * step_s / 2
-    held = np.column_stack([np.interp(moments_s, course.at_s, total) for total in course.totals.T])
+    held = np.column_stack([np.interp(moments_s, sight.at_s, total) for total in sight.totals.T])
     held -= held.mean(axis=0)
     values, slopes = (
         np.column_stack([np.convolve(total, kernel * step_s, "same") for total in held.T])
         for kernel in (rising, turning)
     )
-    known = _known(course, moments_s, half * step_s)
+    known = _known(sight, moments_s, half * step_s)
     return Rates(values * known[:, None], slopes * known[:, None], known)
 
 
-def _known(course: Course, moments_s: Times, reach_s: float) -> NDArray[np.bool_]:
+def _known(sight: Sight, moments_s: Times, reach_s: float) -> NDArray[np.bool_]:
     """Return where no gap is within reach, (M,)."""
-    at_s = course.at_s
+    at_s = sight.at_s
     known = (moments_s - reach_s > at_s[0]) & (moments_s + reach_s < at_s[-1])
-    for before in np.flatnonzero(np.diff(at_s) > _GAP * course.period_s):
+    for before in np.flatnonzero(np.diff(at_s) > _GAP * sight.period_s):
         known &= (moments_s + reach_s < at_s[before]) | (moments_s - reach_s > at_s[before + 1])
     known[: round(reach_s / (moments_s[1] - moments_s[0]))] = False  # there the bell leaves the moments
     known[len(known) - round(reach_s / (moments_s[1] - moments_s[0])) :] = False

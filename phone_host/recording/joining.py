@@ -1,0 +1,225 @@
+"""Joins what a board recorded alone with what its host recorded meanwhile, into one recording that plays as any other."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common.errors import DataError, SettingsError
+from common.recording.capture_runs import CaptureRuns
+from common.recording.layout import ABOUT, CAPTURE, CLOCK, camera_name, image_topic
+from common.recording.opened import inflate, mapped, open_recorded
+from common.recording.recorded import Recorded, Shown
+from common.recording.recording_file import RecordingFile, written
+from common.recording.ros_messages import RecordedImage, image_parts, image_type
+from common.recording.salvage import CHANNELS, Message, Salvage
+from phone_host.model import Side
+from phone_host.recording.clock_messages import ToldClock, clock_text, told_clocks
+from phone_host.recording.relation import Relation, Stream, relate
+
+_LINK: Final = "joined"
+_SECOND_NS: Final = 1_000_000_000
+_MARGIN_NS: Final = _SECOND_NS
+"""What only one of the cameras saw is left out, but for this."""
+
+_SLEPT_NS: Final = 5_000_000
+"""A host whose Unix time moved by more against its own clock has slept, or its time was set: an exchange of before says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A recording and where it lies."""
+
+    path: Path
+    recorded: Recorded
+
+
+@dataclass(frozen=True, slots=True)
+class JoinAccount:
+    """What was joined.
+
+    Attributes:
+        relation: of the clocks.
+        images: of each side.
+        left_out: images that only one camera saw, or that the host's recording has of its own board.
+        seconds: how long both cameras recorded at once.
+    """
+
+    relation: Relation
+    images: dict[Side, int]
+    left_out: int
+    seconds: float
+
+
+def join_recordings(
+    paths: Sequence[Path], out: Path, clock: Path | None, advance: Callable[[float], None]
+) -> JoinAccount:
+    """Write one recording.
+
+    Args:
+        paths: the host's recording and the board's, or all parts of the board's, in any order.
+        out: the new recording; it must not exist.
+        clock: another recording of the same host that has heard the board's clock; None: there is none.
+        advance: called with the share that is done, 0 to 1.
+
+    Raises:
+        SettingsError: these are not one recording of a host and one of a board.
+        DataError: nothing tells how their clocks relate.
+        UnavailableError: a file cannot be read or made, or the disk is full.
+    """
+    parts, host = sorted_out([Opened(path, open_recorded(path)) for path in paths])
+    side = Side(host.recorded.about.board_side)
+    own = host.recorded.images.get(host.recorded.topic_of(side.other.value))
+    if not own:
+        raise DataError(f"{host.path} holds no images of the host's own camera", "record with phone-host record")
+    board = _board_stream(parts)
+    stream = Stream(_ascending(own), host.recorded.about.unix_ns, str(host.path))
+    told = [*told_clocks(host.recorded), *_told_elsewhere(clock, host)]
+    boot_id = parts[0].recorded.about.board_boot_id
+    relation = relate(board, stream, told, boot_id, advance)
+    moved = [_moved(shown, relation, board.unix_ns, stream.unix_ns) for shown in board.shown]
+    first_ns = max(moved[0].image.stamp_ns, stream.shown[0].image.stamp_ns)
+    last_ns = min(moved[-1].image.stamp_ns, stream.shown[-1].image.stamp_ns)
+    if first_ns > last_ns:
+        apart = f"{(first_ns - last_ns) / 1e9:.0f} s apart"
+        raise DataError(f"{board.name} and {host.path} were recorded {apart}", "give recordings of the same time")
+    kept = {
+        side: _between(moved, first_ns - _MARGIN_NS, last_ns + _MARGIN_NS),
+        side.other: _between(stream.shown, first_ns - _MARGIN_NS, last_ns + _MARGIN_NS),
+    }
+    with written(out) as file:
+        _write_begin(file, host, parts[0], relation, first_ns)
+        _write_images(file, kept, side)
+    every = len(moved) + sum(map(len, host.recorded.images.values()))
+    images = {each: len(shown) for each, shown in kept.items()}
+    return JoinAccount(relation, images, every - sum(images.values()), (last_ns - first_ns) / 1e9)
+
+
+def sorted_out(opened: Sequence[Opened]) -> tuple[list[Opened], Opened]:
+    """Return the parts of the board's recording, and the host's.
+
+    Raises:
+        SettingsError: they are not one recording of a board and one of a host.
+    """
+    parts = [each for each in opened if each.recorded.about.board_boot_id]
+    hosts = [each for each in opened if not each.recorded.about.board_boot_id]
+    if not parts:
+        raise SettingsError(
+            "none of these was recorded by a board alone", "name one of board-agent record and one of phone-host record"
+        )
+    if len(hosts) != 1:
+        names = " and ".join(str(each.path) for each in hosts) or "none of these"
+        what = "were both recorded by a host" if hosts else "was recorded by a host"
+        raise SettingsError(f"{names} {what}", "name one of phone-host record, and the board's")
+    for each in parts[1:]:
+        if each.recorded.about.board_boot_id != parts[0].recorded.about.board_boot_id:
+            raise SettingsError(
+                f"{parts[0].path} and {each.path} are of two boots of a board, each with a clock of its own",
+                "join those of one boot at a time",
+            )
+    return parts, hosts[0]
+
+
+def _board_stream(parts: Sequence[Opened]) -> Stream:
+    """Return the images of all parts, with stamps on the first one's Unix time."""
+    unix_ns = parts[0].recorded.about.unix_ns
+    every: list[Shown] = []
+    for part in parts:
+        later_ns = unix_ns - part.recorded.about.unix_ns
+        shown = next(iter(part.recorded.images.values()))
+        every += [_later(one, later_ns) for one in shown] if later_ns else shown
+    return Stream(_ascending(every), unix_ns, str(parts[0].path))
+
+
+def _ascending(shown: Sequence[Shown]) -> list[Shown]:
+    return sorted(shown, key=lambda one: one.image.stamp_ns)
+
+
+def _later(shown: Shown, by_ns: int, frame_id: str = "") -> Shown:
+    image = shown.image
+    stamp_ns = image.stamp_ns + by_ns
+    moved = RecordedImage(stamp_ns, frame_id or image.frame_id, image.pixel_format, image.size_px, image.payload)
+    return Shown(moved, shown.sequence, shown.log_ns + by_ns, shown.publish_ns + by_ns, shown.grabbed_ns + by_ns)
+
+
+def _moved(shown: Shown, relation: Relation, board_unix_ns: int, host_unix_ns: int) -> Shown:
+    """Return an image of the board with the host's times."""
+    board_ns = shown.image.stamp_ns - board_unix_ns
+    return _later(shown, relation.to_host(board_ns) + host_unix_ns - shown.image.stamp_ns)
+
+
+def _between(shown: Sequence[Shown], first_ns: int, last_ns: int) -> list[Shown]:
+    return [one for one in shown if first_ns <= one.image.stamp_ns <= last_ns]
+
+
+def _told_elsewhere(clock: Path | None, host: Opened) -> list[ToldClock]:
+    """Return what another recording of the same host tells of boards' clocks.
+
+    Raises:
+        SettingsError: it is of another host, or the host has slept in between.
+    """
+    if clock is None:
+        return []
+    other, about = open_recorded(clock), host.recorded.about
+    if other.about.host_boot_id != about.host_boot_id or not about.host_boot_id:
+        raise SettingsError(
+            f"{clock} and {host.path} are of two boots of a host", "leave --clock out: the content may tell"
+        )
+    if abs(other.about.unix_ns - about.unix_ns) > _SLEPT_NS:
+        raise SettingsError(
+            f"between {clock} and {host.path} the host slept, or its time was set",
+            "leave --clock out: the content may tell",
+        )
+    return told_clocks(other)
+
+
+def _write_begin(file: RecordingFile, host: Opened, board: Opened, relation: Relation, at_ns: int) -> None:
+    """Write all that is no image: what the host's recording tells, the board's camera, and how they were joined."""
+    board_about, side = board.recorded.about, host.recorded.about.board_side
+    for name, values in host.recorded.metadata.items():
+        if name not in {CHANNELS, "clock", camera_name(side)}:
+            file.tell(name, dict(values))
+    if ABOUT not in host.recorded.metadata:
+        file.tell(ABOUT, host.recorded.about.values())
+    camera = dict(board.recorded.metadata.get(camera_name(board_about.board_side), {}))
+    file.tell(camera_name(side), {**camera, "link": _LINK, "began_ns": "0"})
+    told = {"by": relation.by.value, "uncertainty_ns": str(relation.uncertainty_ns), "board_file": board.path.name}
+    file.tell(_LINK, {**told, "board_boot_id": board_about.board_boot_id})
+    for name, data in host.recorded.attachments.items():
+        file.attach(name, "application/octet-stream", bytes(data), at_ns)
+    if "settings.json" in board.recorded.attachments:
+        settings = bytes(board.recorded.attachments["settings.json"])
+        file.attach("board-settings.json", "application/json", settings, at_ns)
+    for record in Salvage(mapped(host.path), inflate).records():
+        if isinstance(record, Message) and record.channel is not None and record.channel.topic.endswith("camera_info"):
+            file.add(record.channel.topic, record.data, sequence=0, log_ns=record.log_ns, publish_ns=record.publish_ns)
+    text = clock_text(relation.clock, board_about.board_boot_id).encode()
+    file.add(CLOCK, text, sequence=0, log_ns=at_ns - _MARGIN_NS, publish_ns=at_ns - _MARGIN_NS)
+
+
+def _write_images(file: RecordingFile, kept: dict[Side, list[Shown]], board: Side) -> None:
+    """Write the images of both sides in the order in which they were there."""
+    runs, due_ns, grabbed_ns = CaptureRuns(), 0, 0
+
+    def write_runs() -> None:
+        if text := runs.take():
+            file.add(CAPTURE, text, sequence=0, log_ns=grabbed_ns, publish_ns=grabbed_ns)
+
+    for side, shown in _merged(kept):
+        image = shown.image
+        moved = RecordedImage(image.stamp_ns, side.value, image.pixel_format, image.size_px, image.payload)
+        topic = image_topic(side.value, image_type(image.pixel_format))
+        file.add(topic, *image_parts(moved), sequence=shown.sequence, log_ns=shown.log_ns, publish_ns=shown.publish_ns)
+        if side is board:
+            grabbed_ns = shown.grabbed_ns
+            runs.note(shown.sequence, grabbed_ns - image.stamp_ns)
+            if grabbed_ns >= due_ns:
+                write_runs()
+                due_ns = grabbed_ns + _SECOND_NS
+    write_runs()
+
+
+def _merged(kept: dict[Side, list[Shown]]) -> Iterator[tuple[Side, Shown]]:
+    every = [(shown.log_ns, side.value, side, shown) for side, of in kept.items() for shown in of]
+    for _, _, side, shown in sorted(every, key=lambda item: item[:2]):
+        yield side, shown
