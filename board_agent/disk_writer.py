@@ -119,8 +119,7 @@ class DiskWriter:
         try:
             while (came := self._next()) is not None:
                 taken = came
-                while taken and self._end is None:
-                    self._write(taken[0])
+                while taken and self._write(taken[0]):
                     taken.popleft()
                 now_ns = now.monotonic_ns()
                 if (
@@ -147,19 +146,21 @@ class DiskWriter:
             self._queued_bytes = 0
             return taken
 
-    def _write(self, frame: Frame) -> None:
+    def _write(self, frame: Frame) -> bool:
+        """Write a frame; return False, if it does not fit any more."""
         size_px, unix_ns = (frame.width_px, frame.height_px), self._unix_ns
         image = RecordedImage(unix_ns + frame.exposed.ns, SIDE, frame.pixel_format, size_px, frame.payload)
         if not self._files.make_room(len(frame.payload) + _MESSAGE_BYTES):
             with self._changed:
                 self._end = WriteEnd.FULL
-            return
+            return False
         grabbed_ns = unix_ns + frame.grabbed.ns
         topic = image_topic(SIDE, image_type(frame.pixel_format))
         parts = image_parts(image)
         self._files.file.add(topic, *parts, sequence=frame.sequence, log_ns=grabbed_ns, publish_ns=grabbed_ns)
         with self._changed:
             self._frames += 1
+        return True
 
     def _fail(self, cause: str) -> None:
         with self._changed:

@@ -69,8 +69,8 @@ def recorded_run(file: Path) -> RecordedRun:
     size, rate_hz = Size(camera.width_px, camera.height_px), max(1, round(1e9 / camera.period_ns))
     board, counts = _accounts(playback, ledgers)
     session = SessionAccount("", BoardCounts(), BoardCounts(), received=counts.received)
-    known = [(told.log_ns, told.estimate) for told in told_clocks(recorded)]
-    last = known[-1][1] if known else None
+    known = told_clocks(recorded)
+    last = known[-1].estimate if known else None
     result = CaseResult(
         case=Case(interface=interface, size=size, quality_percent=BOARD_SETS, rate_hz=rate_hz),
         ledgers=kept,

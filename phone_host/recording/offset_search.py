@@ -23,7 +23,9 @@ _MARGIN_NATS: Final = 15.0
 _MOST_S: Final = 300.0
 """What of the one recording is looked for in the other: more would drift apart by more than a movement lasts."""
 
-_LOBE_S: Final = 1.0
+LOBE_S: Final = 1.0
+"""A movement is told from the next one within this: offsets that fit nearly as well as the best lie closer to it."""
+
 _NOTHING: Final = 1e-6
 _LEAST_SIGHT: Final = np.array([0.5, 0.5, 0.02, np.inf])
 """What must be surpassed by the spread of some rate, or else nothing moved: px of the small image per s, and logarithm of brightness per s."""
@@ -168,9 +170,9 @@ def _decided(offsets_s: Times, nats: NDArray[np.float64], step_s: float, *, is_b
     if floor < (0.0 if is_bounded else float(np.median(nats))):
         return Unclear.STRANGE
     rivals = np.flatnonzero(nats > floor)
-    if np.abs(offsets_s[rivals] - offsets_s[best]).max() > _LOBE_S / 2 + step_s:
+    if np.abs(offsets_s[rivals] - offsets_s[best]).max() > LOBE_S / 2 + step_s:
         return Unclear.REPEATED if _is_high(nats, best) else Unclear.STRANGE
-    away = np.abs(offsets_s - offsets_s[best]) > _LOBE_S
+    away = np.abs(offsets_s - offsets_s[best]) > LOBE_S
     return Found(float(offsets_s[best]), float(nats[best] - (nats[away].max() if away.any() else 0.0)))
 
 

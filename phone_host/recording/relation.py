@@ -10,7 +10,7 @@ from common.errors import DataError
 from common.recording.recorded import Shown, period_ns
 from phone_host.recording.clock_messages import ToldClock
 from phone_host.recording.offset_fit import Offset, fit_offset
-from phone_host.recording.offset_search import LEAST_S, Unclear, search_offset
+from phone_host.recording.offset_search import LEAST_S, LOBE_S, Unclear, search_offset
 from phone_host.recording.watching import watch
 from phone_host.sync.clock import ClockEstimate
 
@@ -114,7 +114,7 @@ def _by_content(board: Stream, host: Stream, known: ClockEstimate | None, advanc
             f"{board.name} and {host.name} tell their offset only to +-{uncertainty_ns / 1e6:.0f} ms",
             "record longer, and move both cameras together quickly",
         )
-    return Relation(By.CONTENT, _estimate(offset, zeros, board, host), uncertainty_ns, offset)
+    return Relation(By.CONTENT, _estimate(offset, zeros), uncertainty_ns, offset)
 
 
 def _within_s(known: ClockEstimate, span_ns: tuple[int, int], zeros: tuple[int, int]) -> tuple[float, float]:
@@ -124,22 +124,23 @@ def _within_s(known: ClockEstimate, span_ns: tuple[int, int], zeros: tuple[int, 
     return (-max(high for _, high in limits) - apart_ns) / 1e9, (-min(low for low, _ in limits) - apart_ns) / 1e9
 
 
-def _estimate(offset: Offset, zeros: tuple[int, int], board: Stream, host: Stream) -> ClockEstimate:
-    """Return the relation as a clock estimate. Its hard limits: beyond them the recordings would not overlap."""
+def _estimate(offset: Offset, zeros: tuple[int, int]) -> ClockEstimate:
+    """Return the relation as a clock estimate. Its limits: beyond them nothing fitted."""
     host_ns = zeros[1] + round(offset.at_s * 1e9)
     board_ns = zeros[0] + round((offset.at_s + offset.offset_s) * 1e9)
     wide = math.ceil(offset.uncertainty_s * _TO_999 * 1e9)
     turn = offset.drift_uncertainty * _TO_999
     skew = -offset.drift / (1 + offset.drift)
+    offset_ns, limit_ns = host_ns - board_ns, round(LOBE_S * 1e9)
     return ClockEstimate(
         reference_ns=board_ns,
-        offset_ns=host_ns - board_ns,
+        offset_ns=offset_ns,
         skew=skew,
         skew_uncertainty=turn,
         uncertainty_ns=wide,
         round_trip_ns=0,
-        low_ns=host.span_ns[0] - board.span_ns[1],
-        high_ns=host.span_ns[1] - board.span_ns[0],
+        low_ns=offset_ns - limit_ns,
+        high_ns=offset_ns + limit_ns,
         skew_low=skew - turn,
         skew_high=skew + turn,
     )
