@@ -1,5 +1,6 @@
 """Joins what a board recorded alone with what its host recorded meanwhile, into one recording that plays as any other."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,9 @@ from phone_host.recording.clock_messages import ToldClock, clock_text, told_cloc
 from phone_host.recording.relation import Relation, Stream, relate
 
 _LINK: Final = "joined"
+_PART: Final = re.compile(r"-\d{6,9}\.mcap$")
+"""How board-agent names the parts of a ring."""
+
 _SECOND_NS: Final = 1_000_000_000
 _MARGIN_NS: Final = _SECOND_NS
 """What only one of the cameras saw is left out, but for this."""
@@ -42,6 +46,7 @@ class JoinAccount:
         relation: of the clocks.
         images: of each side.
         left_out: images that only one camera saw, or that the host's recording has of its own board.
+        empty: parts of a ring that hold no images: their board died right after they were begun.
         seconds: how long both cameras recorded at once.
     """
 
@@ -49,6 +54,7 @@ class JoinAccount:
     images: dict[Side, int]
     left_out: int
     seconds: float
+    empty: tuple[Path, ...]
 
 
 def join_recordings(
@@ -67,7 +73,8 @@ def join_recordings(
         DataError: nothing tells how their clocks relate.
         UnavailableError: a file cannot be read or made, or the disk is full.
     """
-    parts, host = sorted_out([Opened(path, open_recorded(path)) for path in paths])
+    opened, empty = _opened(paths)
+    parts, host = sorted_out(opened)
     side = Side(host.recorded.about.board_side)
     own = host.recorded.images.get(host.recorded.topic_of(side.other.value))
     if not own:
@@ -92,7 +99,20 @@ def join_recordings(
         _write_images(file, kept, side)
     every = len(moved) + sum(map(len, host.recorded.images.values()))
     images = {each: len(shown) for each, shown in kept.items()}
-    return JoinAccount(relation, images, every - sum(images.values()), (last_ns - first_ns) / 1e9)
+    return JoinAccount(relation, images, every - sum(images.values()), (last_ns - first_ns) / 1e9, empty)
+
+
+def _opened(paths: Sequence[Path]) -> tuple[list[Opened], tuple[Path, ...]]:
+    """Open all, but for parts of a ring that hold nothing."""
+    opened, empty = [], []
+    for path in paths:
+        try:
+            opened.append(Opened(path, open_recorded(path)))
+        except DataError:
+            if not _PART.search(path.name):
+                raise
+            empty.append(path)
+    return opened, tuple(empty)
 
 
 def sorted_out(opened: Sequence[Opened]) -> tuple[list[Opened], Opened]:

@@ -10,6 +10,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -44,7 +45,8 @@ def _texture(seed: int, width_m: float, height_m: float) -> np.ndarray:
     for cells in (8, 32, 128):
         grid = chance.random((cells * size[1] // size[0] + 1, cells), np.float32)
         total += cv2.resize(grid, size, interpolation=cv2.INTER_CUBIC) / np.float32(np.sqrt(cells))
-    return np.asarray(cv2.normalize(total, None, 20, 235, cv2.NORM_MINMAX), np.float32)
+    low, high = float(total.min()), float(total.max())
+    return np.asarray(20 + 215 * (total - low) / (high - low), np.float32)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +165,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name, case in CASES.items():
         if options.only not in name:
             continue

@@ -67,18 +67,20 @@ def test_a_file_ends_when_it_is_full(tmp_path: Path) -> None:
 def test_in_a_ring_the_oldest_parts_give_way(tmp_path: Path) -> None:
     """At no moment more than its size; the newest frames are there without a gap; each part tells whose it is; it goes on after a restart."""
     path = tmp_path / "drive.mcap"
+    gave_way = 0
     for life in range(2):
         writer = _write(BoundedFiles(path, _RING_BYTES, _begin, is_ring=True), range(life * 100, life * 100 + 100))
         written = writer.finish()
         assert written.end is None
         assert written.frames == 100
+        gave_way += written.gave_way
         parts = list(parts_of(path).values())
         assert sum(part.stat().st_size for part in parts) <= _RING_BYTES
         kept = [one.sequence for part in parts for one in open_recorded(part).images["/left/image"]]
         assert kept == list(range(kept[0], life * 100 + 100))
         assert len(kept) * 19_200 > _RING_BYTES * (PARTS - 3) / PARTS
         assert all(open_recorded(part).about.board_boot_id == "boot" for part in parts)
-    assert written.gave_way > 0
+    assert gave_way > 0
     assert part_path(path, 7) == tmp_path / "drive-000007.mcap"
 
 

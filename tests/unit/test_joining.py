@@ -154,8 +154,11 @@ def test_a_clock_of_another_recording_is_taken(tmp_path: Path, films: tuple[list
     parts = [_board(tmp_path, films[0][100:], "part-2"), _board(tmp_path, films[0][:100], "part-1")]
     clocks = [(_clock(), "b1")]
     early = _file(tmp_path / "early.mcap", films[1][:3], _host_about(), side="right", clocks=clocks)
-    account = _join([host, *parts], tmp_path, early)
+    begun = [tmp_path / "drive-000003.mcap", _file(tmp_path / "drive-000004.mcap", [], About(board_boot_id="b1"))]
+    begun[0].write_bytes(b"")
+    account = _join([host, *parts, *begun], tmp_path, early)
     assert account.relation.by is By.CLOCK
+    assert list(account.empty) == begun
     assert max(map(abs, _true_skews_ms(tmp_path, films))) < 0.001
     other = _file(tmp_path / "other.mcap", films[1][:3], _host_about("h2"), side="right", clocks=clocks)
     with pytest.raises(SettingsError, match="two boots of a host"):
@@ -196,7 +199,10 @@ def test_what_cannot_be_joined_is_refused_in_one_line(tmp_path: Path, films: tup
     rest = [replace(one, image=replace(one.image, payload=payload)) for one in films[0]]
     board, host = _board(tmp_path, films[0]), _file(tmp_path / "host.mcap", films[1], _host_about(), side="right")
     known = _file(tmp_path / "known.mcap", films[1], _host_about(), side="right", clocks=[(_clock(), "b2")])
+    empty = tmp_path / "empty.mcap"
+    empty.write_bytes(b"")
     cases: list[tuple[list[Path], str]] = [
+        ([board, host, empty], "empty.mcap is empty"),
         ([host, host], "none of these was recorded by a board alone"),
         ([board, board], "none of these was recorded by a host"),
         ([board, host, host], "were both recorded by a host"),

@@ -162,6 +162,7 @@ def _join(options: argparse.Namespace) -> Told:
         "seconds": account.seconds,
         "images": {side.value: count for side, count in account.images.items()},
         "left_out": account.left_out,
+        "empty": [str(path) for path in account.empty],
     }
     return values, "\n".join(_join_lines(options.out, account)), 0
 
@@ -178,7 +179,7 @@ def _join_lines(out: Path, account: JoinAccount) -> list[str]:
         seen = relation.content
         how = f"joined by what both saw in {seen.overlap_s:.0f} s, {known}; drift {-seen.drift * 1e6:+.0f} ppm, {seen.likeness:.0%} of the movement agrees"
     left_out = f"; {counted(account.left_out, 'image')} that only one camera has left out" if account.left_out else ""
-    return [written + left_out, f"  {how}"]
+    return [written + left_out, f"  {how}", *(f"  {path} holds no images" for path in account.empty)]
 
 
 def _export(options: argparse.Namespace) -> Told:
