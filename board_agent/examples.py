@@ -44,7 +44,7 @@ RECORD: Final = """examples:
   board-agent record --camera v4l2:auto --out walk.mcap    # until Ctrl-C, or until nine tenths of the disk are full
   board-agent record --camera v4l2:auto --out drive.mcap --ring 2GB    # the newest 2 GB: drive-000001.mcap and so on
   board-agent record --camera 'replay:frames?fps=30' --seconds 60 --out minute.mcap
-  board-agent record --config /etc/tandemscan/board-agent.toml --out walk.mcap --most 500MB    # first: sudo systemctl stop tandemscan-board
+  board-agent record --config /etc/tandemscan/board-agent.toml --out walk.mcap --most 500MB
 """
 
 SETTINGS: Final = """examples:
