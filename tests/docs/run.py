@@ -32,6 +32,7 @@ _HARDWARE: Final = (
     "host.toml",
     "wall",
     "session.mcap",
+    "host.mcap",
     "opencv-bm",
     "phone-host serve",  # until it is stopped; tests/system/test_serve.py
     "--serve",
