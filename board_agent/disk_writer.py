@@ -22,8 +22,8 @@ _MOST_BYTES: Final = 32 << 20
 _SYNC_NS: Final = 800_000_000
 """A power cut takes a second at most: this, and the time that the disk takes."""
 
-_MESSAGE_BYTES: Final = 200
-"""More than what a frame takes beside its image."""
+_MESSAGE_BYTES: Final = 2000
+"""More than what a frame takes beside its image; the first one of a file brings its topic's definition, twice."""
 
 
 class WriteEnd(Enum):

@@ -23,7 +23,10 @@ def topics_of(recorded: Recorded, file: Path) -> Mapping[Side, str]:
     topics = {side: recorded.topic_of(side.value) for side in Side}
     if not all(topics.values()):
         held = ", ".join(sorted(recorded.images))
-        raise DataError(f"{file} holds the images of one camera only ({held})", "record both cameras")
+        raise DataError(
+            f"{file} holds the images of one camera only ({held})",
+            "record both cameras, or join two recordings: phone-host sessions join",
+        )
     return topics
 
 

@@ -6,6 +6,7 @@ The uncertainty comes from the scatter of the pull among blocks of time, so it h
 Source: White 1982, Maximum likelihood estimation of misspecified models; Fisher 1925, expansion of Student's distribution.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -48,6 +49,7 @@ class Offset:
         uncertainty_s: half-width that holds the true offset in 95 %, there.
         drift_uncertainty: the same of the drift.
         overlap_s: for how long both recordings tell something.
+        worst_s: half-width that holds the true offset in 95 % at the ends of the overlap, where the drift tells most.
         likeness: share of the second camera's changes that the first one's explain, of that quantity where it is greatest, 0 to 1.
     """
 
@@ -57,6 +59,7 @@ class Offset:
     uncertainty_s: float
     drift_uncertainty: float
     overlap_s: float
+    worst_s: float
     likeness: float
 
 
@@ -158,6 +161,7 @@ def fit_offset(first: Sight, second: Sight, start_s: float) -> Offset:
         uncertainty_s=wide * float(sigmas[0]),
         drift_uncertainty=wide * float(sigmas[1]),
         overlap_s=float(end - begin),
+        worst_s=wide * math.hypot(float(sigmas[0]), float(sigmas[1]) * most_s),
         likeness=pulled.likeness,
     )
 

@@ -14,11 +14,19 @@ from numpy.typing import NDArray
 
 from phone_host.recording.sight import QUANTITIES, Rates, Series, Sight, Times, rates_at
 
+Floats = NDArray[np.float64]
+
 LEAST_S: Final = 5.0
 """Least overlap: shorter ones fit by chance."""
 
+_CHANCE_NATS: Final = 25.0
+"""What the best of thousands of offsets reaches by chance: 16 coefficients give 8 on average."""
+
 _MARGIN_NATS: Final = 15.0
-"""The best offset must be better by this than any other."""
+"""The best offset must be better by this than chance, and than any other."""
+
+_RIVAL: Final = 0.75
+"""An offset with this share of the best one's evidence is another answer: what moves has nearly repeated itself."""
 
 _MOST_S: Final = 300.0
 """What of the one recording is looked for in the other: more would drift apart by more than a movement lasts."""
@@ -47,7 +55,7 @@ class Found:
 
     Attributes:
         offset_s: time of the first recording minus that of the second, for one moment, to a period.
-        nats: evidence for it over the next best.
+        nats: evidence for it over the next best, if as much of that overlapped.
     """
 
     offset_s: float
@@ -72,22 +80,22 @@ def search_offset(first: Sight, second: Sight, within_s: tuple[float, float] | N
             return unclear
     begin = _busiest(rates[1], round(_MOST_S / step_s))
     piece = slice(begin, begin + round(_MOST_S / step_s))
-    lags, nats = _evidence(
+    lags, nats, count = _evidence(
         rates[0], Rates(rates[1].values[piece], rates[1].slopes[piece], rates[1].known[piece]), step_s
     )
     offsets_s = grids[0][0] - grids[1][begin] + lags * step_s
     if within_s is not None:
         chosen = (offsets_s >= within_s[0] - step_s) & (offsets_s <= within_s[1] + step_s)
-        offsets_s, nats = offsets_s[chosen], nats[chosen]
-    return _decided(offsets_s, nats, step_s, is_bounded=within_s is not None)
+        offsets_s, nats, count = offsets_s[chosen], nats[chosen], count[chosen]
+    return _decided(offsets_s, nats, count)
 
 
 def _grid(sight: Sight, step_s: float) -> Times:
     return np.arange(sight.at_s[0], sight.at_s[-1], step_s, dtype=np.float64)
 
 
-def _spread(rates: Rates) -> NDArray[np.float64]:
-    spread: NDArray[np.float64] = rates.values[rates.known].std(axis=0)
+def _spread(rates: Rates) -> Floats:
+    spread: Floats = rates.values[rates.known].std(axis=0)
     return spread
 
 
@@ -100,16 +108,16 @@ def _busiest(rates: Rates, length: int) -> int:
     return int(np.argmax(summed[length:] - summed[:-length]))
 
 
-def _evidence(first: Rates, second: Rates, step_s: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the lags with enough overlap, ascending, and the evidence for each, nats."""
+def _evidence(first: Rates, second: Rates, step_s: float) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Return the lags with enough overlap, ascending, the evidence for each, nats, and how many moments overlap."""
     x, y = _scaled(first), _scaled(second)
     length = 1 << (len(x) + len(y)).bit_length()
     lags = np.arange(-len(y) + 1, len(x))
 
-    def spectra(series: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def spectra(series: Floats) -> NDArray[np.complex128]:
         return np.fft.rfft(series, length, axis=0)
 
-    def summed(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def summed(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> Floats:
         full = np.fft.irfft(one * other.conj(), length, axis=0)
         return full[lags % length]
 
@@ -119,7 +127,7 @@ def _evidence(first: Rates, second: Rates, step_s: float) -> tuple[NDArray[np.in
     enough = count * step_s >= LEAST_S
     lags, count = lags[enough], np.maximum(count, 1.0)[enough]
     if not len(lags):
-        return lags, np.empty(0)
+        return lags, np.empty(0), count
     mean_x = np.stack([summed(in_x[:, i], mask_y) for i in range(QUANTITIES)], axis=1) / count[:, None]
     mean_y = np.stack([summed(mask_x, in_y[:, i]) for i in range(QUANTITIES)], axis=1) / count[:, None]
     power_y = np.stack([summed(mask_x, squares_y[:, i]) for i in range(QUANTITIES)], axis=1) / count[:, None]
@@ -137,7 +145,7 @@ def _evidence(first: Rates, second: Rates, step_s: float) -> tuple[NDArray[np.in
     explained = (products * np.linalg.solve(squares, products)).sum(axis=1) / power_y
     independent = count[:, None] / _memory(x, y)
     nats = -0.5 * (independent * np.log1p(-np.clip(explained, 0.0, 0.999))).sum(axis=1)
-    return lags, np.asarray(nats)
+    return lags, np.asarray(nats), count
 
 
 def _scaled(rates: Rates) -> Series:
@@ -146,7 +154,7 @@ def _scaled(rates: Rates) -> Series:
     return np.asarray(values / np.maximum(_spread(rates), _NOTHING) * rates.known[:, None], np.float64)
 
 
-def _memory(x: Series, y: Series) -> NDArray[np.float64]:
+def _memory(x: Series, y: Series) -> Floats:
     """Return for each quantity of y over how many moments it and x remember, (4,): Bartlett's sum of both autocorrelations' products."""
     of_x, of_y = _autocorrelation(x), _autocorrelation(y)
     length = min(len(of_x), len(of_y))
@@ -161,22 +169,20 @@ def _autocorrelation(series: Series) -> Series:
     return np.asarray(full / np.maximum(full[0], _NOTHING))
 
 
-def _decided(offsets_s: Times, nats: NDArray[np.float64], step_s: float, *, is_bounded: bool) -> Found | Unclear:
-    """Return the best offset, if it is the only one."""
+def _decided(offsets_s: Times, nats: Floats, count: Floats) -> Found | Unclear:
+    """Return the best offset, if no other explains nearly as much of as many moments.
+
+    An offset at which less overlaps is no worse for that: what repeats itself would be joined where most of it overlaps.
+    """
     if not len(nats):
         return Unclear.STRANGE
     best = int(np.argmax(nats))
-    floor = float(nats[best]) - _MARGIN_NATS
-    if floor < (0.0 if is_bounded else float(np.median(nats))):
+    excess = (nats - _CHANCE_NATS) * (count[best] / count)
+    if excess[best] < _MARGIN_NATS:
         return Unclear.STRANGE
-    rivals = np.flatnonzero(nats > floor)
-    if np.abs(offsets_s[rivals] - offsets_s[best]).max() > LOBE_S / 2 + step_s:
-        return Unclear.REPEATED if _is_high(nats, best) else Unclear.STRANGE
+    rivals = np.flatnonzero(excess > min(_RIVAL * excess[best], excess[best] - _MARGIN_NATS))
+    near = int(rivals[-1] - rivals[0]) == len(rivals) - 1 and offsets_s[rivals[-1]] - offsets_s[rivals[0]] < LOBE_S
+    if not near:
+        return Unclear.REPEATED
     away = np.abs(offsets_s - offsets_s[best]) > LOBE_S
-    return Found(float(offsets_s[best]), float(nats[best] - (nats[away].max() if away.any() else 0.0)))
-
-
-def _is_high(nats: NDArray[np.float64], best: int) -> bool:
-    """Return whether the best offset stands far above chance, as its rivals do."""
-    spread = float(np.percentile(nats, 84) - np.median(nats))
-    return float(nats[best] - np.median(nats)) > 8 * max(spread, 1.0)
+    return Found(float(offsets_s[best]), float(excess[best] - (excess[away].max() if away.any() else 0.0)))

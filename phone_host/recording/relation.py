@@ -55,7 +55,7 @@ class Relation:
     Attributes:
         by: what told it.
         clock: the relation.
-        uncertainty_ns: half-width that holds the true offset at the reference in 95 %.
+        uncertainty_ns: half-width that holds the true offset in 95 %, where it is known worst.
         content: what was measured, if the content told it.
     """
 
@@ -108,7 +108,7 @@ def _by_content(board: Stream, host: Stream, known: ClockEstimate | None, advanc
     if isinstance(found, Unclear):
         raise _unclear(found, board, host)
     offset = fit_offset(first, second, found.offset_s)
-    uncertainty_ns = math.ceil(offset.uncertainty_s * 1e9)
+    uncertainty_ns = math.ceil(offset.worst_s * 1e9)
     if uncertainty_ns > _USABLE * max(period_ns(board.shown), period_ns(host.shown)):
         raise DataError(
             f"{board.name} and {host.name} tell their offset only to +-{uncertainty_ns / 1e6:.0f} ms",

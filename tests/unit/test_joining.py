@@ -220,6 +220,17 @@ def test_what_cannot_be_joined_is_refused_in_one_line(tmp_path: Path, films: tup
         assert not (tmp_path / "joined.mcap").exists()
 
 
+def test_a_movement_in_a_rhythm_is_refused(tmp_path: Path) -> None:
+    """It comes again every 2.5 s: both recordings fit at several offsets."""
+    lap = np.diff(hand(np.random.default_rng(9), 2.5), axis=0, prepend=0)
+    positions = np.cumsum(np.tile(lap, (6, 1)), axis=0)
+    eye = Eye(begin_s=0, end_s=14, rate_hz=12, missing=0)
+    shown = panned(np.random.default_rng(1), positions, eye)
+    host = _file(tmp_path / "host.mcap", shown, _host_about(), side="right")
+    with pytest.raises(DataError, match="repeats itself"):
+        _join([_board(tmp_path, shown), host], tmp_path)
+
+
 def test_a_board_that_said_hello_names_its_boot() -> None:
     """Its estimates carry it into the recording."""
     assert boot_of(HELLO) == "b1"

@@ -34,7 +34,7 @@ def _bring(switch: RecordingSwitch, number: int, image: bytes = payload(0)) -> N
     """A frame of each camera."""
     switch.board_frame(board_frame(number, image, now.monotonic_ns()))
     switch.own_frame(own_frame(number, image, now.monotonic_ns()))
-    switch.clock(None, 0)
+    switch.clock(None, "", 0)
 
 
 @contextmanager

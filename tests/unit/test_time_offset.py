@@ -101,6 +101,16 @@ def test_of_a_long_recording_the_busiest_piece_is_looked_for() -> None:
     assert abs(found.offset_s + 4) < 0.1
 
 
+def test_over_five_minutes_a_drift_is_followed_from_the_middle_outward() -> None:
+    """At 150 ppm the offset moves by 45 ms: more than a frame's period lies between both ends."""
+    chance = np.random.default_rng(7)
+    eyes = Eye(begin_s=0, end_s=300, rate_hz=20, offset_s=5, drift=150e-6), Eye(begin_s=0, end_s=300, rate_hz=20)
+    fitted = fit_offset(*_two(chance, hand(chance, 300), *eyes), 5 + 150 * 150e-6)
+    assert abs(fitted.offset_s - 5 - 150e-6 * fitted.at_s) < 2 * fitted.uncertainty_s < 0.005
+    assert abs(fitted.drift - 150e-6) < 2 * fitted.drift_uncertainty < 40e-6
+    assert fitted.uncertainty_s < fitted.worst_s < 0.01
+
+
 def test_images_tell_their_shift_and_light() -> None:
     """A camera that pans by 20 px/s over a wall: rates as they were; a spoiled image and one of the same moment are left out."""
     chance = np.random.default_rng(6)
