@@ -79,12 +79,15 @@ def noise_of(problem: RigProblem, state: BundleState, unknown: int) -> tuple[tup
         for errors, mean in zip(both, means, strict=True)
     )
     baseline = state.translation_m[:2] / max(float(np.linalg.norm(state.translation_m[:2])), np.finfo(float).tiny)
-    aside = (means[1] - means[0]) @ np.array([-baseline[1], baseline[0]])
+    ratio = float(
+        state.right.matrix[0, 0] / state.left.matrix[0, 0]
+    )  # in the right one's pixels: whatever the pose takes up drops out
+    aside = (means[1] - ratio * means[0]) @ np.array([-baseline[1], baseline[0]])
     seen = np.isfinite(aside)
     if seen.sum() < _LEAST_VIEWS:
         return (left, right), 0.0
     corners = [float(np.isfinite(errors[seen, :, 0]).sum(axis=1).mean()) for errors in both]
-    by_corners = left**2 / corners[0] + right**2 / corners[1]
+    by_corners = (ratio * left) ** 2 / corners[0] + right**2 / corners[1]
     shift = deviation_px(aside) ** 2 * seen.sum() / (seen.sum() - 1) - by_corners
     return (left, right), float(np.sqrt(max(shift, 0.0)))
 
