@@ -88,11 +88,11 @@ class Watched:
         off = values_of(true) - values_of(self.watch.overlay)
         return float(np.percentile(np.abs(self.model.everywhere() @ off), 95))
 
-    def raw_rows_px(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """Return the rows that the latest sightings say, all over the image, px, whether proven or not."""
+    def raw_rows_px(self) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], float]:
+        """Return the rows that the latest sightings say, all over the image, proven or not, and how well they are known, px."""
         assert self.model is not None
-        values = fit_rows(self.model, self.seen).values[:PARAMETERS]
-        return np.asarray(self.model.everywhere() @ values, np.float64)
+        fit, everywhere = fit_rows(self.model, self.seen), self.model.everywhere()
+        return np.asarray(everywhere @ fit.values[:PARAMETERS], np.float64), fit.rows_sigma_px(everywhere)
 
 
 def told(changes: Iterable[Change]) -> Iterator[str]:
