@@ -197,6 +197,7 @@ def _recipe(found: Data) -> str:
 
 
 def _corners(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
     for name, found in data["rows"].items():
         beside = ", ".join(f"{who}: {found[who]['rms_px']:.3f} px" for who in ("cornerSubPix", "sectors"))
         yield Figure(f"{name}: error of a corner, RMS", f"{found['ours']['rms_px']:.3f} px", beside)
