@@ -54,12 +54,13 @@ def covariance_of(problem: RigProblem, state: BundleState, free: NDArray[np.bool
     """
     chosen = np.ix_(free, free)
     information = problem.linearised(state).reduced(0.0, free)[0]
-    inverse = inverse_of(information)
     noise_px, shift_px = noise_of(problem, state, int(free.sum()) + 6 * len(problem.views))
     pulls = problem.scatter(state, noise_px, shift_px) + np.diag(problem.prior[1])
-    corners = np.zeros((GLOBALS, GLOBALS))
-    corners[chosen] = inverse @ pulls[chosen] @ inverse
-    return _with_scatter(corners, problem, state, information, free)
+    result = np.zeros((GLOBALS, GLOBALS))
+    if free.any():
+        moves = _left_out(problem, state, information, free)
+        result[chosen] = _covariance(inverse_of(information), pulls[chosen], moves)
+    return result
 
 
 def noise_of(problem: RigProblem, state: BundleState, unknown: int) -> tuple[tuple[float, float], float]:
@@ -89,7 +90,7 @@ def noise_of(problem: RigProblem, state: BundleState, unknown: int) -> tuple[tup
         return (left, right), 0.0
     corners = [float(np.isfinite(errors[seen, :, 0]).sum(axis=1).mean()) for errors in both]
     by_corners = (ratio * left) ** 2 / corners[0] + right**2 / corners[1]
-    shift = deviation_px(aside) ** 2 * seen.sum() / (seen.sum() - 1) - by_corners
+    shift = (aside[seen] ** 2).sum() / (seen.sum() - 1) - by_corners
     return (left, right), float(np.sqrt(max(shift, 0.0)))
 
 
@@ -99,41 +100,44 @@ def _means(errors: Vector) -> Vector:
     return np.asarray(np.where(count > 0, np.nansum(errors, axis=1) / np.maximum(count, 1), np.nan), np.float64)
 
 
-def _with_scatter(
-    corners: Vector, problem: RigProblem, state: BundleState, information: Vector, free: NDArray[np.bool_]
-) -> Vector:
-    """Return the covariance (30, 30) that the scatter from view to view shows, where it exceeds that of independent corners.
-
-    Errors of a view's corners hang together: a board that is not flat, blur, a detector's bias, a lens that the formula does not
-    quite meet. Then views disagree by more than their corners' scatter says. Each view in turn is left out (to first order),
-    and how far the parameters move shows their real covariance (the jackknife of B. Efron, "The Jackknife, the Bootstrap and
-    Other Resampling Plans", 1982). Some dozen views show it but roughly: in units of the corners' covariance, in which all
-    directions are alike, it is averaged with its own mean over the directions (O. Ledoit and M. Wolf, "A well-conditioned estimator
-    for large-dimensional covariance matrices", 2004), and no direction becomes better known than by the corners.
-
-    Args:
-        corners: (30, 30) the covariance that the corners' scatter gives.
-        problem: the views.
-        state: the optimum.
-        information: (F, F) of the free parameters, by the corners' weights.
-        free: (30,) which parameters are estimated.
-    """
-    count = len(problem.views)
-    if count < _JACKKNIFE_VIEWS or not free.any():
-        return corners
-    moves = np.zeros((count, int(free.sum())))
+def _left_out(problem: RigProblem, state: BundleState, information: Vector, free: NDArray[np.bool_]) -> Vector:
+    """Return how far the free parameters move if each view in turn is left out, to first order, (V, F)."""
+    moves = np.zeros((len(problem.views), len(information)))
     for index, (pull, known) in enumerate(zip(*problem.by_view(state), strict=True)):
         rest = information - known[np.ix_(free, free)]
         np.fill_diagonal(rest, np.maximum(np.diag(rest), _LEAST_LEFT * np.diag(information)))
         moves[index] = inverse_of(rest) @ pull[free]
-    sigmas = np.sqrt(np.maximum(np.diag(corners)[free], np.finfo(float).tiny))
-    values, axes = np.linalg.eigh(corners[np.ix_(free, free)] / np.outer(sigmas, sigmas))
-    root = axes * np.sqrt(np.maximum(values, _LEAST_LEFT**2))
-    whitened = (moves / sigmas) @ (axes / np.sqrt(np.maximum(values, _LEAST_LEFT**2)))
+    return moves
+
+
+def _covariance(inverse: Vector, pulls: Vector, moves: Vector) -> Vector:
+    """Return the covariance (F, F) that the noise leaves, enlarged where views scatter by more.
+
+    Errors of a view's corners hang together: a board that is not flat, blur, a detector's bias, a lens that the formula does not
+    quite meet. Then views disagree by more than the noise says. Each view in turn is left out,
+    and how far the parameters move shows their real covariance (the jackknife of B. Efron, "The Jackknife, the Bootstrap and
+    Other Resampling Plans", 1982). Some dozen views show it but roughly: in units of the noise's covariance, in which all
+    directions are alike, it is averaged with its own mean over the directions (O. Ledoit and M. Wolf, "A well-conditioned estimator
+    for large-dimensional covariance matrices", 2004), and no direction becomes better known than by the noise.
+
+    Args:
+        inverse: (F, F) of the information that the fit's weights give.
+        pulls: (F, F) covariance of what the views pull.
+        moves: (V, F) of the parameters, each view left out.
+    """
+    # Units in which the inverse is the unit matrix: there the noise is near it, too. Lenses whose terms nearly cancel leave no other way.
+    sigmas = np.sqrt(np.maximum(np.diag(inverse), np.finfo(float).tiny))
+    values, axes = np.linalg.eigh(inverse / np.outer(sigmas, sigmas))
+    lengths = np.sqrt(np.maximum(values, _LEAST_LEFT**2))
+    root, back = sigmas[:, np.newaxis] * axes * lengths, axes / lengths / sigmas[:, np.newaxis]
+    values, axes = np.linalg.eigh(root.T @ pulls @ root)
+    lengths = np.sqrt(np.maximum(values, _LEAST_LEFT))
+    root, count = root @ axes * lengths, len(moves)
+    if count < _JACKKNIFE_VIEWS:
+        return np.asarray(root @ root.T, np.float64)
+    whitened = moves @ back @ axes / lengths
     scatter = (count - 1) / count * whitened.T @ whitened
     scatter = (1 - _TO_MEAN) * scatter + _TO_MEAN * np.trace(scatter) / len(scatter) * np.eye(len(scatter))
     shares, directions = np.linalg.eigh(scatter)
-    spread = (root @ directions * np.sqrt(np.maximum(shares, 1.0))) * sigmas[:, np.newaxis]
-    result = np.zeros_like(corners)
-    result[np.ix_(free, free)] = spread @ spread.T
-    return result
+    spread = root @ directions * np.sqrt(np.maximum(shares, 1.0))
+    return np.asarray(spread @ spread.T, np.float64)

@@ -13,7 +13,7 @@ from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 
 _FREE = FreeParameters(Bend.USUAL.free(), Bend.USUAL.free())
-_NOISE_PX, _SHIFT_PX, _VIEWS, _SERIES = 0.009, 0.02, 10, 12
+_NOISE_PX, _SHIFT_PX, _VIEWS, _SERIES = 0.011, 0.02, 10, 12
 """Live views of rendered rigs: so well are corners found, so far does a hand move between the two exposures."""
 
 

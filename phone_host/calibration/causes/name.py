@@ -97,7 +97,7 @@ def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Finding
         or _in_a_mirror(series)
         or _spoiled(series)
         or _exchanged(series, found)
-        or _placed(series, found)
+        or placed(series, found)
         or _swapped(found)
         or _stretched(series)
         or _other_baseline(series, found, _BASELINE_FAR_OFF)
@@ -189,8 +189,8 @@ def _numbers_apart(wrong: list[tuple[str, str]]) -> int:
     return usual if apart.count(usual) >= _SHIFTED_SHARE * len(wrong) else 0
 
 
-def _placed(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
-    """Name a turned or mirrored side; who knows the options given writes the sentence."""
+def placed(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+    """Name a turned or mirrored side; who knows the options given writes the sentence. Arguments as those of `name_mistake`."""
     wrong = misplaced(list(series.pairs), series.board, series.sizes_px, found)
     if wrong is None:
         return None
