@@ -22,7 +22,7 @@ _MEDIAN_TO_SIGMA: Final = 1.4826
 
 _LEAST_NOISE_PX: Final = 0.01
 """Corners of good pictures scatter by 0.005 to 0.01 px (docs/decisions/0053), and some of what they are off by is alike in all views: no scatter shows it. Ten
-rendered rigs lay inside their 95 % with 91 % of their parameters at 0.003, with 94 % at this."""
+rendered rigs lie inside their 95 % with 91 % of their parameters at 0.003, with 92.5 % at this."""
 
 _LEAST_VIEWS: Final = 3
 """From two, the turn of the cameras takes up half of what they lie aside."""
