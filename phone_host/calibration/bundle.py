@@ -23,8 +23,9 @@ from phone_host.calibration.bundle_problem import (
     errors_of,
     project_view,
 )
+from phone_host.calibration.scatter import covariance_of, deviation_px
 from phone_host.geometry.rig_pixels import LEFT, RIGHT
-from phone_host.geometry.schur import inverse_of, minimise
+from phone_host.geometry.schur import minimise
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Lens, Rig
 
@@ -46,15 +47,11 @@ __all__ = [
 
 _MOST_PASSES = 4  # each has a noise estimate that the outliers of the one before no longer inflate
 _SAME_NOISE = 0.002  # relative change of the noise estimate below which another pass changes nothing
-# With fewer, leaving one out leaves too little. With 5 to 7 views of hand-held boards depth erred by 1.3 to 1.6 of what independent
-# corners say, and by 0.9 of what the jackknife says.
-_JACKKNIFE_VIEWS = 5
-_LEAST_LEFT = 1e-6  # share of what all views know that is left without one: rounding must not make it negative
-_TO_MEAN = 0.5  # how far a scatter that a dozen views show is drawn to its mean
 ROUGHLY = 1e-5
 """Relative decrease of the cost at which a search may end whose result is only compared."""
-_MEDIAN_TO_SIGMA = 1.4826  # turns a median of absolute values into a standard deviation (Gaussian)
-_LEAST_SIGMA_PX = 0.02  # no corner detector is better; with a test's exact corners this keeps the cost quadratic
+# A view's corners err together by about as much, whatever the detector: smaller weights would let one camera's lucky corners, and Huber's limit,
+# rule. Also, with a test's exact corners it keeps the cost quadratic. What is stated does not know it (`scatter.py`).
+_LEAST_SIGMA_PX = 0.02
 # Where the views do not determine the principal point (all boards parallel), this prior keeps it near the middle: a
 # tenth of the image width, ten times more than lenses are off. Views that do determine it outweigh the prior
 # ten-thousandfold.
@@ -158,16 +155,12 @@ def adjust(views: list[BundleView], points_m: Vector, start: BundleState, free: 
         problem = _problem(views, points_m, state, prior)
         if np.allclose(problem.sigmas_px, before, rtol=_SAME_NOISE, atol=0):
             break
-    system = problem.linearised(state)
-    unknown = int(flags.sum()) + 6 * len(views)
-    corners = system.covariance(flags) * problem.count(state) / max(problem.count(state) - unknown, 1)
-    information = system.reduced(0.0, flags)[0]
     left, right = errors_of(views, points_m, state)
     return BundleResult(
         state=state,
         left_errors_px=left,
         right_errors_px=right,
-        covariance=_with_scatter(corners, problem, state, information, flags),
+        covariance=covariance_of(problem, state, flags),
     )
 
 
@@ -217,50 +210,9 @@ def _problem(views: list[BundleView], points_m: Vector, state: BundleState, prio
     return RigProblem(views, points_m, prior, (sigmas[0], sigmas[1]))
 
 
-def _with_scatter(
-    corners: Vector, problem: RigProblem, state: BundleState, information: Vector, free: NDArray[np.bool_]
-) -> Vector:
-    """Return the covariance (30, 30) that the scatter from view to view shows, where it exceeds that of independent corners.
-
-    Errors of a view's corners hang together: a board that is not flat, blur, a detector's bias, a lens that the formula does not
-    quite meet. Then views disagree by more than their corners' scatter says. Each view in turn is left out (to first order),
-    and how far the parameters move shows their real covariance (the jackknife of B. Efron, "The Jackknife, the Bootstrap and
-    Other Resampling Plans", 1982). Some dozen views show it but roughly: in units of the corners' covariance, in which all
-    directions are alike, it is averaged with its own mean over the directions (O. Ledoit and M. Wolf, "A well-conditioned estimator
-    for large-dimensional covariance matrices", 2004), and no direction becomes better known than by the corners.
-
-    Args:
-        corners: (30, 30) the covariance that the corners' scatter gives.
-        problem: the views.
-        state: the optimum.
-        information: (F, F) the inverse of it for the free parameters, before the degrees of freedom are counted.
-        free: (30,) which parameters are estimated.
-    """
-    count = len(problem.views)
-    if count < _JACKKNIFE_VIEWS or not free.any():
-        return corners
-    moves = np.zeros((count, int(free.sum())))
-    for index, (pull, known) in enumerate(zip(*problem.by_view(state), strict=True)):
-        rest = information - known[np.ix_(free, free)]
-        np.fill_diagonal(rest, np.maximum(np.diag(rest), _LEAST_LEFT * np.diag(information)))
-        moves[index] = inverse_of(rest) @ pull[free]
-    sigmas = np.sqrt(np.maximum(np.diag(corners)[free], np.finfo(float).tiny))
-    values, axes = np.linalg.eigh(corners[np.ix_(free, free)] / np.outer(sigmas, sigmas))
-    root = axes * np.sqrt(np.maximum(values, _LEAST_LEFT**2))
-    whitened = (moves / sigmas) @ (axes / np.sqrt(np.maximum(values, _LEAST_LEFT**2)))
-    scatter = (count - 1) / count * whitened.T @ whitened
-    scatter = (1 - _TO_MEAN) * scatter + _TO_MEAN * np.trace(scatter) / len(scatter) * np.eye(len(scatter))
-    shares, directions = np.linalg.eigh(scatter)
-    spread = (root @ directions * np.sqrt(np.maximum(shares, 1.0))) * sigmas[:, np.newaxis]
-    result = np.zeros_like(corners)
-    result[np.ix_(free, free)] = spread @ spread.T
-    return result
-
-
 def _sigma_px(errors: Vector) -> float:
-    """Return the robust standard deviation of one coordinate, px."""
-    seen = np.abs(errors[np.isfinite(errors)])
-    return max(float(np.median(seen)) * _MEDIAN_TO_SIGMA, _LEAST_SIGMA_PX) if seen.size else 1.0
+    """Return the robust standard deviation of one coordinate for the corners' weights, px."""
+    return max(deviation_px(errors), _LEAST_SIGMA_PX)
 
 
 def _prior(state: BundleState) -> tuple[Vector, Vector]:

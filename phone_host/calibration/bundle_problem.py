@@ -21,6 +21,9 @@ Vector = NDArray[np.float64]
 
 GLOBALS: Final = RIG_PARAMETERS
 
+_Side = tuple[NDArray[np.intp], Vector, Vector, Vector]
+"""What one side's corners say; see `RigProblem._sides`."""
+
 HUBER_SIGMAS: Final = 2.5
 """Huber's threshold in standard deviations: Gaussian noise loses 1 % of its information."""
 
@@ -164,14 +167,13 @@ class RigProblem:
         """Linearise at a state."""
         count = len(self.views)
         shared, right = np.diag(self.prior[1]), self.prior[1] * (self.prior[0] - globals_of(state))
-        coupling, blocks, blocks_right = np.zeros((count, GLOBALS, 6)), np.zeros((count, 6, 6)), np.zeros((count, 6))
-        for at, by_shared, by_pose, errors in self._sides(state):
+        sides, blocks_right = self._sides(state), np.zeros((count, 6))
+        coupling, blocks = _of_poses(sides)
+        for at, by_shared, by_pose, errors in sides:
             turned = np.swapaxes(by_shared, 1, 2)
             # View by view: the products stay too small for the linear algebra library to wake its threads.
             shared[np.ix_(at, at)] += (turned @ by_shared).sum(axis=0)
             right[at] += (turned @ errors[..., np.newaxis]).sum(axis=0)[:, 0]
-            coupling[:, at] += turned @ by_pose
-            blocks += np.swapaxes(by_pose, 1, 2) @ by_pose
             blocks_right += (np.swapaxes(by_pose, 1, 2) @ errors[..., np.newaxis])[..., 0]
         return NormalEquations(
             shared=shared, coupling=coupling, blocks=blocks, shared_right=right, blocks_right=blocks_right
@@ -183,23 +185,44 @@ class RigProblem:
         Returns:
             (V, 30) how it pulls at them, in all 0 at the optimum (but for the prior); (V, 30, 30) what it knows of them.
         """
-        count = len(self.views)
+        count, sides = len(self.views), self._sides(state)
         pulls, known = np.zeros((count, GLOBALS)), np.zeros((count, GLOBALS, GLOBALS))
-        coupling, blocks = np.zeros((count, GLOBALS, 6)), np.zeros((count, 6, 6))
-        for at, by_shared, by_pose, errors in self._sides(state):
+        coupling, blocks = _of_poses(sides)
+        for at, by_shared, _, errors in sides:
             turned = np.swapaxes(by_shared, 1, 2)
             pulls[:, at] += (turned @ errors[..., np.newaxis])[..., 0]
             known[np.ix_(np.arange(count), at, at)] += turned @ by_shared
-            coupling[:, at] += turned @ by_pose
-            blocks += np.swapaxes(by_pose, 1, 2) @ by_pose
         return pulls, known - eliminated(coupling, blocks, np.zeros((count, 6)))[0]
+
+    def scatter(self, state: BundleState, noise_px: tuple[float, float], shift_px: float) -> Vector:
+        """Return the covariance (30, 30) of what all views together pull at the shared parameters, poses eliminated.
+
+        Args:
+            state: the optimum.
+            noise_px: standard deviation of one coordinate of a corner, left and right, each corner on its own.
+            shift_px: standard deviation of one coordinate by which all of a view's right corners lie aside together.
+        """
+        sides, result = self._sides(state), np.zeros((GLOBALS, GLOBALS))
+        coupling, blocks = _of_poses(sides)
+        back = np.linalg.inv(blocks) @ np.swapaxes(coupling, 1, 2)
+        for at, by_shared, by_pose, _ in sides:
+            own = -by_pose @ back
+            own[:, :, at] += by_shared
+            side = int(at[0] == RIGHT.start)
+            result += (noise_px[side] / self.sigmas_px[side]) ** 2 * (np.swapaxes(own, 1, 2) @ own).sum(axis=0)
+            if side:
+                errors = errors_of(self.views, self.points_m, state)[side]
+                by_corner = own.reshape(*errors.shape, GLOBALS) * _weights(errors, self.sigmas_px[side])
+                together = by_corner.sum(axis=1).reshape(-1, GLOBALS)
+                result += shift_px**2 * together.T @ together
+        return result
 
     def _measured(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         left = np.isfinite(np.array([view.left_px for view in self.views])).all(axis=2)
         right = np.isfinite(np.array([view.right_px for view in self.views])).all(axis=2)
         return left, right
 
-    def _sides(self, state: BundleState) -> list[tuple[NDArray[np.intp], Vector, Vector, Vector]]:
+    def _sides(self, state: BundleState) -> list[_Side]:
         """Return, for each side that sees anything, what its corners say.
 
         Each item: which shared parameters it depends on (S,), the weighed derivatives by them (V, 2N, S) and by the poses
@@ -238,6 +261,16 @@ class RigProblem:
                 )
             )
         return sides
+
+
+def _of_poses(sides: list[_Side]) -> tuple[Vector, Vector]:
+    """Return the normal equations' parts of the poses: (V, 30, 6) with the shared parameters, (V, 6, 6) their own."""
+    count = len(sides[0][1])
+    coupling, blocks = np.zeros((count, GLOBALS, 6)), np.zeros((count, 6, 6))
+    for at, by_shared, by_pose, _ in sides:
+        coupling[:, at] += np.swapaxes(by_shared, 1, 2) @ by_pose
+        blocks += np.swapaxes(by_pose, 1, 2) @ by_pose
+    return coupling, blocks
 
 
 def _weights(errors: Vector, sigma_px: float) -> Vector:

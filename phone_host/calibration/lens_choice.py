@@ -68,13 +68,14 @@ def choose_lens(
         points_m: (N, 3) corners in the board's axes.
         model: the camera as far as it is known.
         poses: (V, 6) of the boards in its axes.
-        at_least: the formula that is already needed: no simpler one is tried.
+        at_least: the formula that is already needed: no simpler one is tried. (A fisheye may have been needed for the other camera's sake: a rational lens is
+            tried as well.)
 
     Returns:
         The chosen formula, and all that were tried. Too few views for any choice: the formula that is needed, untried.
     """
     order = list(_LEAST_VIEWS)
-    wanted = [at_least] if at_least in {Bend.FISHEYE, Bend.RATIONAL} else order[order.index(at_least) :]
+    wanted = order[order.index(at_least) :]
     trials = list[LensTrial]()
     for bend in wanted:
         if len(views) >= _LEAST_VIEWS[bend]:

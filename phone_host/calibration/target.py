@@ -40,8 +40,10 @@ _SECTORS: Final = (
 )
 # Noise and moire can hide squares at full size that are visible at half size.
 _SMALLER = 0.5
-# Photographs (12 MPx) are searched in a pyramid. A board in the middle of a room is found at the second size.
+# Photographs (12 MPx) are searched in a pyramid. A board in the middle of a room is found by the second search, or at the second size.
 _LARGEST_SEARCHED_PX = 1600
+# The outlines of a whole room at 1600 px take half a second, and 74 small boards in it showed none that the sectors miss.
+_PHOTO_OUTLINES_PX = 800
 _PHOTO_SECTORS = (
     (800, cv2.CALIB_CB_NORMALIZE_IMAGE),
     (800, 0),
@@ -183,10 +185,9 @@ def _search(grey: Image, board: Board) -> Corners:
     largest = max(grey.shape)
     is_photo = largest > _LARGEST_SEARCHED_PX
     size = board.columns, board.rows
-    for scale in [each / largest for each in (800, 1600)] if is_photo else [1.0]:
-        corners = _by_outlines(grey, *shrunk(grey, scale), board)
-        if len(corners):
-            return corners
+    corners = _by_outlines(grey, *shrunk(grey, _PHOTO_OUTLINES_PX / largest if is_photo else 1.0), board)
+    if len(corners):
+        return corners
     ways = [(side / largest, way) for side, way in _PHOTO_SECTORS]
     for scale, way in ways if is_photo else [(scale, way) for scale in (1.0, _SMALLER) for way in _SECTORS]:
         searched, factors = shrunk(grey, scale)

@@ -90,12 +90,6 @@ class NormalEquations:
         step[free] = solved(matrix, right)
         return step, np.einsum("vij,vj->vi", inverse, self.blocks_right - np.einsum("vij,i->vj", self.coupling, step))
 
-    def covariance(self, free: Flags) -> Floats:
-        """Return the (G, G) covariance of the shared parameters, 0 for those that are not free, if the residuals have variance 1."""
-        result = np.zeros(self.shared.shape)
-        result[np.ix_(free, free)] = inverse_of(self.reduced(0.0, free)[0])
-        return result
-
 
 def _product(one: Floats, other: Floats) -> Floats:
     """Return one @ other.T, (G, G), of two wide matrices (G, K), in tiles: too small for the linear algebra library to wake its threads.

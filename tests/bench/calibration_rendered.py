@@ -18,6 +18,8 @@ from phone_host.geometry.lens import parameters_of, project
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
 from phone_host.model import CameraModel, Image, Lens, Rig
 from tests.bench.calibration_render import render
+from tests.support.fisheyes import BOARD as FISHEYES_BOARD
+from tests.support.fisheyes import RIGHT_M, fisheye, fisheye_pairs
 
 BOARD: Final = Board(11, 8, 0.022)
 """Fills an A4 sheet."""
@@ -151,16 +153,18 @@ def rendered_pairs(rig: Rig, seed: int) -> list[BoardPair]:
     return pairs
 
 
-def compared(seed: int, rig: Rig, pairs: list[BoardPair]) -> RenderedResult:
+def compared(seed: int, rig: Rig, pairs: list[BoardPair], board: Board = BOARD, name: str = "") -> RenderedResult:
     """Calibrate and compare with the truth.
 
     Args:
         seed: names the rig.
         rig: the truth.
         pairs: what was found in its images.
+        board: what they show.
+        name: of the rig; empty: its seed.
     """
     sizes = ((rig.left.width_px, rig.left.height_px), (rig.right.width_px, rig.right.height_px))
-    found = calibrate(pairs, BOARD, sizes)
+    found = calibrate(pairs, board, sizes)
     made = found.rig
     focal = [
         abs(model.matrix[i, i] / truth.matrix[i, i] - 1)
@@ -171,7 +175,7 @@ def compared(seed: int, rig: Rig, pairs: list[BoardPair]) -> RenderedResult:
     turn = vectors_of(made.R_right_left @ rig.R_right_left.T)
     kinds = zip((rig.left, rig.right), (made.left, made.right), found.bends, strict=True)
     return RenderedResult(
-        name=str(seed),
+        name=name or str(seed),
         lenses=", ".join(f"{truth.lens.value}>{model.lens.value}{bend.terms}" for truth, model, bend in kinds),
         views=len(found.used),
         focal_share=float(max(focal)),
@@ -207,6 +211,20 @@ def _shared(truth: CameraModel, bend: Bend) -> NDArray[np.bool_]:
     is_fisheye = Lens.FISHEYE in {truth.lens, bend.lens}
     same = truth.lens is bend.lens if is_fisheye else bend.terms >= _TRUE_TERMS[truth.lens]
     return np.arange(12) < (12 if same else 4)
+
+
+def fisheyes_result(across_deg: float, seed: int) -> RenderedResult:
+    """Calibrate two alike fisheyes from exact corners with noise, up to the edge of what they see (`tests/support/fisheyes.py`), and compare.
+
+    Args:
+        across_deg: angle that the images' width covers.
+        seed: of the boards.
+    """
+    camera = fisheye(across_deg)
+    rig = Rig(left=camera, right=camera, R_right_left=np.eye(3), t_right_left_m=RIGHT_M)
+    return compared(
+        seed, rig, fisheye_pairs(camera, camera, seed), FISHEYES_BOARD, f"two of {across_deg:g} degrees, {seed}"
+    )
 
 
 def rendered_result(seed: int) -> RenderedResult:

@@ -197,6 +197,7 @@ def _recipe(found: Data) -> str:
 
 
 def _corners(data: Data) -> Iterator[Figure]:
+    yield from _verdicts(data)
     for name, found in data["rows"].items():
         beside = ", ".join(f"{who}: {found[who]['rms_px']:.3f} px" for who in ("cornerSubPix", "sectors"))
         yield Figure(f"{name}: error of a corner, RMS", f"{found['ours']['rms_px']:.3f} px", beside)
@@ -329,6 +330,7 @@ SOURCES: Final = (
     Source("browser", Topic.PAGE, "Stamps of a browser's camera against the moment at which Chromium's fake camera read the image from its file.", f"{_BENCH}bench_browser --json", _verdicts, 150),
     Source("capture", Topic.CALIBRATION, "Films with and without stabilisation, told apart.", f"{_BENCH}bench_capture --json", _verdicts, 300),
     Source("measure", Topic.DEPTH, "Points of rendered rooms, measured as `phone-host measure` does: does the truth lie within what is stated?", f"{_BENCH}bench_measure --json", _verdicts, 300),
+    Source("quality", Topic.DEPTH, "A rendered wall, measured as `phone-host quality` does, beside what the exact disparity and depth of every pixel give.", f"{_BENCH}bench_quality --json", _verdicts, 60),
     Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),
     Source("serial", Topic.LINKS, "Serial lines: a pseudo terminal, and emulated slow cables.", f"{_BENCH}bench_serial --runs 2 --seconds 10 --json", _serial, 80),
     Source("switches", Topic.LINKS, "The better of two links is lost and comes back.", f"{_BENCH}bench_links --losses 2 --json", _switches, 70),

@@ -16,7 +16,7 @@ from phone_host.calibration.arrangement import turned_corners
 from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.board_views import look_for_boards
 from phone_host.calibration.calibrate import Sizes, calibrate
-from phone_host.calibration.causes.mistakes import Finding, Mistake
+from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.target import Board, agree, find_corners
 from phone_host.model import Image
 from phone_host.stereo.view_files import pair_files
@@ -181,10 +181,24 @@ def _lit(image: Image, board: Board) -> Image:
     return lit(image, (float(x), float(y)), 0.2 * float(np.ptp(corners, axis=0).max()))
 
 
-def named_real_series() -> Iterator[tuple[str, Mistake | None, Finding | None]]:
-    """Give each real series's name, the mistake made and what is named; nothing without $SCAN_DATA."""
+@dataclass(frozen=True, slots=True)
+class RealNamed:
+    """What was named of a real series: the series, what was done to it, the mistake that is (None: none was made), the one named, and its sentence."""
+
+    series: str
+    what: str
+    made: Mistake | None
+    named: Mistake | None
+    sentence: str
+
+
+def named_real_series() -> Iterator[RealNamed]:
+    """Judge each real series as it is and with each mistake; nothing without $SCAN_DATA."""
     if not os.environ.get("SCAN_DATA"):
         return
     for name in REAL:
         for what, mistake, made in variants(name):
-            yield f"{name}, {what}", mistake, finding_of(made)
+            found = finding_of(made)
+            yield RealNamed(
+                name, what, mistake, None if found is None else found.mistake, "" if found is None else found.sentence
+            )

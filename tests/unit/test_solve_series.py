@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from common.orientation import UPRIGHT
+from common.orientation import UPRIGHT, Flip, Orientation
+from phone_host.calibration.arrangement import turned_corners
 from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.board_views import BoardViews
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.causes.mistakes import Course
+from phone_host.calibration.causes.mistakes import Course, Mistake
 from phone_host.calibration.verdict import Verdict, judge
 from phone_host.geometry.se3 import vectors_of
 from phone_host.model import Rig, Side
@@ -118,3 +119,25 @@ def test_pictures_from_folders_are_judged_as_live_ones(verdict: Verdict, *, pose
     assert isinstance(judged, Judged)
     assert judged.judgement.verdict is verdict
     assert ("no board was seen in the" in judged.judgement.remedy) is (verdict is Verdict.USABLE)
+
+
+def test_mirrored_new_pictures_are_named_so_beside_earlier_ones(tmp_path: Path) -> None:
+    """Seven pictures, then four with --from whose right camera mirrors: they are named mirrored, not as of another moment."""
+    pairs, found = _good()
+    earlier = _from_file(
+        Solved(
+            views=BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=_SIZES), seen=pairs, pairs=pairs, found=found
+        ),
+        tmp_path,
+    )
+    later = exact_pairs(unlike_rig(), poses(4, seed=9), noise_px=0.02)
+    mirrored = [
+        replace(pair, right_px=turned_corners(pair.right_px, _SIZES[1], Orientation(0, Flip.H), BOARD))
+        for pair in later
+    ]
+    finding = _solved(earlier, mirrored).finding
+    assert finding is not None
+    assert finding.mistake is Mistake.MIRRORED
+    assert finding.misplaced is not None
+    assert finding.misplaced.side is Side.RIGHT
+    assert finding.misplaced.is_mirrored

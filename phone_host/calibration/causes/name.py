@@ -47,6 +47,9 @@ _LARGEST_BOARD_M, _SMALLEST_BOARD_M = 2.0, 0.03
 BASELINE_OFF: Final = 0.03
 """A ruler between two lenses is off by less."""
 
+_BASELINE_FAR_OFF: Final = 0.1
+"""From here on it is told before all that makes views deviate: that scatters to both sides, and costs less than such a scale."""
+
 _STRETCHED: Final = 0.01
 """Pixels of all usual cameras are square to 0.1 %, and so are prints to scale."""
 
@@ -94,11 +97,13 @@ def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Finding
         or _in_a_mirror(series)
         or _spoiled(series)
         or _exchanged(series, found)
-        or _placed(series, found)
+        or placed(series, found)
         or _swapped(found)
         or _stretched(series)
+        or _other_baseline(series, found, _BASELINE_FAR_OFF)
         or _deviating(series, found)
-        or _other_square(series, found)
+        or _other_baseline(series, found, BASELINE_OFF)
+        or _upright_stretch(found)
         or (None if isinstance(found, DataError) else bent(found, series.board))
     )
 
@@ -184,8 +189,8 @@ def _numbers_apart(wrong: list[tuple[str, str]]) -> int:
     return usual if apart.count(usual) >= _SHIFTED_SHARE * len(wrong) else 0
 
 
-def _placed(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
-    """Name a turned or mirrored side; who knows the options given writes the sentence."""
+def placed(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+    """Name a turned or mirrored side; who knows the options given writes the sentence. Arguments as those of `name_mistake`."""
     wrong = misplaced(list(series.pairs), series.board, series.sizes_px, found)
     if wrong is None:
         return None
@@ -238,30 +243,35 @@ def _absurd_square(series: BoardSeries) -> Finding | None:
     )
 
 
-def _other_square(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
-    """Name a square that cannot be as long as --square says, or that is no square."""
+def _other_baseline(series: BoardSeries, found: Calibration | DataError, off_share: float) -> Finding | None:
+    """Name a square that cannot be as long as --square says, because the user measured a distance of the cameras that is off by such a share."""
     board = series.board
     if isinstance(found, DataError):
         return None
     baseline_m = float(np.linalg.norm(found.rig.t_right_left_m))
     factor = series.baseline_m / baseline_m
     sigma = 3 * found.baseline_sigma_m / baseline_m if math.isfinite(found.baseline_sigma_m) else 0.0
-    if math.isfinite(factor) and abs(factor - 1) > BASELINE_OFF + sigma:
-        return Finding(
-            mistake=Mistake.SQUARE,
-            sentence=(
-                f"the cameras would be {baseline_m * 1e3:.1f} mm apart, and you measured {series.baseline_m * 1e3:.1f} mm:"
-                f" squares of {board.square_m * factor * 1e3:.2f} mm would fit, --square says {board.square_m * 1e3:g} mm"
-            ),
-            remedy="measure ten squares together with a ruler",
-            most=Verdict.REJECT,
-        )
-    # All boards upright: the lenses take the stretch, both the same.
+    if not math.isfinite(factor) or abs(factor - 1) <= off_share + sigma:
+        return None
+    return Finding(
+        mistake=Mistake.SQUARE,
+        sentence=(
+            f"the cameras would be {baseline_m * 1e3:.1f} mm apart, and you measured {series.baseline_m * 1e3:.1f} mm:"
+            f" squares of {board.square_m * factor * 1e3:.2f} mm would fit, --square says {board.square_m * 1e3:g} mm"
+        ),
+        remedy="measure ten squares together with a ruler",
+        most=Verdict.REJECT,
+    )
+
+
+def _upright_stretch(found: Calibration | DataError) -> Finding | None:
+    """Name squares that are no squares of boards that were all held upright: the lenses take the stretch, both the same."""
+    if isinstance(found, DataError):
+        return None
     left, right = (lens.matrix[0, 0] / lens.matrix[1, 1] - 1 for lens in (found.rig.left, found.rig.right))
     stretch = float(left + right) / 2
-    if abs(stretch) > _STRETCHED and abs(left - right) < _ALIKE * abs(stretch):
-        return _no_squares(stretch)
-    return None
+    is_stretched = abs(stretch) > _STRETCHED and abs(left - right) < _ALIKE * abs(stretch)
+    return _no_squares(stretch) if is_stretched else None
 
 
 def _stretched(series: BoardSeries) -> Finding | None:

@@ -1,13 +1,14 @@
 """From the board in the pictures to a rig: with the pairs of an earlier calibration, and without a drift of the cameras."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from common.errors import DataError
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.board_views import BoardViews
+from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.mistakes import Course, Finding
-from phone_host.calibration.causes.name import BoardSeries, name_mistake
+from phone_host.calibration.causes.name import BoardSeries, name_mistake, placed
 from phone_host.calibration.causes.unturned import unturned
 from phone_host.calibration.out_of_step import out_of_step
 from phone_host.verbs.calibrate.earlier import Series, calibrated, every_pair
@@ -60,7 +61,9 @@ def solve_series(series: Series, views: BoardViews, baseline_m: float, say: Call
     taken = BoardSeries(
         pairs=tuple(seen), board=series.board, sizes_px=sizes_px, looks=views.looks, baseline_m=baseline_m
     )
-    finding = name_mistake(taken, found)
+    finding = _of_the_new(taken, seen[0 if series.views is None else len(series.views.names) :], found) or name_mistake(
+        taken, found
+    )
     straight = _straightened(seen, finding)
     try:
         without = calibrated(series, straight, sizes_px) if straight is not seen else found
@@ -70,6 +73,20 @@ def solve_series(series: Series, views: BoardViews, baseline_m: float, say: Call
         without = found  # no better
     pairs = seen if without is found else straight
     return Solved(views=views, seen=seen, pairs=pairs, found=without, finding=finding)
+
+
+def _of_the_new(taken: BoardSeries, later: list[BoardPair], found: Calibration | DataError) -> Finding | None:
+    """Name how the new pictures hang, if most of them do not fit those of an earlier calibration: together, they only look as if of two moments."""
+    names = {pair.name for pair in later}
+    fit = 0 if isinstance(found, DataError) else sum(used.name in names for used in found.used)
+    if len(later) == len(taken.pairs) or 2 * fit > len(later):
+        return None
+    alone: Calibration | DataError
+    try:
+        alone = calibrate(later, taken.board, taken.sizes_px)
+    except DataError as failure:
+        alone = failure
+    return placed(replace(taken, pairs=tuple(later)), alone)
 
 
 def _straightened(pairs: list[BoardPair], finding: Finding | None) -> list[BoardPair]:
