@@ -1,0 +1,56 @@
+"""One pair as the scan takes it: the rectified left image, its depth, and how sure that is. Pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import Image, StereoGeometry
+
+Depth = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class View:
+    """What one pair shows.
+
+    A depth camera is one, too: its baseline and disparity noise are those of its projector.
+
+    Attributes:
+        grey: (H, W) uint8, the rectified left image.
+        colours: (H, W, 3) BGR uint8, the same.
+        depth_m: (H, W) float32, m, NaN = none.
+        geometry: of the rectified pair.
+        noise_px: standard deviation of a disparity, px, > 0.
+    """
+
+    grey: Image
+    colours: Image
+    depth_m: Depth
+    geometry: StereoGeometry
+    noise_px: float
+
+    @property
+    def noise_per_m(self) -> float:
+        """Standard deviation of the depth 1 m away, m; it grows with the depth squared."""
+        return self.noise_px / (self.geometry.focal_px * self.geometry.baseline_m)
+
+
+def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeometry]:
+    """Take every second depth of every second row, so that none is mixed across an edge.
+
+    Args:
+        depth_m: (H, W) float32, m.
+        geometry: of the pair.
+
+    Returns:
+        ((H + 1) // 2, (W + 1) // 2) depths, packed, and the geometry of their pixels.
+    """
+    half = StereoGeometry(
+        focal_px=geometry.focal_px / 2,
+        baseline_m=geometry.baseline_m,
+        cx_px=geometry.cx_px / 2,
+        cy_px=geometry.cy_px / 2,
+        doffs_px=geometry.doffs_px / 2,
+    )
+    return np.ascontiguousarray(depth_m[::2, ::2]), half
