@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.geometry.se3 import SE3
 from phone_host.model import Image, StereoGeometry
 
 Depth = NDArray[np.float32]
@@ -34,6 +35,21 @@ class View:
     def noise_per_m(self) -> float:
         """Standard deviation of the depth 1 m away, m; it grows with the depth squared."""
         return self.noise_px / (self.geometry.focal_px * self.geometry.baseline_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A camera at a place.
+
+    Attributes:
+        geometry: of its images.
+        shape: height and width of these, px.
+        world_camera: where it is.
+    """
+
+    geometry: StereoGeometry
+    shape: tuple[int, int]
+    world_camera: SE3
 
 
 def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeometry]:

@@ -11,7 +11,7 @@ from phone_host.scan.odometry import Odometry, OdometrySettings
 from phone_host.scan.sightings import Sighting, by_motion
 from phone_host.scan.view import halved
 from phone_host.scan.window import Keyframe, fitted
-from tests.support.plane_films import path, plane_view, texture
+from tests.support.plane_films import distance, path, plane_view, texture
 
 GEOMETRY = StereoGeometry(focal_px=300.0, baseline_m=0.12, cx_px=159.5, cy_px=119.5, doffs_px=2.0)
 SIGHTING = Sighting(GEOMETRY, 0.3)
@@ -23,12 +23,6 @@ def points(count: int, seed: int = 3) -> np.ndarray:
     random = np.random.default_rng(seed)
     depth = random.uniform(1, 6, count)
     return np.column_stack([random.uniform(-0.4, 0.4, count) * depth, random.uniform(-0.3, 0.3, count) * depth, depth])
-
-
-def distance(one: SE3, other: SE3) -> np.ndarray:
-    """Turn, rad, and shift, m, between two poses."""
-    difference = (one.inverse() @ other).pose()
-    return np.array([np.linalg.norm(difference[:3]), np.linalg.norm(difference[3:])])
 
 
 def test_a_sighting_puts_a_point_where_it_was_seen() -> None:
