@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.sightings import Sighting, by_motion, huber
+from phone_host.scan.observation import Observer, by_motion, huber
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -43,37 +43,37 @@ class CameraPose:
     inliers: Flags
 
 
-def located(points_m: Floats, sightings_px: Floats, sighting: Sighting) -> CameraPose | None:
+def located(points_m: Floats, observed_px: Floats, observer: Observer) -> CameraPose | None:
     """Locate a camera.
 
     Args:
         points_m: (N, 3) points in the world.
-        sightings_px: (N, 3) u, v, d of each; d NaN = none.
-        sighting: how they are measured.
+        observed_px: (N, 3) u, v, d of each; d NaN = none.
+        observer: how they are measured.
 
     Returns:
         The pose, or None: too few points agree on one.
     """
     if len(points_m) < LEAST_INLIERS:
         return None
-    start = _consensus(points_m, sightings_px, sighting)
+    start = _consensus(points_m, observed_px, observer)
     if start is None:
         return None
-    pose = refined(start.camera_world, points_m[start.inliers], sightings_px[start.inliers], sighting)
-    near = _lengths(pose, points_m, sightings_px, sighting) < _OUTLIER_SIGMAS
+    pose = refined(start.camera_world, points_m[start.inliers], observed_px[start.inliers], observer)
+    near = _lengths(pose, points_m, observed_px, observer) < _OUTLIER_SIGMAS
     if np.count_nonzero(near) < LEAST_INLIERS or not np.isfinite(pose.t_m).all():
         return None
-    return CameraPose(refined(pose, points_m[near], sightings_px[near], sighting), near)
+    return CameraPose(refined(pose, points_m[near], observed_px[near], observer), near)
 
 
-def _consensus(points_m: Floats, sightings_px: Floats, sighting: Sighting) -> CameraPose | None:
+def _consensus(points_m: Floats, observed_px: Floats, observer: Observer) -> CameraPose | None:
     """Find the pose on which most pixels agree; the draws are the same each time (OpenCV seeds them so)."""
-    of = sighting.geometry
+    of = observer.geometry
     matrix = np.array([[of.focal_px, 0, of.cx_px], [0, of.focal_px, of.cy_px], [0, 0, 1]])
     try:
         found, turn, shift, chosen = cv2.solvePnPRansac(
             points_m,
-            np.ascontiguousarray(sightings_px[:, :2]),
+            np.ascontiguousarray(observed_px[:, :2]),
             matrix,
             None,
             iterationsCount=_DRAWS,
@@ -92,24 +92,24 @@ def _consensus(points_m: Floats, sightings_px: Floats, sighting: Sighting) -> Ca
     return CameraPose(SE3.of(pose), inliers) if np.isfinite(pose).all() else None
 
 
-def refined(camera_world: SE3, points_m: Floats, sightings_px: Floats, sighting: Sighting) -> SE3:
-    """Minimise Huber's cost of all sightings over the pose, by Gauss and Newton.
+def refined(camera_world: SE3, points_m: Floats, observed_px: Floats, observer: Observer) -> SE3:
+    """Minimise Huber's cost of all observations over the pose, by Gauss and Newton.
 
     Args:
         camera_world: where to start.
         points_m: (N, 3) points in the world.
-        sightings_px: (N, 3) u, v, d; d NaN = none.
-        sighting: how they are measured.
+        observed_px: (N, 3) u, v, d; d NaN = none.
+        observer: how they are measured.
 
     Returns:
         The pose; the start where the points determine none.
     """
-    pose, weights = camera_world, sighting.weights
+    pose, weights = camera_world, observer.weights
     for _ in range(_STEPS):
         seen = pose.apply(points_m)
-        errors = np.nan_to_num((sightings_px - sighting.projected(seen)) * weights, nan=0.0)
-        slopes = by_motion(sighting.slopes(seen), seen) * weights[:, np.newaxis]
-        slopes[~np.isfinite(sightings_px)] = 0
+        errors = np.nan_to_num((observed_px - observer.projected(seen)) * weights, nan=0.0)
+        slopes = by_motion(observer.slopes(seen), seen) * weights[:, np.newaxis]
+        slopes[~np.isfinite(observed_px)] = 0
         robust = huber(np.linalg.norm(errors, axis=1))[1]
         weighted = (slopes * robust[:, np.newaxis, np.newaxis]).reshape(-1, 6)
         flat = slopes.reshape(-1, 6)
@@ -123,6 +123,6 @@ def refined(camera_world: SE3, points_m: Floats, sightings_px: Floats, sighting:
     return pose
 
 
-def _lengths(pose: SE3, points_m: Floats, sightings_px: Floats, sighting: Sighting) -> Floats:
-    errors = (sightings_px - sighting.projected(pose.apply(points_m))) * sighting.weights
+def _lengths(pose: SE3, points_m: Floats, observed_px: Floats, observer: Observer) -> Floats:
+    errors = (observed_px - observer.projected(pose.apply(points_m))) * observer.weights
     return np.asarray(np.linalg.norm(np.nan_to_num(errors, nan=0.0), axis=1), np.float64)

@@ -14,7 +14,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import Image
 from phone_host.scan.camera_pose import located
 from phone_host.scan.corners import followed, new_corners
-from phone_host.scan.sightings import Sighting
+from phone_host.scan.observation import Observer
 from phone_host.scan.view import View
 from phone_host.scan.window import WINDOW, Keyframe, fitted
 
@@ -47,12 +47,12 @@ class _Held:
     """Points that are followed: (N,) numbers, in rising order, (N, 3) u, v, d, (N, 3) place in the world, m."""
 
     ids: Numbers
-    sightings_px: Floats
+    observed_px: Floats
     points_m: Floats
 
     def only(self, chosen: NDArray[np.bool_]) -> "_Held":
         """Return some of them."""
-        return _Held(ids=self.ids[chosen], sightings_px=self.sightings_px[chosen], points_m=self.points_m[chosen])
+        return _Held(ids=self.ids[chosen], observed_px=self.observed_px[chosen], points_m=self.points_m[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -83,7 +83,7 @@ class Odometry:
 
     def __init__(self, settings: OdometrySettings = OdometrySettings()) -> None:
         self._settings = settings
-        self._held = _Held(ids=np.zeros(0, np.int64), sightings_px=np.zeros((0, 3)), points_m=np.zeros((0, 3)))
+        self._held = _Held(ids=np.zeros(0, np.int64), observed_px=np.zeros((0, 3)), points_m=np.zeros((0, 3)))
         self._grey: Image | None = None
         self._pose = SE3.identity()
         self._next_id = 0
@@ -105,21 +105,21 @@ class Odometry:
         """
         before, last = self._grey, self._pose
         self._grey = view.grey
-        sighting = Sighting(view.geometry, view.noise_px, self._offset_px)
+        observer = Observer(view.geometry, view.noise_px, self._offset_px)
         if before is None:
-            self._keyframe(view, sighting)
+            self._keyframe(view, observer)
             return self._told(last, is_known=True, followed_count=0)
         count = self._follow(before, view)
-        found = located(self._held.points_m, self._held.sightings_px, sighting)
+        found = located(self._held.points_m, self._held.observed_px, observer)
         if found is None:
             self._held = self._held.only(np.zeros(len(self._held.ids), np.bool_))
             self._window = []
-            self._keyframe(view, sighting)
+            self._keyframe(view, observer)
             return self._told(last, is_known=False, followed_count=count)
         self._held, self._pose = self._held.only(found.inliers), found.camera_world.inverse()
         inliers = len(self._held.ids)
         if self._is_keyframe():
-            self._keyframe(view, sighting)
+            self._keyframe(view, observer)
         else:
             self._note()
         return replace(self._told(last, is_known=True, followed_count=count), inliers=inliers)
@@ -139,9 +139,9 @@ class Odometry:
 
     def _follow(self, before: Image, view: View) -> int:
         """Follow the held points into the view; return how many were."""
-        pixels, found = followed(before, view.grey, self._held.sightings_px[:, :2].astype(np.float32))
+        pixels, found = followed(before, view.grey, self._held.observed_px[:, :2].astype(np.float32))
         held = self._held.only(found)
-        self._held = replace(held, sightings_px=_sightings(pixels[found], view))
+        self._held = replace(held, observed_px=_observed(pixels[found], view))
         return len(held.ids)
 
     def _is_keyframe(self) -> bool:
@@ -156,18 +156,18 @@ class Odometry:
         newest = len(self._keyframe_poses) - 1
         self._poses.append((newest, self._keyframe_poses[newest].inverse() @ self._pose))
 
-    def _keyframe(self, view: View, sighting: Sighting) -> None:
+    def _keyframe(self, view: View, observer: Observer) -> None:
         """Begin new points, and fit the window."""
-        self._begin_points(view, sighting)
+        self._begin_points(view, observer)
         held = self._held
         self._keyframe_poses.append(self._pose)
         newest = Keyframe(
-            index=len(self._poses), camera_world=self._pose.inverse(), ids=held.ids, sightings_px=held.sightings_px
+            index=len(self._poses), camera_world=self._pose.inverse(), ids=held.ids, observed_px=held.observed_px
         )
         self._window = [*self._window, newest][-WINDOW:]
         if len(self._window) > 1:
             still = _HELD_STILL if len(self._window) == WINDOW else 1
-            fit = fitted(self._window, held.ids, held.points_m, sighting, still)
+            fit = fitted(self._window, held.ids, held.points_m, observer, still)
             self._window, self._offset_px = list(fit.keyframes), fit.offset_px
             self._held = replace(held, points_m=fit.updated(held.ids, held.points_m))
             first = len(self._keyframe_poses) - len(self._window)
@@ -175,28 +175,28 @@ class Odometry:
             self._pose = self._keyframe_poses[-1]
         self._note()
 
-    def _begin_points(self, view: View, sighting: Sighting) -> None:
+    def _begin_points(self, view: View, observer: Observer) -> None:
         """Hold new corners where there are few, each put where its disparity says; those without one are left out."""
         held, settings = self._held, self._settings
         pixels = new_corners(
             view.grey,
-            held.sightings_px[:, :2].astype(np.float32),
+            held.observed_px[:, :2].astype(np.float32),
             settings.corners,
             settings.apart_px,
             np.isfinite(view.depth_m),
         )
-        sightings = _sightings(pixels, view)
-        sightings = sightings[np.isfinite(sightings[:, 2])]
-        ids = np.arange(self._next_id, self._next_id + len(sightings))
-        self._next_id += len(sightings)
+        observations = _observed(pixels, view)
+        observations = observations[np.isfinite(observations[:, 2])]
+        ids = np.arange(self._next_id, self._next_id + len(observations))
+        self._next_id += len(observations)
         self._held = _Held(
             ids=np.concatenate([held.ids, ids]),
-            sightings_px=np.concatenate([held.sightings_px, sightings]),
-            points_m=np.concatenate([held.points_m, self._pose.apply(sighting.points(sightings))]),
+            observed_px=np.concatenate([held.observed_px, observations]),
+            points_m=np.concatenate([held.points_m, self._pose.apply(observer.points(observations))]),
         )
 
 
-def _sightings(pixels: NDArray[np.float32], view: View) -> Floats:
+def _observed(pixels: NDArray[np.float32], view: View) -> Floats:
     """Return (N, 3) float64 u, v and the disparity of the nearest pixel, px; NaN = none."""
     geometry, places = view.geometry, np.rint(pixels).astype(np.int64)
     depth = view.depth_m[places[:, 1], places[:, 0]].astype(np.float64)

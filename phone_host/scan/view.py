@@ -1,7 +1,9 @@
 """One pair as the scan takes it: the rectified left image, its depth, and how sure that is. Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,9 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import Image, StereoGeometry
 
 Depth = NDArray[np.float32]
+
+_LEAST_WIDTH_PX: Final = 480
+"""Narrower images have no corners to spare."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -70,3 +75,19 @@ def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeome
         doffs_px=geometry.doffs_px / 2,
     )
     return np.ascontiguousarray(depth_m[::2, ::2]), half
+
+
+def reduced(view: View) -> View:
+    """Return a view of half the size, its grey averaged over 2 x 2 pixels; one that is small already as it is."""
+    if view.grey.shape[1] < _LEAST_WIDTH_PX:
+        return view
+    depth, half = halved(view.depth_m, view.geometry)
+    small = (depth.shape[1], depth.shape[0])
+    return View(
+        grey=np.asarray(cv2.resize(view.grey, small, interpolation=cv2.INTER_AREA), np.uint8),
+        colours=view.colours[::2, ::2],
+        depth_m=depth,
+        # An average's centre lies half a pixel farther than its first pixel's.
+        geometry=replace(half, cx_px=half.cx_px - 0.25, cy_px=half.cy_px - 0.25),
+        noise_px=view.noise_px / 2,
+    )

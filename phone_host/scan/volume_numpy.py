@@ -22,7 +22,7 @@ _SAMPLES: Final = 5
 _AT_ONCE: Final = 64
 """Blocks that are fused together: they fit the cache."""
 
-_SEED_TRUNCATIONS: Final = F(2)
+_SEED_TRUNCATIONS: Final = F(1.5)
 _JUMP: Final = F(0.05)
 _ROOT_STEPS: Final = 2
 

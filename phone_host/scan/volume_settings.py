@@ -11,7 +11,6 @@ WEIGHT_ONE: Final = 64.0
 MOST_WEIGHT: Final = 4096
 """At which a voxel's weight stays: 64 sure depths. So what moves away is forgotten in the end, and 16 bit hold the mean exactly enough."""
 
-_TRUNCATION_VOXELS: Final = 4
 _SURE_VOXELS: Final = 0.5
 
 
@@ -23,16 +22,19 @@ class VolumeSettings:
         voxel_m: distance of two values, m, > 0; about half the noise of the depths or more.
         far_m: depths beyond it are not fused, m.
         most_bytes: memory of the blocks at most.
+        truncation_voxels: distance from the surface, voxels, to which the field tells it; three or four standard deviations of the farthest
+            depths, but thin parts must be thicker than that.
     """
 
     voxel_m: float = 0.01
     far_m: float = 4.0
     most_bytes: int = 300_000_000
+    truncation_voxels: float = 4.0
 
     @property
     def truncation_m(self) -> float:
         """Distance from the surface, m, to which the field tells it."""
-        return _TRUNCATION_VOXELS * self.voxel_m
+        return self.truncation_voxels * self.voxel_m
 
     @property
     def sure_m(self) -> float:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.schur import NormalEquations, minimise
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.scan.sightings import Sighting, by_motion, huber
+from phone_host.scan.observation import Observer, by_motion, huber
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -42,13 +42,13 @@ class Keyframe:
         index: of the view in the sequence.
         camera_world: takes the world's points to the camera.
         ids: (N,) the points it sees, in rising order.
-        sightings_px: (N, 3) float64 u, v, d of each, px; d NaN = none.
+        observed_px: (N, 3) float64 u, v, d of each, px; d NaN = none.
     """
 
     index: int
     camera_world: SE3
     ids: Numbers
-    sightings_px: Floats
+    observed_px: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,14 +75,14 @@ class Fitted:
         return np.where((self.ids[at] == ids)[:, np.newaxis], self.points_m[at], points_m)
 
 
-def fitted(keyframes: Sequence[Keyframe], ids: Numbers, points_m: Floats, sighting: Sighting, still: int) -> Fitted:
+def fitted(keyframes: Sequence[Keyframe], ids: Numbers, points_m: Floats, observer: Observer, still: int) -> Fitted:
     """Fit keyframes and the points that at least two of them see.
 
     Args:
         keyframes: at least two.
         ids: (P,) points whose place is known, in rising order; others start where their first disparity puts them.
         points_m: (P, 3) float64, m, in the world.
-        sighting: how they are measured.
+        observer: how they are measured.
         still: how many of the first keyframes stay where they are, >= 1.
 
     Returns:
@@ -90,18 +90,18 @@ def fitted(keyframes: Sequence[Keyframe], ids: Numbers, points_m: Floats, sighti
     """
     seen, counts = np.unique(np.concatenate([each.ids for each in keyframes]), return_counts=True)
     seen = seen[counts > 1]
-    start = _started(keyframes, seen, sighting)
+    start = _started(keyframes, seen, observer)
     start = Fitted(tuple(keyframes), ids, points_m, 0.0).updated(seen, start)
     known = np.isfinite(start).all(axis=1)
     seen, start = seen[known], start[known]
     if len(seen) < _LEAST_POINTS:
-        return Fitted(tuple(keyframes), seen[:0], start[:0], sighting.offset_px)
-    problem = _Problem(tuple(_seen_by(each, seen) for each in keyframes), sighting)
+        return Fitted(tuple(keyframes), seen[:0], start[:0], observer.offset_px)
+    problem = _Problem(tuple(_seen_by(each, seen) for each in keyframes), observer)
     state = _State(
         np.array([each.camera_world.R for each in keyframes]),
         np.array([each.camera_world.t_m for each in keyframes]),
         start,
-        sighting.offset_px,
+        observer.offset_px,
     )
     free = np.append(np.repeat(np.arange(len(keyframes)) >= still, 6), values=True)
     found = minimise(problem, state, free, _CONVERGED)
@@ -112,12 +112,12 @@ def fitted(keyframes: Sequence[Keyframe], ids: Numbers, points_m: Floats, sighti
     return Fitted(tuple(moved), seen, found.points_m, found.offset_px)
 
 
-def _started(keyframes: Sequence[Keyframe], ids: Numbers, sighting: Sighting) -> Floats:
+def _started(keyframes: Sequence[Keyframe], ids: Numbers, observer: Observer) -> Floats:
     """Return where the first disparity of each point puts it, (P, 3), m, in the world; NaN without any."""
     points = np.full((len(ids), 3), np.nan)
     for each in reversed(keyframes):
         rows = _seen_by(each, ids)
-        found = each.camera_world.inverse().apply(sighting.points(rows.sightings_px))
+        found = each.camera_world.inverse().apply(observer.points(rows.observed_px))
         usable = np.isfinite(found).all(axis=1)
         points[rows.points[usable]] = found[usable]
     return points
@@ -128,13 +128,13 @@ class _Seen:
     """What one keyframe sees of the fitted points: their numbers (N,), each once, and (N, 3) u, v, d."""
 
     points: Numbers
-    sightings_px: Floats
+    observed_px: Floats
 
 
 def _seen_by(keyframe: Keyframe, ids: Numbers) -> _Seen:
     at = np.minimum(np.searchsorted(ids, keyframe.ids), max(len(ids) - 1, 0))
     chosen = ids[at] == keyframe.ids if len(ids) else np.zeros(len(keyframe.ids), np.bool_)
-    return _Seen(at[chosen], keyframe.sightings_px[chosen])
+    return _Seen(at[chosen], keyframe.observed_px[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,10 +152,10 @@ class _Problem:
     """See `geometry.schur.Problem`."""
 
     seen: tuple[_Seen, ...]
-    sighting: Sighting
+    observer: Observer
 
     def cost(self, state: _State) -> float:
-        """Return Huber's cost of all sightings."""
+        """Return Huber's cost of all observations."""
         total = float((self._offset(state)[0] ** 2).sum())
         for frame, rows in enumerate(self.seen):
             errors = self._errors(rows, self._in_camera(state, frame, rows), state)
@@ -182,14 +182,14 @@ class _Problem:
             errors = self._errors(rows, points, state)
             root = np.sqrt(huber(np.linalg.norm(errors, axis=1))[1])
             errors *= root[:, np.newaxis]
-            slopes = self.sighting.slopes(points) * (self.sighting.weights * root[:, np.newaxis])[..., np.newaxis]
-            slopes[~np.isfinite(rows.sightings_px)] = 0
+            slopes = self.observer.slopes(points) * (self.observer.weights * root[:, np.newaxis])[..., np.newaxis]
+            slopes[~np.isfinite(rows.observed_px)] = 0
             by_pose, by_point = by_motion(slopes, points), slopes @ state.turns[frame]
             here, flat, turned = slice(6 * frame, 6 * frame + 6), by_pose.reshape(-1, 6), np.swapaxes(by_point, 1, 2)
             shared[here, here] = flat.T @ flat
             right[here] = flat.T @ errors.ravel()
             coupling[rows.points, here] = np.swapaxes(by_pose, 1, 2) @ by_point
-            by_offset = np.where(np.isfinite(rows.sightings_px[:, 2]), self.sighting.weights[2] * root, 0.0)
+            by_offset = np.where(np.isfinite(rows.observed_px[:, 2]), self.observer.weights[2] * root, 0.0)
             shared[-1, -1] += (by_offset**2).sum()
             shared[here, -1] = shared[-1, here] = by_offset @ by_pose[:, 2]
             right[-1] += by_offset @ errors[:, 2]
@@ -205,11 +205,11 @@ class _Problem:
 
     def _errors(self, rows: _Seen, points_m: Floats, state: _State) -> Floats:
         """Return (N, 3) seen minus projected, in standard deviations; 0 where nothing was measured."""
-        sighting = replace(self.sighting, offset_px=state.offset_px)
-        errors = (rows.sightings_px - sighting.projected(points_m)) * sighting.weights
+        observer = replace(self.observer, offset_px=state.offset_px)
+        errors = (rows.observed_px - observer.projected(points_m)) * observer.weights
         return np.nan_to_num(errors, nan=0.0)
 
     def _offset(self, state: _State) -> tuple[Floats, Floats]:
         """Return how far the common error is from none, and from that of the last window, in standard deviations; and 1 / these, 1/px."""
         roots = np.array([1 / _OFFSET_SIGMA_PX, 1 / _OFFSET_STEP_PX])
-        return roots * (np.array([0.0, self.sighting.offset_px]) - state.offset_px), roots
+        return roots * (np.array([0.0, self.observer.offset_px]) - state.offset_px), roots

@@ -1,4 +1,4 @@
-"""Odometry: points, poses and windows of keyframes, on sightings made by geometry and on a drawn plane."""
+"""Odometry: points, poses and windows of keyframes, on observations made by geometry and on a drawn plane."""
 
 import numpy as np
 import pytest
@@ -7,14 +7,14 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.camera_pose import LEAST_INLIERS, located, refined
 from phone_host.scan.corners import followed, new_corners
+from phone_host.scan.observation import Observer, by_motion
 from phone_host.scan.odometry import Odometry, OdometrySettings
-from phone_host.scan.sightings import Sighting, by_motion
 from phone_host.scan.view import halved
 from phone_host.scan.window import Keyframe, fitted
 from tests.support.plane_films import distance, path, plane_view, texture
 
 GEOMETRY = StereoGeometry(focal_px=300.0, baseline_m=0.12, cx_px=159.5, cy_px=119.5, doffs_px=2.0)
-SIGHTING = Sighting(GEOMETRY, 0.3)
+OBSERVATION = Observer(GEOMETRY, 0.3)
 PICTURE = texture()
 
 
@@ -25,30 +25,30 @@ def points(count: int, seed: int = 3) -> np.ndarray:
     return np.column_stack([random.uniform(-0.4, 0.4, count) * depth, random.uniform(-0.3, 0.3, count) * depth, depth])
 
 
-def test_a_sighting_puts_a_point_where_it_was_seen() -> None:
+def test_an_observation_puts_a_point_where_it_was_seen() -> None:
     """Projecting and reprojecting is the identity, with a common error of the disparities, too."""
-    sighting = Sighting(GEOMETRY, 0.3, 0.4)
-    assert np.allclose(sighting.points(sighting.projected(points(20))), points(20))
-    assert np.allclose(sighting.projected(points(20))[:, 2], SIGHTING.projected(points(20))[:, 2] + 0.4)
+    observer = Observer(GEOMETRY, 0.3, 0.4)
+    assert np.allclose(observer.points(observer.projected(points(20))), points(20))
+    assert np.allclose(observer.projected(points(20))[:, 2], OBSERVATION.projected(points(20))[:, 2] + 0.4)
 
 
 def test_derivatives_are_those_of_small_motions() -> None:
     """A point's derivatives by turn and shift are the differences that such motions make."""
     places = points(5)
-    slopes = by_motion(SIGHTING.slopes(places), places)
+    slopes = by_motion(OBSERVATION.slopes(places), places)
     for axis in range(6):
         step = 1e-6 * np.eye(6)[axis]
-        moved = [SIGHTING.projected(SE3.of(sign * step).apply(places)) for sign in (1, -1)]
+        moved = [OBSERVATION.projected(SE3.of(sign * step).apply(places)) for sign in (1, -1)]
         assert np.allclose(slopes[..., axis], (moved[0] - moved[1]) / 2e-6, rtol=1e-5, atol=1e-4)
 
 
 def test_a_camera_is_located_among_outliers() -> None:
-    """A third of the sightings is anywhere, some have no disparity; the pose is exact and the outliers are named."""
+    """A third of the observations is anywhere, some have no disparity; the pose is exact and the outliers are named."""
     pose = SE3.of(np.array([0.05, -0.1, 0.02, 0.1, 0.05, -0.3]))
-    seen = SIGHTING.projected(pose.apply(points(90)))
+    seen = OBSERVATION.projected(pose.apply(points(90)))
     seen[:30, :2] += np.random.default_rng(1).uniform(15, 60, (30, 2))
     seen[30:40, 2] = np.nan
-    found = located(points(90), seen, SIGHTING)
+    found = located(points(90), seen, OBSERVATION)
     assert found is not None
     assert distance(found.camera_world, pose).max() < 1e-6
     assert not found.inliers[:30].any()
@@ -57,20 +57,20 @@ def test_a_camera_is_located_among_outliers() -> None:
 
 def test_no_pose_is_made_up() -> None:
     """Too few points, points without any common motion, and points on one line give none."""
-    seen = SIGHTING.projected(points(60))
+    seen = OBSERVATION.projected(points(60))
     line = np.outer(np.linspace(1, 3, 60), [0.1, 0.1, 1.0])
-    assert located(points(LEAST_INLIERS - 1), seen[: LEAST_INLIERS - 1], SIGHTING) is None
-    assert located(points(60), np.random.default_rng(2).uniform(0, 300, (60, 3)), SIGHTING) is None
-    assert located(line, SIGHTING.projected(line), SIGHTING) is None
-    nowhere = refined(SE3.identity(), np.zeros((20, 3)), np.full((20, 3), np.nan), SIGHTING)
+    assert located(points(LEAST_INLIERS - 1), seen[: LEAST_INLIERS - 1], OBSERVATION) is None
+    assert located(points(60), np.random.default_rng(2).uniform(0, 300, (60, 3)), OBSERVATION) is None
+    assert located(line, OBSERVATION.projected(line), OBSERVATION) is None
+    nowhere = refined(SE3.identity(), np.zeros((20, 3)), np.full((20, 3), np.nan), OBSERVATION)
     assert np.array_equal(nowhere.pose(), np.zeros(6))
 
 
 def test_the_disparities_weigh_by_their_noise() -> None:
     """Pixels that speak for one pose and disparities that speak for another: the surer ones win."""
-    wrong = SIGHTING.projected(points(200))
+    wrong = OBSERVATION.projected(points(200))
     wrong[:, 2] += 0.5
-    sure, unsure = (refined(SE3.identity(), points(200), wrong, Sighting(GEOMETRY, noise)) for noise in (0.05, 5.0))
+    sure, unsure = (refined(SE3.identity(), points(200), wrong, Observer(GEOMETRY, noise)) for noise in (0.05, 5.0))
     assert distance(unsure, SE3.identity())[1] < 1e-3 < distance(sure, SE3.identity())[1]
 
 
@@ -80,19 +80,19 @@ def keyframes() -> tuple[list[Keyframe], list[SE3]]:
     random, truth = np.random.default_rng(7), path(4, np.array([0.01, 0.03, 0.0, 0.08, 0.0, 0.12]))
     made = []
     for index, pose in enumerate(truth):
-        seen = SIGHTING.projected(pose.inverse().apply(points(120) + np.array([0, 0, 1.0])))
+        seen = OBSERVATION.projected(pose.inverse().apply(points(120) + np.array([0, 0, 1.0])))
         seen += random.normal(0, [0.05, 0.05, 0.05], seen.shape) + np.array([0, 0, 0.2])
         start = pose.inverse() if index == 0 else SE3.of(random.normal(0, 0.01, 6)) @ pose.inverse()
-        made.append(Keyframe(index=index, camera_world=start, ids=np.arange(120), sightings_px=seen))
+        made.append(Keyframe(index=index, camera_world=start, ids=np.arange(120), observed_px=seen))
     return made, truth
 
 
 def test_a_window_finds_poses_points_and_the_common_error(keyframes: tuple[list[Keyframe], list[SE3]]) -> None:
     """Starts that are 1 cm off end within 4 mm; window by window two thirds of the disparities' common error of 0.2 px are found."""
     frames, truth = keyframes
-    fit = fitted(frames, np.arange(0), np.zeros((0, 3)), Sighting(GEOMETRY, 0.05), 1)
+    fit = fitted(frames, np.arange(0), np.zeros((0, 3)), Observer(GEOMETRY, 0.05), 1)
     for _ in range(40):
-        fit = fitted(fit.keyframes, fit.ids, fit.points_m, Sighting(GEOMETRY, 0.05, fit.offset_px), 1)
+        fit = fitted(fit.keyframes, fit.ids, fit.points_m, Observer(GEOMETRY, 0.05, fit.offset_px), 1)
     for frame, pose in zip(fit.keyframes, truth, strict=True):
         assert distance(frame.camera_world.inverse(), pose).max() < 4e-3
     assert fit.offset_px == pytest.approx(0.2, abs=0.07)
@@ -104,9 +104,9 @@ def test_a_window_without_common_points_leaves_all_as_it_was(keyframes: tuple[li
     first, second = keyframes[0][:2]
     apart = [
         first,
-        Keyframe(index=1, camera_world=second.camera_world, ids=second.ids + 1000, sightings_px=second.sightings_px),
+        Keyframe(index=1, camera_world=second.camera_world, ids=second.ids + 1000, observed_px=second.observed_px),
     ]
-    fit = fitted(apart, np.arange(0), np.zeros((0, 3)), SIGHTING, 1)
+    fit = fitted(apart, np.arange(0), np.zeros((0, 3)), OBSERVATION, 1)
     assert fit.keyframes == tuple(apart)
     assert np.array_equal(fit.updated(np.arange(3), np.ones((3, 3))), np.ones((3, 3)))
 

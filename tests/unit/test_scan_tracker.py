@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.tracker import Gate, Tracked, Tracker
+from phone_host.scan.tracker import PoseGate, Tracked, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
@@ -78,7 +78,7 @@ def test_a_jump_is_not_fused() -> None:
 
 def test_a_moved_scene_does_not_fit() -> None:
     """Where the pictures say that nothing moved and the depths say otherwise, nothing is fused."""
-    view, tracker, strict = film(POSES[:1])[0], Tracker(SETTINGS), Tracker(SETTINGS, gate=Gate(most_shift_m=0.02))
+    view, tracker, strict = film(POSES[:1])[0], Tracker(SETTINGS), Tracker(SETTINGS, gate=PoseGate(most_shift_m=0.02))
     run([view, view], tracker)
     run([view, view], strict)
     nearer = replace(view, depth_m=(view.depth_m * np.float32(0.93)))

@@ -1,4 +1,4 @@
-"""The volume: fusing, casting, aligning and the mesh; the native library and numpy agree."""
+"""The volume: fusing, casting, registration and the mesh; the native library and numpy agree."""
 
 from dataclasses import replace
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.align import AlignSettings, Trial, aligned, summed
 from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
 from phone_host.scan.cube_cases import cube_cases
 from phone_host.scan.mesh import Mesh, mesh_of
+from phone_host.scan.registration import RegistrationSettings, Trial, registered, summed
 from phone_host.scan.view import Camera, View, halved
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import MOST_WEIGHT, VolumeSettings
@@ -144,10 +144,10 @@ def test_wrong_sizes_are_refused() -> None:
         volume.cast(Camera(GEOMETRY, (10, 10), POSES[0]), view.depth_m)
     surface = volume.cast(Camera(GEOMETRY, (10, 10), POSES[0]))
     with pytest.raises(ValueError, match="surface"):
-        aligned(view.depth_m, surface, ALIGN, None)
+        registered(view.depth_m, surface, REGISTRATION, None)
 
 
-ALIGN = AlignSettings(
+REGISTRATION = RegistrationSettings(
     most_m=0.2, floor_m=0.006, noise_per_m=0.005, geometry=halved(np.zeros((2, 2), np.float32), GEOMETRY)[1]
 )
 
@@ -162,8 +162,8 @@ def test_the_library_and_numpy_sum_the_same(step: int) -> None:
     surface = volume.cast(Camera(geometry, depth.shape, POSES[1]), depth)
     motion = SE3.of(np.array([0.002, 0.001, 0.003, 0.004, -0.002, 0.003]))
     trial = Trial(motion, step)
-    sums = [summed(depth, surface, replace(ALIGN, threads=threads), trial, library) for threads in (1, 3)]
-    numpys = summed(depth, surface, ALIGN, trial, None)
+    sums = [summed(depth, surface, replace(REGISTRATION, threads=threads), trial, library) for threads in (1, 3)]
+    numpys = summed(depth, surface, REGISTRATION, trial, None)
     assert np.array_equal(sums[0], sums[1])
     assert sums[0][29] > 0.8 * sums[0][30] > 0
     assert np.allclose(sums[0], numpys, rtol=1e-3, atol=1e-4 * np.abs(numpys).max())
@@ -176,7 +176,7 @@ def test_a_depth_is_laid_against_the_surface() -> None:
     off = SE3.of(np.array([0.006, -0.005, 0.007, 0.006, 0.005, -0.006]))
     surface = volume.cast(Camera(geometry, depth.shape, POSES[2] @ off), depth)
     found = native()
-    fit = aligned(depth, surface, ALIGN, found if isinstance(found, Library) else None)
+    fit = registered(depth, surface, REGISTRATION, found if isinstance(found, Library) else None)
     assert fit.told == 6
     assert fit.overlap > 0.8
     assert fit.near > 0.95
@@ -190,7 +190,7 @@ def test_a_plane_tells_three_directions() -> None:
     depth, geometry = halved(wall.depth_m, GEOMETRY)
     along, across = WALL[0].axes[1] * 0.01, WALL[0].axes[0] * 0.01
     surface = volume.cast(Camera(geometry, depth.shape, SE3(np.eye(3), along + across)), depth)
-    fit = aligned(depth, surface, ALIGN, None)
+    fit = registered(depth, surface, REGISTRATION, None)
     assert fit.told == 3
     assert fit.start_now.t_m @ WALL[0].axes[0] == pytest.approx(-0.01, abs=1e-3)
     assert abs(fit.start_now.t_m @ WALL[0].axes[1]) < 1e-3
@@ -200,7 +200,7 @@ def test_without_partners_nothing_moves() -> None:
     """An empty volume gives the start back, and says so."""
     depth, geometry = halved(views()[0].depth_m, GEOMETRY)
     surface = Volume(SETTINGS).cast(Camera(geometry, depth.shape, POSES[0]), depth)
-    fit = aligned(depth, surface, ALIGN, None)
+    fit = registered(depth, surface, REGISTRATION, None)
     assert fit.overlap == fit.told == 0
     assert np.array_equal(fit.start_now.pose(), np.zeros(6))
 

@@ -53,7 +53,7 @@ ONCE: Final = (
     "volume.c",
     "fuse.c",
     "cast.c",
-    "align.c",
+    "register.c",
 )
 """Compiled once, for the plainest processor of the architecture."""
 

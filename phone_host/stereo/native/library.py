@@ -15,7 +15,7 @@ from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
 from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
-from phone_host.stereo.native.volume_jobs import AlignJob, CastJob, FuseJob, TouchJob, declare
+from phone_host.stereo.native.volume_jobs import RegisterJob, CastJob, FuseJob, TouchJob, declare
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
@@ -229,9 +229,9 @@ class Library:
         """Show a volume's surface as a camera sees it; see cast_kernel.c."""
         _require_done(self.handle.tandem_cast(self.isa, ctypes.byref(job)))
 
-    def align(self, job: AlignJob) -> None:
-        """Compare a depth image with such a surface; see align.c."""
-        _require_done(self.handle.tandem_align(ctypes.byref(job)))
+    def register(self, job: RegisterJob) -> None:
+        """Compare a depth image with such a surface; see register.c."""
+        _require_done(self.handle.tandem_register(ctypes.byref(job)))
 
 
 @cache

@@ -85,8 +85,8 @@ class CastJob(ctypes.Structure):
     )
 
 
-class AlignJob(ctypes.Structure):
-    """`struct tandem_align_job`."""
+class RegisterJob(ctypes.Structure):
+    """`struct tandem_register_job`."""
 
     _fields_ = (
         ("depth_m", _POINTER),
@@ -110,6 +110,6 @@ def declare(handle: ctypes.CDLL) -> None:
     handle.tandem_fuse.argtypes = [_INT, ctypes.POINTER(FuseJob)]
     handle.tandem_cast.argtypes = [_INT, ctypes.POINTER(CastJob)]
     handle.tandem_touch.argtypes = [ctypes.POINTER(TouchJob)]
-    handle.tandem_align.argtypes = [ctypes.POINTER(AlignJob)]
-    for function in (handle.tandem_fuse, handle.tandem_cast, handle.tandem_touch, handle.tandem_align):
+    handle.tandem_register.argtypes = [ctypes.POINTER(RegisterJob)]
+    for function in (handle.tandem_fuse, handle.tandem_cast, handle.tandem_touch, handle.tandem_register):
         function.restype = _INT

@@ -11,7 +11,7 @@
 #include "kernels.h"
 #include "volume.h"
 
-#define SEED_TRUNCATIONS 2.0f
+#define SEED_TRUNCATIONS 1.5f
 #define JUMP 0.05f /* neighbours whose depths differ by more, as a share, lie on different surfaces */
 
 enum { ROOT_STEPS = 2 }; /* of the false position: the field is nearly linear there */

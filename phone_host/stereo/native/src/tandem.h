@@ -194,8 +194,8 @@ struct tandem_cast_job {
 
 TANDEM_API int32_t tandem_cast(int32_t isa, struct tandem_cast_job *job);
 
-/* How a depth image lies against such a surface; see align.c. */
-struct tandem_align_job {
+/* How a depth image lies against such a surface; see register.c. */
+struct tandem_register_job {
     const float *depth_m;      /* (height, width), packed, NAN = none */
     const float *points_m;     /* (height, width, 3), as tandem_cast writes them */
     const float *normals;
@@ -215,7 +215,7 @@ struct tandem_align_job {
     int32_t reserved;
 };
 
-TANDEM_API int32_t tandem_align(struct tandem_align_job *job);
+TANDEM_API int32_t tandem_register(struct tandem_register_job *job);
 
 /* What these functions return. */
 enum tandem_result {

@@ -23,8 +23,8 @@ _LEAST_DEPTH_M: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
-    """How sightings are measured.
+class Observer:
+    """How a pair observes points.
 
     Attributes:
         geometry: of the rectified pair.
@@ -41,12 +41,12 @@ class Sighting:
         """(3,) 1 / standard deviation of u, v and d, 1/px."""
         return np.array([1 / FOLLOWING_PX, 1 / FOLLOWING_PX, 1 / self.noise_px])
 
-    def points(self, sightings_px: Floats) -> Floats:
-        """Return where sightings (..., 3) are, (..., 3), m, in the camera's axes; NaN without a disparity."""
+    def points(self, observed_px: Floats) -> Floats:
+        """Return where observations (..., 3) are, (..., 3), m, in the camera's axes; NaN without a disparity."""
         of = self.geometry
-        depth = of.focal_px * of.baseline_m / (sightings_px[..., 2] - self.offset_px + of.doffs_px)
-        x = (sightings_px[..., 0] - of.cx_px) * depth / of.focal_px
-        y = (sightings_px[..., 1] - of.cy_px) * depth / of.focal_px
+        depth = of.focal_px * of.baseline_m / (observed_px[..., 2] - self.offset_px + of.doffs_px)
+        x = (observed_px[..., 0] - of.cx_px) * depth / of.focal_px
+        y = (observed_px[..., 1] - of.cy_px) * depth / of.focal_px
         return np.stack((x, y, depth), axis=-1)
 
     def projected(self, points_m: Floats) -> Floats:

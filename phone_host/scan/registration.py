@@ -16,13 +16,16 @@ from phone_host.scan.jobs import aim, rows_of
 from phone_host.scan.view import Depth
 from phone_host.scan.volume import Surface
 from phone_host.stereo.native.library import Library
-from phone_host.stereo.native.volume_jobs import AlignJob
+from phone_host.stereo.native.volume_jobs import RegisterJob
 
 Floats = NDArray[np.float64]
 
 HUBER_SIGMAS: Final = 1.5
 _ROUNDS: Final = ((4, 6), (2, 5), (1, 3))
 """Steps between the pixels, and searches at each: coarse, then fine."""
+
+_JUDGED_STEP: Final = 2
+"""Of the pixels that tell how well the result fits."""
 
 _STILL: Final = 2e-5
 """rad and m: a step as short as this ends a round."""
@@ -38,7 +41,7 @@ SUMS: Final = 31
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AlignSettings:
+class RegistrationSettings:
     """How depths are compared with a surface.
 
     Attributes:
@@ -57,7 +60,7 @@ class AlignSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Aligned:
+class Registered:
     """A depth image that was laid against a surface.
 
     Attributes:
@@ -75,7 +78,7 @@ class Aligned:
     told: int
 
 
-def aligned(depth_m: Depth, surface: Surface, settings: AlignSettings, library: Library | None) -> Aligned:
+def registered(depth_m: Depth, surface: Surface, settings: RegistrationSettings, library: Library | None) -> Registered:
     """Lay a depth image against the surface that was cast from where the camera is believed to be.
 
     Args:
@@ -99,12 +102,12 @@ def aligned(depth_m: Depth, surface: Surface, settings: AlignSettings, library: 
             motion = SE3.of(move) @ motion
             if np.abs(move).max() < _STILL:
                 break
-    return _told(motion, summed(depth_m, surface, settings, Trial(motion, 1), library), told)
+    return _told(motion, summed(depth_m, surface, settings, Trial(motion, _JUDGED_STEP), library), told)
 
 
-def _told(motion: SE3, sums: Floats, told: int) -> Aligned:
+def _told(motion: SE3, sums: Floats, told: int) -> Registered:
     near, off_m, partners, visible = sums[27:]
-    return Aligned(
+    return Registered(
         start_now=motion,
         overlap=float(partners / max(visible, 1)),
         near=float(near / max(partners, 1)),
@@ -135,14 +138,16 @@ class Trial:
     step: int
 
 
-def summed(depth_m: Depth, surface: Surface, settings: AlignSettings, trial: Trial, library: Library | None) -> Floats:
-    """Return the (31,) sums that native/src/align.c describes; the same for any number of threads."""
+def summed(
+    depth_m: Depth, surface: Surface, settings: RegistrationSettings, trial: Trial, library: Library | None
+) -> Floats:
+    """Return the (31,) sums that native/src/register.c describes; the same for any number of threads."""
     if library is None:
         return _by_numpy(depth_m, surface, settings, trial)
     sums = np.empty((-(-depth_m.shape[0] // trial.step), SUMS))
     points, normals = np.ascontiguousarray(surface.points_m), np.ascontiguousarray(surface.normals)
     depth = np.ascontiguousarray(depth_m)
-    job = AlignJob(
+    job = RegisterJob(
         depth_m=depth.ctypes.data,
         points_m=points.ctypes.data,
         normals=normals.ctypes.data,
@@ -156,11 +161,11 @@ def summed(depth_m: Depth, surface: Surface, settings: AlignSettings, trial: Tri
         threads=settings.threads,
     )
     aim(job, settings.geometry, depth_m.shape)
-    library.align(job)
+    library.register(job)
     return np.asarray(sums.sum(axis=0), np.float64)
 
 
-def _by_numpy(depth_m: Depth, surface: Surface, settings: AlignSettings, trial: Trial) -> Floats:
+def _by_numpy(depth_m: Depth, surface: Surface, settings: RegistrationSettings, trial: Trial) -> Floats:
     (height, width), geometry, step = depth_m.shape, settings.geometry, trial.step
     rows, columns = np.mgrid[0:height:step, 0:width:step]
     depth = depth_m[rows, columns]

@@ -14,7 +14,7 @@
 
 enum { UPPER = 21, NEAR = 27, OFF_M = 28, PARTNERS = 29, VISIBLE = 30, SUMS = 31 };
 
-static void add(const struct tandem_align_job *job, double *sums, const float *point, const float *model, const float *normal)
+static void add(const struct tandem_register_job *job, double *sums, const float *point, const float *model, const float *normal)
 {
     const double jacobian[6] = {
         point[1] * normal[2] - point[2] * normal[1],
@@ -40,7 +40,7 @@ static void add(const struct tandem_align_job *job, double *sums, const float *p
     sums[PARTNERS] += 1;
 }
 
-static void align_row(const struct tandem_align_job *job, int32_t task)
+static void register_row(const struct tandem_register_job *job, int32_t task)
 {
     double *sums = job->sums + (ptrdiff_t)SUMS * task;
     memset(sums, 0, SUMS * sizeof *sums);
@@ -77,7 +77,7 @@ static void align_row(const struct tandem_align_job *job, int32_t task)
 
 static int tasks_of(void *context, int step)
 {
-    const struct tandem_align_job *job = context;
+    const struct tandem_register_job *job = context;
     (void)step;
     return (job->height + job->step - 1) / job->step;
 }
@@ -86,10 +86,10 @@ static void do_task(void *context, int step, int task, int thread)
 {
     (void)step;
     (void)thread;
-    align_row(context, task);
+    register_row(context, task);
 }
 
-int32_t tandem_align(struct tandem_align_job *job)
+int32_t tandem_register(struct tandem_register_job *job)
 {
     if (!is_image(job->width, job->height) || job->step < 1 || job->step > INT16_MAX) {
         return TANDEM_BAD_SIZE;
