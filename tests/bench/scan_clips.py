@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Image, RectifiedPair, StereoGeometry
+from phone_host.output.rig_files.imported import import_rig
 from phone_host.scan.view import View
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.rectifier import Rectifier
 
 STREET_NOISE_PX = 0.7
 """Of `tandem` on the street; measured as the spread of the disparities' errors in the sliding window."""
@@ -83,6 +85,16 @@ def matched(left: Image, right: Image, geometry: StereoGeometry) -> View:
         geometry=geometry,
         noise_px=STREET_NOISE_PX,
     )
+
+
+def at_rest(data: Path) -> Clip:
+    """euroc_v101_static: 12 pairs of a rig that does not move."""
+    folder = data / "euroc_v101_static"
+    rectifier = Rectifier(import_rig((folder,)).rig)
+    names = [sorted((folder / "mav0" / name / "data").iterdir()) for name in ("cam0", "cam1")]
+    pairs = [rectifier.rectify(_grey(left), _grey(right)) for left, right in zip(*names, strict=True)]
+    views = tuple(matched(pair.left, pair.right, rectifier.geometry) for pair in pairs)
+    return Clip(views, tuple(SE3.identity() for _ in views))
 
 
 def unmirrored(pose: SE3, baseline_m: float) -> SE3:

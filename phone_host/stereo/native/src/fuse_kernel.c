@@ -65,16 +65,19 @@ static int32_t one_row(const struct tandem_fuse_job *job, const float *start, co
             continue;
         }
         const float share = distance / volume->truncation_m;
+        const int32_t held = volume->weights[at + i], weight = weight_of(job, seen), total = held + weight;
+        changed = 1;
+        volume->weights[at + i] = (uint16_t)(total < job->most_weight ? total : job->most_weight);
+        if (share >= 1 && volume->field[at + i] == FIELD_ONE) {
+            continue; /* empty before and now: most voxels */
+        }
         const int32_t value = (int32_t)floorf((share < 1 ? share : 1) * FIELD_ONE + 0.5f);
-        const int32_t held = volume->weights[at + i], weight = weight_of(job, seen);
-        const float mean = (float)(volume->field[at + i] * held + value * weight) / (float)(held + weight);
+        const float mean = (float)(volume->field[at + i] * held + value * weight) / (float)total;
         const int32_t rounded = (int32_t)floorf(mean + 0.5f);
         volume->field[at + i] = (int16_t)(rounded != 0 ? rounded : 1); /* a node exactly on the surface would give empty triangles */
         if (share < 1) {
             add_colour(volume->colours + 3 * (at + i), job->colours + 3 * (int64_t)place[i], held, weight);
         }
-        volume->weights[at + i] = (uint16_t)(held + weight < job->most_weight ? held + weight : job->most_weight);
-        changed = 1;
     }
     return changed;
 }
