@@ -1,5 +1,7 @@
 """Where a depth image lies against a surface: point to plane, in the directions that the surface tells. Pure.
 
+The start counts as a measurement, too. Depths of a matcher err together in patches, so that a wall of noisy depths tells less than corners do.
+
 Source: A. W. Fitzgibbon, "Robust registration of 2D and 3D point sets", 2003 (the robust weight); J. Zhang et al., "On degeneracy of
 optimization-based state estimation problems", 2016 (directions without information keep their start).
 """
@@ -34,7 +36,8 @@ _LEAST_PARTNERS: Final = 300
 """Of the finest round's pixels; the coarse ones need their share."""
 
 _TOLD: Final = 2e-3
-"""A direction whose information is less than this share of the best one's keeps its start; a plane seen with noise gives 1e-4."""
+"""A direction whose information is less than this share of the best one's keeps its start. A plane gives 1e-4, the poorest real room
+4e-3; noise of the normals can lift a plane above it, then the start's own certainty holds (`start_shift_m`)."""
 
 _UPPER: Final = np.triu_indices(6)
 SUMS: Final = 31
@@ -48,6 +51,9 @@ class RegistrationSettings:
         most_m: partners lie no farther apart, m.
         floor_m: least noise of a distance, m: that of the surface itself.
         noise_per_m: standard deviation of a depth 1 m away, m; it grows with the depth squared.
+        patch_px: side of the patches whose depths err together, px; each counts as one measurement beside the start.
+        start_turn: standard deviation of the start's turn, rad; infinite = nothing is known of it.
+        start_shift_m: and of its shift, m.
         geometry: of both.
         threads: that the library uses; results do not depend on them.
     """
@@ -56,6 +62,9 @@ class RegistrationSettings:
     floor_m: float
     noise_per_m: float
     geometry: StereoGeometry
+    patch_px: float = 1.0
+    start_turn: float = float("inf")
+    start_shift_m: float = float("inf")
     threads: int = 1
 
 
@@ -78,6 +87,14 @@ class Registered:
     told: int
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """Where a depth image is tried: a motion of its points, and the step between the pixels that are looked at."""
+
+    motion: SE3
+    step: int
+
+
 def registered(depth_m: Depth, surface: Surface, settings: RegistrationSettings, library: Library | None) -> Registered:
     """Lay a depth image against the surface that was cast from where the camera is believed to be.
 
@@ -95,10 +112,11 @@ def registered(depth_m: Depth, surface: Surface, settings: RegistrationSettings,
     motion, told = SE3.identity(), 0
     for step, searches in _ROUNDS:
         for _ in range(searches):
-            sums = summed(depth_m, surface, settings, Trial(motion, step), library)
+            trial = Trial(motion, step)
+            sums = summed(depth_m, surface, settings, trial, library)
             if sums[29] * step * step < _LEAST_PARTNERS:
                 return _told(motion, sums, 0)
-            move, told = _step(sums)
+            move, told = _step(sums, settings, trial)
             motion = SE3.of(move) @ motion
             if np.abs(move).max() < _STILL:
                 break
@@ -116,26 +134,22 @@ def _told(motion: SE3, sums: Floats, told: int) -> Registered:
     )
 
 
-def _step(sums: Floats) -> tuple[Floats, int]:
-    """Solve the equations in the directions that have information; return the motion (6,) and how many those are."""
+def _step(sums: Floats, settings: RegistrationSettings, trial: Trial) -> tuple[Floats, int]:
+    """Solve the equations; return the motion (6,) and how many directions the surface tells."""
     matrix = np.zeros((6, 6))
     matrix[_UPPER] = sums[:21]
     matrix += np.triu(matrix, 1).T
     # Turns and shifts have different units: each is measured by what it moves the points on average.
     lever = np.sqrt(np.trace(matrix[:3, :3]) / max(np.trace(matrix[3:, 3:]), np.finfo(float).tiny))
     scale = np.repeat([1 / max(lever, 1e-6), 1.0], 3)
-    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    share = min(trial.step**2 / settings.patch_px**2, 1.0)
+    values, vectors = np.linalg.eigh(share * matrix * np.outer(scale, scale))
     told = values > _TOLD * values[-1]
-    parts = (vectors[:, told].T @ (scale * sums[21:27])) / values[told]
-    return scale * (vectors[:, told] @ parts), int(np.count_nonzero(told))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Trial:
-    """Where a depth image is tried: a motion of its points, and the step between the pixels that are looked at."""
-
-    motion: SE3
-    step: int
+    along = vectors[:, told]
+    prior = scale**2 * np.repeat([settings.start_turn**-2, settings.start_shift_m**-2], 3)
+    right = along @ (along.T @ (share * scale * sums[21:27])) - prior * trial.motion.pose() / scale
+    whole = (along * values[told]) @ along.T + np.diag(prior)
+    return scale * (np.linalg.pinv(whole, hermitian=True) @ right), int(np.count_nonzero(told))
 
 
 def summed(

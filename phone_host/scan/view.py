@@ -28,6 +28,7 @@ class View:
         depth_m: (H, W) float32, m, NaN = none.
         geometry: of the rectified pair.
         noise_px: standard deviation of a disparity, px, > 0.
+        patch_px: side of the patches whose depths err together, px: what a matcher smooths; a depth camera's window is smaller.
     """
 
     grey: Image
@@ -35,6 +36,7 @@ class View:
     depth_m: Depth
     geometry: StereoGeometry
     noise_px: float
+    patch_px: float = 40.0
 
     @property
     def noise_per_m(self) -> float:
@@ -90,4 +92,5 @@ def reduced(view: View) -> View:
         # An average's centre lies half a pixel farther than its first pixel's.
         geometry=replace(half, cx_px=half.cx_px - 0.25, cy_px=half.cy_px - 0.25),
         noise_px=view.noise_px / 2,
+        patch_px=view.patch_px / 2,
     )

@@ -24,6 +24,8 @@ _KINECT = StereoGeometry(focal_px=585.0, baseline_m=0.075, cx_px=320.0, cy_px=24
 _KINECT_NOISE_PX = 0.11
 """2.5 mm at 1 m."""
 
+_KINECT_PATCH_PX = 5.0
+
 _INVALID = 65535
 
 
@@ -123,6 +125,7 @@ def room(data: Path) -> Clip:
                 depth_m=depth.astype(np.float32),
                 geometry=_KINECT,
                 noise_px=_KINECT_NOISE_PX,
+                patch_px=_KINECT_PATCH_PX,
             )
         )
     if not views:

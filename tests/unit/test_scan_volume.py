@@ -196,6 +196,19 @@ def test_a_plane_tells_three_directions() -> None:
     assert abs(fit.start_now.t_m @ WALL[0].axes[1]) < 1e-3
 
 
+@pytest.mark.parametrize(("patch_px", "share"), [(1.0, 0.0), (1e5, 1.0)])
+def test_a_start_weighs_against_the_depths(patch_px: float, share: float) -> None:
+    """Many independent depths overrule a start that is 1 cm off; depths that all err together leave it as it is."""
+    volume = filled(native())
+    depth, geometry = halved(views()[2].depth_m, GEOMETRY)
+    off = SE3(np.eye(3), np.array([0.006, 0.005, -0.006]))
+    surface = volume.cast(Camera(geometry, depth.shape, POSES[2] @ off), depth)
+    settings = replace(REGISTRATION, patch_px=patch_px, start_turn=0.005, start_shift_m=0.005)
+    fit = registered(depth, surface, settings, None)
+    left = np.linalg.norm(off.t_m + fit.start_now.t_m) / np.linalg.norm(off.t_m)
+    assert left == pytest.approx(share, abs=0.12)
+
+
 def test_without_partners_nothing_moves() -> None:
     """An empty volume gives the start back, and says so."""
     depth, geometry = halved(views()[0].depth_m, GEOMETRY)

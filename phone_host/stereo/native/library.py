@@ -15,7 +15,7 @@ from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
 from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
-from phone_host.stereo.native.volume_jobs import RegisterJob, CastJob, FuseJob, TouchJob, declare
+from phone_host.stereo.native.volume_jobs import CastJob, FuseJob, RegisterJob, TouchJob, declare
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
