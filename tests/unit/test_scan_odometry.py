@@ -1,5 +1,7 @@
 """Odometry: points, poses and windows of keyframes, on observations made by geometry and on a drawn plane."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from phone_host.scan.camera_pose import LEAST_INLIERS, located, refined
 from phone_host.scan.corners import followed, new_corners
 from phone_host.scan.observation import Observer, by_motion
 from phone_host.scan.odometry import Odometry, OdometrySettings
-from phone_host.scan.view import halved
+from phone_host.scan.view import halved, reduced
 from phone_host.scan.window import Keyframe, fitted
 from tests.support.plane_films import distance, path, plane_view, texture
 
@@ -165,3 +167,21 @@ def test_half_a_depth_is_every_second_pixel() -> None:
         view.geometry.focal_px * view.geometry.baseline_m / (10 - view.geometry.doffs_px)
     )
     assert view.noise_per_m == pytest.approx(0.1 / 20)
+
+
+def test_a_reduced_view_shows_the_same_points() -> None:
+    """A wide view loses half its size; a point lies where the average of four pixels does. A small one stays as it is."""
+    small = plane_view(SE3.identity(), PICTURE)
+    wide = replace(
+        small,
+        grey=np.tile(small.grey, (2, 3)),
+        colours=np.tile(small.colours, (2, 3, 1)),
+        depth_m=np.tile(small.depth_m, (2, 3)),
+    )
+    half = reduced(wide)
+    assert half.grey.shape == half.depth_m.shape == (180, 360)
+    assert half.grey[10, 20] == pytest.approx(wide.grey[20:22, 40:42].mean(), abs=0.51)
+    slope = (40.5 - wide.geometry.cx_px) / wide.geometry.focal_px
+    assert (20 - half.geometry.cx_px) / half.geometry.focal_px == pytest.approx(slope)
+    assert half.noise_per_m == pytest.approx(wide.noise_per_m)
+    assert reduced(small) is small
