@@ -28,6 +28,7 @@ CONVERGED: Final = 1e-9
 """Relative decrease of the cost at which the search ends; the baseline of a rig then moves by less than a micrometre."""
 
 _TILE: Final = 16
+_DEEP: Final = 1024
 """OpenBLAS works alone up to 262144 products: 16 x 16 x 1024."""
 
 _ALONE: Final = 150
@@ -97,9 +98,12 @@ def _product(one: Floats, other: Floats) -> Floats:
     They spin while they wait for each other: on a busy machine that took ten times as long. One product for each block, and their sum, fills the
     memory instead.
     """
-    rows = len(one)
-    tiles = [np.pad(each, ((0, -rows % _TILE), (0, 0))).reshape(-1, _TILE, each.shape[1]) for each in (one, other)]
-    product = tiles[0][:, np.newaxis] @ np.swapaxes(tiles[1], 1, 2)[np.newaxis]
+    rows, wide = one.shape
+    tiles = [np.pad(each, ((0, -rows % _TILE), (0, 0))).reshape(-1, _TILE, wide) for each in (one, other)]
+    product = np.zeros((len(tiles[0]), len(tiles[0]), _TILE, _TILE))
+    for first in range(0, wide, _DEEP):
+        here, there = (each[..., first : first + _DEEP] for each in tiles)
+        product += here[:, np.newaxis] @ np.swapaxes(there, 1, 2)[np.newaxis]
     return np.asarray(product.transpose(0, 2, 1, 3).reshape(2 * (rows + -rows % _TILE,))[:rows, :rows], np.float64)
 
 

@@ -38,10 +38,23 @@ PER_ISA: Final = (
     "guide_kernel.c",
     "vote_kernel.c",
     "support_kernel.c",
+    "fuse_kernel.c",
+    "cast_kernel.c",
 )
 """Compiled once per instruction set."""
 
-ONCE: Final = ("dispatch.c", "match.c", "speckles.c", "support.c", "bridges.c", "crew.c")
+ONCE: Final = (
+    "dispatch.c",
+    "match.c",
+    "speckles.c",
+    "support.c",
+    "bridges.c",
+    "crew.c",
+    "volume.c",
+    "fuse.c",
+    "cast.c",
+    "register.c",
+)
 """Compiled once, for the plainest processor of the architecture."""
 
 FLAGS: Final = (

@@ -15,11 +15,12 @@ from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
 from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
+from phone_host.stereo.native.volume_jobs import CastJob, FuseJob, RegisterJob, TouchJob, declare
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
 
-_ABI: Final = 3  # TANDEM_ABI of tandem.h
+_ABI: Final = 4  # TANDEM_ABI of tandem.h
 _HERE: Final = Path(__file__).resolve().parent
 _INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
 _REINSTALL: Final = "reinstall"
@@ -216,6 +217,22 @@ class Library:
         """See a coloured image through a map; see remap_kernel.c."""
         _require_done(self.handle.tandem_remap(self.isa, ctypes.byref(job)))
 
+    def touch(self, job: TouchJob) -> None:
+        """Make room where a depth image shows a surface; see volume.c."""
+        _require_done(self.handle.tandem_touch(ctypes.byref(job)))
+
+    def fuse(self, job: FuseJob) -> None:
+        """Fuse a depth image into a volume; see fuse_kernel.c."""
+        _require_done(self.handle.tandem_fuse(self.isa, ctypes.byref(job)))
+
+    def cast(self, job: CastJob) -> None:
+        """Show a volume's surface as a camera sees it; see cast_kernel.c."""
+        _require_done(self.handle.tandem_cast(self.isa, ctypes.byref(job)))
+
+    def register(self, job: RegisterJob) -> None:
+        """Compare a depth image with such a surface; see register.c."""
+        _require_done(self.handle.tandem_register(ctypes.byref(job)))
+
 
 @cache
 def native() -> Library | Missing:
@@ -300,6 +317,7 @@ def _choices(library: Library) -> str:
 
 def _declare(handle: ctypes.CDLL) -> None:
     """State the arguments and results of the library's functions."""
+    declare(handle)
     handle.tandem_abi.argtypes, handle.tandem_abi.restype = [], ctypes.c_int32
     handle.tandem_sources.argtypes, handle.tandem_sources.restype = [], ctypes.c_char_p
     handle.tandem_isa_name.argtypes, handle.tandem_isa_name.restype = [ctypes.c_int32], ctypes.c_char_p

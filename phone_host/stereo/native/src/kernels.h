@@ -39,6 +39,9 @@ typedef void tandem_support_smooth_rows_fn(const struct support *job, int from, 
 typedef void tandem_support_cost_rows_fn(const struct support *job, int from, int to, uint8_t *scratch);
 typedef void tandem_support_drop_rows_fn(const struct support *job, int from, int to);
 typedef size_t tandem_support_scratch_fn(int width);
+typedef void tandem_fuse_blocks_fn(const struct tandem_fuse_job *job, int32_t from, int32_t to);
+typedef void tandem_cast_row_fn(const struct tandem_cast_job *job, int32_t v);
+typedef void tandem_cast_normals_fn(const struct tandem_cast_job *job, int32_t v);
 
 #define TANDEM_KERNELS(KERNEL) \
     KERNEL(reproject)          \
@@ -54,7 +57,10 @@ typedef size_t tandem_support_scratch_fn(int width);
     KERNEL(support_smooth_rows) \
     KERNEL(support_cost_rows)  \
     KERNEL(support_drop_rows)  \
-    KERNEL(support_scratch)
+    KERNEL(support_scratch)   \
+    KERNEL(fuse_blocks)       \
+    KERNEL(cast_row)          \
+    KERNEL(cast_normals)
 
 struct tandem_kernels {
 #define TANDEM_FIELD(name) tandem_##name##_fn *name;

@@ -1,7 +1,7 @@
-/* What the library offers to Python (library.py declares the same). Plain C11, no global state.
+/* What the library offers to Python (library.py and volume_jobs.py declare the same). Plain C11, no global state.
  *
  * Rules:
- * - every function that computes takes the instruction set as its first argument and gives the same bits for all of them:
+ * - every function that is compiled per instruction set takes it as its first argument and gives the same bits for all of them:
  *   IEEE float32 in the stated order, no contraction, no reordering;
  * - lengths and strides are checked by the Python side (one place per function), pointers are never kept;
  * - nothing here prints, exits or throws.
@@ -16,7 +16,7 @@
 #define TANDEM_API __attribute__((visibility("default")))
 
 /* Raise it, here and in library.py, when a signature or a struct changes. */
-#define TANDEM_ABI 3
+#define TANDEM_ABI 4
 
 /* Instruction sets, from the plainest. The numbers are part of the ABI, isa_name() their names for people. */
 enum tandem_isa {
@@ -117,6 +117,105 @@ struct tandem_match_job {
 
 TANDEM_API int64_t tandem_match_bytes(int32_t isa, const struct tandem_match_job *job); /* of the workspace; -1: no such set, or a size that tandem_match refuses: sides of 1 to 32767 px, 1 to 2048 disparities */
 TANDEM_API int32_t tandem_match(int32_t isa, struct tandem_match_job *job);
+
+/* A distance field in blocks; see volume.h. The caller owns the arrays. */
+struct tandem_volume {
+    int32_t *slots;      /* (slot_count,) number of a block + 1, 0 = free */
+    int32_t *places;     /* (room, 3) of the blocks, in blocks */
+    int16_t *field;      /* (room, 512) distance in truncations, 32000 = 1, positive before the surface */
+    uint16_t *weights;   /* (room, 512), 0 = nothing was seen */
+    uint8_t *colours;    /* (room, 512, 3) BGR */
+    int64_t slot_count;  /* a power of 2, at least 2 room */
+    int32_t room;        /* blocks that the arrays hold */
+    int32_t count;       /* blocks in use; tandem_touch adds some */
+    float voxel_m;
+    float truncation_m;
+};
+
+/* Blocks where a depth image shows a surface; see volume.c. */
+struct tandem_touch_job {
+    struct tandem_volume *volume;
+    const float *depth_m;      /* (height, width), packed, NAN = none */
+    float world_camera[12];    /* 3 rows of rotation and translation, m */
+    int32_t width;
+    int32_t height;
+    float focal_px;
+    float cx_px;
+    float cy_px;
+    float far_m;
+    int32_t step;              /* of the pixels that are looked at */
+    int32_t reserved;
+    int64_t missing;           /* written: blocks for which there was no room, the same one perhaps several times */
+};
+
+TANDEM_API int32_t tandem_touch(struct tandem_touch_job *job);
+
+/* A depth image into all blocks; see fuse_kernel.c. */
+struct tandem_fuse_job {
+    const struct tandem_volume *volume;
+    const float *depth_m;      /* (height, width), packed, NAN = none */
+    const uint8_t *colours;    /* (height, width, 3) BGR, packed */
+    uint8_t *changed;          /* (count,) written: 1 where the block got something */
+    float camera_world[12];
+    int32_t width;
+    int32_t height;
+    float focal_px;
+    float cx_px;
+    float cy_px;
+    float far_m;
+    float noise_per_m;         /* of a depth 1 m away; it grows with the depth squared */
+    float sure_m;              /* a depth with this noise or less has the full weight */
+    float weight_one;          /* the full weight */
+    int32_t most_weight;       /* at which a voxel's weight stays */
+    int32_t threads;           /* results do not depend on it */
+    int32_t reserved;
+};
+
+TANDEM_API int32_t tandem_fuse(int32_t isa, struct tandem_fuse_job *job);
+
+/* The surface as a camera sees it; see cast_kernel.c. */
+struct tandem_cast_job {
+    const struct tandem_volume *volume;
+    const float *seeds_m;      /* (height, width) near which the surface is looked for, packed, NAN = none; NULL: none at all */
+    float *points_m;           /* (height, width, 3), packed; written: in the camera's axes, NAN = none */
+    float *normals;            /* (height, width, 3), packed; written: towards the camera, NAN = none */
+    float world_camera[12];
+    int32_t width;
+    int32_t height;
+    float focal_px;
+    float cx_px;
+    float cy_px;
+    float near_m;
+    float far_m;
+    int32_t search;            /* 1: rays without a seed are searched from near_m to far_m */
+    int32_t threads;           /* results do not depend on it */
+    int32_t reserved;
+};
+
+TANDEM_API int32_t tandem_cast(int32_t isa, struct tandem_cast_job *job);
+
+/* How a depth image lies against such a surface; see register.c. */
+struct tandem_register_job {
+    const float *depth_m;      /* (height, width), packed, NAN = none */
+    const float *points_m;     /* (height, width, 3), as tandem_cast writes them */
+    const float *normals;
+    double *sums;              /* (rows, 31); written: 21 of the upper triangle, 6 of the right side, partners within 3 sigma, sum of |distance|, partners, pixels in view */
+    float model_camera[12];    /* takes the depth's points to the axes of the surface */
+    int32_t width;
+    int32_t height;
+    float focal_px;
+    float cx_px;
+    float cy_px;
+    float most_m;              /* partners lie no farther apart */
+    float floor_m;             /* least noise of a distance */
+    float noise_per_m;
+    float huber_sigmas;
+    int32_t step;              /* of the pixels that are looked at: rows = ceil(height / step) */
+    int32_t threads;           /* results do not depend on it */
+    int32_t reserved;
+};
+
+TANDEM_API int32_t tandem_register(struct tandem_register_job *job);
 
 /* What these functions return. */
 enum tandem_result {

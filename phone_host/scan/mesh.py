@@ -1,0 +1,131 @@
+"""The surface of a volume as triangles with colours: marching cubes over its blocks. Pure.
+
+A cube is used only where something was seen at all eight corners, so the mesh is open where nobody looked. Blocks are taken in the order of
+their places: the same volume gives the same bytes, in whatever order its blocks came.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.scan.blocks import SIDE, Blocks
+from phone_host.scan.cube_cases import CORNERS, EDGES, cube_cases
+
+_AT_ONCE: Final = 256
+"""Blocks that are taken together: some 10 MB."""
+
+_KEY_BITS: Final = 20
+"""Of a voxel's number along each axis: a volume of 1 mm voxels may be 1 km wide."""
+
+_AXIS_OF_EDGE: Final = np.repeat(np.arange(3), 4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangles.
+
+    Attributes:
+        points_m: (V, 3) float32, m, in the world.
+        colours: (V, 3) uint8, red green blue.
+        triangles: (T, 3) int32 numbers of points, anticlockwise as seen from where the camera was.
+    """
+
+    points_m: NDArray[np.float32]
+    colours: NDArray[np.uint8]
+    triangles: NDArray[np.int32]
+
+
+def mesh_of(blocks: Blocks, voxel_m: float, least_weight: int = 1) -> Mesh:
+    """Make the mesh of a volume.
+
+    Args:
+        blocks: of the volume.
+        voxel_m: distance of two values, m.
+        least_weight: of a voxel that counts as seen; more leaves out what was seen only once.
+
+    Returns:
+        The mesh; without triangles where there is no surface.
+    """
+    order = np.lexsort(blocks.places[: blocks.count].T)
+    keys, points, colours, corners = [], [], [], []
+    for first in range(0, len(order), _AT_ONCE):
+        part = _part(blocks, order[first : first + _AT_ONCE], least_weight)
+        keys.append(part.keys)
+        points.append(part.points)
+        colours.append(part.colours)
+        corners.append(part.corners)
+    if not keys:
+        return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.int32))
+    # An edge on the border of two parts was met by both: its point is one.
+    whole, chosen = np.unique(np.concatenate(keys), return_index=True)
+    wanted = np.searchsorted(whole, np.concatenate(corners)).reshape(-1, 3).astype(np.int32)
+    metres = (np.concatenate(points)[chosen] * voxel_m).astype(np.float32)
+    return Mesh(metres, np.ascontiguousarray(np.concatenate(colours)[chosen][:, ::-1]), wanted)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """Points on edges: key (P,), place in voxels (P, 3), colour (P, 3); and (T, 3) keys of the triangles' corners."""
+
+    keys: NDArray[np.int64]
+    points: NDArray[np.float64]
+    colours: NDArray[np.uint8]
+    corners: NDArray[np.int64]
+
+
+def _part(blocks: Blocks, numbers: NDArray[np.int64], least_weight: int) -> _Part:
+    """Make the triangles of the cubes whose lowest corner lies in some blocks."""
+    field, known, tint = _with_neighbours(blocks, numbers, least_weight)
+    size, cases = SIDE + 1, np.zeros((len(numbers), SIDE, SIDE, SIDE), np.int64)
+    whole = np.ones(cases.shape, np.bool_)
+    for corner, (x, y, z) in enumerate(CORNERS):
+        at = np.s_[:, z : z + SIDE, y : y + SIDE, x : x + SIDE]
+        cases |= (field[at] < 0).astype(np.int64) << corner
+        whole &= known[at]
+    table = cube_cases()
+    block, z, y, x = np.nonzero(whole & (table.counts[cases] > 0))
+    edges = table.edges[cases[block, z, y, x]]
+    used = edges[..., 0] >= 0
+    cube = np.broadcast_to(np.arange(len(block))[:, np.newaxis], used.shape)[used]
+    edges = edges[used]
+    ends = np.array(EDGES)[edges]  # (T, 3, 2) corners
+    lower = np.column_stack([x, y, z])[cube][:, np.newaxis, np.newaxis] + CORNERS[ends]
+    flat = block[cube][:, np.newaxis, np.newaxis] * size**3 + lower @ np.array([1, size, size**2])
+    world = lower[:, :, 0] + SIDE * blocks.places[numbers[block[cube]]].astype(np.int64)[:, np.newaxis]
+    keys = _keys(world) * 3 + _AXIS_OF_EDGE[edges]
+    distinct, first = np.unique(keys, return_index=True)
+    flat, axis = flat.reshape(-1, 2)[first], _AXIS_OF_EDGE[edges].ravel()[first]
+    values = field.ravel()[flat].astype(np.float64)
+    share = values[:, 0] / (values[:, 0] - values[:, 1])
+    points = world.reshape(-1, 3)[first].astype(np.float64)
+    points[np.arange(len(points)), axis] += share
+    shades = tint.reshape(-1, 3)[flat].astype(np.float64)
+    colours = shades[:, 0] + (shades[:, 1] - shades[:, 0]) * share[:, np.newaxis]
+    return _Part(distinct, points, np.rint(colours).astype(np.uint8), keys)
+
+
+def _keys(voxels: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return one number for each voxel (..., 3)."""
+    x, y, z = np.moveaxis(voxels + (1 << _KEY_BITS - 1), -1, 0)
+    return np.asarray((((z << _KEY_BITS) + y) << _KEY_BITS) + x, np.int64)
+
+
+def _with_neighbours(
+    blocks: Blocks, numbers: NDArray[np.int64], least_weight: int
+) -> tuple[NDArray[np.int16], NDArray[np.bool_], NDArray[np.uint8]]:
+    """Return field, what is known, and colours of blocks with one more voxel on each upper side, (N, 9, 9, 9[, 3]) z y x."""
+    size, count = SIDE + 1, len(numbers)
+    field, known = np.zeros((count, size, size, size), np.int16), np.zeros((count, size, size, size), np.bool_)
+    tint = np.zeros((count, size, size, size, 3), np.uint8)
+    cube = (-1, SIDE, SIDE, SIDE)
+    for step in CORNERS:
+        there = blocks.find(blocks.places[numbers] + step.astype(np.int32))
+        has, beside = np.flatnonzero(there >= 0), there[there >= 0]
+        z, y, x = (slice(SIDE, size) if up else slice(0, SIDE) for up in step[::-1])
+        k, j, i = (slice(0, 1) if up else slice(0, SIDE) for up in step[::-1])
+        field[has, z, y, x] = blocks.field[beside].reshape(cube)[:, k, j, i]
+        known[has, z, y, x] = blocks.weights[beside].reshape(cube)[:, k, j, i] >= least_weight
+        tint[has, z, y, x] = blocks.colours[beside].reshape(*cube, 3)[:, k, j, i]
+    return field, known, tint

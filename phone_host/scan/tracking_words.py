@@ -1,0 +1,40 @@
+"""What the tracker says of a view, and what helps. Pure."""
+
+from enum import Enum
+
+
+class Tracking(Enum):
+    """How sure a view's pose is.
+
+    TRACKING: fused. WEAK: fused, but something is wrong; a `Weakness` says what. LOST: not fused. RELOCALISED: found again, fused.
+    """
+
+    TRACKING = "tracking"
+    WEAK = "weak"
+    LOST = "lost"
+    RELOCALISED = "relocalised"
+
+
+class Weakness(Enum):
+    """Why a pose is weak, or lost."""
+
+    NONE = "none"
+    NO_DEPTH = "no depth"
+    FEW_CORNERS = "few corners"
+    TOO_FAST = "too fast"
+    LITTLE_OVERLAP = "little overlap"
+    POOR_FIT = "poor fit"
+    FLAT = "flat"
+
+    @property
+    def advice(self) -> str:
+        """What happened and what to do, in one line."""
+        return {
+            Weakness.NONE: "",
+            Weakness.NO_DEPTH: "hardly anything has a depth: go nearer, or give more light",
+            Weakness.FEW_CORNERS: "too few features to follow: show more texture, or give more light",
+            Weakness.TOO_FAST: "moved too fast: move more slowly, back to where it was",
+            Weakness.LITTLE_OVERLAP: "too little of the model is in view: move back to where it was",
+            Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
+            Weakness.FLAT: "only a plane is in view: show something with depth beside it",
+        }[self]

@@ -1,0 +1,96 @@
+"""One pair as the scan takes it: the rectified left image, its depth, and how sure that is. Pure."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.geometry.se3 import SE3
+from phone_host.model import Image, StereoGeometry
+
+Depth = NDArray[np.float32]
+
+_LEAST_WIDTH_PX: Final = 480
+"""Narrower images have no corners to spare."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class View:
+    """What one pair shows.
+
+    A depth camera is one, too: its baseline and disparity noise are those of its projector.
+
+    Attributes:
+        grey: (H, W) uint8, the rectified left image.
+        colours: (H, W, 3) BGR uint8, the same.
+        depth_m: (H, W) float32, m, NaN = none.
+        geometry: of the rectified pair.
+        noise_px: standard deviation of a disparity, px, > 0.
+        patch_px: side of the patches whose depths err together, px: what a matcher smooths; a depth camera's window is smaller.
+    """
+
+    grey: Image
+    colours: Image
+    depth_m: Depth
+    geometry: StereoGeometry
+    noise_px: float
+    patch_px: float = 40.0
+
+    @property
+    def noise_per_m(self) -> float:
+        """Standard deviation of the depth 1 m away, m; it grows with the depth squared."""
+        return self.noise_px / (self.geometry.focal_px * self.geometry.baseline_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A camera at a place.
+
+    Attributes:
+        geometry: of its images.
+        shape: height and width of these, px.
+        world_camera: where it is.
+    """
+
+    geometry: StereoGeometry
+    shape: tuple[int, int]
+    world_camera: SE3
+
+
+def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeometry]:
+    """Take every second depth of every second row, so that none is mixed across an edge.
+
+    Args:
+        depth_m: (H, W) float32, m.
+        geometry: of the pair.
+
+    Returns:
+        ((H + 1) // 2, (W + 1) // 2) depths, packed, and the geometry of their pixels.
+    """
+    half = StereoGeometry(
+        focal_px=geometry.focal_px / 2,
+        baseline_m=geometry.baseline_m,
+        cx_px=geometry.cx_px / 2,
+        cy_px=geometry.cy_px / 2,
+        doffs_px=geometry.doffs_px / 2,
+    )
+    return np.ascontiguousarray(depth_m[::2, ::2]), half
+
+
+def reduced(view: View) -> View:
+    """Return a view of half the size, its grey averaged over 2 x 2 pixels; one that is small already as it is."""
+    if view.grey.shape[1] < _LEAST_WIDTH_PX:
+        return view
+    depth, half = halved(view.depth_m, view.geometry)
+    small = (depth.shape[1], depth.shape[0])
+    return View(
+        grey=np.asarray(cv2.resize(view.grey, small, interpolation=cv2.INTER_AREA), np.uint8),
+        colours=view.colours[::2, ::2],
+        depth_m=depth,
+        # An average's centre lies half a pixel farther than its first pixel's.
+        geometry=replace(half, cx_px=half.cx_px - 0.25, cy_px=half.cy_px - 0.25),
+        noise_px=view.noise_px / 2,
+        patch_px=view.patch_px / 2,
+    )

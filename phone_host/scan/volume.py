@@ -1,0 +1,179 @@
+"""A surface as a signed distance field with colour: views go in, the surface as a camera sees it comes out. Pure.
+
+The native library computes; without it numpy does (`volume_numpy`), with the same result within a rounding.
+Sources: B. Curless and M. Levoy, "A Volumetric Method for Building Complex Models from Range Images", 1996; R. A. Newcombe et al.,
+"KinectFusion", 2011; M. Niessner et al., "Real-time 3D Reconstruction at Scale using Voxel Hashing", 2013.
+"""
+
+import ctypes
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.geometry.se3 import SE3
+from phone_host.model import StereoGeometry
+from phone_host.scan import volume_numpy
+from phone_host.scan.blocks import BLOCK_BYTES, SIDE, VOXELS, Blocks
+from phone_host.scan.jobs import aim, rows_of
+from phone_host.scan.view import Camera, Depth, View
+from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
+from phone_host.stereo.native.library import Library, Missing, native
+from phone_host.stereo.native.volume_jobs import CastJob, FuseJob, TouchJob, VolumeArrays
+
+_LOOKS_A_BLOCK: Final = 3
+_MOST_STEP_PX: Final = 4
+"""Of the pixels that make room: every fourth, or more where a block is less than 12 px wide at the farthest depth."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """A surface as a camera sees it.
+
+    Attributes:
+        points_m: (H, W, 3) float32, m, in the camera's axes, NaN = none.
+        normals: (H, W, 3) float32, towards the camera, NaN = none.
+    """
+
+    points_m: NDArray[np.float32]
+    normals: NDArray[np.float32]
+
+
+class Volume:
+    """A distance field that grows where views show something.
+
+    Args:
+        settings: its fineness and limits.
+        threads: that work on it, >= 1; results do not depend on them.
+        library: computes; None: that of this installation.
+    """
+
+    def __init__(self, settings: VolumeSettings, threads: int = 1, library: Library | Missing | None = None) -> None:
+        self.settings, self._threads = settings, threads
+        found = native() if library is None else library
+        self._library = found if isinstance(found, Library) else None
+        self.blocks = Blocks()
+        self.left_out = 0
+
+    @property
+    def memory_bytes(self) -> int:
+        """Memory of the blocks in use."""
+        return self.blocks.count * BLOCK_BYTES
+
+    def fuse(self, view: View, world_camera: SE3) -> NDArray[np.uint8]:
+        """Fuse a view.
+
+        Args:
+            view: what the camera saw.
+            world_camera: where it was.
+
+        Returns:
+            (count,) 1 for each block that got something. Blocks for which there was no memory are added to `left_out`.
+        """
+        depth = np.ascontiguousarray(view.depth_m, np.float32)
+        colours = np.ascontiguousarray(view.colours, np.uint8)
+        if depth.shape != view.grey.shape or colours.shape != (*depth.shape, 3):
+            raise ValueError(f"depth {depth.shape} and colours {colours.shape} of an image {view.grey.shape}")
+        self._make_room(depth, Camera(view.geometry, view.grey.shape, world_camera))
+        if self._library is None:
+            packed = replace(view, depth_m=depth, colours=colours)
+            return volume_numpy.fuse(self.blocks, self.settings, packed, world_camera.inverse())
+        changed = np.zeros(self.blocks.count, np.uint8)
+        arrays = self._arrays()
+        job = FuseJob(
+            volume=ctypes.pointer(arrays),
+            depth_m=depth.ctypes.data,
+            colours=colours.ctypes.data,
+            changed=changed.ctypes.data,
+            camera_world=rows_of(world_camera.inverse()),
+            far_m=self.settings.far_m,
+            noise_per_m=view.noise_per_m,
+            sure_m=self.settings.sure_m,
+            weight_one=WEIGHT_ONE,
+            most_weight=MOST_WEIGHT,
+            threads=self._threads,
+        )
+        aim(job, view.geometry, depth.shape)
+        self._library.fuse(job)
+        return changed
+
+    def cast(self, camera: Camera, seeds_m: Depth | None = None) -> Surface:
+        """Show the surface as a camera sees it.
+
+        Args:
+            camera: from where.
+            seeds_m: (H, W) float32 depths near which the surface is looked for, m, NaN = nowhere; None: everywhere.
+
+        Returns:
+            The surface.
+        """
+        shape = camera.shape
+        if seeds_m is not None and seeds_m.shape != shape:
+            raise ValueError(f"seeds {seeds_m.shape} for an image {shape}")
+        seeds = None if seeds_m is None else np.ascontiguousarray(seeds_m, np.float32)
+        if self._library is None:
+            return Surface(*volume_numpy.cast(self.blocks, self.settings, camera, seeds))
+        points, normals = np.empty((*shape, 3), np.float32), np.empty((*shape, 3), np.float32)
+        arrays = self._arrays()
+        job = CastJob(
+            volume=ctypes.pointer(arrays),
+            seeds_m=None if seeds is None else seeds.ctypes.data,
+            points_m=points.ctypes.data,
+            normals=normals.ctypes.data,
+            world_camera=rows_of(camera.world_camera),
+            near_m=self.settings.voxel_m,
+            far_m=self.settings.far_m,
+            search=int(seeds is None),
+            threads=self._threads,
+        )
+        aim(job, camera.geometry, shape)
+        self._library.cast(job)
+        return Surface(points, normals)
+
+    def _make_room(self, depth: Depth, camera: Camera) -> None:
+        """Add the blocks that a depth image shows; grow while there is memory."""
+        while True:
+            missing = self._touch(depth, camera)
+            room = min(2 * self.blocks.room, self.settings.most_blocks)
+            if not missing or room <= self.blocks.room:
+                self.left_out += missing
+                return
+            self.blocks = self.blocks.grown(room)
+
+    def _touch(self, depth: Depth, camera: Camera) -> int:
+        """Add blocks as far as there is room; return how many found none."""
+        if self._library is None:
+            return volume_numpy.touch(self.blocks, self.settings, depth, camera, self._step_px(camera.geometry))
+        arrays = self._arrays()
+        job = TouchJob(
+            volume=ctypes.pointer(arrays),
+            depth_m=depth.ctypes.data,
+            world_camera=rows_of(camera.world_camera),
+            far_m=self.settings.far_m,
+            step=self._step_px(camera.geometry),
+        )
+        aim(job, camera.geometry, camera.shape)
+        self._library.touch(job)
+        self.blocks.count = arrays.count
+        return int(job.missing)
+
+    def _step_px(self, geometry: StereoGeometry) -> int:
+        block_px = SIDE * self.settings.voxel_m * geometry.focal_px / self.settings.far_m
+        return min(max(int(block_px / _LOOKS_A_BLOCK), 1), _MOST_STEP_PX)
+
+    def _arrays(self) -> VolumeArrays:
+        blocks = self.blocks
+        assert blocks.field.shape == (blocks.room, VOXELS)
+        return VolumeArrays(
+            slots=blocks.slots.ctypes.data,
+            places=blocks.places.ctypes.data,
+            field=blocks.field.ctypes.data,
+            weights=blocks.weights.ctypes.data,
+            colours=blocks.colours.ctypes.data,
+            slot_count=len(blocks.slots),
+            room=blocks.room,
+            count=blocks.count,
+            voxel_m=self.settings.voxel_m,
+            truncation_m=self.settings.truncation_m,
+        )

@@ -1,0 +1,235 @@
+"""What the native library does with a volume, in numpy: for machines without it, and to judge it. Pure.
+
+The operations are those of native/src/volume.c, fuse_kernel.c and cast_kernel.c, float32 in the same order.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.geometry.se3 import SE3
+from phone_host.model import StereoGeometry
+from phone_host.scan.blocks import ONE, SIDE, VOXELS, Blocks
+from phone_host.scan.view import Camera, Depth, View
+from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
+
+Floats = NDArray[np.float32]
+F: Final = np.float32
+
+_SAMPLES: Final = 5
+_AT_ONCE: Final = 64
+"""Blocks that are fused together: they fit the cache."""
+
+_SEED_TRUNCATIONS: Final = F(1.5)
+_JUMP: Final = F(0.05)
+_ROOT_STEPS: Final = 2
+
+
+def _turned(pose: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
+    """Return the three coordinates (3, N) of turned and shifted points."""
+    return np.stack([row[0] * x + row[1] * y + row[2] * z + row[3] for row in pose])
+
+
+def _rows(pose: SE3) -> Floats:
+    return np.column_stack([pose.R, pose.t_m]).astype(F)
+
+
+def _slopes(geometry: StereoGeometry, shape: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Return x / z of the columns, (1, W), and y / z of the rows, (H, 1)."""
+    height, width = shape
+    focal = F(geometry.focal_px)
+    columns = (np.arange(width, dtype=F) - F(geometry.cx_px)) / focal
+    rows = (np.arange(height, dtype=F) - F(geometry.cy_px)) / focal
+    return columns[np.newaxis], rows[:, np.newaxis]
+
+
+def touch(blocks: Blocks, settings: VolumeSettings, depth: Depth, camera: Camera, step: int) -> int:
+    """Add the blocks that a depth image shows, as far as there is room; return how many found none."""
+    dx, dy = (np.broadcast_to(slope, depth.shape)[::step, ::step] for slope in _slopes(camera.geometry, depth.shape))
+    seen = depth[::step, ::step]
+    usable = (seen > 0) & (seen <= F(settings.far_m))
+    scale = F(1) / (F(SIDE) * F(settings.voxel_m))
+    places = []
+    for sample in range(_SAMPLES):
+        z = seen[usable] + (F(sample) * F(0.5) - F(1)) * F(settings.truncation_m)
+        world = _turned(_rows(camera.world_camera), dx[usable] * z, dy[usable] * z, z)
+        places.append(np.floor(world * scale).astype(np.int32).T)
+    wanted = np.unique(np.concatenate(places), axis=0)
+    new = wanted[blocks.find(wanted) < 0]
+    room = blocks.room - blocks.count
+    blocks.add(new[:room])
+    return max(len(new) - room, 0)
+
+
+def fuse(blocks: Blocks, settings: VolumeSettings, view: View, camera_world: SE3) -> NDArray[np.uint8]:
+    """Fuse a view into all blocks; return which got something, (count,)."""
+    changed = np.zeros(blocks.count, np.uint8)
+    for first in range(0, blocks.count, _AT_ONCE):
+        part = slice(first, min(first + _AT_ONCE, blocks.count))
+        changed[part] = _fuse_some(blocks, part, settings, view, _rows(camera_world))
+    return changed
+
+
+def _fuse_some(blocks: Blocks, part: slice, settings: VolumeSettings, view: View, pose: Floats) -> NDArray[np.bool_]:
+    seen, pixels, z = _seen_at(blocks.places[part], F(settings.voxel_m), pose, view.geometry, view.depth_m)
+    distance, truncation = seen - z, F(settings.truncation_m)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        got = (seen > 0) & (seen <= F(settings.far_m)) & (distance >= -truncation)
+        sure = F(settings.sure_m) / (F(view.noise_per_m) * seen[got] * seen[got])
+    share = np.minimum(distance[got] / truncation, F(1))
+    value = np.floor(share * F(ONE) + F(0.5)).astype(np.int32)
+    weight = np.maximum((F(WEIGHT_ONE) * np.minimum(sure * sure, F(1)) + F(0.5)).astype(np.int32), 1)
+    held = blocks.weights[part][got].astype(np.int32)
+    total = (held + weight).astype(F)
+    mean = np.floor((blocks.field[part][got] * held + value * weight).astype(F) / total + F(0.5)).astype(np.int16)
+    blocks.field[part][got] = np.where(mean == 0, np.int16(1), mean)
+    near = got.copy()
+    near[got] = share < 1
+    of = share < 1
+    tint = view.colours.reshape(-1, 3)[pixels[near]].astype(np.int32) * weight[of, np.newaxis]
+    old = blocks.colours[part][near].astype(np.int32) * held[of, np.newaxis]
+    blocks.colours[part][near] = ((old + tint).astype(F) / total[of, np.newaxis] + F(0.5)).astype(np.uint8)
+    blocks.weights[part][got] = np.minimum(held + weight, MOST_WEIGHT)
+    return np.asarray(got.any(axis=1), np.bool_)
+
+
+def _seen_at(
+    places: NDArray[np.int32], voxel: np.float32, pose: Floats, geometry: StereoGeometry, depth: Depth
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Return what the image shows at each voxel, its pixel, and the voxel's own depth, (N, 512) each; NaN outside the image."""
+    corner = (SIDE * places).astype(F) * voxel
+    at = np.arange(VOXELS)
+    i, y, z = (at % SIDE).astype(F), (at // SIDE % SIDE).astype(F) * voxel, (at // SIDE**2).astype(F) * voxel
+    camera = []
+    for row in pose:
+        first = row[0] * corner[:, 0] + row[1] * corner[:, 1] + row[2] * corner[:, 2] + row[3]
+        start = first[:, np.newaxis] + (row[1] * y + row[2] * z)
+        camera.append(start + (row[0] * voxel) * i)
+    depths = camera[2]
+    safe, focal = np.maximum(depths, F(1e-3)), F(geometry.focal_px)
+    u = focal * camera[0] / safe + F(geometry.cx_px) + F(0.5)
+    v = focal * camera[1] / safe + F(geometry.cy_px) + F(0.5)
+    height, width = depth.shape
+    inside = (depths > F(1e-3)) & (u >= 0) & (v >= 0) & (u < F(width)) & (v < F(height))
+    pixels = np.where(inside, v, 0).astype(np.int64) * width + np.where(inside, u, 0).astype(np.int64)
+    return np.where(inside, depth.ravel()[pixels], F(np.nan)), pixels, depths
+
+
+class _Field:
+    """A volume's values by the place in the world, in voxels."""
+
+    def __init__(self, blocks: Blocks) -> None:
+        self._blocks = blocks
+
+    def at(self, voxels: NDArray[np.int32]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the field at voxels (N, 3), whether it is known, and whether there is a block."""
+        blocks, inside = self._blocks, voxels & (SIDE - 1)
+        numbers = blocks.find(voxels >> 3)
+        at = inside[:, 0] + SIDE * inside[:, 1] + SIDE**2 * inside[:, 2]
+        there = numbers >= 0
+        safe = np.maximum(numbers, 0)
+        return blocks.field[safe, at].astype(F), there & (blocks.weights[safe, at] > 0), there
+
+    def between(self, points: Floats) -> Floats:
+        """Return the field between voxels at (N, 3) points, trilinear; NaN where one of the eight is unknown."""
+        floored = np.floor(points)
+        low, share = floored.astype(np.int32), points - floored
+        total, known = np.zeros(len(points), F), np.ones(len(points), np.bool_)
+        for corner in range(8):
+            step = np.array([corner & 1, corner >> 1 & 1, corner >> 2], np.int32)
+            values, here, _ = self.at(low + step)
+            parts = np.where(step == 1, share, F(1) - share)
+            total += parts[:, 0] * parts[:, 1] * parts[:, 2] * values
+            known &= here
+        return np.where(known, total, F(np.nan))
+
+
+def cast(blocks: Blocks, settings: VolumeSettings, camera: Camera, seeds: Depth | None) -> tuple[Floats, Floats]:
+    """Return points and normals of the surface as a camera sees it, (H, W, 3) each, NaN = none."""
+    dx, dy = (np.broadcast_to(slope, camera.shape).ravel() for slope in _slopes(camera.geometry, camera.shape))
+    pose, reach = _rows(camera.world_camera), _SEED_TRUNCATIONS * F(settings.truncation_m)
+    rays = np.stack([row[0] * dx + row[1] * dy + row[2] for row in pose], axis=1)
+    start, end = np.full(dx.size, F(settings.voxel_m)), np.full(dx.size, F(settings.far_m))
+    wanted = np.ones(dx.size, np.bool_)
+    if seeds is not None:
+        flat = seeds.ravel()
+        with np.errstate(invalid="ignore"):
+            wanted = flat > 0
+        start = np.where(wanted, np.maximum(flat - reach, start), start)
+        end = np.where(wanted, np.minimum(flat + reach, end), end)
+    depth = np.full(dx.size, F(np.nan))
+    depth[wanted] = _found(_Field(blocks), settings, _Rays(pose[:, 3], rays[wanted]), start[wanted], end[wanted])
+    points = np.stack([dx * depth, dy * depth, depth], axis=1).reshape(*camera.shape, 3)
+    return points, _normals(points)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rays:
+    """Rays from one place, (3,), along (N, 3), m a metre of depth."""
+
+    origin: Floats
+    along: Floats
+
+    def at(self, depth: Floats, scale: np.float32) -> Floats:
+        """Return the points at (N,) depths, (N, 3), scaled."""
+        return np.asarray((self.origin + depth[:, np.newaxis] * self.along) * scale, F)
+
+    def only(self, chosen: NDArray[np.int64]) -> "_Rays":
+        """Return some of them."""
+        return _Rays(self.origin, self.along[chosen])
+
+
+def _found(field: _Field, settings: VolumeSettings, rays: _Rays, start: Floats, end: Floats) -> Floats:
+    """Return the depth of the surface on each ray, (N,), NaN = none."""
+    voxel, truncation, scale = F(settings.voxel_m), F(settings.truncation_m), F(1) / F(settings.voxel_m)
+    depth, has_before, result = start.copy(), np.zeros(len(start), np.bool_), np.full(len(start), F(np.nan))
+    walking = np.flatnonzero(depth < end)
+    while len(walking):
+        at = rays.only(walking).at(depth[walking], scale)
+        values, known, there = field.at(np.floor(at + F(0.5)).astype(np.int32))
+        values = values / F(ONE)
+        behind = known & (values <= 0)
+        ends = walking[behind & has_before[walking]]
+        result[ends] = _root(field, rays.only(ends), depth[ends] - F(2) * voxel, depth[ends] + voxel, scale)
+        step = np.where(
+            known, np.maximum(F(0.8) * values * truncation, voxel), np.where(there, voxel, F(0.5) * truncation)
+        )
+        has_before[walking] = known
+        depth[walking] += step
+        walking = walking[~behind]
+        walking = walking[depth[walking] < end[walking]]
+    return result
+
+
+def _root(field: _Field, rays: _Rays, before: Floats, behind: Floats, scale: np.float32) -> Floats:
+    """Return where the field is 0 between two depths of each ray, (N,), NaN = not known well enough."""
+
+    def value(depth: Floats) -> Floats:
+        return field.between(rays.at(depth, scale))
+
+    first, second, middle = value(before), value(behind), np.full(len(before), F(np.nan))
+    for _ in range(_ROOT_STEPS):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            open_ = (first > 0) & (second <= 0)
+            middle = np.where(open_, before + (behind - before) * (first / (first - second)), middle)
+            here = value(np.where(open_, middle, F(0)))
+            nearer = open_ & (here > 0)
+        before, first = np.where(nearer, middle, before), np.where(nearer, here, first)
+        behind, second = np.where(open_ & ~nearer, middle, behind), np.where(open_ & ~nearer, here, second)
+    return middle
+
+
+def _normals(points: Floats) -> Floats:
+    """Return the normals of a point image from each point's neighbours."""
+    normals = np.full(points.shape, F(np.nan))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        a, b = points[1:-1, 2:] - points[1:-1, :-2], points[2:, 1:-1] - points[:-2, 1:-1]
+        most = _JUMP * points[1:-1, 1:-1, 2]
+        smooth = (np.abs(a[..., 2]) <= most) & (np.abs(b[..., 2]) <= most)
+        cross = np.cross(b, a).astype(F)
+        x, y, z = (cross[..., axis] for axis in range(3))
+        unit = cross / np.sqrt(x * x + y * y + z * z)[..., np.newaxis]
+    normals[1:-1, 1:-1] = np.where(smooth[..., np.newaxis], unit, F(np.nan))
+    return normals

@@ -1,0 +1,181 @@
+/* The surface of a volume as a camera sees it: where the field changes its sign along each pixel's ray, and the normals there.
+ *
+ * A depth that is known from elsewhere is a seed: the ray is searched only near it. Without one it is searched as a whole, or not at all.
+ * R. A. Newcombe et al., "KinectFusion", 2011.
+ *
+ * SPDX-License-Identifier: Apache-2.0
+ */
+#include <math.h>
+#include <stddef.h>
+
+#include "kernels.h"
+#include "volume.h"
+
+#define SEED_TRUNCATIONS 1.5f
+#define JUMP 0.05f /* neighbours whose depths differ by more, as a share, lie on different surfaces */
+
+enum { ROOT_STEPS = 2 }; /* of the false position: the field is nearly linear there */
+
+struct walk {
+    const struct tandem_volume *volume;
+    int32_t place[3]; /* of the block that was looked up last */
+    int32_t number;
+};
+
+/* The voxel's index in the volume's arrays; -1: nothing was fused there. */
+static int64_t voxel_at(struct walk *walk, int32_t x, int32_t y, int32_t z)
+{
+    const int32_t place[3] = {x >> 3, y >> 3, z >> 3}; /* arithmetic shift: floor */
+    if (place[0] != walk->place[0] || place[1] != walk->place[1] || place[2] != walk->place[2]) {
+        for (int axis = 0; axis < 3; axis++) {
+            walk->place[axis] = place[axis];
+        }
+        walk->number = volume_find(walk->volume, place[0], place[1], place[2]);
+    }
+    if (walk->number < 0) {
+        return -1;
+    }
+    return (int64_t)walk->number * BLOCK_VOXELS + (x & 7) + 8 * (y & 7) + 64 * (z & 7);
+}
+
+/* The field between voxels, trilinear; NAN where one of the eight is unknown. */
+static float between(struct walk *walk, const float *at)
+{
+    int32_t low[3];
+    float share[3], sum = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        low[axis] = floor_of(at[axis]);
+        share[axis] = at[axis] - (float)low[axis];
+    }
+    const int in_one = (low[0] & 7) < 7 && (low[1] & 7) < 7 && (low[2] & 7) < 7; /* block: two in three */
+    const int64_t first = voxel_at(walk, low[0], low[1], low[2]);
+    if (first < 0) {
+        return NAN;
+    }
+    for (int corner = 0; corner < 8; corner++) {
+        const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
+        const int64_t voxel = in_one ? first + dx + 8 * dy + 64 * dz : voxel_at(walk, low[0] + dx, low[1] + dy, low[2] + dz);
+        if (voxel < 0 || walk->volume->weights[voxel] == 0) {
+            return NAN;
+        }
+        const float x = dx ? share[0] : 1 - share[0], y = dy ? share[1] : 1 - share[1], z = dz ? share[2] : 1 - share[2];
+        sum += x * y * z * (float)walk->volume->field[voxel];
+    }
+    return sum;
+}
+
+static void point_at(const struct tandem_cast_job *job, const float *ray, float depth, float *at)
+{
+    const float scale = 1 / job->volume->voxel_m;
+    for (int axis = 0; axis < 3; axis++) {
+        at[axis] = (job->world_camera[4 * axis + 3] + depth * ray[axis]) * scale;
+    }
+}
+
+/* Where the field is 0 between a depth before the surface and one behind it; NAN: it isn't known well enough there. */
+static float root(const struct tandem_cast_job *job, struct walk *walk, const float *ray, float before, float behind)
+{
+    float at[3], middle = NAN;
+    point_at(job, ray, before, at);
+    float first = between(walk, at);
+    point_at(job, ray, behind, at);
+    float second = between(walk, at);
+    for (int i = 0; i < ROOT_STEPS && first > 0 && second <= 0; i++) {
+        middle = before + (behind - before) * (first / (first - second));
+        if (i + 1 == ROOT_STEPS) {
+            break;
+        }
+        point_at(job, ray, middle, at);
+        const float value = between(walk, at);
+        if (value > 0) {
+            before = middle;
+            first = value;
+        } else {
+            behind = middle;
+            second = value;
+        }
+    }
+    return middle;
+}
+
+static float found(const struct tandem_cast_job *job, struct walk *walk, const float *ray, float from, float to)
+{
+    const float voxel = job->volume->voxel_m, truncation = job->volume->truncation_m;
+    float depth = from;
+    int has_before = 0;
+    while (depth < to) {
+        float at[3];
+        point_at(job, ray, depth, at);
+        const int64_t place = voxel_at(walk, floor_of(at[0] + 0.5f), floor_of(at[1] + 0.5f), floor_of(at[2] + 0.5f));
+        if (place < 0 || job->volume->weights[place] == 0) {
+            has_before = 0;
+            depth += place < 0 ? 0.5f * truncation : voxel; /* farther would jump over the front of a surface */
+            continue;
+        }
+        const float value = (float)job->volume->field[place] / FIELD_ONE;
+        if (value <= 0) {
+            /* the nearest voxel lies up to 0.87 voxels off: the sign changes about so far before or behind */
+            return has_before ? root(job, walk, ray, depth - 2 * voxel, depth + voxel) : NAN;
+        }
+        has_before = 1;
+        const float step = 0.8f * value * truncation;
+        depth += step > voxel ? step : voxel;
+    }
+    return NAN;
+}
+
+void ISA_NAME(cast_row)(const struct tandem_cast_job *job, int32_t v)
+{
+    struct walk walk = {.volume = job->volume, .place = {INT32_MAX, INT32_MAX, INT32_MAX}, .number = -1};
+    const float *pose = job->world_camera, dy = ((float)v - job->cy_px) / job->focal_px;
+    const float reach = SEED_TRUNCATIONS * job->volume->truncation_m;
+    for (int32_t u = 0; u < job->width; u++) {
+        const ptrdiff_t at = (ptrdiff_t)v * job->width + u;
+        const float seed = job->seeds_m == NULL ? NAN : job->seeds_m[at], dx = ((float)u - job->cx_px) / job->focal_px;
+        float from = job->near_m, to = job->far_m, depth = NAN;
+        if (seed > 0) {
+            from = seed - reach > from ? seed - reach : from;
+            to = seed + reach < to ? seed + reach : to;
+        }
+        if (seed > 0 || job->search) {
+            float ray[3];
+            for (int axis = 0; axis < 3; axis++) {
+                ray[axis] = pose[4 * axis] * dx + pose[4 * axis + 1] * dy + pose[4 * axis + 2];
+            }
+            depth = found(job, &walk, ray, from, to);
+        }
+        job->points_m[3 * at] = dx * depth;
+        job->points_m[3 * at + 1] = dy * depth;
+        job->points_m[3 * at + 2] = depth;
+    }
+}
+
+/* From the neighbours' points; NAN at the border and where one of them is missing or belongs to another surface. */
+void ISA_NAME(cast_normals)(const struct tandem_cast_job *job, int32_t v)
+{
+    const ptrdiff_t wide = job->width;
+    for (int32_t u = 0; u < job->width; u++) {
+        const ptrdiff_t at = v * wide + u;
+        float *normal = job->normals + 3 * at;
+        normal[0] = normal[1] = normal[2] = NAN;
+        if (u == 0 || v == 0 || u + 1 == job->width || v + 1 == job->height) {
+            continue;
+        }
+        const float *left = job->points_m + 3 * (at - 1), *right = job->points_m + 3 * (at + 1);
+        const float *up = job->points_m + 3 * (at - wide), *down = job->points_m + 3 * (at + wide);
+        const float most = JUMP * job->points_m[3 * at + 2];
+        if (!(fabsf(right[2] - left[2]) <= most && fabsf(down[2] - up[2]) <= most)) {
+            continue;
+        }
+        const float a[3] = {right[0] - left[0], right[1] - left[1], right[2] - left[2]};
+        const float b[3] = {down[0] - up[0], down[1] - up[1], down[2] - up[2]};
+        /* b x a: towards the camera */
+        const float x = b[1] * a[2] - b[2] * a[1], y = b[2] * a[0] - b[0] * a[2], z = b[0] * a[1] - b[1] * a[0];
+        const float length = sqrtf(x * x + y * y + z * z);
+        if (length > 0) {
+            normal[0] = x / length;
+            normal[1] = y / length;
+            normal[2] = z / length;
+        }
+    }
+}
