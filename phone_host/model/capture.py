@@ -87,7 +87,7 @@ class Rigidity:
         excess: by how much a warp of each frame explains more than noise, in standard deviations of the noise; median.
         noise_px: by how much followed points scatter about the best warp, px; median.
         knows_lens: whether the calibrated lens was used.
-        readout_ms: from the first row to the last, rolling shutter; NaN: not told.
+        readout_ms: from the first row to the last, rolling shutter; NaN: not told. Of stabilised images it is told only where it is the reason.
         readout_sigma_ms: its standard uncertainty.
     """
 

@@ -33,6 +33,10 @@ _RIGID_SHARE: Final = 0.75
 _GAP: Final = 1.5
 _BRIGHTNESS_STEP: Final = 8
 
+_LEAST_READOUT_MS: Final = 2.0
+"""The sensors of phones are read row by row within 3 ms or more. Rows of one moment are the work of a stabiliser, which turns each row back by its own
+time."""
+
 
 class Stage(Enum):
     """What the user shall do."""
@@ -143,7 +147,8 @@ class CaptureCheck:
     @property
     def report(self) -> CaptureReport:
         """What was found so far."""
-        rigidity = replace(rigidity_of(self._readings), knows_lens=self._lens is not None)
+        found = rigidity_of(self._readings, by_program=bool(self._source.software))
+        rigidity = replace(found, knows_lens=self._lens is not None)
         return CaptureReport(source=self._source, pace=pace_of(self._shots, self._asked_hz), rigidity=rigidity)
 
     def _collected(self, luma: Image, step_ns: int) -> Window | None:
@@ -174,11 +179,12 @@ class CaptureCheck:
         return max(float(np.median(np.diff(newest))), 1.0)
 
 
-def rigidity_of(readings: list[Reading]) -> Rigidity:
+def rigidity_of(readings: list[Reading], *, by_program: bool = False) -> Rigidity:
     """Judge what all stretches of film tell.
 
     Args:
         readings: in their order.
+        by_program: whether a program, such as a phone's browser, stands between the sensor and the images.
     """
     told = [each for each in readings if each.unseen is None]
     if not told:
@@ -186,7 +192,7 @@ def rigidity_of(readings: list[Reading]) -> Rigidity:
     warped = [each for each in told if each.is_warped]
     share = len(warped) / len(told)
     found, unseen = Warping.UNKNOWN, None
-    if len(told) >= _FEWEST:
+    if len(told) >= max(_FEWEST, 1 + sum(each.unseen is Unseen.FLAT for each in readings)):
         if share >= _WARPED_SHARE:
             found = Warping.STABILISED
         elif share <= 1 - _RIGID_SHARE:
@@ -197,6 +203,8 @@ def rigidity_of(readings: list[Reading]) -> Rigidity:
         unseen = _usual([each.unseen for each in readings if each.unseen is not None] or [Unseen.STILL])
     rigid = [each for each in told if not each.is_warped]
     readout_ms, readout_sigma_ms = _readout(rigid) if found is Warping.GOOD else (math.nan, math.nan)
+    if by_program and readout_ms < _LEAST_READOUT_MS:
+        found = Warping.STABILISED
     return Rigidity(
         warping=found,
         unseen=unseen,

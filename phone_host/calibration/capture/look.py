@@ -24,13 +24,14 @@ _ACROSS: Final = 0.004
 """Shares of the width by which the picture must move to say anything, and to be called rigid: along and across."""
 
 RIGID: Final = 0.42
-WARPED: Final = 0.48
-"""Excess of a warp over noise. Rendered films of rigid cameras leave 0.1 to 0.4, stabilised ones 0.5 to 17 (bench_capture)."""
+WARPED: Final = 0.45
+"""Excess of a warp over noise. Rendered films of rigid cameras leave 0.1 to 0.4, stabilised ones 0.4 to 7 (bench_capture)."""
 
 _FLAT_PX: Final = 3.0
-_FLAT: Final = 0.05
-"""Of a scene that moves by more than so many pixels and leaves a plane by less than this share of it, nothing is told: a plane's film fits
-many cameras."""
+_FLAT_OFF_PX: Final = 0.14
+_FLAT_NOISE: Final = 3.5
+"""A scene whose parallax is larger than the first, but leaves a plane by less than the second, or so many times the noise, tells nothing: a
+plane's film fits many cameras. Rendered posters leave 0.05 to 0.13 px, the flattest scenes with depth 0.2."""
 
 _COUNTS: Final = 0.3
 _GLANCE_PX: Final = 160
@@ -123,7 +124,7 @@ def _judged(compared: Compared, seen: Flags, period_ms: float, along: float, acr
     excess, unseen = excess_of(compared), None
     if (compared.trust > _COUNTS)[seen].mean() < _LEAST_SHARE:
         unseen = Unseen.LIVELY
-    elif compared.parallax_px > _FLAT_PX and compared.off_plane_px < _FLAT * compared.parallax_px:
+    elif compared.parallax_px > _FLAT_PX and compared.off_plane_px < max(_FLAT_OFF_PX, _FLAT_NOISE * compared.noise_px):
         unseen = Unseen.FLAT
     elif excess < WARPED:
         if along < _MOTION or across < _ACROSS:

@@ -1,83 +1,30 @@
-"""Whether followed points move as before one rigid camera: a bundle of some frames, with and without a warp of each frame. Pure.
-
-Each frame has a pose, and a turn and shift while its rows are read (rolling shutter); each point has a place in space. What is
-left then is noise, if the camera is rigid. A stabiliser shifts and turns the finished image: its middle and its lens leave the
-middle of the frame. So the same bundle is computed with a warp of every frame: a shift, a keystone and a zoom. If that explains
-much more, the image was warped.
+"""Whether followed points move as before one rigid camera: the bundle of a window, with and without a warp of each frame. Pure.
 
 - Both use the same weights, from the bundle with warps: what follows a warp counts as little as an outlier in neither.
-- A turn does what a shift does, but for the keystone of a wide image, its distortion, and what rolls with the rows. That is
-  told only from points that are well spread, of motion in both directions.
-- The stored lens may be off a little: its focal length and middle are estimated for all frames together, or, without a stored
-  lens, its main distortion too.
+- Both begin with the points that move as one turning camera says, nearly; the others are tried again when poses are known.
+- A bundle of points that leave a plane by little has more than one valley. Several are tried before a camera is accused.
 """
 
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from phone_host.geometry.lens import parameters_of, project_linearised, rays_through, with_parameters
-from phone_host.geometry.schur import NormalEquations, solved
-from phone_host.geometry.se3 import cross_matrices, rotations_of, vectors_of
+from phone_host.calibration.capture.bundle import LIKELY, Flags, Floats, Problem, State, Tracks, moved
+from phone_host.calibration.capture.consensus import still_points
+from phone_host.geometry.se3 import rotations_of
+from phone_host.geometry.schur import solved
 from phone_host.model import CameraModel
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
-POSE, ROWS, WARP = slice(0, 6), slice(6, 9), slice(9, 14)
-"""A frame's parameters: turn, translation; by how much more it turns from first to last row; shift, keystone, zoom."""
-
-OF_FRAME: Final = 14
-OF_ALL: Final = 5
-"""Of all frames together: focal length (logarithm), middle (x, y; px), k1, readout (frame periods)."""
 
 _NOISE_PX: Final = 0.1
 """Followed points of good images scatter by this."""
 
 _MOST_STEPS: Final = 40
+_SOME: Final = 70
+_FEW_STEPS: Final = 12
+_LEANS: Final = ((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 _CONVERGED: Final = 5e-4
 _TUKEY: Final = 4.7
-_READOUT: Final = 0.5
-"""Rows of webcams and phones are read within 0.2 to 0.9 of a frame period."""
-
-_LIKELY: Final = np.array([0.0, 0.0, 0.0, 0.0, _READOUT])
-_LEAST_COMMON: Final = np.array([-0.7, -np.inf, -np.inf, -1.0, 0.0])
-_MOST_COMMON: Final = np.array([0.7, np.inf, np.inf, 1.0, 1.05])
-_SIDE: Final = 3
-_SLOPE: Final = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
-"""Speed from three frames on either side, to sixth order: right to 9 % for a hand that trembles with 8 Hz, seen at 30 frames/s."""
-
-_COARSE: Final = np.array([0.0, 1.0, -8.0, 0.0, 8.0, -1.0, 0.0]) / 12
-"""The same to fourth order, right to 19 %."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tracks:
-    """Points that were followed through some frames.
-
-    Attributes:
-        points_px: (F, N, 2) float64, px.
-        seen: (F, N) whether a point was found in a frame.
-        home: the frame in which the points were chosen.
-    """
-
-    points_px: Floats
-    seen: Flags
-    home: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _State:
-    """A guess: turns (F, 3, 3), translations (F, 3), more turn over the rows (F, 3), warps (F, 5), of all (5,), slopes and inverse depths (N, 3)."""
-
-    turns: Floats
-    shifts: Floats
-    rows: Floats
-    warps: Floats
-    common: Floats
-    points: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,199 +52,35 @@ class Compared:
     off_plane_px: float
 
 
-class _Problem:
-    """The equations of one window."""
 
-    def __init__(self, tracks: Tracks, model: CameraModel, *, knows_lens: bool) -> None:
-        self._tracks, self._model, self._knows_lens = tracks, model, knows_lens
-        self.frames, self.count = tracks.points_px.shape[:2]
-        middle = (np.array([model.width_px, model.height_px], np.float64) - 1) / 2
-        self._row = (tracks.points_px[:, :, 1] - middle[1]) / model.height_px
-        self._place = (tracks.points_px - middle) / model.width_px
-        self._values = parameters_of(model)
-        width = model.width_px
-        self._warp_prior = np.full(5, 0.05 * width)
-        lens = [0.3, 0.005 * width, 0.005 * width, 0.005] if knows_lens else [0.3, 0.01 * width, 0.01 * width, 0.2]
-        self._common_prior = np.array([*lens, 0.5])
-        self.point_prior = np.array([0.0, 0.0, 1.0])
-
-    def prior(self, state: _State, *, warped: bool) -> Floats:
-        """Return one over the variance of each parameter, which is about 0.
-
-        How a rigid camera turns while its rows are read follows from how it turns from frame to frame, as far as that is known: the
-        difference of two formulas for its speed tells. At both ends of the window it is not known.
-        """
-        speeds, coarse = self.speeds(state)[:, :3], self.speeds(state, _COARSE)[:, :3]
-        speed = float(np.sqrt((speeds**2).sum(axis=1).mean())) + 1e-4
-        rows = np.full(self.frames, speed)
-        if not warped:
-            rows[_SIDE:-_SIDE] = np.linalg.norm(speeds - coarse, axis=1)[_SIDE:-_SIDE] / 2 + 1e-6
-        frame = np.empty((self.frames, OF_FRAME))
-        frame[:, POSE] = 1.0
-        frame[:, ROWS] = rows[:, np.newaxis]
-        frame[:, WARP] = self._warp_prior
-        return np.concatenate([frame.ravel(), self._common_prior]) ** -2.0
-
-    def free(self, *, warped: bool) -> Flags:
-        """Return which parameters are estimated."""
-        frame = np.ones((self.frames, OF_FRAME), bool)
-        frame[self._tracks.home, POSE] = False
-        frame[:, WARP] = warped
-        common = np.ones(OF_ALL, bool)
-        common[0] = warped or not self._knows_lens
-        return np.concatenate([frame.ravel(), common])
-
-    def start(self) -> _State:
-        """Return the guess that nothing moves and all is equally far."""
-        rays = rays_through(self._tracks.points_px[self._tracks.home], self._model)
-        points = np.column_stack([rays[:, :2] / rays[:, 2:], np.ones(len(rays))])
-        still, none = np.tile(np.eye(3), (self.frames, 1, 1)), np.zeros((self.frames, 3))
-        return _State(still, none, none, np.zeros((self.frames, 5)), _LIKELY.copy(), points)
-
-    def speeds(self, state: _State, formula: Floats = _SLOPE) -> Floats:
-        """Return how each frame moves, (F, 6): turn and translation per frame period, in its own axes."""
-        at = np.arange(self.frames)
-        first = np.clip(at - _SIDE, 0, self.frames - len(_SLOPE))
-        near = first[:, np.newaxis] + np.arange(len(_SLOPE))
-        turns = state.turns[near] @ np.swapaxes(state.turns, 1, 2)[:, np.newaxis]
-        shifts = state.shifts[near] - (turns @ state.shifts[:, np.newaxis, :, np.newaxis])[..., 0]
-        inside = (first == at - _SIDE)[:, np.newaxis]
-        slopes = np.where(inside, formula, _SLOPES[at - first])
-        return np.asarray(
-            np.einsum("fk,fkj->fj", slopes, np.concatenate([vectors_of(turns), shifts], axis=2)), np.float64
-        )
-
-    def residuals(self, state: _State) -> tuple[Floats, Floats, Floats]:
-        """Return what is left, (F, N, 2) px, and the derivatives by frame and all (F, N, 2, 14 + 5) and by point (F, N, 2, 3)."""
-        f, n = self.frames, self.count
-        direction = np.column_stack([state.points[:, :2], np.ones(n)])
-        rho, row = state.points[:, 2], self._row[..., np.newaxis, np.newaxis]
-        speeds, readout = self.speeds(state), state.common[4]
-        turning, shifting = readout * speeds[:, :3] + state.rows, readout * speeds[:, 3:]
-        still = np.einsum("fij,nj->fni", state.turns, direction) + rho[:, np.newaxis] * state.shifts[:, np.newaxis]
-        spin = rotations_of(turning[:, np.newaxis] * row[..., 0])
-        moved = np.einsum("fnij,fnj->fni", spin, still) + row[..., 0] * rho[:, np.newaxis] * shifting[:, np.newaxis]
-        values = self._values.copy()
-        values[:2] *= np.exp(state.common[0])
-        values[2:5] += state.common[1:4]
-        seen, by_point, by_lens = project_linearised(moved.reshape(-1, 3), with_parameters(self._model, values))
-        seen, by_point, by_lens = seen.reshape(f, n, 2), by_point.reshape(f, n, 2, 3), by_lens.reshape(f, n, 2, -1)
-        columns = np.zeros((f, n, 2, OF_FRAME + OF_ALL))
-        columns[..., 0:3] = -by_point @ cross_matrices(moved)
-        columns[..., 3:6] = by_point * rho[:, np.newaxis, np.newaxis]
-        columns[..., ROWS] = columns[..., 0:3] * row
-        columns[..., 0, 9] = columns[..., 1, 10] = 1.0
-        columns[..., 11] = self._place * self._place[..., :1]
-        columns[..., 12] = self._place * self._place[..., 1:]
-        columns[..., 13] = self._place
-        columns[..., 14] = by_lens[..., 0] * values[0] + by_lens[..., 1] * values[1]
-        columns[..., 15:18] = by_lens[..., 2:5]
-        columns[..., 18] = np.einsum("fnij,fj->fni", columns[..., POSE], speeds) * row[..., 0]
-        seen = seen + np.einsum("fnij,fj->fni", columns[..., WARP], state.warps)
-        through = by_point @ spin
-        by_place = np.empty((f, n, 2, 3))
-        by_place[..., :2] = through @ state.turns[:, np.newaxis, :, :2]
-        by_place[..., 2] = np.einsum("fnij,fj->fni", through, state.shifts)
-        by_place[..., 2] += row[..., 0] * np.einsum("fnij,fj->fni", by_point, shifting)
-        rest = np.where(self._tracks.seen[..., np.newaxis], self._tracks.points_px - seen, 0.0)
-        return rest, columns, by_place
-
-    def cost(self, state: _State, rest: Floats, weights: Floats, prior: Floats) -> float:
-        """Return the cost of a state with its residuals."""
-        depth = float((self.point_prior * (state.points - 1.0) ** 2).sum())
-        return float((weights[..., np.newaxis] * rest**2).sum() + prior @ _deviations(state) ** 2) + depth
-
-    def equations(
-        self, state: _State, parts: tuple[Floats, Floats, Floats], weights: Floats, prior: Floats
-    ) -> NormalEquations:
-        """Return the normal equations at a state with its residuals and derivatives."""
-        rest, columns, by_place = parts
-        f, n, own = self.frames, self.count, OF_FRAME
-        size = f * own + OF_ALL
-        left = columns.transpose(0, 3, 1, 2).reshape(f, own + OF_ALL, n * 2)
-        heavy = left * np.repeat(weights, 2, axis=1)[:, np.newaxis]
-        square = heavy @ left.transpose(0, 2, 1)
-        right = (heavy @ rest.reshape(f, n * 2, 1))[..., 0]
-        shared, shared_right = np.diag(prior), -prior * _deviations(state)
-        for each in range(f):
-            at = slice(each * own, (each + 1) * own)
-            shared[at, at] += square[each, :own, :own]
-            shared[at, -OF_ALL:] += square[each, :own, own:]
-            shared[-OF_ALL:, at] += square[each, own:, :own]
-            shared_right[at] += right[each, :own]
-        shared[-OF_ALL:, -OF_ALL:] += square[:, own:, own:].sum(axis=0)
-        shared_right[-OF_ALL:] += right[:, own:].sum(axis=0)
-        heavy_place = by_place * weights[..., np.newaxis, np.newaxis]
-        cross = np.swapaxes(columns, 2, 3) @ heavy_place
-        coupling = np.empty((n, size, 3))
-        coupling[:, : f * own] = cross[:, :, :own].transpose(1, 0, 2, 3).reshape(n, f * own, 3)
-        coupling[:, f * own :] = cross[:, :, own:].sum(axis=0)
-        blocks = (np.swapaxes(by_place, 2, 3) @ heavy_place).sum(axis=0) + np.diag(self.point_prior + 1e-9)
-        blocks_right = (np.swapaxes(heavy_place, 2, 3) @ rest[..., np.newaxis])[..., 0].sum(axis=0)
-        blocks_right -= self.point_prior * (state.points - 1.0)
-        return NormalEquations(
-            shared=shared, coupling=coupling, blocks=blocks, shared_right=shared_right, blocks_right=blocks_right
-        )
+def _sigma(rest: Floats, seen: Flags) -> float:
+    """Return the standard deviation of the residuals, px: the median length of two normal numbers is 1.177 of it."""
+    return max(float(np.median(np.linalg.norm(rest, axis=2)[seen])) / 1.177, _NOISE_PX / 4)
 
 
-def _slopes() -> Floats:
-    """Return the weights of seven values for the derivative at each of them, (7, 7): fourth-order at the ends, from the five next to it."""
-    found = np.zeros((len(_SLOPE), len(_SLOPE)))
-    for at in range(len(_SLOPE)):
-        used = np.arange(5) if at < _SIDE else np.arange(2, 7)
-        powers = np.vander(used - float(at), 5, increasing=True).T
-        found[at, used] = np.linalg.solve(powers, np.eye(5)[1])
-    return found
-
-
-_SLOPES: Final = _slopes()
-
-
-def _deviations(state: _State) -> Floats:
-    turns = np.zeros_like(state.shifts)  # a turn has no likely value
-    frame = np.concatenate([turns, state.shifts, state.rows, state.warps], axis=1)
-    return np.concatenate([frame.ravel(), state.common - _LIKELY])
-
-
-def _moved(state: _State, shared: Floats, points: Floats) -> _State:
-    frame = shared[:-OF_ALL].reshape(len(state.turns), OF_FRAME)
-    turn = rotations_of(frame[:, :3])
-    return _State(
-        turn @ state.turns,
-        (turn @ state.shifts[..., np.newaxis])[..., 0] + frame[:, 3:6],
-        state.rows + frame[:, ROWS],
-        state.warps + frame[:, WARP],
-        np.clip(state.common + shared[-OF_ALL:], _LEAST_COMMON, _MOST_COMMON),
-        state.points + points,
-    )
-
-
-def _trusted(rest: Floats, seen: Flags) -> tuple[Floats, float]:
-    """Return Tukey's weights (F, N) and the standard deviation of the residuals, px."""
+def _trust(rest: Floats, seen: Flags, sigma: float) -> Floats:
+    """Return Tukey's weights (F, N)."""
     off = np.linalg.norm(rest, axis=2)
-    sigma = max(
-        float(np.median(off[seen])) / 1.177, _NOISE_PX / 4
-    )  # the median length of two normal numbers is 1.177 of them
-    return np.where(seen, np.clip(1 - (off / (_TUKEY * sigma)) ** 2, 0, None) ** 2, 0.0), sigma
+    return np.where(seen, np.clip(1 - (off / (_TUKEY * sigma)) ** 2, 0, None) ** 2, 0.0)
 
 
 def _fit(
-    problem: _Problem, state: _State, seen: Flags, weights: Floats | None, *, warped: bool
-) -> tuple[_State, Floats]:
+    problem: Problem, state: State, seen: Flags, weights: Floats | None, *, warped: bool, steps: int = _MOST_STEPS
+) -> State:
     """Minimise (Levenberg and Marquardt), with given weights or with those of Tukey, found on the way."""
     free, damping, small = problem.free(warped=warped), 1e-3, 0
     parts = problem.residuals(state)
-    for _ in range(_MOST_STEPS):
+    for _ in range(steps):
         if weights is None:
-            trust, sigma = _trusted(parts[0], seen)
-            used = trust / sigma**2
+            sigma = _sigma(parts[0], seen)
+            used = _trust(parts[0], seen, sigma) / sigma**2
         else:
             used = weights
         prior = problem.prior(state, warped=warped)
         before = problem.cost(state, parts[0], used, prior)
         equations = problem.equations(state, parts, used, prior)
         while True:
-            tried = _moved(state, *equations.step(damping, free))
+            tried = moved(state, *equations.step(damping, free))
             tried_parts = problem.residuals(tried)
             after = problem.cost(tried, tried_parts[0], used, prior)
             if after < before or damping > 1e3:
@@ -309,21 +92,41 @@ def _fit(
         small = small + 1 if (before - after) < _CONVERGED * before else 0
         if small == 2:
             break
-    trust, sigma = _trusted(parts[0], seen)
-    return state, trust / sigma**2 if weights is None else weights
+    return state
 
 
-def _unreversed(problem: _Problem, state: _State, seen: Flags) -> _State:
-    """Return the better one of a guess and its reversal in depth (Necker's): near for far and there for back looks nearly the same."""
+def _begun(tracks: Tracks, model: CameraModel, still: Flags, turns: Floats, *, knows_lens: bool) -> State:
+    """Return a state to begin with: the best of scenes that lean this way or that, as some of the points tell, and of its reversal."""
+    some = np.flatnonzero(still)[:: max(1, int(still.sum()) // _SOME)]
+    few = Tracks(tracks.points_px[:, some], tracks.seen[:, some], tracks.home)
+    problem, seen = Problem(few, model, knows_lens=knows_lens), few.seen
+    flat = problem.start(turns)
+    lean = [replace(flat, points=flat.points + np.outer(flat.points @ [across, down, 0.0], [0, 0, 1])) for across, down in _LEANS]
+    found = [_fit(problem, each, seen, None, warped=False, steps=_FEW_STEPS) for each in lean]
+    best = _best(problem, found, seen)
+    best = _best(problem, [best, _fit(problem, reversed_in_depth(best), seen, None, warped=False, steps=_FEW_STEPS)], seen)
+    whole = Problem(tracks, model, knows_lens=knows_lens)
+    points = whole.start(turns).points
+    points[some] = best.points
+    others = np.ones(len(points), bool)
+    others[some] = False
+    return whole.placed(replace(best, points=points), others)
+
+
+def _best(problem: Problem, states: list[State], seen: Flags) -> State:
+    """Return the state that leaves the least, outliers counted alike."""
+    off = [np.linalg.norm(problem.residuals(each)[0], axis=2)[seen] for each in states]
+    most = _TUKEY * min(float(np.median(each)) for each in off)
+    return states[int(np.argmin([float((np.minimum(each, most) ** 2).sum()) for each in off]))]
+
+
+def reversed_in_depth(state: State) -> State:
+    """Return the reversal of a state in depth (Necker's): near for far and there for back looks nearly the same."""
     depth = float(np.median(state.points[:, 2]))
     back = 2 * depth * state.shifts
     turns = rotations_of(np.column_stack([-back[:, 1], back[:, 0], np.zeros(len(back))])) @ state.turns
     points = np.column_stack([state.points[:, :2], 2 * depth - state.points[:, 2]])
-    other = _State(turns, -state.shifts, np.zeros_like(state.rows), state.warps, _LIKELY.copy(), points)
-    found = [state, _fit(problem, other, seen, None, warped=False)[0]]
-    off = [np.linalg.norm(problem.residuals(each)[0], axis=2)[seen] for each in found]
-    most = _TUKEY * min(float(np.median(each)) for each in off)
-    return found[int(np.argmin([float((np.minimum(each, most) ** 2).sum()) for each in off]))]
+    return State(turns, -state.shifts, np.zeros_like(state.rows), state.warps, LIKELY.copy(), points)
 
 
 def compare(tracks: Tracks, model: CameraModel, *, knows_lens: bool) -> Compared:
@@ -340,12 +143,18 @@ def compare(tracks: Tracks, model: CameraModel, *, knows_lens: bool) -> Compared
     Raises:
         np.linalg.LinAlgError: the points tell nothing.
     """
-    problem, seen = _Problem(tracks, model, knows_lens=knows_lens), tracks.seen
-    rigid = _unreversed(problem, _fit(problem, problem.start(), seen, None, warped=False)[0], seen)
-    warped, weights = _fit(problem, rigid, seen, None, warped=True)
-    trust, sigma = _trusted(problem.residuals(warped)[0], seen)
+    problem = Problem(tracks, model, knows_lens=knows_lens)
+    still, turns = still_points(tracks, model)
+    seen = tracks.seen & still
+    begun = _begun(tracks, model, still, turns, knows_lens=knows_lens)
+    rigid = _fit(problem, begun, seen, None, warped=False)
+    warped = problem.placed(_fit(problem, rigid, seen, None, warped=True), ~still)
+    rest = problem.residuals(warped)[0]
+    sigma = _sigma(rest, seen)
+    trust = _trust(rest, tracks.seen, sigma)
+    weights = trust / sigma**2
     straight = replace(warped, warps=np.zeros_like(warped.warps), rows=rigid.rows, common=rigid.common)
-    both = [_fit(problem, start, seen, weights, warped=False)[0] for start in (rigid, straight)]
+    both = [_fit(problem, start, seen, weights, warped=False) for start in (rigid, straight)]
     rigid = min(both, key=lambda each: _left(problem, each, weights))
     return Compared(
         _left(problem, rigid, weights),
@@ -358,7 +167,7 @@ def compare(tracks: Tracks, model: CameraModel, *, knows_lens: bool) -> Compared
     )
 
 
-def _parallax(state: _State, model: CameraModel, trust: Floats) -> tuple[float, float]:
+def _parallax(state: State, model: CameraModel, trust: Floats) -> tuple[float, float]:
     """Return by how much the camera's way moves the points, and by how much they leave a plane, px."""
     points = state.points[trust.mean(axis=0) >= np.median(trust.mean(axis=0)) / 2]
     places = np.column_stack([np.ones(len(points)), points[:, :2]])
@@ -368,11 +177,11 @@ def _parallax(state: _State, model: CameraModel, trust: Floats) -> tuple[float, 
     return way_px * float(np.median(points[:, 2])), way_px * off
 
 
-def _left(problem: _Problem, state: _State, weights: Floats) -> float:
+def _left(problem: Problem, state: State, weights: Floats) -> float:
     return float((weights[..., np.newaxis] * problem.residuals(state)[0] ** 2).sum())
 
 
-def _readout_sigma(problem: _Problem, state: _State, weights: Floats) -> float:
+def _readout_sigma(problem: Problem, state: State, weights: Floats) -> float:
     free, prior = problem.free(warped=False), problem.prior(state, warped=False)
     matrix = problem.equations(state, problem.residuals(state), weights, prior).reduced(0.0, free)[0]
     unit = np.zeros(len(matrix))

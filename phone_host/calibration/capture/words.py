@@ -132,6 +132,8 @@ def warp_finding(rigidity: Rigidity) -> Finding:
             return ok("stabilisation", f"none seen: the images move as one rigid camera's{lens}")
         case Warping.STABILISED:
             text = f"the images are warped or cropped: no rigid camera with this lens made {of}"
+            if math.isfinite(rigidity.readout_ms):
+                text = "all rows show one moment: software makes up for the rolling shutter, as stabilisation does"
             return warn(
                 "stabilisation",
                 text,
