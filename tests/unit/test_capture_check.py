@@ -186,6 +186,7 @@ def test_a_plain_picture_and_a_still_one_tell_nothing() -> None:
         ([RIGID] * 3 + [WARPED], Warping.GOOD, None),
         ([RIGID] * 3 + [WARPED] * 2, Warping.UNKNOWN, Unseen.VAGUE),
         ([RIGID] + [WARPED] * 3, Warping.STABILISED, None),
+        ([WARPED] * 3 + [Reading(Unseen.FLAT)] * 3, Warping.UNKNOWN, Unseen.FLAT),
     ],
 )
 def test_all_stretches_together_give_the_verdict(
@@ -196,6 +197,16 @@ def test_all_stretches_together_give_the_verdict(
     assert (found.warping, found.unseen) == (verdict, unseen)
     grade = Grade.OK if verdict is Warping.GOOD else Grade.WARN
     assert warp_finding(found).verdict is grade
+
+
+def test_rows_of_one_moment_are_a_programs_work() -> None:
+    """A phone's sensor is read row by row: a browser's film without that was stabilised; a camera of its own may have a global shutter."""
+    rows = [replace(RIGID, readout_ms=0.9)] * 3
+    assert rigidity_of(rows).warping is Warping.GOOD
+    found = rigidity_of(rows, by_program=True)
+    assert found.warping is Warping.STABILISED
+    assert "one moment" in warp_finding(found).text
+    assert rigidity_of([RIGID] * 3, by_program=True).warping is Warping.GOOD
 
 
 def test_a_missing_calibration_and_a_global_shutter_are_named() -> None:

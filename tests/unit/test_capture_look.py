@@ -34,7 +34,8 @@ def reading(excess: float, *, trust: float = 1.0, off_plane_px: float = 5.0, alo
         ({"excess": RIGID * 0.5}, None),
         ({"excess": (RIGID + WARPED) / 2}, Unseen.VAGUE),
         ({"excess": RIGID * 0.5, "along": 0.001}, Unseen.STILL),
-        ({"excess": 5.0, "off_plane_px": 0.1}, Unseen.FLAT),
+        ({"excess": 5.0, "off_plane_px": 0.3}, Unseen.FLAT),
+        ({"excess": 5.0, "off_plane_px": 0.4}, None),
         ({"excess": 5.0, "trust": 0.1}, Unseen.LIVELY),
     ],
 )

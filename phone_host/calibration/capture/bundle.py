@@ -1,11 +1,10 @@
-"""Whether followed points move as before one rigid camera: a bundle of some frames, with and without a warp of each frame. Pure.
+"""A bundle of some frames before one rigid camera, with and without a warp of each frame: its parameters and equations. Pure.
 
 Each frame has a pose, and a turn and shift while its rows are read (rolling shutter); each point has a place in space. What is
 left then is noise, if the camera is rigid. A stabiliser shifts and turns the finished image: its middle and its lens leave the
 middle of the frame. So the same bundle is computed with a warp of every frame: a shift, a keystone and a zoom. If that explains
 much more, the image was warped.
 
-- Both use the same weights, from the bundle with warps: what follows a warp counts as little as an outlier in neither.
 - A turn does what a shift does, but for the keystone of a wide image, its distortion, and what rolls with the rows. That is
   told only from points that are well spread, of motion in both directions.
 - The stored lens may be off a little: its focal length and middle are estimated for all frames together, or, without a stored
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.lens import parameters_of, project_linearised, rays_through, with_parameters
-from phone_host.geometry.schur import NormalEquations, solved
+from phone_host.geometry.schur import NormalEquations
 from phone_host.geometry.se3 import cross_matrices, rotations_of, vectors_of
 from phone_host.model import CameraModel
 
@@ -40,6 +39,8 @@ LIKELY: Final = np.array([0.0, 0.0, 0.0, 0.0, _READOUT])
 _LEAST_COMMON: Final = np.array([-0.7, -np.inf, -np.inf, -1.0, 0.0])
 _MOST_COMMON: Final = np.array([0.7, np.inf, np.inf, 1.0, 1.05])
 _PLACING: Final = 5
+"""Steps until a point lies where frames that do not move any more see it best."""
+
 _SIDE: Final = 3
 _SLOPE: Final = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
 """Speed from three frames on either side, to sixth order: right to 9 % for a hand that trembles with 8 Hz, seen at 30 frames/s."""
@@ -211,7 +212,11 @@ class Problem:
 
     def placed(self, state: State, which: Flags) -> State:
         """Return a state in which some points (N,) lie where the frames see them best, the frames as they are."""
-        points = np.where(which[:, np.newaxis], np.column_stack([state.points[:, :2], np.full(self.count, np.median(state.points[:, 2]))]), state.points)
+        points = np.where(
+            which[:, np.newaxis],
+            np.column_stack([state.points[:, :2], np.full(self.count, np.median(state.points[:, 2]))]),
+            state.points,
+        )
         for _ in range(_PLACING):
             rest, _, by_place = self.residuals(replace(state, points=points))
             by_place = by_place * self._tracks.seen[..., np.newaxis, np.newaxis]
@@ -241,6 +246,7 @@ def _deviations(state: State) -> Floats:
 
 
 def moved(state: State, shared: Floats, points: Floats) -> State:
+    """Return a state after a step: of the frames and all (F * 14 + 5,), and of the points (N, 3)."""
     frame = shared[:-OF_ALL].reshape(len(state.turns), OF_FRAME)
     turn = rotations_of(frame[:, :3])
     return State(
