@@ -34,7 +34,7 @@ _GAP: Final = 1.5
 _BRIGHTNESS_STEP: Final = 8
 
 _LEAST_READOUT_MS: Final = 2.0
-"""The sensors of phones are read row by row within 3 ms or more. Rows of one moment are the work of a stabiliser, which turns each row back by its own
+"""No sensor of a phone that we know is read within less. Rows of one moment are the work of a stabiliser, which turns each row back by its own
 time."""
 
 

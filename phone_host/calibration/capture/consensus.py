@@ -60,14 +60,16 @@ def still_points(tracks: Tracks, model: CameraModel) -> tuple[Flags, Floats]:
     for _ in range(_TRIALS):
         some = random.choice(count, _OF_TRIAL, replace=False)
         few = _Sights(sights.home[some], places[:, some], row[:, some])
-        tried = _turned(few, seen[:, some] * 1.0, np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3)))
+        tried = _turned(
+            few, np.asarray(seen[:, some], np.float64), np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3))
+        )
         off_px = model.mean_focal_px * _off(sights, seen, *tried)
         if np.median(off_px) < np.median(far_px):
             (turns, rolled), far_px = tried, off_px
     for _ in range(_STEPS):
         off = np.linalg.norm(_left(sights, turns, rolled)[0], axis=2)
         sigma = max(float(np.median(far_px)) / 1.177, _LEAST_PX / _FAR) / model.mean_focal_px
-        trust = np.where(seen, np.clip(1 - (off / (_TUKEY * sigma)) ** 2, 0, None) ** 2, 0.0)
+        trust = np.asarray(np.where(seen, np.clip(1 - (off / (_TUKEY * sigma)) ** 2, 0, None) ** 2, 0.0), np.float64)
         turns, rolled = _turned(sights, trust, turns, rolled)
         far_px = model.mean_focal_px * _off(sights, seen, turns, rolled)
     limit_px = max(_FAR * float(np.median(far_px)) / 1.177, _LEAST_PX)
@@ -75,9 +77,9 @@ def still_points(tracks: Tracks, model: CameraModel) -> tuple[Flags, Floats]:
 
 
 def _off(sights: _Sights, seen: Flags, turns: Floats, rolled: Floats) -> Floats:
-    """Return by how much each point is beside its place, (N,), root of the mean square of the frames that show it."""
+    """Return by how much each point is beside its place, (N,), in units of the focal length: root mean square of the frames that show it."""
     square = (_left(sights, turns, rolled)[0] ** 2).sum(axis=2)
-    return np.sqrt((square * seen).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
+    return np.asarray(np.sqrt((square * seen).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)), np.float64)
 
 
 def _turned(sights: _Sights, trust: Floats, turns: Floats, rolled: Floats) -> tuple[Floats, Floats]:
@@ -90,7 +92,8 @@ def _turned(sights: _Sights, trust: Floats, turns: Floats, rolled: Floats) -> tu
         heavy = np.swapaxes(wide * np.repeat(trust, 2, axis=1)[..., np.newaxis], 1, 2)
         right = (heavy @ rest.reshape(frames, 2 * count, 1))[..., 0]
         right[:, 3:] -= prior[3:] * rolled
-        step = np.linalg.solve(heavy @ wide + np.diag(prior), right[..., np.newaxis])[..., 0]
+        solved = np.linalg.solve(heavy @ wide + np.diag(prior), right[..., np.newaxis])
+        step = np.asarray(solved[..., 0], np.float64)
         turns, rolled = rotations_of(step[:, :3]) @ turns, rolled + step[:, 3:]
     return turns, rolled
 
