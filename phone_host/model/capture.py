@@ -118,6 +118,11 @@ class CaptureSource:
     width_px: int
     height_px: int
 
+    @property
+    def is_of_phone(self) -> bool:
+        """Whether the software is that of a phone or tablet: its sensor is read row by row."""
+        return any(name in self.software for name in ("Android", "iPhone", "iPad"))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaptureReport:

@@ -142,7 +142,7 @@ def watch(take: Take, *, knows_lens: bool = True) -> tuple[Rigidity, float]:
     Returns:
         What was found, and the mean CPU time of a look, ms.
     """
-    source = CaptureSource(software="a phone's browser", width_px=take.width_px, height_px=take.height_px)
+    source = CaptureSource(software="Chrome 141 on Android", width_px=take.width_px, height_px=take.height_px)
     plan = Plan(take.seconds + 1, 0.5 / take.fps, take.seconds + 1)
     check = CaptureCheck(source, take.fps, _calibrated(take) if knows_lens else None, plan)
     times_ms: list[float] = []

@@ -203,10 +203,10 @@ def test_rows_of_one_moment_are_a_programs_work() -> None:
     """A phone's sensor is read row by row: a browser's film without that was stabilised; a camera of its own may have a global shutter."""
     rows = [replace(RIGID, readout_ms=0.9)] * 3
     assert rigidity_of(rows).warping is Warping.GOOD
-    found = rigidity_of(rows, by_program=True)
+    found = rigidity_of(rows, by_phone=True)
     assert found.warping is Warping.STABILISED
     assert "one moment" in warp_finding(found).text
-    assert rigidity_of([RIGID] * 3, by_program=True).warping is Warping.GOOD
+    assert rigidity_of([RIGID] * 3, by_phone=True).warping is Warping.GOOD
 
 
 def test_a_missing_calibration_and_a_global_shutter_are_named() -> None:

@@ -18,4 +18,4 @@ def test_the_page_is_told_what_is_new_and_no_more() -> None:
     guide.tell(Progress(Stage.MOVE, 0.1, 1, Unseen.PLAIN))
     ((said,),) = told[-1:]
     assert "too few details" in said.words
-    assert "1 of" in said.words
+    assert "1 of" in said.remedy

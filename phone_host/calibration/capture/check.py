@@ -147,7 +147,7 @@ class CaptureCheck:
     @property
     def report(self) -> CaptureReport:
         """What was found so far."""
-        found = rigidity_of(self._readings, by_program=bool(self._source.software))
+        found = rigidity_of(self._readings, by_phone=self._source.is_of_phone)
         rigidity = replace(found, knows_lens=self._lens is not None)
         return CaptureReport(source=self._source, pace=pace_of(self._shots, self._asked_hz), rigidity=rigidity)
 
@@ -179,12 +179,12 @@ class CaptureCheck:
         return max(float(np.median(np.diff(newest))), 1.0)
 
 
-def rigidity_of(readings: list[Reading], *, by_program: bool = False) -> Rigidity:
+def rigidity_of(readings: list[Reading], *, by_phone: bool = False) -> Rigidity:
     """Judge what all stretches of film tell.
 
     Args:
         readings: in their order.
-        by_program: whether a program, such as a phone's browser, stands between the sensor and the images.
+        by_phone: whether a phone's program, such as its browser, stands between the sensor and the images.
     """
     told = [each for each in readings if each.unseen is None]
     if not told:
@@ -203,7 +203,7 @@ def rigidity_of(readings: list[Reading], *, by_program: bool = False) -> Rigidit
         unseen = _usual([each.unseen for each in readings if each.unseen is not None] or [Unseen.STILL])
     rigid = [each for each in told if not each.is_warped]
     readout_ms, readout_sigma_ms = _readout(rigid) if found is Warping.GOOD else (math.nan, math.nan)
-    if by_program and readout_ms < _LEAST_READOUT_MS:
+    if by_phone and readout_ms < _LEAST_READOUT_MS:
         found = Warping.STABILISED
     return Rigidity(
         warping=found,
