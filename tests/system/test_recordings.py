@@ -142,13 +142,13 @@ def test_record_without_depth_survives_being_killed(film: Path, tmp_path: Path) 
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_run(film: Path, tmp_path: Path) -> None:
-    """A file may take 300 kB: the run has all its pairs, says in a line what is missing and ends with exit code 4."""
+    """A file may take 1 MB: the run has all its pairs, says in a line what is missing and ends with exit code 4."""
     link, path = f"ipc://{tmp_path}/link", tmp_path / "s.mcap"
     words = ["run", "--camera", _uri(film, "right"), "--link", link, "--record", str(path), "--pairs", "60", "--json"]
 
     def limit() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
 
     with board(["run", "--camera", _uri(film, "left"), "--link", link], tmp_path):
         ended = subprocess.run(
