@@ -102,7 +102,9 @@ def test_nothing_is_claimed_that_nobody_looked_for(program: Played, opened: Open
     page.click("#link-find")
     page.wait_for_selector("#link-answer:has-text('Found 0 boards')")
     page.click("#step-camera")
-    assert page.text_content("#camera-none").startswith("None on this machine. ")
+    assert page.text_content("#camera-none") == "Nobody has looked yet: press Find."
+    program.change(boards=())
+    page.wait_for_selector("#camera-none:has-text('None on this machine. ')")
     program.change(trouble=Trouble("tcp://10.0.0.9:5555 does not answer", "see /etc/hosts"))
     page.wait_for_selector("#trouble:not([hidden])")
     assert page.text_content("#trouble") == "tcp://10.0.0.9:5555 does not answer. See /etc/hosts"
