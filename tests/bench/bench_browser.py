@@ -4,7 +4,8 @@ Chromium's fake camera reads a film of numbered images; when the file itself is 
 process of its own, gives each image a stamp. Rows: images as luma and as JPEG; the fallback without MediaStreamTrackProcessor; a
 browser whose clock is another one, as a phone's is (a time namespace, where that is allowed); all cores busy. Figures to reach: with
 idle cores no image has another image's stamp; where browser and host have the same clock, the error's 99th percentile is below 1 ms,
-elsewhere 99 % of the errors are within the stated uncertainty; with busy cores 99 % of the images have their own stamp; at most 3 ms
+elsewhere 99 % of the errors are within the stated uncertainty, but for the constant part that stamps of a free epoch have by nature (the
+median; decision 0060: `calibrate-time` measures it); with busy cores 99 % of the images have their own stamp; at most 3 ms
 of the host's CPU time a frame. Exit 4 when one is missed, 3 without Chromium.
 """
 
@@ -24,6 +25,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from phone_host.camera.browser_epoch import Epoch
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.numbered_film import against_reads, reads_of, write_numbered
@@ -80,7 +82,7 @@ class Row:
         p50_ms: median of stamp minus reading, ms.
         p99_ms: 99th percentile of its absolute value, ms.
         stated_ms: median of the stated uncertainty, ms; 0: the stamps are the host's own clock's.
-        inside: share of errors within the stated uncertainty; None: there is none.
+        inside: share of errors within the stated uncertainty, without the constant part of a free epoch; None: there is none.
         cpu_ms: the host's CPU time a frame, ms.
         epoch: on which clock the stamps were found to count.
         dropped: images that were not believed, by reason.
@@ -147,6 +149,7 @@ def row_of(way: Way, told: Mapping[str, Any], reads_ns: "np.ndarray[tuple[int], 
     right, error_ns = against_reads(number, stamp_ns, reads_ns)
     error_ms = error_ns / 1e6
     foreign = stated_ns > 0
+    constant_ms = float(np.median(error_ms)) if told["epoch"] == Epoch.FREE.value else 0.0
     return Row(
         name=way.name,
         is_busy=way.is_busy,
@@ -155,7 +158,9 @@ def row_of(way: Way, told: Mapping[str, Any], reads_ns: "np.ndarray[tuple[int], 
         p50_ms=float(np.median(error_ms)),
         p99_ms=float(np.percentile(np.abs(error_ms), 99)),
         stated_ms=float(np.median(stated_ns)) / 1e6,
-        inside=float(np.mean(np.abs(error_ms)[foreign] * 1e6 <= stated_ns[foreign])) if foreign.any() else None,
+        inside=float(np.mean(np.abs(error_ms - constant_ms)[foreign] * 1e6 <= stated_ns[foreign]))
+        if foreign.any()
+        else None,
         cpu_ms=told["cpu_ms"],
         epoch=told["epoch"],
         dropped=told["dropped"],
@@ -188,7 +193,7 @@ def judge(rows: Sequence[Row]) -> list[Verdict]:
                 Verdict(
                     f"{row.name}: within the stated uncertainty",
                     row.inside >= _LEAST_INSIDE,
-                    f"{row.inside:.1%} of +-{row.stated_ms:.2f} ms",
+                    f"{row.inside:.1%} of +-{row.stated_ms:.2f} ms (p50 {row.p50_ms:+.2f})",
                     f"{_LEAST_INSIDE:.0%}",
                 )
             )
