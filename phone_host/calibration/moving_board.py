@@ -111,10 +111,12 @@ class SizeFinder:
 
     Args:
         square_m: side of its squares, m.
+        apart_looks: one picture in so many looks is kept, for a board without a margin.
+        pictures: so many of them tell.
     """
 
-    def __init__(self, square_m: float) -> None:
-        self._square_m = square_m
+    def __init__(self, square_m: float, *, apart_looks: int = _APART_LOOKS, pictures: int = _PICTURES) -> None:
+        self._square_m, self._apart_looks, self._enough = square_m, apart_looks, pictures
         self._vote = Vote(0, Counter())
         self._seen: deque[Image] = deque(maxlen=ENOUGH)
         self._looks = 0
@@ -145,10 +147,10 @@ class SizeFinder:
 
     def _without_margin(self, grey: Image) -> Inner | None:
         self._looks += 1
-        if self._looks % _APART_LOOKS or size_seen(grey) is None:
+        if self._looks % self._apart_looks or size_seen(grey) is None:
             return None
         self._pictures.append(small_for_sizes(grey))
-        if len(self._pictures) < _PICTURES:
+        if len(self._pictures) < self._enough:
             return None
         pictures, self._pictures = self._pictures, []
         return size_in_pictures(pictures)

@@ -17,7 +17,6 @@ from common import now
 from common.errors import DataError, SettingsError, UnavailableError
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.calibration import moving_board
 from phone_host.calibration.board_names import named_board
 from phone_host.calibration.board_size import whole_size_seen
 from phone_host.calibration.causes.looks import BoardLook
@@ -73,13 +72,11 @@ def test_the_boards_size_is_found_and_a_wrong_one_is_named() -> None:
         check.missed(*_PAIR)
 
 
-def test_a_board_without_a_margin_is_counted_in_some_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_board_without_a_margin_is_counted_in_some_pictures() -> None:
     """A board that is black to its edge never looks whole: it is counted as in files, in pictures that are some looks apart."""
-    monkeypatch.setattr(moving_board, "_APART_LOOKS", 2)
-    monkeypatch.setattr(moving_board, "_PICTURES", 3)
     left, right = (_cut_out(image) for image in _PAIR)
     assert (whole_size_seen(left), whole_size_seen(right)) == (None, None)
-    finder = SizeFinder(0.025)
+    finder = SizeFinder(0.025, apart_looks=2, pictures=3)
     assert [finder.find(left, right) for _ in range(6)] == [None] * 5 + [BOARD]
 
 
