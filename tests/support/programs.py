@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -82,6 +83,33 @@ def board(arguments: list[str], folder: Path, name: str = "board", more: Mapping
 def host(arguments: list[str], folder: Path, name: str = "host", more: Mapping[str, str] | None = None) -> Any:
     """Run phone-host while the block lasts."""
     return program("phone_host.cli", arguments, folder, name, more)
+
+
+def on_a_full_disk(
+    module: str, arguments: list[str], folder: Path, most_bytes: int
+) -> "subprocess.CompletedProcess[str]":
+    """Run a program to its end whose files may take so much and no more.
+
+    Args:
+        module: the program.
+        arguments: its command line.
+        folder: for its settings.
+        most_bytes: of a file.
+    """
+
+    def limit() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+
+    return subprocess.run(
+        [sys.executable, "-P", "-m", module, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+        preexec_fn=limit,
+        env={**os.environ, "XDG_CONFIG_HOME": str(folder / "config")},
+    )
 
 
 def until(condition: Callable[[], bool], what: str) -> None:

@@ -1,11 +1,7 @@
 """A board records alone, as its user has it do, and its recording is joined with the host's: with the real programs."""
 
 import json
-import os
-import resource
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +11,7 @@ import pytest
 from board_agent.ring import part_path, parts_of
 from common.recording.opened import open_recorded
 from tests.support.handheld import Eye, hand, panned
-from tests.support.programs import board, host, ledgers, program, until
+from tests.support.programs import board, host, ledgers, on_a_full_disk, program, until
 
 RATE = 25
 IMAGES = 12 * RATE
@@ -116,21 +112,8 @@ def test_a_ring_that_is_killed_can_be_read(films: Path, tmp_path: Path) -> None:
 def test_a_full_disk_ends_the_recording_in_one_line(films: Path, tmp_path: Path) -> None:
     """A file may take 300 kB: what is in it can be read; exit code 4, and one line says why and what to do."""
     path = tmp_path / "a.mcap"
-
-    def limit() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
-
     words = ["record", "--camera", _uri(films, "left", 400), "--out", str(path)]
-    ended = subprocess.run(
-        [sys.executable, "-P", "-m", "board_agent.cli", *words],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        preexec_fn=limit,
-        env={**os.environ, "XDG_CONFIG_HOME": str(tmp_path / "config")},
-    )
+    ended = on_a_full_disk("board_agent.cli", words, tmp_path, 300_000)
     assert ended.returncode == 4
     assert "it ended early (File too large): make room; what is in it can be used" in ended.stdout
     assert ended.stdout.count("\n") == 1

@@ -1,11 +1,7 @@
 """Recordings as a user makes and replays them, with the real programs."""
 
 import json
-import os
-import resource
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +11,7 @@ import pytest
 
 from common.recording.mcap_writer import CHUNK_BYTES
 from common.recording.opened import open_recorded
-from tests.support.programs import board, host, ledgers, program, until
+from tests.support.programs import board, host, ledgers, on_a_full_disk, program, until
 
 RATE = 25
 PAIRS = 30
@@ -145,21 +141,8 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(film: Path, tmp_path: Pa
     """A file may take 1 MB: the run has all its pairs, says in a line what is missing and ends with exit code 4."""
     link, path = f"ipc://{tmp_path}/link", tmp_path / "s.mcap"
     words = ["run", "--camera", _uri(film, "right"), "--link", link, "--record", str(path), "--pairs", "60", "--json"]
-
-    def limit() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
-
     with board(["run", "--camera", _uri(film, "left"), "--link", link], tmp_path):
-        ended = subprocess.run(
-            [sys.executable, "-P", "-m", "phone_host.cli", *words],
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-            preexec_fn=limit,
-            env={**os.environ, "XDG_CONFIG_HOME": str(tmp_path / "config")},
-        )
+        ended = on_a_full_disk("phone_host.cli", words, tmp_path, 1_000_000)
     report = json.loads(ended.stdout)
     assert ended.returncode == 4
     assert report["pairs"] == 60
