@@ -171,11 +171,12 @@ def check_usb_log(log: KernelLog) -> Finding:
     if not log.readable:
         return _unreadable("usb-log")
     errors, pulled = _matching(log, _USB_ERROR), _matching(log, _USB_DISCONNECT)
+    unplugged = f"; a device was unplugged {_times(pulled)}" if pulled else ""
     if errors:
-        said = f"USB errors or resets {_times(errors)}; the last: {errors[-1].text}"
+        said = f"USB errors or resets {_times(errors)}; the last: {errors[-1].text}{unplugged}"
         return warn("usb-log", said, "another cable or port; a hub with its own supply; a shorter way")
     if pulled:
-        return ok("usb-log", f"no USB error; a device was unplugged {_times(pulled)}")
+        return ok("usb-log", f"no USB error{unplugged}")
     return ok("usb-log", "no USB error since the boot")
 
 

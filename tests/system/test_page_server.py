@@ -20,6 +20,7 @@ from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Command, Do
 from tests.support.page_source import PageSource
+from tests.support.programs import until
 from tests.support.served_page import Start, next_pair, start, viewer  # noqa: F401 - start is a fixture
 from tests.support.stereo_pages import GEOMETRY
 
@@ -117,9 +118,9 @@ def test_the_newest_pair_as_files(start: Start, tmp_path: Path) -> None:
     assert json.loads(served.get("/api/state")[2])["matchers"] == ["tandem", "sgbm"]
     assert served.get("/api/report.json")[0] == 404
     served.source.start_run(4)
-    while (answer := served.get("/api/report.json"))[0] == 404:  # it may be a moment old
-        pass
-    assert json.loads(answer[2])["pairs"] == 4
+    until(lambda: served.get("/api/report.json")[0] != 404, "the report is no longer the one of a moment ago")
+    status, _, body = served.get("/api/report.json")
+    assert (status, json.loads(body)["pairs"]) == (200, 4)
 
 
 def test_saved_pairs(start: Start, tmp_path: Path) -> None:

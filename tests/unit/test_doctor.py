@@ -309,6 +309,17 @@ def test_usb_trouble_in_the_kernel_log_warns(text: str, verdict: Grade) -> None:
     assert check_usb_log(log(text)).verdict is verdict
 
 
+def test_an_unplugged_device_is_told_beside_errors() -> None:
+    """A camera that went away is often the cause of the error, or its end: both are told."""
+    away, error = (
+        LogLine(9, "usb 1-1: USB disconnect, device number 9"),
+        LogLine(8, "usb 1-1: device not accepting address 10, error -71"),
+    )
+    finding = check_usb_log(KernelLog(readable=True, lines=(away, error)))
+    assert finding.verdict is WARN
+    assert finding.text.endswith("error -71; a device was unplugged once, 9 s ago")
+
+
 def test_clocks() -> None:
     """A coarse clock fails, a date before that of the program's own files warns, an unsynchronised clock is no fault."""
     good = Clocks(2e9, 1.7e9, synchronised=False, source="tsc", resolution_ns=1)

@@ -16,6 +16,7 @@ import tty
 from typing import Any
 
 _RETRY_S = 0.1
+_CONNECT_S = 10.0  # the kernel itself waits up to 40 s for an answer that an adapter switched off meanwhile never gave
 
 
 def open_line() -> int:
@@ -29,6 +30,7 @@ def open_line() -> int:
     own, board, channel = sys.argv[2:]
     with socket.socket(socket.AF_BLUETOOTH, socket.SOCK_STREAM, socket.BTPROTO_RFCOMM) as dialling:
         dialling.bind((own, 0))
+        dialling.settimeout(_CONNECT_S)
         dialling.connect((board, int(channel)))
         dialling.settimeout(0)
         return dialling.detach()

@@ -81,7 +81,7 @@ _LEAST_GAIN, _LEAST_SAVED_M = 0.08, 0.0005
 so by about 4 %, and a matcher's own error is larger."""
 
 _VAIN_TRIES: Final = 3
-"""A corner that was asked for so often in vain cannot be shown, it seems."""
+"""A corner that was asked for so often in vain, after a minute and a half, cannot be shown, it seems."""
 
 _COMPLAINTS: Final = {Gate.BLURRED: Words.BLURRED, Gate.GLARE: Words.GLARE}
 _ABSENT: Final = {
@@ -333,6 +333,7 @@ class Guide:
         self._open.discard(self._asked)
         self._ask(now_ns)
         progress, in_vain = self._progress, all(self._given_up[want] >= _VAIN_TRIES for want in self._unseen)
+        in_vain = in_vain and now_ns - self.views[0].glance.at_ns > _LONG_NS
         if in_vain and progress is not None and progress.views == len(self.views) and self._is_enough(progress, now_ns):
             self.ended = Ended.ENOUGH if self._unseen else Ended.GOOD
 
