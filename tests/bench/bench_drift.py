@@ -63,8 +63,9 @@ _MOST_SIGMAS: Final = 2.0
 _FEW: Final = ("bare", "dark", "repeated")
 """Films that show too little: whoever corrects there must be right."""
 
-_LEAST_SEEN: Final = 12
-"""Nine rendered minutes (of ten, one shows a pattern that repeats) and three given sequences."""
+_LEAST_SEEN: Final = 11
+"""Nine rendered minutes (of ten, one shows a pattern that repeats) and two given sequences. The others show a board, or one still
+of a bare table: thirty features, which tell the rows to 0.3 to 0.8 px. There nothing is said and nothing is corrected."""
 
 _MINUTES: Final = 10
 _SEED: Final = 6

@@ -54,6 +54,12 @@ _STEP_SHARE: Final = 0.1
 """A sighting that departs from the estimate by so much is set aside: 5 sigmas in four dimensions, and more than a bar that trembles by 0.01 degrees. Of a rig that stands far away, the
 linear model itself knows the rows to a tenth."""
 
+_SMALL_STEP_PX: Final = 0.2
+_SMALL_STEP_CHI2: Final = 18.5
+_NEWEST: Final = 3
+"""A smaller step shows when the newest sightings of the window are laid against the older ones together. One in a thousand departs so far by chance; that
+costs nothing, for the newest alone must then prove what is corrected."""
+
 MOST_TURN_RAD: Final = math.radians(1.0)
 MOST_FOCUS: Final = 0.02
 """Beyond this the linear model, the filled window and the belief that only the right camera turned no longer hold."""
@@ -138,6 +144,7 @@ class DriftWatch:
         if self._known is None or not self._departs(single, self._known):
             self._aside.clear()
             self._window.append(seen)
+            self._forget_before_a_small_step(model)
         elif not self._is_confirmed(model, seen):
             return
         else:
@@ -206,11 +213,20 @@ class DriftWatch:
         is_real = not values.any() or is_better(self._model, tuple(self._window), _SIGMAS)
         return values if is_real else np.zeros(PARAMETERS)
 
-    def _departs(self, one: Fit, other: Fit) -> bool:
+    def _forget_before_a_small_step(self, model: RowModel) -> None:
+        """Drop what the window saw before a step that is too small for one sighting to prove: the estimate would lag behind by the window's length."""
+        seen = tuple(self._window)
+        older, newest = seen[:-_NEWEST], seen[-_NEWEST:]
+        if len(older) < _NEWEST - 1:
+            return
+        if self._departs(fit_rows(model, newest), fit_rows(model, older), _SMALL_STEP_PX, _SMALL_STEP_CHI2):
+            self._window = deque(newest, maxlen=WINDOW)
+
+    def _departs(self, one: Fit, other: Fit, least_px: float = _STEP_PX, least_chi2: float = _STEP_CHI2) -> bool:
         off = (one.values - other.values)[:PARAMETERS]
         both = (one.covariance + other.covariance)[:PARAMETERS, :PARAMETERS]
-        least_px = max(_STEP_PX, _STEP_SHARE * self._rows_px(other.values[:PARAMETERS]))
-        return bool(off @ np.linalg.solve(both, off) > _STEP_CHI2) and self._rows_px(off) > least_px
+        least_px = max(least_px, _STEP_SHARE * self._rows_px(other.values[:PARAMETERS]))
+        return bool(off @ np.linalg.solve(both, off) > least_chi2) and self._rows_px(off) > least_px
 
     def _is_sound(self, fit: Fit) -> bool:
         return (
