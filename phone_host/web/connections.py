@@ -117,6 +117,7 @@ class Connections:
     def __init__(self, limits: Limits, serve: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None) -> None:
         self._limits, self._serve, self._tls = limits, serve, tls
         self._open: dict[asyncio.Transport, Connection | Handshake] = {}
+        self._is_closed = False
 
     def __call__(self) -> asyncio.Protocol:
         """Make the protocol of a new connection."""
@@ -133,6 +134,9 @@ class Connections:
     def begun(self, connection: Connection | Handshake) -> None:
         """Take a new connection in, at the cost of the one that is idle longest, or of itself."""
         assert connection.transport is not None
+        if self._is_closed:  # it was accepted just before the server ended
+            connection.abort()
+            return
         self._open[connection.transport] = connection
         if len(self._open) > self._limits.connections:
             idle = [each for each in self._open.values() if not each.answering]
@@ -162,6 +166,7 @@ class Connections:
                     each.abort()
 
     def close(self) -> None:
-        """Cut all that are left."""
+        """Cut all that are left, and all that are still being accepted."""
+        self._is_closed = True
         for each in list(self._open.values()):
             each.abort()

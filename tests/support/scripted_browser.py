@@ -84,7 +84,7 @@ class Script:
     device: str = "d0"
     track: str = "t0"
     browser: str = "Mozilla/5.0 (X11; Linux) Chrome/156"
-    spoil: Callable[[int, Shot], Shot] = field(default=lambda _, shot: shot)
+    spoil: Callable[[Shot], Shot] = field(default=lambda shot: shot)
 
 
 class ScriptedBrowser:
@@ -210,7 +210,7 @@ class ScriptedBrowser:
         script = self.script
         shown = script.shots[index % len(script.shots)]
         stamp_us = index / script.fps * 1e6 - script.epoch_us
-        return script.spoil(self.sequence, replace(shown, stamp_us=stamp_us, callback_us=self.now_us()))
+        return replace(shown, stamp_us=stamp_us, callback_us=self.now_us())
 
     async def _film(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         index = int(time.monotonic() * self.script.fps)
@@ -223,6 +223,7 @@ class ScriptedBrowser:
             number, self.sequence = self.sequence, self.sequence + 1
             if self.sent < self.up_to:
                 self.sent += 1
+                shot = self.script.spoil(shot)
                 await socket.send_bytes(shot.packed(number, self.dropped, self.now_us()))
             else:
                 self.dropped += 1

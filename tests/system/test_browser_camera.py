@@ -5,7 +5,7 @@ import json
 import re
 import select
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -174,15 +174,16 @@ def test_what_lies_is_dropped_by_name() -> None:
         18: lambda shot: replace(LUMA_SHOT, payload=bytes(5), stamp_us=shot.stamp_us, callback_us=shot.callback_us),
         22: lambda shot: replace(shot, stamp_us=shot.stamp_us - 12_000),
     }
-    began = 0
+    sent, is_lying = 0, False
 
-    def spoil(number: int, shot: Shot) -> Shot:
-        lie = lies.get(number - began) if began else None
-        return shot if lie is None else lie(shot)
+    def spoil(shot: Shot) -> Shot:
+        nonlocal sent
+        sent += is_lying
+        return lies[sent](shot) if sent in lies else shot
 
     with world() as made, made.browser(spoil=spoil) as browser, made.camera() as camera:
-        began = browser.sequence
-        made.read(camera, lambda: browser.sequence - began > 30)
+        is_lying = True
+        made.read(camera, lambda: sent > 30 and len(camera.health.faults) >= len(lies))
         assert dict(camera.health.faults) == {
             FrameFault.TURNED: 1,
             FrameFault.OTHER_SIZE: 1,
@@ -199,10 +200,9 @@ def test_frames_beyond_the_credit_are_not_used_and_end_the_line() -> None:
     with world() as made, made.browser() as browser, made.camera() as camera:
         made.read(camera, lambda: len(made.frames) >= 3)
         data = SHOTS[0].packed(2**31, 0, 1.0)
-        for _ in range(60):
-            browser.send(data)
-            if browser.told("refused"):
-                break
+        with suppress(aiohttp.ClientConnectionResetError):  # the line may end before the refusal is read
+            for _ in range(60):
+                browser.send(data)
         until(lambda: bool(browser.told("refused")), "the refusal")
         made.read(camera, lambda: dict(camera.health.faults).get(FrameFault.UNASKED, 0) > 20)
 
