@@ -16,7 +16,7 @@ from phone_host.scene.demo_scene import plane_scene
 from phone_host.scene.scene import render, rig_poses
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.numbered import BITS, write_film
-from tests.support.page_client import page
+from tests.support.page_client import PageClient, page
 from tests.support.programs import board, until
 from tests.web.conftest import PHONE
 
@@ -114,6 +114,12 @@ def test_from_nothing_to_true_depth_on_the_page_alone(browser: Any, wall: Path, 
     assert {"rig.yaml", "settings.json", "cameras.json"} <= recorded.attachments.keys()
 
 
+def _recorded(client: PageClient) -> int:
+    """Frames in the recording that goes on; 0 also while the newest snapshot is from before its start."""
+    live = client.state()["live"] or {}
+    return int((live.get("recording") or {"frames": 0})["frames"])
+
+
 def test_the_pairs_on_the_page_beside_a_run_are_pairs(browser: Any, tmp_path: Path) -> None:
     """Both pictures carry their frame's number: on the page they always show the same one, as the run pairs them."""
     film = write_film(tmp_path / "film", 24)
@@ -138,7 +144,7 @@ def test_the_pairs_on_the_page_beside_a_run_are_pairs(browser: Any, tmp_path: Pa
         assert len(set(seen)) == 6
         assert client.do("record")["words"].startswith("recording to ")
         assert client.do("record")["problem"] == "a recording is going on"
-        until(lambda: client.state()["live"]["recording"]["frames"] > 2, "recorded frames")
+        until(lambda: _recorded(client) > 2, "recorded frames")
         assert "recorded: " in client.do("end_recording")["words"]
         assert client.do("end_recording")["words"] == "nothing is recorded"
         shown.wait_for_selector("#trust[data-level=bad], #trust[data-level=warning]")  # twice the same image
