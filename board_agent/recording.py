@@ -8,12 +8,13 @@ from enum import Enum
 from typing import Final
 
 from board_agent.camera_watch import CameraWatch
-from board_agent.disk_writer import DiskWriter, WriteEnd, Written
+from board_agent.disk_writer import DiskWriter, Written
 from common import now
 from common.camera.base import Camera, CameraState, Ended, Skipped, Spoiled
 from common.frame import Frame
 from common.link.waiter import Waiter
 from common.program.logs import event
+from common.recording.disk_queue import WriteEnd
 
 _LOG: Final = logging.getLogger(__name__)
 _LONGEST_WAIT_MS: Final = 200

@@ -88,6 +88,22 @@ class BoundedFiles:
         self.file = self._opened()
         return self.file.ended_bytes + size <= self.file_bytes
 
+    def end_chunk(self) -> None:
+        """See RecordingFile."""
+        self.file.end_chunk()
+
+    def sync(self) -> None:
+        """See RecordingFile."""
+        self.file.sync()
+
+    def close(self) -> None:
+        """See RecordingFile."""
+        self.file.close()
+
+    def abandon(self, cause: str) -> None:  # noqa: ARG002 - the account tells it
+        """See RecordingFile."""
+        self.file.abandon()
+
     def _opened(self) -> RecordingFile:
         self.files += 1
         path = self._path

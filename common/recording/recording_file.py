@@ -114,14 +114,10 @@ class RecordingFile:
 
     def _hand_over(self) -> None:
         """Give the operating system what waits. A disk that is nearly full takes a part of it, then fails."""
-        parts = [memoryview(part) for part in self._waiting]
+        parts = self._waiting[:]
         self._waiting.clear()
         while parts:
-            taken = os.writev(self._file.fileno(), parts[:_MOST_PARTS])
-            while parts and taken >= len(parts[0]):
-                taken -= len(parts.pop(0))
-            if taken:
-                parts[0] = parts[0][taken:]
+            parts = _behind(parts, os.writev(self._file.fileno(), parts[:_MOST_PARTS]))
 
     def abandon(self) -> None:
         """Leave the file as it is. Whatever is whole in it can be read."""
@@ -140,6 +136,15 @@ class RecordingFile:
             os.fsync(self._file.fileno())
         finally:
             self.abandon()
+
+
+def _behind(parts: list[Buffer], size: int) -> list[Buffer]:
+    """Return what is left of pieces behind so many bytes."""
+    for place, part in enumerate(parts):
+        if size < len(part):
+            return [memoryview(part)[size:], *parts[place + 1 :]]
+        size -= len(part)
+    return []
 
 
 @contextmanager

@@ -4,12 +4,14 @@ Their bytes are those that ROS 2 itself writes, so that its tools, Foxglove and 
 Source: common_interfaces, sensor_msgs/msg/CompressedImage, Image, CameraInfo, PointCloud2 and PointField; std_msgs/msg/Header; builtin_interfaces/msg/Time.
 """
 
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from common.frame import Buffer, PixelFormat
-from common.recording.cdr import BrokenMessageError, CdrReader, CdrWriter
+from common.recording.cdr import HEADER, BrokenMessageError, CdrReader, CdrWriter
 
 NS: Final = 1_000_000_000
 _MOST_SECONDS: Final = 2**31 - 1
@@ -43,6 +45,8 @@ SCHEMAS: Final[dict[str, str]] = {
 }
 """The definition of each message with all that it holds, as `ros2msg` writes them."""
 
+_STAMP: Final = struct.Struct("<iI")
+_COUNT: Final = struct.Struct("<I")
 _COMPRESSED: Final = {PixelFormat.MJPEG: "jpeg", PixelFormat.PNG: "png"}
 _RAW: Final = {PixelFormat.GREY: ("mono8", 1), PixelFormat.YUYV: ("yuv422_yuy2", 2), PixelFormat.NV12: ("nv12", 1)}
 _FLOAT32: Final = 7  # PointField's number for it
@@ -110,14 +114,23 @@ def image_message(image: RecordedImage) -> bytes:
 
 def image_parts(image: RecordedImage) -> tuple[bytes, Buffer]:
     """Write an image in two pieces, the second of which is its own bytes: copies of them would cost more than all else."""
+    head = bytearray(_image_head(image.frame_id, image.pixel_format, image.size_px))
+    _STAMP.pack_into(head, len(HEADER), *_stamp(image.stamp_ns))
+    _COUNT.pack_into(head, len(head) - _COUNT.size, len(image.payload))
+    return bytes(head), image.payload
+
+
+@lru_cache(maxsize=16)
+def _image_head(frame_id: str, pixel_format: PixelFormat, size_px: tuple[int, int]) -> bytes:
+    """Return what stands before the bytes of an image, its stamp and their count 0: but for those it is the same for all images of a camera."""
     writer = CdrWriter()
-    _write_header(writer, image.stamp_ns, image.frame_id)
-    if image.pixel_format in _COMPRESSED:
-        writer.text(_COMPRESSED[image.pixel_format])
+    _write_header(writer, 0, frame_id)
+    if pixel_format in _COMPRESSED:
+        writer.text(_COMPRESSED[pixel_format])
     else:
-        _write_raw(writer, image.size_px, *_RAW[image.pixel_format])
-    writer.number("I", len(image.payload))
-    return writer.done(), image.payload
+        _write_raw(writer, size_px, *_RAW[pixel_format])
+    writer.number("I", 0)
+    return writer.done()
 
 
 def depth_parts(stamp_ns: int, frame_id: str, size_px: tuple[int, int], data: Buffer) -> tuple[Buffer, ...]:
@@ -244,10 +257,16 @@ def _short(name: str) -> str:
 
 
 def _write_header(writer: CdrWriter, stamp_ns: int, frame_id: str) -> None:
-    seconds, rest = divmod(stamp_ns, NS)
-    writer.number("i", min(seconds, _MOST_SECONDS))
+    seconds, rest = _stamp(stamp_ns)
+    writer.number("i", seconds)
     writer.number("I", rest)
     writer.text(frame_id)
+
+
+def _stamp(stamp_ns: int) -> tuple[int, int]:
+    """Return the seconds and nanoseconds of a stamp."""
+    seconds, rest = divmod(stamp_ns, NS)
+    return min(seconds, _MOST_SECONDS), rest
 
 
 def _read_header(reader: CdrReader) -> tuple[int, str]:

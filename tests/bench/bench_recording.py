@@ -13,6 +13,7 @@ import random
 import statistics
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -67,7 +68,7 @@ def _record(folder: Path, seconds: int) -> tuple[float, float, float]:
         name="bench", width_px=640, height_px=480, pixel_format=form, period_ns=33_333_333, pacing=Pacing.CLOCK
     )
     recorder.board_camera(camera)
-    thread = recorder._thread
+    [thread] = [each for each in threading.enumerate() if each.name == "recorder"]
     assert thread.ident is not None
     clock = time.pthread_getcpuclockid(thread.ident)
     began, before = time.monotonic(), time.clock_gettime(clock)

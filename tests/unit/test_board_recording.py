@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from board_agent.disk_writer import DiskWriter, WriteEnd
+from board_agent.disk_writer import DiskWriter
 from board_agent.ring import PARTS, BoundedFiles, part_path, parts_of
 from common.errors import SettingsError, UnavailableError
 from common.frame import Frame, PixelFormat
 from common.program.quantities import file_size
 from common.recording.capture_runs import CaptureRuns
+from common.recording.disk_queue import WriteEnd
 from common.recording.layout import ABOUT, About
 from common.recording.opened import open_recorded
 from common.recording.recording_file import RecordingFile
