@@ -87,7 +87,7 @@ soak: $(READY) ## run a booted board for ten minutes and both programs for thirt
 attack: $(READY) ## run every attack on the running programs, ten minutes in all (MINUTES=N, ONLY=word); exit 4 if a limit is missed
 	@$(BIN)/python -m tests.system.hostile $(if $(MINUTES),--minutes $(MINUTES)) $(if $(ONLY),--only "$(ONLY)")
 
-figures: .venv/.ready-bench ## run short benchmarks of everything and write docs/figures.md (45 minutes; ONLY=name, AGAIN=1); exit 4 if one is missed
+figures: .venv/.ready-bench ## run short benchmarks of everything and write docs/figures.md (an hour; ONLY=name, AGAIN=1); exit 4 if one is missed
 	@$(BIN)/python -m tests.docs.figures $(if $(ONLY),--only "$(ONLY)") $(if $(AGAIN),--again)
 
 .venv/.ready-bench: $(READY) requirements/bench.txt

@@ -19,7 +19,7 @@ _GATHER_S: Final = 0.2
 """So long an image waits for others with which it makes a chunk."""
 
 _SYNC_NS: Final = 700_000_000
-"""A power cut takes a second at most: this, what waits, and the time that the disk takes. From the begin of one to the begin of the next."""
+"""From the begin of one sync to the begin of the next. A power cut takes a second at most: this, and the time that the disk takes."""
 
 Job = Callable[[], None]
 """Writes something. Raises FullRecordingError if it does not fit any more, which ends the recording in order."""
@@ -129,12 +129,12 @@ class DiskQueue:
         return self.account
 
     def _work(self) -> None:
-        synced_ns, end, cause = now.monotonic_ns(), None, ""
+        due_ns, end, cause = now.monotonic_ns() + _SYNC_NS, None, ""
         try:
-            while end is None and (jobs := self._next()) is not None:
+            while end is None and (jobs := self._next((due_ns - now.monotonic_ns()) / 1e9)) is not None:
                 end = self._do(jobs)
-                if (now_ns := now.monotonic_ns()) - synced_ns >= _SYNC_NS:
-                    synced_ns = now_ns
+                if (now_ns := now.monotonic_ns()) >= due_ns:
+                    due_ns = now_ns + _SYNC_NS
                     self._target.sync()
             self._target.close()
         except Exception as error:  # noqa: BLE001 - a thread's root: the run goes on, and its account says what is missing
@@ -161,10 +161,11 @@ class DiskQueue:
             self._frames += frames - left
         return end
 
-    def _next(self) -> list[tuple[Job, bool]] | None:
-        """Wait for a chunk's worth of jobs, but not long; None: nothing will come."""
+    def _next(self, due_s: float) -> list[tuple[Job, bool]] | None:
+        """Wait for a chunk's worth of jobs, but not long, and not after the next sync is due; None: nothing will come."""
         with self._changed:
-            self._changed.wait_for(lambda: self._is_closing or self._queued_bytes >= CHUNK_BYTES, _GATHER_S)
+            longest_s = max(0.0, min(_GATHER_S, due_s))
+            self._changed.wait_for(lambda: self._is_closing or self._queued_bytes >= CHUNK_BYTES, longest_s)
             if not self._queue and self._is_closing:
                 return None
             taken, size = [], 0

@@ -33,9 +33,9 @@ def measured(folder: Path, minutes: float, tell: Callable[[str], None]) -> Itera
     own = ["--link", link, "--camera", f"replay:{film}/right?fps={_FPS}&loop=1"]
     words = ["record", *own, "--out", str(recording), "--seconds", str(60 * minutes)]
     tell(f"recording for {minutes:g} minutes")
-    with board(["run", "--camera", f"replay:{film}/left?fps={_FPS}&loop=1", "--link", link], folder) as agent:
-        with host(words, folder, "record") as recorder:
-            samples = _sampled({"board-agent": agent, "phone-host record": recorder}, recorder)
+    sends = ["run", "--camera", f"replay:{film}/left?fps={_FPS}&loop=1", "--link", link]
+    with board(sends, folder) as agent, host(words, folder, "record") as recorder:
+        samples = _sampled({"board-agent": agent, "phone-host record": recorder}, recorder)
     tell(f"replaying {recording.stat().st_size / 1e6:.0f} MB")
     depth = ["--rectified", "--disparities", "32", "--scale", "0.25", "--save-every", "0"]
     with host(["run", "--replay", str(recording), *depth, "--out", str(folder / "out")], folder, "replay") as replay:

@@ -44,7 +44,7 @@ _JUDGED: Final = re.compile(r"^\| (.*?) \| (.*?) \| (.*?): (reached|\*\*missed\*
 _INTRO: Final = """# Figures
 
 How fast, how exact, measured how? `make figures` runs the command under each table and writes this page; nobody edits it by hand. The full results stay
-in `out/figures`. Some runs take ten minutes, all of them together three quarters of an hour; without their arguments the benchmarks measure longer. p50 is
+in `out/figures`. Some runs take ten minutes, all of them together an hour; without their arguments the benchmarks measure longer. p50 is
 the median, p95 and p99 are the 95th and 99th percentile.
 """
 
