@@ -44,10 +44,10 @@ def open_recorded(path: Path) -> Recorded:
     """
     found = read_recorded(mapped(path), inflate)
     if not found.images:
-        held = ", ".join(sorted(found.kinds)) or "nothing"
+        held = f", only {', '.join(sorted(found.kinds))}" if found.kinds else ", and nothing else"
         spoiled = f" ({found.damages[0].words})" if found.damages else ""
         raise DataError(
-            f"{path} holds no images{spoiled}: {held}",
+            f"{path} holds no images{held}{spoiled}",
             "give a file with sensor_msgs/msg/CompressedImage or Image in it",
         )
     return found

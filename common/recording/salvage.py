@@ -102,6 +102,11 @@ class Damage:
     lost: int
     words: str
 
+    @property
+    def text(self) -> str:
+        """For people: what is wrong, and where, if it is at one place."""
+        return f"at byte {self.at}: {self.words}; {self.lost} bytes passed over" if self.lost else self.words
+
 
 Record = Message | Attachment | Metadata | Damage
 Inflate = Callable[[str, memoryview, int], memoryview]

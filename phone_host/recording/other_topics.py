@@ -9,6 +9,7 @@ from common.recording.opened import open_recorded
 from common.recording.recording_file import written
 from common.recording.ros_messages import RecordedImage, image_message, image_type
 from common.versions import all_versions
+from phone_host.recording.both_sides import topics_of
 
 _SIDES = ("left", "right")
 
@@ -25,14 +26,15 @@ def import_topics(source: Path, names: Sequence[str] | None, out: Path) -> dict[
         How many images each side has.
 
     Raises:
-        DataError: there are no such topics.
+        DataError: there are no such topics, or no two at all.
         UnavailableError: a file cannot be read or made, or the disk is full.
     """
     found = open_recorded(source)
-    chosen = list(names or (found.topic_of(side) for side in _SIDES))
+    chosen = list(names or topics_of(found, source).values())
     if not set(chosen) <= set(found.images) or len(set(chosen)) < len(_SIDES):
         raise DataError(
-            f"{source} holds no two such image topics: {', '.join(sorted(found.images))}", "give --topics LEFT RIGHT"
+            f"{source} holds no two such image topics, but {', '.join(sorted(found.images))}",
+            "give two of them as --topics LEFT RIGHT",
         )
     every = [(shown, side) for side, topic in zip(_SIDES, chosen, strict=True) for shown in found.images[topic]]
     with written(out) as file:

@@ -114,7 +114,7 @@ def session_info(recorded: Recorded) -> SessionInfo:
         skew=_skew(recorded),
         messages=tuple(sorted(recorded.kinds.items())),
         attachments=tuple((name, len(data)) for name, data in recorded.attachments.items()),
-        damages=tuple(f"at byte {one.at}: {one.words}; {one.lost} bytes passed over" for one in recorded.damages),
+        damages=tuple(one.text for one in recorded.damages),
     )
 
 

@@ -174,6 +174,9 @@ def test_two_topics_of_another_file(tmp_path: Path) -> None:
     assert left[0].image.stamp_ns == ZERO_NS + LATE_NS
     with pytest.raises(DataError, match="no two such"):
         import_topics(source, ["/left/image/compressed", "/x"], tmp_path / "no.mcap")
+    copy_recording(source, tmp_path / "one.mcap", lambda m: m.channel is not None and "left" in m.channel.topic)
+    with pytest.raises(DataError, match="one camera only"):
+        import_topics(tmp_path / "one.mcap", None, tmp_path / "no.mcap")
 
 
 def test_a_replay_needs_both_cameras(tmp_path: Path) -> None:
@@ -254,7 +257,7 @@ def test_files_of_other_programs_are_read(tmp_path: Path) -> None:
     found = open_recorded(path)
     assert (found.is_ours, found.topic_of("left"), found.topic_of("right")) == (False, "/cam0/raw", "/cam1/raw")
     assert (found.camera("/cam0/raw").width_px, found.camera("/cam0/raw").pixel_format) == (4, PixelFormat.GREY)
-    assert [damage.words for damage in found.damages] == ["1 messages are of an unknown topic or spoiled"]
+    assert [damage.text for damage in found.damages] == ["1 messages are of an unknown topic or spoiled"]
     named = open_recorded(_other(tmp_path, ("/a/right", kind, image), ("/z/left", kind, image)))
     assert (named.topic_of("left"), named.topic_of("right")) == ("/z/left", "/a/right")
     with pytest.raises(DataError, match="holds no images"):

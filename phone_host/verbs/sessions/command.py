@@ -1,14 +1,14 @@
 """phone-host sessions: look into recordings, mend and cut them, and turn them into folders and back."""
 
 import argparse
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final
 
 from rich.console import Console
 
-from common.errors import SettingsError
+from common.errors import DataError, SettingsError
 from common.places import make_folder
 from common.program.terminal import fitted
 from common.recording.layout import CAPTURE
@@ -28,9 +28,8 @@ from phone_host.run.progress_bar import busy_bar, share_bar
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.sessions.page import info_page
 
-_BAD_DATA: Final = 4
-Told = tuple[Mapping[str, object], str, int]
-"""What is printed: as JSON, and as text; and the exit code."""
+Told = tuple[Mapping[str, object], str]
+"""What is printed: as JSON, and as text."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -44,15 +43,15 @@ def run(options: argparse.Namespace) -> int:
         "import": _import,
     }
     if options.task == "join":
-        values, text, code = _join(options)
+        values, text = _join(options)
     else:
         with busy_bar(f"sessions {options.task}"):
-            values, text, code = tasks[options.task](options)
+            values, text = tasks[options.task](options)
     if options.json:
         print(json_text({"format_version": REPORT_FORMAT, "command": "sessions", "task": options.task, **values}))
     else:
         print(fitted(text))
-    return code
+    return 0
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -83,7 +82,7 @@ def _info(options: argparse.Namespace) -> Told:
         except OSError as error:
             raise unwritable(options.out, error) from error
     lines = _lines(path, info) + ([f"plots: {page}"] if page else [])
-    return {**asdict(info), "page": None if page is None else str(page)}, "\n".join(lines), 0
+    return {**asdict(info), "page": None if page is None else str(page)}, "\n".join(lines)
 
 
 def _lines(path: Path, info: SessionInfo) -> list[str]:
@@ -116,36 +115,48 @@ def _repair(options: argparse.Namespace) -> Told:
 
 
 def _cut(options: argparse.Namespace) -> Told:
-    recorded = open_recorded(options.paths[0])
-    zero_ns = min(shown.image.stamp_ns for stream in recorded.images.values() for shown in stream)
+    path = options.paths[0]
+    recorded = open_recorded(path)
+    every = [shown for stream in recorded.images.values() for shown in stream]
+    zero_ns = min(shown.image.stamp_ns for shown in every)
     first_ns = zero_ns + round(options.first * 1e9)
-    last_ns = None if options.last is None else zero_ns + round(options.last * 1e9)
-    del recorded
+    last_ns = math.inf if options.last is None else zero_ns + round(options.last * 1e9)
+    if not any(first_ns <= shown.log_ns < last_ns for shown in every):
+        length_s = (max(shown.log_ns for shown in every) - zero_ns) / 1e9
+        raise DataError(
+            f"{path} holds no image of that time: it lasts {length_s:.1f} s", "give another --from and --to"
+        )
+    del recorded, every
 
     def wanted(message: Message) -> bool:
         topic = "" if message.channel is None else message.channel.topic
-        return (
-            topic == CAPTURE
-            or topic.endswith("camera_info")
-            or (first_ns <= message.log_ns and (last_ns is None or message.log_ns < last_ns))
-        )
+        return topic == CAPTURE or topic.endswith("camera_info") or first_ns <= message.log_ns < last_ns
 
-    return _copied(options, copy_recording(options.paths[0], options.out, wanted))
+    return _copied(options, copy_recording(path, options.out, wanted))
 
 
 def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
-    lines = [f"{counted(account.messages, 'message')} written to {options.out}"]
-    lines += [f"  missing: at byte {one.at}: {one.words}; {one.lost} bytes passed over" for one in account.damages]
-    lines += [
-        f"  left out: {count} of {topic}, a message that is not known here" for topic, count in account.left_out.items()
+    """Tell what was copied.
+
+    Raises:
+        DataError: nothing was.
+    """
+    told = [f"missing: {one.text}" for one in account.damages]
+    told += [
+        f"left out: {count} of {topic}, a message that is not known here" for topic, count in account.left_out.items()
     ]
+    if not account.messages:
+        options.out.unlink()
+        why = f" ({'; '.join(told)})" if told else ""
+        raise DataError(f"{options.paths[0]} holds nothing that can be written{why}", "give a recording")
+    written = f"{counted(account.messages, 'message')} written to {options.out}"
     values = {
         "file": str(options.out),
         "messages": account.messages,
         "damages": [asdict(one) for one in account.damages],
         "left_out": account.left_out,
     }
-    return values, "\n".join(lines), 0 if account.messages else _BAD_DATA
+    return values, "\n  ".join([written, *told])
 
 
 def _join(options: argparse.Namespace) -> Told:
@@ -164,7 +175,7 @@ def _join(options: argparse.Namespace) -> Told:
         "left_out": account.left_out,
         "empty": [str(path) for path in account.empty],
     }
-    return values, "\n".join(_join_lines(options.out, account)), 0
+    return values, "\n".join(_join_lines(options.out, account))
 
 
 def _join_lines(out: Path, account: JoinAccount) -> list[str]:
@@ -183,9 +194,12 @@ def _join_lines(out: Path, account: JoinAccount) -> list[str]:
 
 
 def _export(options: argparse.Namespace) -> Told:
-    counts = export_folders(open_recorded(options.paths[0]), options.out)
+    recorded = open_recorded(options.paths[0])
+    counts = export_folders(recorded, options.out)
     text = f"{counts['left']} left and {counts['right']} right images written to {options.out}"
-    return {"folder": str(options.out), "images": counts}, text, 0
+    return {"folder": str(options.out), "images": counts}, "\n  ".join(
+        [text, *(f"missing: {one.text}" for one in recorded.damages)]
+    )
 
 
 def _import(options: argparse.Namespace) -> Told:
@@ -195,4 +209,4 @@ def _import(options: argparse.Namespace) -> Told:
     else:
         counts = import_folders(options.paths, options.times, options.out)
     text = f"{counts['left']} left and {counts['right']} right images written to {options.out}"
-    return {"file": str(options.out), "images": counts}, text, 0
+    return {"file": str(options.out), "images": counts}, text
