@@ -6,10 +6,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 
-from common.errors import UnavailableError
+from common.errors import SettingsError, UnavailableError
 from common.frame import Buffer
 from common.recording.layout import topics
 from common.recording.mcap_writer import McapWriter, Topic
+from common.recording.opened import SUFFIX, is_recording
 from common.versions import PACKAGE_VERSION
 
 _MOST_PARTS: Final = 1024
@@ -35,7 +36,7 @@ class RecordingFile:
         try:
             self._file: BinaryIO = path.open("xb", buffering=0)
         except FileExistsError:
-            raise UnavailableError(f"{path} exists already", "name another file, or delete it") from None
+            raise _taken(path) from None
         except OSError as error:
             raise UnavailableError(f"{path} cannot be written ({error.strerror})", "name another file") from None
         self._is_dirty = True
@@ -136,6 +137,27 @@ class RecordingFile:
             os.fsync(self._file.fileno())
         finally:
             self.abandon()
+
+
+def require_new(path: Path, option: str) -> None:
+    """Refuse at once, before anything long, what cannot become a recording.
+
+    Args:
+        path: the file.
+        option: what names it.
+
+    Raises:
+        SettingsError: its name is none of a recording, by which it would be known later.
+        UnavailableError: it exists.
+    """
+    if not is_recording(path.name):
+        raise SettingsError(f"{option} {path} does not end in {SUFFIX}", "give FILE.mcap")
+    if path.exists():
+        raise _taken(path)
+
+
+def _taken(path: Path) -> UnavailableError:
+    return UnavailableError(f"{path} exists already", "name another file, or delete it")
 
 
 def _behind(parts: list[Buffer], size: int) -> list[Buffer]:

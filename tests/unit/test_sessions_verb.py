@@ -58,3 +58,18 @@ def test_what_is_missing_is_told_of_an_export(tmp_path: Path, capsys: pytest.Cap
     path.write_bytes(data[: len(data) // 2])
     assert main(["sessions", "export", str(path), "--out", str(tmp_path / "out")]) == 0
     assert "missing: at byte" in capsys.readouterr().out
+
+
+def test_a_new_recording_has_a_name_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is replaced, and nothing is written that would not be known as a recording later; told before anything long begins."""
+    path, camera = str(recording_file(tmp_path, 3)), ["--camera", f"replay:{tmp_path}/none.avi"]
+    for words, option in (
+        (["sessions", "cut", path, "--out"], "--out"),
+        (["sessions", "join", path, path, "--out"], "--out"),
+        (["record", "--alone", *camera, "--out"], "--out"),
+        (["run", *camera, "--record"], "--record"),
+    ):
+        assert main([*words, path]) == 3
+        assert f"{path} exists already" in capsys.readouterr().err
+        assert main([*words, str(tmp_path / "new.bag")]) == 2
+        assert f"{option} {tmp_path}/new.bag does not end in .mcap: give FILE.mcap" in capsys.readouterr().err

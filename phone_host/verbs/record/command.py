@@ -16,6 +16,7 @@ from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level, with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import fitted
+from common.recording.recording_file import require_new
 from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
 from phone_host.boards.opened import open_named
@@ -41,6 +42,7 @@ def run(options: argparse.Namespace) -> int:
     check(settings)
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    require_new(options.out, "--out")
     if options.alone and options.link:
         raise SettingsError("--alone records without a board, and --link names one", "leave one of both out")
     if not (math.isfinite(options.seconds) and options.seconds >= 0):

@@ -14,6 +14,7 @@ from common.errors import SettingsError
 from common.link.base import Link
 from common.places import Kind, kind_of, resolved
 from common.program.settings import Resolved, with_origins
+from common.recording.recording_file import require_new
 from common.stamp import HOST_CLOCK
 from phone_host.boards.discovery import remember
 from phone_host.boards.opened import open_named
@@ -226,6 +227,8 @@ def open_run(
         return _open_replay(options, found, tell)
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    if getattr(options, "record", None) is not None:
+        require_new(options.record, "--record")
     if options.out is not None:
         spare(options.out, replayed(settings.camera), settings.calibration, options.overlay)
     with ExitStack() as opened:  # what cannot be had closes what was

@@ -13,6 +13,7 @@ from common.places import make_folder
 from common.program.terminal import fitted
 from common.recording.layout import CAPTURE
 from common.recording.opened import is_recording, open_recorded
+from common.recording.recording_file import require_new
 from common.recording.salvage import Message
 from common.versions import REPORT_FORMAT
 from common.words import counted
@@ -61,6 +62,8 @@ def _check(options: argparse.Namespace) -> None:
         raise SettingsError(f"sessions {options.task} takes one recording", "name one")
     if options.task != "info" and options.out is None:
         raise SettingsError(f"sessions {options.task} needs --out", "add --out PATH")
+    if options.task not in {"info", "export"}:
+        require_new(options.out, "--out")
     if options.last is not None and options.last <= options.first:
         raise SettingsError("--to is not behind --from", "give a later time, s after the first image")
     if options.task != "join" and options.clock is not None:
