@@ -33,6 +33,7 @@ class Written:
         gave_way: how many of them, or of earlier ones, were deleted.
         end: why no more is written; None: it goes on, or was ended in order.
         cause: what failed, in words.
+        remedy: what to do about it.
     """
 
     frames: int
@@ -43,6 +44,7 @@ class Written:
     gave_way: int
     end: WriteEnd | None
     cause: str
+    remedy: str
 
 
 class DiskWriter:
@@ -70,6 +72,7 @@ class DiskWriter:
             gave_way=self._files.gave_way,
             end=queued.end,
             cause=queued.cause,
+            remedy=queued.remedy,
         )
 
     def put(self, frame: Frame) -> None:

@@ -238,6 +238,6 @@ def _words(outcome: Outcome, bound: _Bound) -> str:
     told = f"; not in it: {', '.join(missing)}" if missing else ""
     ended = _ENDS[outcome.end]
     if outcome.end is End.FAILED:
-        ended += f" ({written.cause}): make room; what is in it can be used"
+        ended += f" ({written.cause}): {written.remedy}"
     size = f"{written.size_bytes / 1e6:.1f} MB"
     return f"recorded: {counted(written.frames, 'image')}, {size} in {bound.name}{parts}{told}{ended}"

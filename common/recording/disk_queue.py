@@ -14,6 +14,7 @@ from typing import Final, Protocol
 from common import now
 from common.errors import TandemError
 from common.recording.mcap_writer import CHUNK_BYTES
+from common.recording.recording_file import DeletedRecordingError
 
 _GATHER_S: Final = 0.2
 """So long an image waits for others with which it makes a chunk."""
@@ -47,6 +48,7 @@ class Queued:
         ended_ns: when it ended, ns of the monotonic clock; 0: it goes on.
         end: why it ended early; None: it did not.
         cause: what failed, in words.
+        remedy: what to do about it.
     """
 
     frames: int = 0
@@ -55,6 +57,7 @@ class Queued:
     ended_ns: int = 0
     end: WriteEnd | None = None
     cause: str = ""
+    remedy: str = ""
 
 
 class Target(Protocol):
@@ -91,7 +94,7 @@ class DiskQueue:
         self._frames = self._dropped = self._lost = self._ended_ns = 0
         self._undone = 0  # frames of what is being done
         self._end: WriteEnd | None = None
-        self._cause = ""
+        self._cause = self._remedy = ""
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
@@ -99,7 +102,8 @@ class DiskQueue:
     def account(self) -> Queued:
         """What became of the images so far."""
         with self._changed:
-            return Queued(self._frames, self._dropped, self._lost, self._ended_ns, self._end, self._cause)
+            counts = self._frames, self._dropped, self._lost
+            return Queued(*counts, self._ended_ns, self._end, self._cause, self._remedy)
 
     def put(self, job: Job, size: int, *, is_frame: bool = False) -> None:
         """Take a job. Never waits.
@@ -129,7 +133,7 @@ class DiskQueue:
         return self.account
 
     def _work(self) -> None:
-        due_ns, end, cause = now.monotonic_ns() + _SYNC_NS, None, ""
+        due_ns, end, cause, remedy = now.monotonic_ns() + _SYNC_NS, None, "", ""
         try:
             while end is None and (jobs := self._next((due_ns - now.monotonic_ns()) / 1e9)) is not None:
                 end = self._do(jobs)
@@ -138,10 +142,10 @@ class DiskQueue:
                     self._target.sync()
             self._target.close()
         except Exception as error:  # noqa: BLE001 - a thread's root: the run goes on, and its account says what is missing
-            end, cause = WriteEnd.FAILED, _cause(error)
+            end, (cause, remedy) = WriteEnd.FAILED, _explained(error)
             self._target.abandon(cause)
         with self._changed:
-            self._end, self._cause, self._ended_ns = end, cause, now.monotonic_ns()
+            self._end, self._cause, self._remedy, self._ended_ns = end, cause, remedy, now.monotonic_ns()
             self._lost += self._undone + sum(is_frame for _, _, is_frame in self._queue)
             self._queue.clear()
             self._queued_bytes = 0
@@ -177,8 +181,14 @@ class DiskQueue:
             return taken
 
 
-def _cause(error: Exception) -> str:
-    """Return what failed, in words."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return str(error) if isinstance(error, TandemError) else f"{type(error).__name__}: {error}"
+def _explained(error: Exception) -> tuple[str, str]:
+    """Return what failed, in words, and what to do about it."""
+    match error:
+        case DeletedRecordingError():
+            return str(error.strerror), "record again"
+        case OSError() if error.strerror:
+            return error.strerror, "make room; what is in it can be used"
+        case TandemError():
+            return error.problem, error.remedy
+        case _:
+            return f"{type(error).__name__}: {error}", "what is in it can be used"

@@ -83,7 +83,7 @@ class McapWriter:
     def __init__(self, write: Callable[[Buffer], object], library: str, topics: tuple[Topic, ...]) -> None:
         self._write = write
         self.size = 0
-        self._groups: dict[int, list[bytes]] = {}  # of the summary, by opcode
+        self._groups: dict[int, bytearray] = {}  # of the summary, by opcode; it grows with the file: 100 bytes a chunk
         self._summary_size = 0
         self._counts: dict[int, int] = {}
         self._chunks = self._attachments = self._metadata = 0
@@ -198,8 +198,7 @@ class McapWriter:
         )
         self._summed(_STATISTICS, totals + counts)
         start, at, summary, offsets = self.size, self.size, b"", b""
-        for opcode, records in sorted(self._groups.items()):
-            group = b"".join(records)
+        for opcode, group in sorted(self._groups.items()):
             offsets += _record(_SUMMARY_OFFSET, struct.pack("<BQQ", opcode, at, len(group)))
             summary += group
             at += len(group)
@@ -218,7 +217,7 @@ class McapWriter:
     def _summed(self, opcode: int, content: bytes) -> bytes:
         """Make a record that the summary repeats."""
         record = _record(opcode, content)
-        self._groups.setdefault(opcode, []).append(record)
+        self._groups.setdefault(opcode, bytearray()).extend(record)
         self._summary_size += len(record)
         return record
 

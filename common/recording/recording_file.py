@@ -1,5 +1,6 @@
 """A recording on disk that is being written: safe against a crash at any moment. Used by one thread."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,6 +16,10 @@ from common.versions import PACKAGE_VERSION
 
 _MOST_PARTS: Final = 1024
 """What writev takes at once on Linux and Android (IOV_MAX, limits.h)."""
+
+
+class DeletedRecordingError(OSError):
+    """Raised when a file was deleted while it was written: the system would go on taking what nobody can ever read. The user's fault."""
 
 
 class RecordingFile:
@@ -40,13 +45,14 @@ class RecordingFile:
         except OSError as error:
             raise UnavailableError(f"{path} cannot be written ({error.strerror})", "name another file") from None
         self._is_dirty = True
+        self._size_bytes = 0
         self._waiting: list[Buffer] = []  # images go to the system as they are, a chunk in one call
         self._writer = McapWriter(self._waiting.append, f"tandemscan {PACKAGE_VERSION}", channels or topics())
 
     @property
     def size_bytes(self) -> int:
         """How long the file is, bytes; what has not filled its chunk does not count. Safe from any thread."""
-        return self._writer.size
+        return self._size_bytes
 
     @property
     def left_bytes(self) -> int | None:
@@ -105,20 +111,28 @@ class RecordingFile:
         """Bring onto the disk what came until now. May take long.
 
         Raises:
-            OSError: the disk is full, or gone.
+            OSError: the disk is full, or gone; or the file was deleted.
         """
         if not self._is_dirty:
             return
         self.end_chunk()
-        os.fsync(self._file.fileno())
+        self._bring_down()
         self._is_dirty = False
+
+    def _bring_down(self) -> None:
+        number = self._file.fileno()
+        os.fsync(number)
+        if not os.fstat(number).st_nlink:
+            raise DeletedRecordingError(errno.ENOENT, "its file was deleted")
 
     def _hand_over(self) -> None:
         """Give the operating system what waits. A disk that is nearly full takes a part of it, then fails."""
         parts = self._waiting[:]
         self._waiting.clear()
         while parts:
-            parts = _behind(parts, os.writev(self._file.fileno(), parts[:_MOST_PARTS]))
+            taken = os.writev(self._file.fileno(), parts[:_MOST_PARTS])
+            self._size_bytes += taken
+            parts = _behind(parts, taken)
 
     def abandon(self) -> None:
         """Leave the file as it is. Whatever is whole in it can be read."""
@@ -129,12 +143,12 @@ class RecordingFile:
         """End the file in order.
 
         Raises:
-            OSError: the disk is full, or gone; what was written until then can be read.
+            OSError: the disk is full, or gone, and what was written until then can be read; or the file was deleted.
         """
         try:
             self._writer.finish()
             self._hand_over()
-            os.fsync(self._file.fileno())
+            self._bring_down()
         finally:
             self.abandon()
 

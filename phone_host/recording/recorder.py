@@ -79,8 +79,7 @@ class _Writing:
 
     def abandon(self, cause: str) -> None:
         """See Target."""
-        remedy = "make room; the run goes on"
-        _LOG.error(event("recording_ended_early", file=self.file.path, cause=cause, remedy=remedy))
+        _LOG.error(event("recording_ended_early", file=self.file.path, cause=cause, remedy="the run goes on"))
         self.file.abandon()
 
     def _write_captured(self) -> None:
@@ -113,7 +112,7 @@ class Recorder:
     def account(self) -> RecordingAccount:
         """What became of the images so far."""
         queued, file = self._queue.account, self._writing.file
-        trouble = Trouble(f"it ended early ({queued.cause})", "make room; what is in it can be used")
+        trouble = Trouble(f"it ended early ({queued.cause})", queued.remedy)
         return RecordingAccount(
             file=str(file.path),
             frames=queued.frames,

@@ -1,7 +1,5 @@
 """A board's own recording on its disk: bounded, as a ring, whole at every moment, with its end told."""
 
-import errno
-import os
 import time
 from pathlib import Path
 
@@ -120,8 +118,17 @@ def test_a_folder_that_goes_away_ends_the_recording(tmp_path: Path) -> None:
     writer.put(_frame(31))
     written = writer.finish()
     assert written.end is WriteEnd.FAILED
-    assert os.strerror(errno.ENOENT) in written.cause
+    assert written.cause == "its file was deleted"
     assert written.lost + written.frames == 31
+
+
+def test_a_file_that_is_deleted_meanwhile_ends_the_recording(tmp_path: Path) -> None:
+    """The system would go on taking its bytes, and nobody could ever read them."""
+    path = tmp_path / "a.mcap"
+    writer = _write(BoundedFiles(path, 10_000_000, _begin, is_ring=False), range(3))
+    path.unlink()
+    written = writer.finish()
+    assert (written.end, written.cause, written.remedy) == (WriteEnd.FAILED, "its file was deleted", "record again")
 
 
 def test_an_existing_file_is_kept(tmp_path: Path) -> None:

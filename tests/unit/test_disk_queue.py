@@ -108,14 +108,18 @@ def test_what_does_not_fit_ends_it_in_order() -> None:
 
 
 @pytest.mark.parametrize(
-    ("error", "cause"),
+    ("error", "cause", "remedy"),
     [
-        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), os.strerror(errno.ENOSPC)),
-        (UnavailableError("a.mcap exists already", "name another file"), "a.mcap exists already: name another file"),
-        (ZeroDivisionError("oh"), "ZeroDivisionError: oh"),
+        (
+            OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)),
+            os.strerror(errno.ENOSPC),
+            "make room; what is in it can be used",
+        ),
+        (UnavailableError("a.mcap exists already", "name another file"), "a.mcap exists already", "name another file"),
+        (ZeroDivisionError("oh"), "ZeroDivisionError: oh", "what is in it can be used"),
     ],
 )
-def test_what_fails_is_told(error: Exception, cause: str) -> None:
+def test_what_fails_is_told(error: Exception, cause: str, remedy: str) -> None:
     """The thread ends, its target is left as it is, and no frame of the chunk that failed counts as written."""
     disk = _Disk()
     disk.error = error
@@ -126,4 +130,4 @@ def test_what_fails_is_told(error: Exception, cause: str) -> None:
     queue.put(disk.job(2), 10, is_frame=True)
     ended = queue.finish()
     assert disk.done == [1, f"abandoned: {cause}"]
-    assert ended == Queued(lost=2, ended_ns=ended.ended_ns, end=WriteEnd.FAILED, cause=cause)
+    assert ended == Queued(lost=2, ended_ns=ended.ended_ns, end=WriteEnd.FAILED, cause=cause, remedy=remedy)
