@@ -119,14 +119,18 @@ def session_info(recorded: Recorded) -> SessionInfo:
 
 
 def skews_ms(recorded: Recorded) -> list[tuple[float, float]]:
-    """Return for each left image when it was exposed, s after the first, and how much later than the nearest right one, ms."""
+    """Return for each left image when it was exposed, s after the first, and how much later than the nearest right one, ms.
+
+    Those from before or after the right camera's time are left out: they have no neighbour.
+    """
     streams = [recorded.images.get(recorded.topic_of(side), []) for side in ("left", "right")]
     if not all(streams):
         return []
     left, right = ([shown.image.stamp_ns for shown in stream] for stream in streams)
     right.sort()
-    zero_ns = min(*left, right[0])
-    return [((at_ns - zero_ns) / 1e9, (at_ns - right[nearest(right, at_ns)]) / 1e6) for at_ns in left]
+    zero_ns, margin_ns = min(*left, right[0]), period_ns(streams[1]) // 2
+    common = [at_ns for at_ns in left if right[0] - margin_ns <= at_ns <= right[-1] + margin_ns]
+    return [((at_ns - zero_ns) / 1e9, (at_ns - right[nearest(right, at_ns)]) / 1e6) for at_ns in common]
 
 
 def _skew(recorded: Recorded) -> Skew | None:

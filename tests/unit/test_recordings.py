@@ -17,6 +17,7 @@ from common.recording.mcap_writer import McapWriter, Topic
 from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
 from common.recording.ros_messages import RecordedImage, image_message
+from common.recording.salvage import Message
 from phone_host.recording.copied import copy_recording
 from phone_host.recording.folders import export_folders, import_folders
 from phone_host.recording.opened import open_playback
@@ -110,6 +111,20 @@ def test_a_recording_in_figures(tmp_path: Path) -> None:
     assert info.skew is not None
     assert info.skew.median_ms == -LATE_NS / 1e6
     assert (info.is_complete, info.is_ours, info.damages, info.attachments) == (True, True, (), (("rig.yaml", 250),))
+
+
+def test_what_one_camera_saw_alone_is_no_skew(tmp_path: Path) -> None:
+    """The right camera ends early: the left images behind have no neighbour."""
+    path = tmp_path / "early.mcap"
+
+    def wanted(message: Message) -> bool:
+        return message.channel is not None and ("left" in message.channel.topic or message.sequence < 5)
+
+    copy_recording(recording_file(tmp_path, 20), path, wanted)
+    info = session_info(open_recorded(path))
+    assert [stream.images for stream in info.streams] == [20, 5]
+    assert info.skew is not None
+    assert info.skew.far_ms == LATE_NS / 1e6
 
 
 def test_what_is_told_of_a_camera_comes_back(tmp_path: Path) -> None:
