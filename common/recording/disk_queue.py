@@ -19,7 +19,7 @@ from common.recording.recording_file import DeletedRecordingError
 _GATHER_S: Final = 0.2
 """So long an image waits for others with which it makes a chunk."""
 
-_SYNC_NS: Final = 700_000_000
+_SYNC_NS: Final = 600_000_000
 """From the begin of one sync to the begin of the next. A power cut takes a second at most: this, and the time that the disk takes."""
 
 Job = Callable[[], None]

@@ -345,9 +345,9 @@ SOURCES: Final = (
     Source("clock", Topic.CLOCK, "How well the host knows the board's clock. Why radio misses its figure without echoes: [decision 0009](decisions/0009-clock-estimate.md).", f"{_BENCH}bench_clock --runs 400 --long-runs 40 --real-runs 1 --json", _clock, 230),
     Source("pairing", Topic.PAIRING, "Random streams of two cameras, 0 to 10 % of the frames lost, beside the best possible pairs. The worst of the losses is told.", f"{_BENCH}bench_pairing --streams 200 --json", _pairing, 50),
     Source("age", Topic.AGE, "A host ten times slower than the camera: how old are the frames that it gets?", f"{_BENCH}bench_age --seconds 15 --json", _age, 75),
-    Source("recording", Topic.RECORDINGS, "A recording of 2 x 30 images of 51 KB a second, files with damages, runs with and without `--record` in turn, and replays.", f"{_BENCH}bench_recording --seconds 6 --json", _verdicts, 220),
+    Source("recording", Topic.RECORDINGS, "A recording of 2 x 30 images of 51 KB a second, files with damages, runs with and without `--record` in turn, and replays.", f"{_BENCH}bench_recording --seconds 6 --json", _verdicts, 290),
     Source("recording-memory", Topic.RECORDINGS, "Ten minutes of 2 x 30 images a second recorded, then replayed on demand: memory of each program, without pages of the file.", f"{_BENCH}bench_recording --parts memory --json", _verdicts, 1000),
-    Source("joining", Topic.RECORDINGS, "Two recordings whose offset is found by what both saw: films rendered of hands that hold two unlike cameras, and simulated sights.", f"{_BENCH}bench_joining --films 12 --json", _joining, 400),
+    Source("joining", Topic.RECORDINGS, "Two recordings whose offset is found by what both saw: films rendered of hands that hold two unlike cameras, and simulated sights.", f"{_BENCH}bench_joining --films 12 --json", _joining, 200),
     Source("board", Topic.BOARD, "A booted virtual board (armhf, emulated) with a 640x480 MJPEG webcam at 30 per second.", f"{_BENCH}bench_board --runs 1 --seconds 8 --json", _board, 180),
 )  # fmt: skip
 """Everything on the page."""

@@ -90,8 +90,8 @@ def test_it_syncs_more_often_than_once_a_second() -> None:
         queue.put(disk.job(0), 10)
         time.sleep(0.01)
     queue.finish()
-    assert disk.synced[0] - began > 0.69
-    assert 0.69 < disk.synced[1] - disk.synced[0] < 1
+    assert disk.synced[0] - began > 0.59
+    assert 0.59 < disk.synced[1] - disk.synced[0] < 1
 
 
 def test_what_does_not_fit_ends_it_in_order() -> None:
