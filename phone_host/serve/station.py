@@ -54,7 +54,8 @@ class Station:
     def __init__(self, program: Program) -> None:
         self._program = program
         self._shelf = Shelf()
-        self._memory = Memory(program.kept())
+        kept = program.kept()
+        self._memory = Memory(kept)
         self._recordings = Recordings()
         self._activities = Activities(self._begins, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
@@ -70,6 +71,10 @@ class Station:
             Do.RECORD: self._record,
             Do.END_RECORDING: self._end_recording,
         }
+        try:
+            program.changed(kept, kept)
+        except TandemError as error:  # somebody else has changed the file, or what it names has gone
+            self._memory.fail(trouble_of(error))
 
     @property
     def feed(self) -> BrowserFeed:
@@ -181,8 +186,8 @@ class Station:
             SettingsError: they are not valid, or cannot be kept.
         """
         new = self._program.changed(self._memory.choices, changes)
-        self._memory.choose(new)
         self._program.keep(new)
+        self._memory.choose(new)
 
     def _check(self, values: Choices) -> Answer:
         del values
@@ -231,10 +236,13 @@ class Station:
         choices = self._both_chosen()
 
         def work(task: Task) -> None:
-            ready = self._program.calibration(choices, values)
+            ready = self._program.calibration(choices, values, self._sinks(None))
             shown = SnapshotValues(self._show_guide)
-            with task.held(), self._memory.live(ready.live.host.snapshot):
-                ready.run(task.stopped, (shown,))
+            try:
+                with task.held(), self._memory.live(ready.live.host.snapshot):
+                    ready.run(task.stopped, (shown,))
+            finally:
+                self._shelf.clear()  # these pairs are not those of a run
             if task.stopped():
                 views = counted(ready.live.snapshot().views, "view")
                 self._memory.result(f"stopped: {views} taken and kept, nothing computed from them")
