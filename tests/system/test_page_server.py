@@ -193,6 +193,28 @@ def test_events_are_the_state(start: Start) -> None:
     assert [state["live"]["pairs"] for state in states] == sorted({state["live"]["pairs"] for state in states})
 
 
+def test_viewers_hear_of_a_change_that_another_has_asked_for_first(start: Start) -> None:
+    """Whoever asks all the time has the state made anew each time; those who only listen are told all the same."""
+    served = start()
+
+    async def work(client: aiohttp.ClientSession) -> None:
+        async def listen(stream: aiohttp.StreamReader) -> None:
+            async for line in stream:
+                if b'"pairs": 7' in line:
+                    return
+
+        async with client.get("/api/events") as stream, asyncio.timeout(10):
+            await stream.content.readline()
+            served.source.start_run(7)
+            hearing = asyncio.ensure_future(listen(stream.content))
+            while not hearing.done():
+                async with client.get("/api/state") as asked:
+                    await asked.read()
+                await asyncio.sleep(0.02)
+
+    served.asked(work)
+
+
 def test_a_port_that_is_taken_is_named(start: Start) -> None:
     """One line with the remedy, exit 3; and a server can begin again on its port at once."""
     served = start()

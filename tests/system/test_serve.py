@@ -172,8 +172,7 @@ def test_a_live_calibration_by_the_api_becomes_the_rig_of_the_next_run(tmp_path:
         pictures = [
             cv2.imdecode(np.frombuffer(client.get(f"/api/{side}.jpg"), np.uint8), 0) for side in ("left", "right")
         ]
-        assert pictures[0].shape[::-1] == (cameras["left"]["width"], cameras["left"]["height"])
-        assert pictures[1].std() > 10
+        assert all(picture is not None and picture.std() > 10 for picture in pictures)
         state = client.until_idle()
         with pytest.raises(HTTPError):  # they were no pairs of a run
             client.get("/api/left.jpg")

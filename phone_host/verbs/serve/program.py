@@ -25,6 +25,7 @@ from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
 from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.output.axes import Axes
+from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.run.pair_budget import usable_matchers
 from phone_host.run.sinks import Sink
@@ -105,7 +106,7 @@ class Commands:
         rig, is_rectified = new.get("calibration"), "rectified" in new
         if idle := [name for name in _OF_DEPTH if changes.get(name) and not (rig or is_rectified)]:
             raise SettingsError(f"--{idle[0]} without a calibration", "calibrate, or name a rig.yaml")
-        if rig and changes.get("calibration") and not is_rectified:
+        if rig and changes.get("calibration") and not is_rectified and not is_calib_txt(Path(rig)):
             refuse_rejected(read_own_rig(Path(rig)), rig, allowed=options.use_rejected_rig)
         return new
 

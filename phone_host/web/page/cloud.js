@@ -15,7 +15,7 @@ import * as three from './vendor/three.js';
 /** @typedef {'turned' | 'front' | 'side' | 'above'} ViewName */
 
 /** Yaw and pitch of the views by name. */
-const VIEWS = { turned: [-0.36, 0.22], front: [0, 0], side: [-1.25, 0.1], above: [0, 1.25] };
+const VIEWS = { turned: [-0.28, 0.2], front: [0, 0], side: [-1.25, 0.1], above: [0, 1.25] };
 
 const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 

@@ -39,11 +39,12 @@ function paint(canvas, camera, picture) {
       pen.globalAlpha = (picture ? 0.45 : 0.85) * Math.min(1, count / FULL);
       pen.fillStyle = good;
       pen.fillRect(x * w, y * h, w, h);
-      pen.globalAlpha = 1;
+      pen.globalAlpha = picture ? 0.2 : 1;
       pen.strokeStyle = line;
       pen.strokeRect(x * w + 0.5, y * h + 0.5, w - 1, h - 1);
     }),
   );
+  pen.globalAlpha = 1;
   if (!camera.board_now.length) return;
   pen.beginPath();
   for (const [x, y] of camera.board_now) pen.lineTo(x * width, y * height);
