@@ -7,6 +7,7 @@ page ── Source ── Station ─┬ Activities: enrol | check | calibrate |
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from threading import Lock
 from typing import Final
 
 from common.errors import SettingsError, TandemError
@@ -56,6 +57,7 @@ class Station:
         self._shelf = Shelf()
         kept = program.kept()
         self._memory = Memory(kept)
+        self._choosing = Lock()
         self._recordings = Recordings()
         self._activities = Activities(self._begins, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
@@ -185,9 +187,10 @@ class Station:
         Raises:
             SettingsError: they are not valid, or cannot be kept.
         """
-        new = self._program.changed(self._memory.choices, changes)
-        self._program.keep(new)
-        self._memory.choose(new)
+        with self._choosing:  # two pages may set something at the same moment
+            new = self._program.changed(self._memory.choices, changes)
+            self._program.keep(new)
+            self._memory.choose(new)
 
     def _check(self, values: Choices) -> Answer:
         del values

@@ -12,6 +12,7 @@ from typing import Any
 import aiohttp
 import numpy as np
 import pytest
+from multidict import CIMultiDict
 
 from common.errors import TakenError, UnavailableError
 from phone_host.output.ply import read_ply
@@ -78,8 +79,9 @@ def test_strangers_get_nothing(start: Start, path: str) -> None:
         ({"Host": "evil.example"}, 421),
         ({"Origin": "http://evil.example"}, 403),
         ({"Origin": "null"}, 403),
+        ([("Origin", served.address.rstrip("/")), ("Origin", "http://evil.example")], 403),
     ):
-        answer = served.get(path, headers=headers | served.token)
+        answer = served.get(path, headers=CIMultiDict(headers, **served.token))
         assert answer[0] == status
         assert set(json.loads(answer[2])) == {"problem", "remedy"}
 

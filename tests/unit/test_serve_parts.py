@@ -2,6 +2,7 @@
 
 import io
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -308,6 +309,18 @@ def test_what_the_file_says_is_checked_at_the_start(tmp_path: Path) -> None:
     assert station.command(Command(do=Do.SET, values={"camera": "replay:frames"})).trouble is None
     assert station.state().trouble is None
     assert 'camera = "replay:frames"' in file.read_text()
+
+
+def test_what_is_set_at_the_same_moment_is_all_kept(tmp_path: Path) -> None:
+    """Several pages may set several things at once: none takes another's back, in memory or in the file."""
+    file = tmp_path / "host.toml"
+    station = Station(Commands(file, str(tmp_path / "keys"), lambda _: None))
+    wanted = {"pairs": "3", "seconds": "4", "save-every": "5", "tolerance": "6", "budget": "30ms", "axes": "y-up"}
+    setting = [Command(do=Do.SET, values={name: value}) for name, value in wanted.items()]
+    with ThreadPoolExecutor(len(setting)) as threads:
+        assert {answer.words for answer in threads.map(station.command, setting)} == {"set"}
+    assert station.state().settings == wanted
+    assert kept(file)[0].keys() == wanted.keys()
 
 
 @pytest.mark.parametrize(
