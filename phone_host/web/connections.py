@@ -119,18 +119,15 @@ class Handshake(asyncio.Protocol):
 
     async def _agree(self, plain: asyncio.Transport, first: bytes) -> None:
         connection = self._all.connection()
-        agreeing = asyncio.ensure_future(
-            asyncio.get_running_loop().start_tls(
-                plain, connection, self._tls, server_side=True, ssl_handshake_timeout=_HANDSHAKE_S
-            )
-        )
+        agreeing = asyncio.ensure_future(self._begun(plain, connection))
         secure = None
         try:
             for _ in ("takes the transport over", "begins"):
                 await asyncio.sleep(0)
-            taker = cast("asyncio.BufferedProtocol", plain.get_protocol())
-            cast("memoryview", taker.get_buffer(len(first)))[: len(first)] = first
-            taker.buffer_updated(len(first))
+            if not plain.is_closing():
+                taker = cast("asyncio.BufferedProtocol", plain.get_protocol())
+                cast("memoryview", taker.get_buffer(len(first)))[: len(first)] = first
+                taker.buffer_updated(len(first))
             secure = await agreeing
         except (OSError, RuntimeError):  # no TLS, another version, gone, or too slow
             plain.abort()
@@ -138,6 +135,13 @@ class Handshake(asyncio.Protocol):
             self._all.ended(self)
         if secure is not None:
             connection.connection_made(secure)
+
+    async def _begun(self, plain: asyncio.Transport, connection: Connection) -> asyncio.Transport | None:
+        if plain.is_closing():  # it had to make room: asyncio would never hear of its end
+            raise ConnectionResetError
+        return await asyncio.get_running_loop().start_tls(
+            plain, connection, self._tls, server_side=True, ssl_handshake_timeout=_HANDSHAKE_S
+        )
 
 
 class Connections:
