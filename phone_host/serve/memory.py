@@ -118,6 +118,10 @@ class Memory:
         with self._lock:
             self._ask, self._read_ns = ask, 0
 
+    def outdate(self) -> None:
+        """A command was done: whoever asks next gets the run after it."""
+        self._read_ns = 0
+
     @contextmanager
     def live(self, ask: Callable[[], RunSnapshot]) -> Iterator[None]:
         """While the block runs, the run can be asked; after it nothing is shown of it, unless `last` took its end.

@@ -111,6 +111,7 @@ class Station:
         except TandemError as error:
             return Answer(trouble=trouble_of(error))
         finally:
+            self._memory.outdate()
             self._shelf.tell()
 
     def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
