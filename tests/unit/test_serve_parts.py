@@ -2,7 +2,6 @@
 
 import io
 import threading
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,14 +23,13 @@ from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
-from phone_host.serve.station import Station
 from phone_host.serve.steps import Facts, steps
 from phone_host.verbs.serve.choices import choices_of, run_options, run_words, shown_words, with_changes, without_depth
 from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.page import address_of, page_settings
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import Status, told
-from phone_host.web.source import Activity, Command, Do, PageState, StepName
+from phone_host.web.source import Activity, PageState, StepName
 from tests.support.run_snapshots import run
 from tests.support.samples import LEDGER
 
@@ -291,36 +289,6 @@ def test_what_is_set_is_checked_as_on_the_command_line(tmp_path: Path) -> None:
     assert commands.changed(secret, {**shown, "pairs": "300"}) == {**secret, "pairs": "300"}
     assert commands.command({"near": "300"}).endswith(f"run --keys {tmp_path}/keys --near 300")
     assert commands.snapshots({"out": "scan", "axes": "y-up"}) == (Path("scan/snapshots"), Axes.Y_UP)
-
-
-def test_what_the_file_says_is_checked_at_the_start(tmp_path: Path) -> None:
-    """A name that is no option is refused with its file; a value that is none is told by the page until it is mended."""
-    file, keys = tmp_path / "host.toml", str(tmp_path / "keys")
-    file.write_text('[page]\nbanana = "1"\n')
-    with pytest.raises(SettingsError, match=r"host\.toml: 'banana' is no option"):
-        Commands(file, keys, lambda _: None)
-    file.write_text('camera = "replay:"\n')
-    station = Station(Commands(file, keys, lambda _: None))
-    assert station.state().trouble == Trouble(
-        "camera 'replay:' names no folder", "name one with images, for example replay:frames?fps=30"
-    )
-    refused = station.command(Command(do=Do.SET, values={"pairs": "3"})).trouble
-    assert refused == station.state().trouble
-    assert station.command(Command(do=Do.SET, values={"camera": "replay:frames"})).trouble is None
-    assert station.state().trouble is None
-    assert 'camera = "replay:frames"' in file.read_text()
-
-
-def test_what_is_set_at_the_same_moment_is_all_kept(tmp_path: Path) -> None:
-    """Several pages may set several things at once: none takes another's back, in memory or in the file."""
-    file = tmp_path / "host.toml"
-    station = Station(Commands(file, str(tmp_path / "keys"), lambda _: None))
-    wanted = {"pairs": "3", "seconds": "4", "save-every": "5", "tolerance": "6", "budget": "30ms", "axes": "y-up"}
-    setting = [Command(do=Do.SET, values={name: value}) for name, value in wanted.items()]
-    with ThreadPoolExecutor(len(setting)) as threads:
-        assert {answer.words for answer in threads.map(station.command, setting)} == {"set"}
-    assert station.state().settings == wanted
-    assert kept(file)[0].keys() == wanted.keys()
 
 
 @pytest.mark.parametrize(

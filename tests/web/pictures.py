@@ -53,7 +53,9 @@ def shown_board() -> tuple[Processed, GuideSnapshot]:
         assert found
         places = corners.reshape(BOARD.rows, BOARD.columns, 2) / image.shape[1::-1]
         outlines.append(tuple((float(x), float(y)) for x, y in places[[0, 0, -1, -1], [0, -1, -1, 0]]))
-    return Processed(RectifiedPair(*images), None, None, StageTimes()), replace(guide_snapshot(), outlines=(outlines[0], outlines[1]))
+    return Processed(RectifiedPair(*images), None, None, StageTimes()), replace(
+        guide_snapshot(), outlines=(outlines[0], outlines[1])
+    )
 
 
 def main() -> None:
