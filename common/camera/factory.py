@@ -13,7 +13,7 @@ from typing import Final
 from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
-from common.camera.options import EXAMPLE
+from common.camera.options import EXAMPLE, without_options
 from common.camera.turned import turned
 from common.errors import SettingsError
 from common.orientation import ORIENTING, Orientation, orientation_of
@@ -130,10 +130,11 @@ def _read(scheme: str, uri: str, path: str, options: dict[str, str], clock: str)
 def _parts(uri: str, example: str) -> tuple[str, str, dict[str, str], Orientation]:
     """Split scheme, path, options and orientation; check that the scheme is known."""
     scheme, found, rest = uri.partition(":")
-    known = found and (scheme in _KINDS or scheme in registered_names(_CAMERAS))
-    if not known or (scheme == "replay" and not rest):
+    if not found or not (scheme in _KINDS or scheme in registered_names(_CAMERAS)):
         raise _unknown(uri, example)
     path, options = _split(uri, rest)
+    if scheme == "replay" and not path:
+        raise SettingsError(f"camera {uri!r} names no folder", "name one with images, for example replay:frames?fps=30")
     others = {name: value for name, value in options.items() if name not in ORIENTING}
     return scheme, path, others, orientation_of(options, uri)
 
@@ -153,7 +154,7 @@ def _unknown(uri: str, example: str) -> SettingsError:
     if is_there:
         kind = "v4l2" if Path(path).is_char_device() else "replay"
         return SettingsError(f"camera {uri!r} does not say of which kind it is", f"give '{kind}:{uri}'")
-    return SettingsError(f"camera {uri!r} is of an unknown kind", f"give {example}")
+    return SettingsError(f"camera {uri!r} is of an unknown kind", f"give {without_options(example)}")
 
 
 def _split(uri: str, rest: str) -> tuple[str, dict[str, str]]:

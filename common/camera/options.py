@@ -15,6 +15,12 @@ T = TypeVar("T")
 EXAMPLE: Final = "v4l2:/dev/video0[?size=640x480&fps=30&format=mjpeg] or replay:PATH[?fps=30&loop=1&pace=clock|demand]"
 """Example of a camera URI, for help and errors."""
 
+
+def without_options(example: str) -> str:
+    """Return example URIs without their options, for errors in which the kind or the address is what matters."""
+    return re.sub(r"\[\?[^]]*\]", "", example)
+
+
 TURNED: Final = "rotate=90|180|270 (clockwise) and flip=h|v for a camera that is mounted turned"
 """Options of every camera URI, for help."""
 

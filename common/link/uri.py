@@ -158,9 +158,14 @@ def _check_port(uri: str, address: str) -> None:
     try:
         port = urlsplit(address.replace("*", "0.0.0.0")).port  # noqa: S104 - only to parse it
     except ValueError:
-        port = None
-    if port is None or not 1 <= port <= 65535:
+        port = 0
+    if port is None:
         raise SettingsError(f"link {uri!r} names no port", "give one, for example tcp://127.0.0.1:5555")
+    if not port:
+        raise SettingsError(
+            f"link {uri!r} has the port {address.rpartition(':')[2]!r}",
+            "give 1 to 65535, for example tcp://127.0.0.1:5555",
+        )
     if address.startswith("tcp://:"):
         raise SettingsError(
             f"link {uri!r} names no host", "give its name or address, or * to listen on every interface"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 from urllib.parse import parse_qsl, unquote, urlencode, urlsplit
 
-from common.camera.options import milliseconds
+from common.camera.options import milliseconds, without_options
 from common.errors import SettingsError
 from common.orientation import ORIENTING, Orientation, orientation_of
 
@@ -106,12 +106,14 @@ def http_settings(uri: str, clock: str) -> HttpSettings:
         port, host = parts.port, parts.hostname
         user, password = unquote(parts.username or ""), unquote(parts.password or "")
     except ValueError:
-        raise SettingsError(f"camera {_hidden(uri)!r} is not a valid address", f"give {EXAMPLE}") from None
+        raise SettingsError(
+            f"camera {_hidden(uri)!r} is not a valid address", f"give {without_options(EXAMPLE)}"
+        ) from None
     secure = parts.scheme.lower() == "https"
     # Blanks and control characters would end the request line early.
     target = parts.path or "/"
     if not host or port == 0 or re.search(r"[^\x21-\x7e]", host + target + parts.query):
-        raise SettingsError(f"camera {_hidden(uri)!r} is not a valid address", f"give {EXAMPLE}")
+        raise SettingsError(f"camera {_hidden(uri)!r} is not a valid address", f"give {without_options(EXAMPLE)}")
     ours, theirs = _split(parts.query)
     if "latency_uncertainty_ms" in ours and "latency_ms" not in ours:
         raise SettingsError(

@@ -34,7 +34,7 @@ from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.report.summary import camera_troubles
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
-from phone_host.run.sinks import FunctionSink, SinkQueue
+from phone_host.run.sinks import FunctionSink, Sink, SinkQueue
 from phone_host.stereo.images import to_grey
 from phone_host.stream.demand_clock import has_own_time
 
@@ -87,6 +87,7 @@ class LiveCalibration:
         camera: the host camera, open.
         links: open links to the board.
         grow: calibrates from the views so far; called in a thread of its own.
+        sinks: further ones, such as for who wants to see the pictures.
 
     Raises:
         SettingsError: the host camera has no clock.
@@ -94,7 +95,9 @@ class LiveCalibration:
         OSError: they cannot be written to.
     """
 
-    def __init__(self, settings: LiveSettings, camera: Camera, links: Sequence[Link], grow: Grow) -> None:
+    def __init__(
+        self, settings: LiveSettings, camera: Camera, links: Sequence[Link], grow: Grow, sinks: Sequence[Sink] = ()
+    ) -> None:
         if not has_own_time(camera.description.pacing):
             raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
         self._settings, self._grow = settings, grow
@@ -113,7 +116,7 @@ class LiveCalibration:
         self._looker = FunctionSink("guide", self._look, depth=1)
         self._met_ns: int | None = None
         self._looked_ns = self._began_ns
-        self.host = Host(settings.host, camera, links, None, (self._looker,))
+        self.host = Host(settings.host, camera, links, None, (self._looker, *sinks))
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None]) -> Ended:
         """Take views until it is enough, `stop` returns True or a stream ends.

@@ -14,7 +14,7 @@ from phone_host.measure.image_trust import ImageFigures
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, history
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.trust import Concern, Doubt
-from phone_host.model import StereoGeometry
+from phone_host.model import CutCounts, StereoGeometry
 
 _PATCHY: Final = 0.6
 """Scenes with texture reach 0.68 and more; boards and a guitar before bare walls 0.36 to 0.58, and specks stand on the walls."""
@@ -51,7 +51,11 @@ class Answer:
 
 
 def answer(
-    figures: ImageFigures, found: tuple[Concern, ...], geometry: StereoGeometry | None, error_px: float = math.nan
+    figures: ImageFigures,
+    found: tuple[Concern, ...],
+    geometry: StereoGeometry | None,
+    error_px: float = math.nan,
+    cut: CutCounts | None = None,
 ) -> Answer:
     """Answer for depth that was computed.
 
@@ -60,13 +64,14 @@ def answer(
         found: the concerns, gravest first.
         geometry: converts disparity to metres; None if it is not known.
         error_px: error of a disparity, px; NaN: the usual one.
+        cut: what became of the pixels; None: not counted.
     """
     if found:
         return _doubtful(found[0])
     if math.isnan(figures.density):
         return Answer(Grade.GOOD, "Depth was computed; no pair of this run was judged.")
     patchy = figures.consistency < _PATCHY or figures.scattered_share > _SPECKS
-    parts = [f"{figures.density:.0%} of the pixels have depth"]
+    parts = [f"{figures.density:.0%} {pixels_text(cut)} have depth"]
     checked = not math.isnan(figures.vertical_px)
     if figures.scattered_share > _SPECKS:
         parts.append(f"{figures.scattered_share:.0%} of it in specks that may be wrong")
@@ -80,6 +85,15 @@ def answer(
         opening = "Depth could not be checked, too few features"
     reach = _reach(figures, geometry, USUAL_ERROR_PX if math.isnan(error_px) else error_px)
     return Answer(Grade.GOOD if checked else Grade.WARNING, f"{opening}: {', '.join(parts)}; {reach}")
+
+
+def pixels_text(cut: CutCounts | None) -> str:
+    """Say of which pixels a density is the share: `of the pixels`, `of the pixels inside the crop`.
+
+    Args:
+        cut: the counts; None: not counted.
+    """
+    return "of the pixels inside the crop" if cut is not None and cut.outside else "of the pixels"
 
 
 def _doubtful(concern: Concern) -> Answer:
@@ -170,7 +184,9 @@ def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
     if images.judged and not images.is_settled and run.ended == "running":
         why = newest[0].sentence if newest else f"the newest pair is free of this: {images.concerns[0].sentence}"
         return Answer(Grade.WARNING, f"Depth is being judged again: {why}.")
-    said = answer(images.now, found or figure_doubts(images.now), images.geometry, images.disparity_error_px)
+    said = answer(
+        images.now, found or figure_doubts(images.now), images.geometry, images.disparity_error_px, run.depth.cut
+    )
     if said.grade is not Grade.GOOD:
         return said
     if newest:

@@ -43,15 +43,6 @@ def cut_sentence(cut: CutCounts, limits: DepthLimits | None) -> str:
     )
 
 
-def pixels_text(cut: CutCounts | None) -> str:
-    """Say of which pixels a density is the share: `of the pixels`, `of the pixels inside the crop`.
-
-    Args:
-        cut: the counts; None: not counted.
-    """
-    return "of the pixels inside the crop" if cut is not None and cut.outside else "of the pixels"
-
-
 def share_text(count: int, total: int) -> str:
     """Write a share in percent; a small one is never called 0 %."""
     percent = 100.0 * count / max(1, total)

@@ -14,7 +14,7 @@ from phone_host.measure.accounts import rung_lines
 from phone_host.measure.budget_words import budget_lines, missed_words
 from phone_host.measure.doubt_history import saved_pairs
 from phone_host.measure.drift_words import drift_lines
-from phone_host.measure.headline import headline
+from phone_host.measure.headline import headline, pixels_text
 from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
@@ -22,7 +22,7 @@ from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
 from phone_host.report.budget_report import budget_tables
-from phone_host.report.cut_words import cut_sentence, pixels_text
+from phone_host.report.cut_words import cut_sentence
 from phone_host.report.depth_data import density, photograph
 from phone_host.report.depth_view import cloud_view, depth_view
 from phone_host.report.drift_report import drift_table

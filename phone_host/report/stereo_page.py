@@ -13,10 +13,11 @@ import numpy as np
 
 from common.words import counted, distance_text
 from phone_host.measure.depth_error import depth_error_m
+from phone_host.measure.headline import pixels_text
 from phone_host.model import Processed
 from phone_host.output.preview import colour_disparity, colour_range_px
 from phone_host.report import depth_data
-from phone_host.report.cut_words import cut_rows, pixels_text, searched_from_m, share_text
+from phone_host.report.cut_words import cut_rows, searched_from_m, share_text
 from phone_host.report.depth_view import THIN, cloud_view, depth_view
 from phone_host.report.page_frame import document, section, table
 from phone_host.report.page_links import FileLink, NextCommand, address, files_section, list_section, next_section

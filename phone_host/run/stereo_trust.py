@@ -54,4 +54,4 @@ def judge_pair(
     limits = processed.limits
     is_own_cut = limits is not None and (not limits.from_rig or limits.near_m > 0)
     shown = figures if is_own_cut else replace(figures, density=density(processed))
-    return PairTrust(figures, found, answer(shown, found, processed.geometry, error_px))
+    return PairTrust(figures, found, answer(shown, found, processed.geometry, error_px, processed.cut))

@@ -114,6 +114,8 @@ class BesideRun:
                     return Answer(trouble=_NEEDS_SERVE)
         except TandemError as error:
             return Answer(trouble=trouble_of(error))
+        finally:
+            self._memory.outdate()
 
     def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
         """See Source."""

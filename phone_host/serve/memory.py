@@ -57,8 +57,9 @@ class Memory:
         return self._trouble
 
     def choose(self, choices: Choices) -> None:
-        """Take new choices."""
-        self._choices = dict(choices)
+        """Take new choices. What went wrong with others concerns nobody any more."""
+        if choices != self._choices:
+            self._choices, self._trouble = dict(choices), None
 
     def found(self, boards: tuple[Choice, ...], cameras: tuple[Choice, ...]) -> None:
         """Take what was found."""
@@ -116,6 +117,10 @@ class Memory:
         """
         with self._lock:
             self._ask, self._read_ns = ask, 0
+
+    def outdate(self) -> None:
+        """A command was done: whoever asks next gets the run after it."""
+        self._read_ns = 0
 
     @contextmanager
     def live(self, ask: Callable[[], RunSnapshot]) -> Iterator[None]:

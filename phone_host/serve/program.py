@@ -143,8 +143,8 @@ class Program(Protocol):
             tell: called with each frame.
         """
 
-    def calibration(self, choices: Choices, values: Choices) -> ReadyCalibration:
-        """Open everything that a live calibration needs."""
+    def calibration(self, choices: Choices, values: Choices, sinks: Sequence[Sink]) -> ReadyCalibration:
+        """Open everything that a live calibration needs; the sinks take its pairs."""
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """Return the folder of the snapshots, and the axes of their points."""

@@ -7,6 +7,7 @@ page ── Source ── Station ─┬ Activities: enrol | check | calibrate |
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from threading import Lock
 from typing import Final
 
 from common.errors import SettingsError, TandemError
@@ -54,7 +55,9 @@ class Station:
     def __init__(self, program: Program) -> None:
         self._program = program
         self._shelf = Shelf()
-        self._memory = Memory(program.kept())
+        kept = program.kept()
+        self._memory = Memory(kept)
+        self._choosing = Lock()
         self._recordings = Recordings()
         self._activities = Activities(self._begins, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
@@ -70,6 +73,10 @@ class Station:
             Do.RECORD: self._record,
             Do.END_RECORDING: self._end_recording,
         }
+        try:
+            program.changed(kept, kept)
+        except TandemError as error:  # somebody else has changed the file, or what it names has gone
+            self._memory.fail(trouble_of(error))
 
     @property
     def feed(self) -> BrowserFeed:
@@ -104,6 +111,7 @@ class Station:
         except TandemError as error:
             return Answer(trouble=trouble_of(error))
         finally:
+            self._memory.outdate()
             self._shelf.tell()
 
     def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
@@ -180,9 +188,10 @@ class Station:
         Raises:
             SettingsError: they are not valid, or cannot be kept.
         """
-        new = self._program.changed(self._memory.choices, changes)
-        self._memory.choose(new)
-        self._program.keep(new)
+        with self._choosing:  # two pages may set something at the same moment
+            new = self._program.changed(self._memory.choices, changes)
+            self._program.keep(new)
+            self._memory.choose(new)
 
     def _check(self, values: Choices) -> Answer:
         del values
@@ -231,10 +240,13 @@ class Station:
         choices = self._both_chosen()
 
         def work(task: Task) -> None:
-            ready = self._program.calibration(choices, values)
+            ready = self._program.calibration(choices, values, self._sinks(None))
             shown = SnapshotValues(self._show_guide)
-            with task.held(), self._memory.live(ready.live.host.snapshot):
-                ready.run(task.stopped, (shown,))
+            try:
+                with task.held(), self._memory.live(ready.live.host.snapshot):
+                    ready.run(task.stopped, (shown,))
+            finally:
+                self._shelf.clear()  # these pairs are not those of a run
             if task.stopped():
                 views = counted(ready.live.snapshot().views, "view")
                 self._memory.result(f"stopped: {views} taken and kept, nothing computed from them")

@@ -1,7 +1,7 @@
 """The HTTP API: what each address answers. `openapi` describes it for programs."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import partial
@@ -103,21 +103,19 @@ class Answers:
 
     async def _index(self, request: web.Request) -> web.StreamResponse:
         token = request.query.get("token")
-        if token is None or not self._gate.is_token(token):
+        if token is None:
             return await self._file(request, INDEX)
-        # The fragment stays in the browser: the page keeps the token where only its own origin reaches it.
-        target = f"/#token={token}"
-        headers = {"Set-Cookie": self._gate.set_cookie, "Cache-Control": "no-store"}
-        if request.headers.get("Sec-Fetch-Site", "none") in {"none", "same-origin"}:
-            return web.Response(status=303, headers={**headers, "Location": target})
-        # Coming from another site, the browser would not send a strict cookie along a redirect.
-        text = f'<!doctype html><meta http-equiv="refresh" content="0;url={target}"><title>tandemscan</title>'
-        return web.Response(text=text, content_type="text/html", headers=headers)
+        if not self._gate.is_token(token):  # nor may it take the place of the right one that the page keeps
+            return web.Response(status=303, headers={"Location": "/", "Cache-Control": "no-store"})
+        # The page itself takes the token out of the address, and keeps it where only its own origin reaches it.
+        return await self._file(request, INDEX, {"Set-Cookie": self._gate.set_cookie, "Cache-Control": "no-store"})
 
     async def _static(self, request: web.Request) -> web.StreamResponse:
         return await self._file(request, request.match_info["path"])
 
-    async def _file(self, request: web.Request, path: str) -> web.StreamResponse:
+    async def _file(
+        self, request: web.Request, path: str, further: Mapping[str, str] | None = None
+    ) -> web.StreamResponse:
         file = self._files.get(path)
         if file is None:
             raise web.HTTPNotFound
@@ -127,6 +125,7 @@ class Answers:
             "ETag": f'W/"{file.tag}"',
             "Cache-Control": "no-cache",
             "Vary": "Accept-Encoding",
+            **(further or {}),
         }
         if any(tag.value == file.tag for tag in request.if_none_match or ()):
             return web.Response(status=304, headers=headers)

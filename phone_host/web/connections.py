@@ -5,6 +5,7 @@ has been idle longest makes room: strangers who hold connections open do not kee
 """
 
 import asyncio
+import re
 import ssl
 from collections.abc import Callable
 from typing import Final, cast
@@ -13,6 +14,17 @@ from phone_host.web.settings import Limits
 
 _SWEEP_S: Final = 1.0
 _HANDSHAKE_S: Final = 10.0
+
+_PLAINLY: Final = re.compile(
+    rb"(?:GET|HEAD) [^\n]*\r\n(?:.*\r\n)?Host: *(?P<host>[A-Za-z0-9._:\[\]-]{1,260})\r\n", re.DOTALL | re.IGNORECASE
+)
+"""A browser's request without TLS."""
+
+_LED_TO_HTTPS: Final = (
+    b"HTTP/1.1 307 Temporary Redirect\r\nLocation: https://%s/\r\nCache-Control: no-store\r\nContent-Length: 0\r\n"
+    b"Connection: close\r\n\r\n"
+)
+"""The token does not go along: whoever sends it unencrypted shall notice."""
 
 
 class Connection(asyncio.Protocol):
@@ -66,6 +78,8 @@ class Connection(asyncio.Protocol):
 class Handshake(asyncio.Protocol):
     """Counts a connection from its first moment, while TLS is agreed; asyncio's own server would count it only afterwards.
 
+    Who asks without TLS is led to https.
+
     Args:
         tls: what to agree.
         all_of_them: makes the connection that follows.
@@ -81,28 +95,53 @@ class Handshake(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Begin, if there is room."""
         self.transport = cast("asyncio.Transport", transport)
-        self.transport.pause_reading()  # the first bytes are for TLS
         self._all.begun(self)
-        self._task = asyncio.ensure_future(self._agree(self.transport))
+
+    def data_received(self, data: bytes) -> None:
+        """Take the first bytes, which tell what the peer speaks."""
+        assert self.transport is not None
+        if asked := _PLAINLY.match(data):
+            self.transport.write(_LED_TO_HTTPS % asked["host"])
+            self.transport.close()
+        else:
+            self.transport.pause_reading()  # what follows is for TLS
+            self._task = asyncio.ensure_future(self._agree(self.transport, data))
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End before TLS began."""
+        del exc
+        self._all.ended(self)
 
     def abort(self) -> None:
         """Cut the connection."""
         if self.transport is not None:
             self.transport.abort()
 
-    async def _agree(self, plain: asyncio.Transport) -> None:
+    async def _agree(self, plain: asyncio.Transport, first: bytes) -> None:
         connection = self._all.connection()
+        agreeing = asyncio.ensure_future(self._begun(plain, connection))
+        secure = None
         try:
-            secure = await asyncio.get_running_loop().start_tls(
-                plain, connection, self._tls, server_side=True, ssl_handshake_timeout=_HANDSHAKE_S
-            )
+            for _ in ("takes the transport over", "begins"):
+                await asyncio.sleep(0)
+            if not plain.is_closing():
+                taker = cast("asyncio.BufferedProtocol", plain.get_protocol())
+                cast("memoryview", taker.get_buffer(len(first)))[: len(first)] = first
+                taker.buffer_updated(len(first))
+            secure = await agreeing
         except (OSError, RuntimeError):  # no TLS, another version, gone, or too slow
-            secure = None
             plain.abort()
         finally:
             self._all.ended(self)
         if secure is not None:
             connection.connection_made(secure)
+
+    async def _begun(self, plain: asyncio.Transport, connection: Connection) -> asyncio.Transport | None:
+        if plain.is_closing():  # it had to make room: asyncio would never hear of its end
+            raise ConnectionResetError
+        return await asyncio.get_running_loop().start_tls(
+            plain, connection, self._tls, server_side=True, ssl_handshake_timeout=_HANDSHAKE_S
+        )
 
 
 class Connections:

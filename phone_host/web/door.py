@@ -144,8 +144,9 @@ def asked_of(request: web.Request) -> Asked:
         peer=request.remote or "",
         # A target with a host of its own overrides the header (RFC 9112, section 3.2.2). No browser sends one to a server.
         host=said.get("Host", "") if request.raw_path.startswith("/") else "",
-        origin=said.get("Origin", ""),
-        site=said.get("Sec-Fetch-Site", ""),
+        # Whoever says it twice says something that is not ours.
+        origin=", ".join(said.getall("Origin", ())),
+        site=", ".join(said.getall("Sec-Fetch-Site", ())),
         mode=said.get("Sec-Fetch-Mode", ""),
         cookie="; ".join(said.getall("Cookie", ())),
         authorization=said.get("Authorization", ""),

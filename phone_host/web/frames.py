@@ -164,5 +164,16 @@ def _depth(processed: Processed) -> dict[str, object]:
         "geometry": known,
         "near": near,
         "far": None if limits is None else limits.far_m,
-        "range": None if processed.disparity is None else colour_range_px(processed.disparity),
+        "range": _range_px(processed),
     }
+
+
+def _range_px(processed: Processed) -> tuple[float, float] | None:
+    """Return the disparities of the colours' ends: of what is shown, so that what limits cut uses up no colours."""
+    disparity, cloud = processed.disparity, processed.cloud
+    if disparity is None:
+        return None
+    if cloud is None:
+        return colour_range_px(disparity)
+    kept = np.where(np.isfinite(cloud[::2, ::2, 2]), disparity[::2, ::2], np.float32(np.nan))
+    return colour_range_px(kept if np.isfinite(kept).any() else disparity)

@@ -73,12 +73,13 @@ class Hub:
 
     async def watch(self) -> None:
         """Keep the state up to date while somebody looks, for ever."""
+        told = 0, 0
         while True:
             await asyncio.sleep(_STATE_S)
             if self.watchers:
-                before = self.state_version, self.report_version
-                await self.refresh()
-                if before != (self.state_version, self.report_version):
+                await self.refresh()  # or somebody else's question was before
+                if told != (newest := (self.state_version, self.report_version)):
+                    told = newest
                     self.wake()
 
     def wake(self) -> None:

@@ -60,8 +60,8 @@ class PageSettings:
         """
         if self.credentials is None and not is_loopback(self.host):
             raise SettingsError(
-                f"{self.host} is reached from other machines",
-                "give 127.0.0.1:PORT, or use phone-host serve --lan, which makes it https",
+                f"{self.host!r} is not an address that only this machine reaches",
+                "give 127.0.0.1:PORT, or add --lan for a page that other machines reach by https",
             )
 
     @property

@@ -5,7 +5,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Final
 
 from common.ledger import PairLedger
@@ -15,8 +15,9 @@ from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.unused import unused
-from phone_host.model import Unwritten
+from phone_host.model import DepthAccount, Unwritten
 from phone_host.output.json_text import json_text
+from phone_host.report.cut_words import cut_sentence
 from phone_host.report.run_json import concern_values
 from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
 
@@ -167,6 +168,8 @@ def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step], no
         "pairs_per_s": _number(_rate(run, samples, now_ns)),
         "time_skew_ms": None if run.timeless else _number(skew_ns / 1e6),
         "density": _number(run.images.now.density),
+        "cropped": run.depth.cut is not None and run.depth.cut.outside > 0,
+        "cut": _cut(run.depth),
         "link": _link(run),
         "clock": _clock(run),
         "drops": {item.words: item.count for item in unused(run)},
@@ -178,6 +181,14 @@ def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step], no
         "recording": None if run.recording is None else _recording(run.recording),
         "unsaved": _unsaved(run.unwritten),
     }
+
+
+def _cut(depth: DepthAccount) -> str:
+    """Say of how many pixels the limits leave nothing; disparities like the noise of zero are those of what is too far."""
+    cut = depth.cut
+    if cut is None:
+        return ""
+    return cut_sentence(replace(cut, too_far=cut.too_far + cut.at_zero, at_zero=0), depth.limits)
 
 
 def _unsaved(unwritten: Unwritten) -> dict[str, object] | None:

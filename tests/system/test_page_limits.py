@@ -100,7 +100,7 @@ def test_a_hundred_connections(start: Start) -> None:
         line.close()
 
 
-def test_connections_count_before_tls_is_agreed(start: Start, tmp_path: Path) -> None:
+def test_connections_count_before_tls_is_agreed(start: Start, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Strangers that connect and never begin TLS, or speak something else, take no more descriptors than others."""
     credentials = kept_credentials(tmp_path / "keys", (), dt.datetime.now(dt.UTC))
     served = start(limits=Limits(connections=20), credentials=credentials)
@@ -118,6 +118,7 @@ def test_connections_count_before_tls_is_agreed(start: Start, tmp_path: Path) ->
             assert line.recv(1) in {b"", b"\x15"}  # 0x15: a TLS alert
     for line in lines:
         line.close()
+    assert caplog.records == []  # nobody's end is an error of ours
 
 
 def test_viewers_without_the_token_leave_room_for_those_with_it(start: Start) -> None:

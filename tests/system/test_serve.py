@@ -5,6 +5,7 @@ import signal
 import socket
 from http.client import HTTPException
 from pathlib import Path
+from urllib.error import HTTPError
 
 import cv2
 import numpy as np
@@ -168,7 +169,13 @@ def test_a_live_calibration_by_the_api_becomes_the_rig_of_the_next_run(tmp_path:
         until(lambda: (client.state()["guide"] or {}).get("views", 0) >= 1, "the first view")
         cameras = client.state()["guide"]["cameras"]
         assert all(sum(map(sum, cameras[side]["cells"])) > 0 for side in ("left", "right"))
+        pictures = [
+            cv2.imdecode(np.frombuffer(client.get(f"/api/{side}.jpg"), np.uint8), 0) for side in ("left", "right")
+        ]
+        assert all(picture is not None and picture.std() > 10 for picture in pictures)
         state = client.until_idle()
+        with pytest.raises(HTTPError):  # they were no pairs of a run
+            client.get("/api/left.jpg")
         assert state["trouble"] is None, state["trouble"]
         assert "verdict usable" in state["guide"]["result"]
         rig = tmp_path / "data" / "tandemscan" / "rig" / "rig.yaml"
@@ -193,6 +200,21 @@ def test_a_board_is_enrolled_by_its_code(tmp_path: Path) -> None:
         assert told == {"words": "the board is enrolled"}
         assert client.state()["settings"]["link"] == rig.link
     assert [peer.address for peer in KeyFolder(keys).peers()] == [rig.link]
+
+
+def test_the_page_of_a_run_is_served_to_other_machines_too(tmp_path: Path) -> None:
+    """By https, with the fingerprint to compare; --lan without a page is refused."""
+    run = ["run", "--link", f"ipc://{tmp_path}/link", "--camera", "replay:missing", "--lan"]
+    with (
+        host([*run, "--serve", "127.0.0.1:0"], tmp_path, "served") as served,
+        host(run, tmp_path, "alone") as alone,
+        host([*run[:-1], "--serve", "banana"], tmp_path, "strange") as strange,
+    ):
+        assert (served.wait(), alone.wait(), strange.wait()) == (3, 2, 2)
+    assert "phone-host: the page: https://127.0.0.1:" in served.stderr
+    assert "fingerprint (SHA-256)" in served.stderr
+    assert alone.stderr.splitlines()[-1].endswith("--lan without --serve: add --serve, or leave it out")
+    assert "'banana' is not an address that only this machine reaches: give" in strange.stderr.splitlines()[-1]
 
 
 def test_a_port_that_is_taken_is_told_with_the_remedy(tmp_path: Path) -> None:

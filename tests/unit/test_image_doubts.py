@@ -206,6 +206,9 @@ def test_a_far_scene_is_answered_for_at_its_own_depth() -> None:
     assert "at 10 m, the middle of the scene, it is good to about 1 m" in answer(far, (), GEOMETRY, 0.5).sentence
     assert "in pixels only" in answer(far, (), None).sentence
     assert "was judged" in answer(ImageFigures(), (), None).sentence
+    assert (
+        "of the pixels inside the crop have depth" in answer(far, (), None, cut=CutCounts(kept=1, outside=1)).sentence
+    )
 
 
 def test_a_blocking_doubt_is_the_headline() -> None:

@@ -79,9 +79,18 @@ def test_a_message_says_what_is_in_it() -> None:
     }  # fmt: skip
     assert (header["near"], header["far"], header["way"]) == (0.5, 4.0, [-1, 0])
     assert header["ledger"]["processing_ms"] == 3.0  # type: ignore[index]
-    # The box fills a ninth of the picture, the strip at 8 m a sixth: both are beyond the first and last hundredth.
-    assert header["range"] == [5.0, 40.0]
+    # The box fills a ninth of the picture, so it is no stray; the strip at 8 m lies beyond the far limit and takes no colours.
+    assert header["range"] == [20.0, 40.0]
     assert [decoded(each).shape for each in data[:2]] == [(60, 80, 3), (120, 160, 3)]
+
+
+def test_colours_are_those_of_all_disparities_where_no_point_tells_them_apart() -> None:
+    """Without metres, and where the limits leave nothing, the whole scene has its colours."""
+    shown = processed()
+    assert shown.cloud is not None
+    for cloud in (None, np.full_like(shown.cloud, np.nan)):
+        header, _ = taken_apart(message(0, replace(shown, cloud=cloud), LEDGER, ()))
+        assert header["range"] == [5.0, 40.0]
 
 
 def test_without_depth_there_is_no_geometry() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.measure.trouble import Trouble
-from phone_host.model import PairCounts, Unwritten
+from phone_host.model import CutCounts, DepthAccount, DepthLimits, PairCounts, Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.web.openapi import description
 from phone_host.web.source import Activity, Answer, Measured, PageState, Step, StepName
@@ -59,6 +59,20 @@ def test_the_rate_falls_when_pairs_stay_away() -> None:
     for silent_s, rate in ((0.25, 10.0), (1.0, 1.0), (20.0, 0.05)):
         values = json.loads(whole_text(state_text(state, SAMPLES, int((19.9 + silent_s) * 1e9)), SAMPLES))
         assert values["live"]["pairs_per_s"] == rate
+
+
+def test_what_limits_left_out_is_said() -> None:
+    """Of all pixels: those too far, with those that are like the noise of zero, and those outside the crop; without limits nothing."""
+    limits = DepthLimits(near_m=0.0, far_m=2.5, disparity_error_px=0.2, from_rig=False)
+    cut = CutCounts(kept=30, unmatched=10, at_zero=4, too_far=6, outside=50)
+    for depth, cropped, words in (
+        (DepthAccount(cut=cut, limits=limits), True, "10 % farther than 2.5 m, 50 % outside the crop"),
+        (DepthAccount(cut=CutCounts(kept=9, unmatched=1), limits=limits), False, ""),
+        (DepthAccount(), False, ""),
+    ):
+        live = told(PageState(activity=Activity.RUNNING, run=replace(run(5), ended="running", depth=depth)))["live"]
+        assert isinstance(live, dict)
+        assert (live["cropped"], live["cut"]) == (cropped, words)
 
 
 def test_a_run_without_pairs_is_not_judged_yet() -> None:

@@ -26,7 +26,7 @@ from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.steps import Facts, steps
 from phone_host.verbs.serve.choices import choices_of, run_options, run_words, shown_words, with_changes, without_depth
 from phone_host.verbs.serve.kept_choices import keep, kept
-from phone_host.verbs.serve.page import address_of, own_settings
+from phone_host.verbs.serve.page import address_of, page_settings
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import Status, told
 from phone_host.web.source import Activity, PageState, StepName
@@ -271,15 +271,22 @@ def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
 
 
 def test_what_is_set_is_checked_as_on_the_command_line(tmp_path: Path) -> None:
-    """A bad number, a rig that is none and contradicting limits are refused; a password is not shown, and its place holder changes nothing."""
+    """A bad number, a rig that is none, contradicting limits and limits without depth are refused; a password is not shown, and its place holder changes nothing."""
     commands = Commands(tmp_path / "host.toml", str(tmp_path / "keys"), lambda _: None)
-    for changes in ({"pairs": "many"}, {"calibration": str(tmp_path)}, {"near": "9m", "far": "1m"}, {"link": "x:y"}):
+    refused: tuple[dict[str, str], ...] = (
+        {"pairs": "many"},
+        {"calibration": str(tmp_path)},
+        {"near": "9m", "far": "1m", "rectified": "yes"},
+        {"link": "x:y"},
+        {"near": "300"},
+    )
+    for changes in refused:
         with pytest.raises((SettingsError, DataError)):
             commands.changed({}, changes)
     secret = {"camera": "http://me:secret@10.0.0.2:8080/video"}
     shown = commands.shown(secret)
     assert "secret" not in shown["camera"] + commands.command(secret)
-    assert commands.changed(secret, {**shown, "near": "300"}) == {**secret, "near": "300"}
+    assert commands.changed(secret, {**shown, "pairs": "300"}) == {**secret, "pairs": "300"}
     assert commands.command({"near": "300"}).endswith(f"run --keys {tmp_path}/keys --near 300")
     assert commands.snapshots({"out": "scan", "axes": "y-up"}) == (Path("scan/snapshots"), Axes.Y_UP)
 
@@ -308,7 +315,7 @@ def test_an_address_that_is_none_or_that_others_reach_is_refused(tmp_path: Path)
         with pytest.raises(SettingsError, match="address"):
             address_of(text)
     with pytest.raises(SettingsError) as refused:
-        own_settings("0.0.0.0:8765", tmp_path)
+        page_settings("0.0.0.0:8765", tmp_path)
     assert "--lan" in refused.value.remedy
     assert not (tmp_path / "page-token").exists()
 

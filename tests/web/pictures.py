@@ -1,15 +1,22 @@
 """Takes the pictures of docs/page.md, from rendered scenes: `python -m tests.web.pictures`."""
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 from playwright.sync_api import sync_playwright
 
+from common.ledger import StageTimes
+from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.model import Processed, RectifiedPair
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Activity, StepName
+from tests.support.boards import BOARD, render_pair
+from tests.support.rigs import small_rig
 from tests.web.conftest import CHROMIUM, LAPTOP, PHONE
 from tests.web.played import BOARDS, CAMERAS, Played, guide_snapshot, playing, rendered
 
@@ -34,9 +41,27 @@ def show(page: Any, step: str) -> None:
     page.wait_for_timeout(700)
 
 
+def shown_board() -> tuple[Processed, GuideSnapshot]:
+    """A rendered board before both cameras, and the guide that has found it."""
+    turn = np.array([-0.3, 0.25, 0.0])
+    middle = BOARD.points_m().mean(axis=0)
+    pose = np.concatenate([turn, np.array([0.04, 0.0, 0.45]) - cv2.Rodrigues(turn)[0] @ middle])
+    images = render_pair(small_rig(), pose)
+    outlines = []
+    for image in images:
+        found, corners = cv2.findChessboardCornersSB(image, (BOARD.columns, BOARD.rows))
+        assert found
+        places = corners.reshape(BOARD.rows, BOARD.columns, 2) / image.shape[1::-1]
+        outlines.append(tuple((float(x), float(y)) for x, y in places[[0, 0, -1, -1], [0, -1, -1, 0]]))
+    return Processed(RectifiedPair(*images), None, None, StageTimes()), replace(
+        guide_snapshot(), outlines=(outlines[0], outlines[1])
+    )
+
+
 def main() -> None:
     """Take them all."""
-    program = Played(rendered(8))
+    board, guide = shown_board()
+    program = Played((board,))
     server = PageServer(program, PageSettings(port=0))
     server.start()
     with sync_playwright() as playwright:
@@ -51,13 +76,17 @@ def main() -> None:
         keep(phone, "board")
         program.change(
             activity=Activity.CALIBRATING,
-            guide=guide_snapshot(),
+            guide=guide,
+            begun=1,
             settings=dict(list(SETTINGS.items())[:2]),
             done={StepName.BOARD, StepName.CAMERA, StepName.CHECK},
         )
         show(laptop, "calibration")
+        program.emit()
+        laptop.wait_for_timeout(900)
         keep(laptop, "calibration")
-        program.change(activity=Activity.RUNNING, guide=None, done=set(StepName), settings=SETTINGS)
+        program.change(activity=Activity.RUNNING, guide=None, done=set(StepName), settings=SETTINGS, begun=2)
+        program.pairs = rendered(8)
         with playing(program, 6):
             for page in (laptop, phone):
                 show(page, "run")

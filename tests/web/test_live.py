@@ -235,12 +235,15 @@ def test_without_the_token_one_may_look_but_not_steer(
 
 
 def test_doubts_stand_on_top_in_words_with_what_to_do(running: Played, opened: Opener) -> None:
-    """A doubt comes and goes: its sentence and remedy are on top while it stands, and a screen reader is told once."""
+    """A doubt comes and goes: its sentence and remedy are on top while it stands, once: in the headline or below it."""
     page = opened("run")
     page.wait_for_selector("#trust[data-level=good]")
-    running.change(concerns=(Concern(Doubt.SWAPPED, "the cameras seem to be swapped", "swap them"),))
+    swapped = Concern(Doubt.SWAPPED, "the cameras seem to be swapped", "swap them")
+    dark = Concern(Doubt.DARK, "the left image is dark", "light the scene; check --calibration or --rectified")
+    running.change(concerns=(swapped, dark))
     page.wait_for_selector("#trust[data-level=bad]")
-    assert "The cameras seem to be swapped. Swap them." in page.text_content("#concerns")
+    assert "the cameras seem to be swapped. Remedy: swap them." in page.text_content("#headline")
+    assert page.text_content("#concerns") == "The left image is dark. Light the scene; check Calibration."
     assert page.locator("#trust").bounding_box()["y"] < 200
     running.change(concerns=())
     page.wait_for_selector("#trust[data-level=good]")

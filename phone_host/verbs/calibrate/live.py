@@ -42,6 +42,7 @@ from phone_host.live.calibration_view import Lines, Picture, Shows, SnapshotFile
 from phone_host.live.voice import Voice, speech_program
 from phone_host.model import Side, TimeOffset
 from phone_host.run.host_settings import HostSettings
+from phone_host.run.sinks import Sink
 from phone_host.settings import key_folder, most_pixels
 from phone_host.sync.phase import Whose
 from phone_host.verbs.calibrate.cause import assessed
@@ -170,13 +171,16 @@ class PreparedViews:
         return Live(last, self.left, self.right, signals)
 
 
-def prepare_views(options: argparse.Namespace, asked: Asked, feed: BrowserFeed | None = None) -> PreparedViews:
+def prepare_views(
+    options: argparse.Namespace, asked: Asked, feed: BrowserFeed | None = None, sinks: Sequence[Sink] = ()
+) -> PreparedViews:
     """Open everything that a live calibration needs.
 
     Args:
         options: the command's.
         asked: what they ask for, with what the earlier calibration says.
         feed: brings browsers that give their cameras; None: there is no page.
+        sinks: for who wants to see the pictures.
 
     Raises:
         SettingsError: an option is missing or not valid.
@@ -207,7 +211,7 @@ def prepare_views(options: argparse.Namespace, asked: Asked, feed: BrowserFeed |
         for link in links:
             opened.enter_context(closing(link))
         try:
-            live = LiveCalibration(settings, camera, links, grow)
+            live = LiveCalibration(settings, camera, links, grow, sinks)
         except OSError as error:
             raise unwritable(settings.left, error, "LEFT or --snapshots") from error
         opened.pop_all()

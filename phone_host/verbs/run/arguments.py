@@ -5,6 +5,7 @@ from pathlib import Path
 
 from common.program.quantities import milliseconds, reading, seconds
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+from phone_host.verbs.serve.arguments import add_lan_argument
 from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
 from phone_host.verbs.stereo_arguments import add_overlay_argument, add_stereo_arguments
 
@@ -133,7 +134,8 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--serve",
         nargs="?",
-        const="127.0.0.1:8765",
+        const="",
         metavar="HOST:PORT",
-        help="show the run on a page of this machine (default 127.0.0.1:8765); phone-host serve does more",
+        help="show the run on a page of this machine (default 127.0.0.1:8765, with --lan 0.0.0.0:8765); phone-host serve does more",
     )
+    add_lan_argument(parser, "with --serve: ")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext, suppress
 from typing import TYPE_CHECKING
 
+from common.errors import SettingsError
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
@@ -61,6 +62,8 @@ def _page(
 ) -> "AbstractContextManager[BesideRun | None]":
     """Serve the page of a run, if it is wanted."""
     if options.serve is None:
+        if options.lan:
+            raise SettingsError("--lan without --serve", "add --serve, or leave it out")
         return nullcontext()
     from phone_host.verbs.run.page_beside import page_beside  # noqa: PLC0415 - a server that most runs do without
 

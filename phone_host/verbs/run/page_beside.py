@@ -17,8 +17,10 @@ from phone_host.output.axes import Axes
 from phone_host.serve.beside import BesideRun
 from phone_host.settings import key_folder
 from phone_host.verbs.serve.choices import choices_of, shown_words
-from phone_host.verbs.serve.page import own_settings, served
+from phone_host.verbs.serve.page import first_url, page_settings, served, tell_page
 from phone_host.verbs.serve.places import recording_folder, snapshot_folder
+from phone_host.web.server import PageServer
+from phone_host.web.settings import PageSettings
 
 
 @contextmanager
@@ -42,13 +44,15 @@ def camera_page(uri: str, keys: Path) -> Iterator[BrowserFeed | None]:
         recordings=recording_folder(None),
         axes=Axes.CAMERA,
     )
-    with served(page, own_settings(None, keys)) as server:
-        _tell(server.url, uri)
+    settings = page_settings(None, keys)
+    with served(page, settings) as server:
+        _tell(server, settings, uri)
         yield page.feed
 
 
-def _tell(url: str, camera: str) -> None:
-    say(f"phone-host: the page: {url}", sys.stderr, flush=True)
+def _tell(server: PageServer, settings: PageSettings, camera: str) -> None:
+    say(f"phone-host: the page: {first_url(server, settings)}", sys.stderr, flush=True)
+    tell_page(server, settings)
     if is_browser(camera):
         say("phone-host: open it in the browser whose camera is meant, and start that camera", sys.stderr, flush=True)
 
@@ -74,6 +78,7 @@ def page_beside(options: argparse.Namespace, found: Resolved[PhoneHostSettings])
         recordings=recording_folder(options.out),
         axes=Axes(options.axes),
     )
-    with served(beside, own_settings(options.serve, key_folder(values.keys).path)) as server:
-        _tell(server.url, values.camera)
+    settings = page_settings(options.serve, key_folder(values.keys).path, lan=options.lan)
+    with served(beside, settings) as server:
+        _tell(server, settings, values.camera)
         yield beside

@@ -11,6 +11,21 @@ EXAMPLES = """  phone-host serve --open    # the page in this machine's browser
 """
 
 
+def add_lan_argument(parser: argparse.ArgumentParser, when: str = "") -> None:
+    """Declare --lan, for every verb that serves the page.
+
+    Args:
+        parser: of the verb.
+        when: begins the help text, such as "with --serve: ".
+    """
+    parser.add_argument(
+        "--lan",
+        action="store_true",
+        help=f"{when}serve the page to other machines: by https with a certificate authority of this machine's own, and only"
+        " with the token of the first address",
+    )
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     parser.add_argument(
@@ -20,12 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the page is served (default 127.0.0.1:8765; with --lan 0.0.0.0:8765); port 0: any that is free",
     )
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
-    parser.add_argument(
-        "--lan",
-        action="store_true",
-        help="serve the page to other machines: by https with a certificate authority of this machine's own, and only with"
-        " the token of the first address",
-    )
+    add_lan_argument(parser)
     parser.add_argument(
         "--config",
         type=Path,

@@ -17,7 +17,7 @@ _YES: Final = frozenset({"yes", "true", "on", "1"})
 _NO: Final = frozenset({"", "no", "false", "off", "0"})
 
 _NOT_CHOSEN: Final = frozenset(
-    {"help", "version", "config", "json", "debug", "serve", "open", "keys", "log-level", "wait"}
+    {"help", "version", "config", "json", "debug", "serve", "lan", "open", "keys", "log-level", "wait"}
 )
 """Options of `run` that are not the page's: what concerns this program as a whole, and what a page cannot be asked."""
 

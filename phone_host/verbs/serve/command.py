@@ -16,7 +16,7 @@ from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.serve.station import Station
 from phone_host.verbs.serve.kept_choices import usual_file
-from phone_host.verbs.serve.page import first_url, lan_settings, open_browser, own_settings, served, tell_page
+from phone_host.verbs.serve.page import first_url, open_browser, page_settings, served, tell_page
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import stderr_status
 from phone_host.web.settings import PageSettings
@@ -31,8 +31,7 @@ def run(options: argparse.Namespace) -> int:
         options.config or usual_file(), options.keys, lambda line: say(f"phone-host: {line}", sys.stderr)
     )
     logs.set_up(commands.log_level)
-    make = lan_settings if options.lan else own_settings
-    settings = make(options.address, commands.keys.path)
+    settings = page_settings(options.address, commands.keys.path, lan=options.lan)
     station = Station(commands)
     signals = StopSignals()
     with _opened_if_taken(settings, is_asked=options.open), served(station, settings) as server:

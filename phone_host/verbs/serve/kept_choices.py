@@ -13,7 +13,7 @@ from common.program.settings import read_file
 from common.program.settings_file import Value, changed
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.settings import PAGE_TABLE
-from phone_host.verbs.serve.choices import run_options, run_words
+from phone_host.verbs.serve.choices import run_options, run_words, with_changes
 
 NAME: Final = "phone-host.toml"
 _NAMES: Final = {item.name.replace("_", "-"): item.name for item in fields(PhoneHostSettings)}
@@ -48,7 +48,7 @@ def kept(file: Path) -> tuple[dict[str, str], list[str]]:
         The choices by option, and the words of the settings that are not the page's.
 
     Raises:
-        SettingsError: it cannot be read, or is not TOML.
+        SettingsError: it cannot be read, is not TOML, or its table [page] names what is no option.
     """
     if not is_there(file):
         return {}, []
@@ -56,7 +56,11 @@ def kept(file: Path) -> tuple[dict[str, str], list[str]]:
     found = {name: _as_words(content[key]) for name, key in _NAMES.items() if key in content}
     table = content.get(PAGE_TABLE, {})
     if isinstance(table, dict):
-        found |= {name: value for name, value in table.items() if isinstance(value, str)}
+        chosen = {name: value for name, value in table.items() if isinstance(value, str)}
+        try:
+            found |= with_changes({}, chosen)
+        except SettingsError as error:
+            raise SettingsError(f"settings file {file}: {error.problem}", f"mend its table [{PAGE_TABLE}]") from None
     others = [word for name in _OF_PROGRAM if found.get(name) for word in (f"--{name}", found[name])]
     return {name: value for name, value in found.items() if value and name not in _OF_PROGRAM}, others
 

@@ -42,30 +42,20 @@ def address_of(text: str | None, default_host: str = DEFAULT_HOST) -> tuple[str,
     return host.strip("[]") or default_host, int(port)
 
 
-def lan_settings(text: str | None, keys: Path) -> PageSettings:
-    """Return where the page is served to other machines, by https.
+def page_settings(text: str | None, keys: Path, *, lan: bool = False) -> PageSettings:
+    """Return where the page is served: to this machine alone, or to other machines, by https.
 
     Args:
         text: HOST:PORT; None: not given.
         keys: folder of the secrets.
-    """
-    host, port = address_of(text, _EVERYWHERE)
-    credentials = kept_credentials(keys, own_names(), datetime.now().astimezone())
-    return PageSettings(host=host, port=port, credentials=credentials, token=kept_token(keys))
-
-
-def own_settings(text: str | None, keys: Path) -> PageSettings:
-    """Return where the page is served to this machine alone.
-
-    Args:
-        text: HOST:PORT; None: not given.
-        keys: folder of the secrets.
+        lan: whether other machines may come.
 
     Raises:
-        SettingsError: other machines reach that address.
+        SettingsError: other machines reach that address, and may not come.
     """
-    host, port = address_of(text)
-    settings = PageSettings(host=host, port=port)
+    host, port = address_of(text, _EVERYWHERE if lan else DEFAULT_HOST)
+    credentials = kept_credentials(keys, own_names(), datetime.now().astimezone()) if lan else None
+    settings = PageSettings(host=host, port=port, credentials=credentials)
     return replace(settings, token=kept_token(keys))
 
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from common import now
 from common.doctor.finding import Finding
-from common.errors import DataError
+from common.errors import DataError, SettingsError
 from common.keys import KeyFolder
 from common.program.extensions import registered_names
 from common.program.invocation import command_line
@@ -25,8 +25,10 @@ from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
 from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.output.axes import Axes
+from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.run.pair_budget import usable_matchers
+from phone_host.run.sinks import Sink
 from phone_host.serve.program import Calibrated, Choices, SinksOf
 from phone_host.settings import chosen_keys
 from phone_host.stereo.matcher_names import MATCHERS
@@ -58,6 +60,7 @@ _RIG: Final = Path("rig") / "rig.yaml"
 _CAPTURE_S: Final = 60.0
 """So long a phone is watched for growing hot; half a minute tells about its film."""
 
+_OF_DEPTH: Final = ("near", "far", "crop", "scale", "complete")
 _OF_CALIBRATION: Final = ("board", "square", "baseline", "views")
 
 
@@ -100,8 +103,10 @@ class Commands:
         new = with_changes(choices, {name: value for name, value in changes.items() if value != shown.get(name)})
         options = self._options(new)
         checked(options)
-        rig = new.get("calibration")
-        if rig and changes.get("calibration") and "rectified" not in new:
+        rig, is_rectified = new.get("calibration"), "rectified" in new
+        if idle := [name for name in _OF_DEPTH if changes.get(name) and not (rig or is_rectified)]:
+            raise SettingsError(f"--{idle[0]} without a calibration", "calibrate, or name a rig.yaml")
+        if rig and changes.get("calibration") and not is_rectified and not is_calib_txt(Path(rig)):
             refuse_rejected(read_own_rig(Path(rig)), rig, allowed=options.use_rejected_rig)
         return new
 
@@ -150,7 +155,7 @@ class Commands:
         calibration = Path(question.calibration) if question.calibration else None
         return check_capture(camera, calibration, _CAPTURE_S, stopped, tell).findings
 
-    def calibration(self, choices: Choices, values: Choices) -> "Calibration":
+    def calibration(self, choices: Choices, values: Choices, sinks: Sequence[Sink]) -> "Calibration":
         """See Program."""
         given = {**without_depth(choices), **{name: values[name] for name in _OF_CALIBRATION if values.get(name)}}
         given.pop("fifo", None)
@@ -162,7 +167,7 @@ class Commands:
         options = calibrate_options(["--live", "--no-sound", *words, "--out", str(out)])
         asked = asked_of(options)
         require_rig_place(out)
-        return Calibration(options, asked, prepare_views(options, asked, self.feed))
+        return Calibration(options, asked, prepare_views(options, asked, self.feed, sinks))
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """See Program."""

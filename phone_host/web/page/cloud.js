@@ -4,7 +4,7 @@
 // There are no vertex buffers: a point's number is gl_VertexID. Axes inside: X right, Y up, Z towards the viewer, so that the left camera
 // looks along -Z. A picture is drawn only when the data, the camera or the size changed.
 
-import { lengthOf, middleOf } from './depth.js';
+import { fitted, lengthOf, middleOf, places } from './depth.js';
 import { CloudLegend } from './legend.js';
 import { RAMP } from './ramp.js';
 import * as three from './vendor/three.js';
@@ -14,8 +14,10 @@ import * as three from './vendor/three.js';
 /** @typedef {import('./depth.js').Limits} Limits */
 /** @typedef {'turned' | 'front' | 'side' | 'above'} ViewName */
 
-/** Yaw and pitch of the views by name, and the distance in distances of the thing. */
-const VIEWS = { turned: [-0.36, 0.22, 1.2], front: [0, 0, 1], side: [-1.25, 0.1, 1.1], above: [0, 1.25, 1.1] };
+/** Yaw and pitch of the views by name. */
+const VIEWS = { turned: [-0.28, 0.2], front: [0, 0], side: [-1.25, 0.1], above: [0, 1.25] };
+
+const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 const VERTEX = `
 precision highp float;
@@ -131,27 +133,36 @@ export class Cloud {
     this.draw();
   }
 
-  /** Go to a view by name, around the thing in the middle. @param {ViewName} name */
+  /** Go to a view by name: from where the camera stood, or all of the cloud, turned around the thing in the middle. @param {ViewName} name */
   view(name) {
     if (!this.data) return;
     const { grid, geometry, limits } = this.data;
     this.pivot = middleOf(grid, geometry, limits) ?? this.pivot ?? [0, 0, 1];
-    const [yaw, pitch, farther] = VIEWS[name];
+    const [yaw, pitch] = VIEWS[name];
     const [x, y, z] = this.pivot;
-    const away = farther * lengthOf(this.pivot);
-    // The front view starts from where the camera stood; turns are about the thing.
-    const bearing = [Math.atan2(-x, z) + yaw, Math.asin(y / lengthOf(this.pivot)) + pitch];
-    const flat = Math.cos(bearing[1]) * away;
+    const [turn, tilt] = [Math.atan2(-x, z) + yaw, Math.asin(y / lengthOf(this.pivot)) + pitch];
+    const right = [Math.cos(turn), 0, -Math.sin(turn)];
+    const up = [-Math.sin(tilt) * Math.sin(turn), Math.cos(tilt), -Math.sin(tilt) * Math.cos(turn)];
+    const back = [Math.cos(tilt) * Math.sin(turn), Math.sin(tilt), Math.cos(tilt) * Math.cos(turn)];
+    let stands = [0, 0, lengthOf(this.pivot)];
+    if (name !== 'front') {
+      const points = places(grid, geometry, limits).map(([px, py, pz]) => [px - x, y - py, z - pz]);
+      const seen = (/** @type {number[]} */ axis) => points.map((point) => ({ across: dot(point, axis), away: -dot(point, back) }));
+      const wide = fitted(seen(right), grid.width / 2 / geometry.focal);
+      const high = fitted(seen(up), grid.height / 2 / geometry.focal);
+      stands = [wide.aside, high.aside, Math.max(wide.back, high.back)];
+    }
+    const target = [x, -y, -z].map((v, k) => v + stands[0] * right[k] + stands[1] * up[k]);
     // An orbit that still swings ends here: an update without damping takes all that is left of it.
     const { enableDamping } = this.controls;
     this.controls.enableDamping = false;
     this.controls.update();
-    this.controls.target.set(x, -y, -z);
-    this.camera.position.set(x + flat * Math.sin(bearing[0]), -y + away * Math.sin(bearing[1]), -z + flat * Math.cos(bearing[0]));
+    this.controls.target.set(target[0], target[1], target[2]);
+    this.camera.position.set(target[0] + stands[2] * back[0], target[1] + stands[2] * back[1], target[2] + stands[2] * back[2]);
     this.camera.near = z * 0.02;
-    this.camera.far = z * 60;
+    this.camera.far = z * 60 + stands[2];
     this.controls.minDistance = z * 0.06;
-    this.controls.maxDistance = z * 12;
+    this.controls.maxDistance = z * 12 + stands[2];
     this.controls.update();
     this.controls.enableDamping = enableDamping;
     this.draw();

@@ -22,12 +22,6 @@ export function parsedCrop(words) {
   return numbers.length === 4 && numbers.every((v) => Number.isFinite(v)) ? /** @type {any} */ (numbers) : null;
 }
 
-/** Fields are named as they stand on the page, not as options. @param {{words?: string, problem?: string, remedy?: string}} answer */
-function inWordsOfThePage(answer) {
-  const named = (/** @type {string} */ words) => words.replace(/--(near|far|crop|matcher)\b/g, (_, name) => `${name[0].toUpperCase()}${name.slice(1)}`);
-  return { ...answer, problem: named(answer.problem ?? ''), remedy: named(answer.remedy ?? '') };
-}
-
 export class Controls {
   /** @param {() => any} state @param {() => ?{width: number, height: number}} size - of the left image */
   constructor(state, size) {
@@ -36,6 +30,7 @@ export class Controls {
     this.drawing = false;
     this.answer = byId('run-answer');
     this.settingsAnswer = byId('settings-answer');
+    this.cropAnswer = byId('crop-answer');
     onPress(byId('go'), () => (this.isRunning() ? command('stop') : begin('run')), this.answer);
     onPress(byId('snapshot'), () => command('snapshot'), this.answer);
     onPress(byId('record'), () => this.record(), this.answer);
@@ -43,6 +38,7 @@ export class Controls {
     for (const name of NAMES) this.field(name);
     byId('crop-draw').addEventListener('click', () => this.draw(!this.drawing));
     document.addEventListener('keydown', (event) => event.key === 'Escape' && this.drawing && this.draw(false));
+    byId('crop-stop').addEventListener('click', () => this.draw(false));
     byId('crop-clear').addEventListener('click', () => {
       this.draw(false);
       this.set('crop', '');
@@ -72,23 +68,33 @@ export class Controls {
     input.addEventListener('keydown', (event) => event.key === 'Enter' && input.blur());
   }
 
-  /** @param {string} name @param {string} value */
-  async set(name, value) {
+  /** @param {string} name @param {string} value @param {HTMLElement} [place] - takes the answer */
+  async set(name, value, place = this.settingsAnswer) {
     const answer = await command('set', { [name]: value });
     // What was refused stays as it was typed, to be mended.
     data(byId(name), 'dirty', answer.problem ? 'yes' : 'no');
     byId(name).setAttribute('aria-invalid', String(!!answer.problem));
-    tell(this.settingsAnswer, inWordsOfThePage(answer));
+    tell(place, answer);
     if (this.state()) this.show(this.state());
   }
 
-  /** @param {boolean} on */
+  /** What to do stands at the pictures: on a phone they are far from the button. @param {boolean} on */
   draw(on) {
+    if (on && !this.size()) {
+      tell(this.settingsAnswer, { problem: 'there is no picture yet to draw on', remedy: 'start a run' });
+      return;
+    }
     this.drawing = on;
     byId('crop-draw').setAttribute('aria-pressed', String(on));
     data(byId('views'), 'drawing', on ? 'yes' : 'no');
-    tell(this.settingsAnswer, { words: on ? 'draw a rectangle on the depth or the left picture' : '' });
-    if (!on && this.state()) this.show(this.state());
+    tell(this.settingsAnswer, {});
+    tell(this.cropAnswer, { words: on ? 'drag a rectangle over what shall have depth, on the depth or the left picture' : '' });
+    if (!on) {
+      if (this.state()) this.show(this.state());
+      return;
+    }
+    if (byId('views').dataset.shown === 'cloud') /** @type {HTMLElement} */ (document.querySelector('input[name=shown][value=depth]')).click();
+    byId('crop-line').scrollIntoView();
   }
 
   /** @param {Spot} from @param {Spot} to @param {boolean} done @returns {boolean} whether the pointer draws now */
@@ -99,7 +105,7 @@ export class Controls {
     if (done && box[2] >= LEAST_PX && box[3] >= LEAST_PX) {
       this.draw(false);
       /** @type {HTMLInputElement} */ (byId('crop')).value = box.join(',');
-      this.set('crop', box.join(','));
+      this.set('crop', box.join(','), this.cropAnswer);
     }
     return true;
   }

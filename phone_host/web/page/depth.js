@@ -139,16 +139,20 @@ const NEARER = 0.3;
  */
 export function middleOf(grid, geometry, limits) {
   for (const part of [0.6, 1]) {
-    const found = depths(grid, geometry, limits, part).sort((a, b) => a - b);
+    const found = places(grid, geometry, limits, part).map(([, , z]) => z).sort((a, b) => a - b);
     if (found.length > 20 || (part === 1 && found.length))
       return placeOf(geometry, (grid.width - 1) / 2, (grid.height - 1) / 2, found[Math.floor(NEARER * found.length)]);
   }
   return null;
 }
 
-/** Depths on about 60 x 60 cells of the picture's middle. @param {Grid} grid @param {Geometry} geometry @param {Limits} limits @param {number} part */
-function depths(grid, geometry, limits, part) {
-  /** @type {number[]} */
+/**
+ * Points of about 60 x 60 cells of the picture's middle.
+ * @param {Grid} grid @param {Geometry} geometry @param {Limits} limits @param {number} [part] - of width and height
+ * @returns {Place[]}
+ */
+export function places(grid, geometry, limits, part = 1) {
+  /** @type {Place[]} */
   const found = [];
   const [columns, rows] = [grid.columns * part, grid.rows * part];
   const [left, top] = [Math.floor((grid.columns - columns) / 2), Math.floor((grid.rows - rows) / 2)];
@@ -156,7 +160,24 @@ function depths(grid, geometry, limits, part) {
   for (let row = top; row < top + rows && row < grid.rows; row += by)
     for (let column = left; column < left + columns && column < grid.columns; column += by) {
       const z = depthOf(geometry, disparityOf(grid, grid.cells[row * grid.columns + column]));
-      if (isKept(z, limits)) found.push(z);
+      if (isKept(z, limits)) found.push(placeOf(geometry, column * grid.step, row * grid.step, z));
     }
   return found;
+}
+
+/** The share of the points that may lie beyond each edge of a view that shows all: they are mistakes of the matcher. */
+const STRAY = 0.005;
+
+/**
+ * Where a camera has to stand to see all points, along one axis of its picture.
+ * @param {{across: number, away: number}[]} points - beside the view's axis, and along it @param {number} reach - tangent of half its angle
+ * @returns {{aside: number, back: number}} how far it stands aside and back
+ */
+export function fitted(points, reach) {
+  const edge = (/** @type {number} */ sign, /** @type {number} */ share) => {
+    const all = points.map(({ across, away }) => across + sign * reach * away).sort((a, b) => a - b);
+    return all[Math.round(share * (all.length - 1))];
+  };
+  const [low, high] = [edge(1, STRAY), edge(-1, 1 - STRAY)];
+  return { aside: (low + high) / 2, back: (high - low) / (2 * reach) };
 }

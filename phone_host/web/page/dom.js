@@ -106,9 +106,19 @@ export function tell(place, answer) {
   if (words.trim()) say(words);
 }
 
+/** What stands on the page for an option of the command line. */
+const FIELDS = /** @type {Record<string, string>} */ ({
+  near: 'Near', far: 'Far', crop: 'Crop', matcher: 'Matcher', square: 'Square', board: 'Inner corners', calibration: 'Calibration',
+  link: 'the board\u2019s address', camera: 'the camera\u2019s address',
+});
+
+/** Words of the command line in words of the page; commands stay as they are typed. @param {string} words @returns {string} */
+const ofThePage = (words) =>
+  words.replace(/`([^`]*)`/g, '\u201c$1\u201d').replace(/ or --rectified\b|; see --help\b/g, '').replace(/(?<!\u201c[^\u201d]*)--([a-z]+)(?![\w-])/g, (option, name) => FIELDS[name] ?? option);
+
 /** With a capital letter and a full stop, but for addresses, commands and file names: those stay as they are typed. @param {string} words @returns {string} */
 export function sentence(words) {
-  const plain = words.replace(/`([^`]*)`/g, '\u201c$1\u201d');
+  const plain = ofThePage(words);
   const whole = /^(sudo|phone-host|board-agent)\b/.test(plain) ? plain : plain.replace(/^[a-z](?=[a-z'-]*([\s,;]|:\s|$))/, (first) => first.toUpperCase());
   return !words || /[.!?:]$|\S[/:.\\]\S*$/.test(whole) ? whole : `${whole}.`;
 }

@@ -17,7 +17,7 @@ export function figuresOf(live, delay) {
   const { clock, link } = live;
   return [
     { name: 'pairs', value: number(live.pairs_per_s, 1), unit: '/s', note: `${live.pairs} in all` },
-    { name: 'density', value: number(live.density === null ? null : 100 * live.density, 0), unit: '%', note: 'have depth' },
+    { name: 'density', value: number(live.density === null ? null : 100 * live.density, 0), unit: '%', note: live.cropped ? 'of the crop' : 'have depth' },
     { name: 'delay', value: number(delay, 0), unit: 'ms', note: 'light to depth' },
     { name: 'time skew', value: number(live.time_skew_ms, 1), unit: 'ms', note: 'of exposures' },
     { name: 'link', value: link.up ? 'up' : 'down', unit: '', note: link.name, level: link.up ? 'good' : 'bad' },
@@ -42,6 +42,7 @@ export function showFigures(live, delay) {
       data(value, 'level', one.level ?? '');
     },
   );
+  text(byId('cut'), live.cut ? `Black: ${live.cut}` : '');
   const drops = Object.entries(live.drops).filter(([, count]) => Number(count) > 0);
   show(byId('drops-none'), drops.length === 0);
   keep(byId('drops'), drops, ([reason]) => reason, () => make('div', '', make('dt'), make('dd')), (item, [reason, count]) => {

@@ -1,32 +1,50 @@
-// The live calibration: what the views cover so far, what to show next, and how good it is by now. From guide.json.
+// The live calibration: what the cameras see, what the views cover so far, what to show next, and how good it is by now. From guide.json.
 
 import { byId, data, keep, make, say, sentence, show, text } from './dom.js';
 
 /** Corners of a cell for the strongest colour: about three views (as in guide.svg). */
 const FULL = 36;
 
-/** @param {HTMLCanvasElement} canvas @param {any} camera - of guide.json */
-function paint(canvas, camera) {
-  const width = 320;
-  const height = Math.round((width * camera.height) / camera.width);
+/** The newest pictures of the calibration that goes on. @type {?import('./message.js').Pair} */
+let seen = null;
+
+/** Take the newest pictures. @param {import('./message.js').Pair} pair - its bitmaps are ours from now on @param {any} state */
+export function seePictures(pair, state) {
+  seen?.left?.close();
+  seen?.right?.close();
+  seen = pair;
+  showGuide(state);
+}
+
+/**
+ * The picture with what is known of it: covered cells, and the board.
+ * @param {HTMLCanvasElement} canvas @param {any} camera - of guide.json; null: the board is not known yet @param {?ImageBitmap} picture
+ */
+function paint(canvas, camera, picture) {
+  const width = 480;
+  const of = camera ?? picture;
+  const height = Math.round((width * of.height) / of.width);
   if (canvas.width !== 2 * width || canvas.height !== 2 * height) [canvas.width, canvas.height] = [2 * width, 2 * height];
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
   const style = getComputedStyle(canvas);
   const [good, line, mark] = ['--c2', '--line', '--c4'].map((name) => style.getPropertyValue(name));
   pen.setTransform(2, 0, 0, 2, 0, 0);
   pen.clearRect(0, 0, width, height);
+  if (picture) pen.drawImage(picture, 0, 0, width, height);
+  if (!camera) return;
   const [rows, columns] = [camera.cells.length, camera.cells[0].length];
   const [w, h] = [width / columns, height / rows];
   camera.cells.forEach((/** @type {number[]} */ row, /** @type {number} */ y) =>
     row.forEach((count, x) => {
-      pen.globalAlpha = 0.85 * Math.min(1, count / FULL);
+      pen.globalAlpha = (picture ? 0.45 : 0.85) * Math.min(1, count / FULL);
       pen.fillStyle = good;
       pen.fillRect(x * w, y * h, w, h);
-      pen.globalAlpha = 1;
+      pen.globalAlpha = picture ? 0.2 : 1;
       pen.strokeStyle = line;
       pen.strokeRect(x * w + 0.5, y * h + 0.5, w - 1, h - 1);
     }),
   );
+  pen.globalAlpha = 1;
   if (!camera.board_now.length) return;
   pen.beginPath();
   for (const [x, y] of camera.board_now) pen.lineTo(x * width, y * height);
@@ -58,7 +76,8 @@ const VERDICTS = /** @type {Record<string, string>} */ ({ good: 'good', usable: 
 
 /** @param {any} state */
 export function showGuide(state) {
-  const guide = state.guide;
+  const { guide } = state;
+  const pictures = state.activity === 'calibrating' && seen?.head.begun === state.begun ? seen : null;
   show(byId('guide'), !!guide);
   if (!guide) return;
   const isOver = !!guide.result;
@@ -71,12 +90,13 @@ export function showGuide(state) {
   text(verdict, guide.verdict ? `so far: ${guide.verdict}` : 'no verdict yet');
   text(byId('guide-remedy'), guide.remedy ? sentence(`to mend: ${guide.remedy}`) : '');
   for (const side of ['left', 'right']) {
-    const camera = guide.cameras[side];
+    const camera = guide.cameras[side] ?? null;
+    const picture = pictures?.[/** @type {'left' | 'right'} */ (side)] ?? null;
     const canvas = /** @type {HTMLCanvasElement} */ (byId(`guide-${side}`));
-    show(/** @type {HTMLElement} */ (canvas.parentElement), !!camera);
-    if (!camera) continue;
-    paint(canvas, isOver ? { ...camera, board_now: [] } : camera);
-    canvas.setAttribute('aria-label', `${side} picture: ${Math.round(100 * coveredShare(camera))} percent of it covered`);
+    show(/** @type {HTMLElement} */ (canvas.parentElement), !!camera || !!picture);
+    if (!camera && !picture) continue;
+    paint(canvas, isOver && camera ? { ...camera, board_now: [] } : camera, picture);
+    canvas.setAttribute('aria-label', `${side} picture: ${camera ? Math.round(100 * coveredShare(camera)) : 0} percent of it covered`);
   }
   keep(byId('guide-figures'), figuresOf(guide), ([name]) => name, () => make('div', '', make('dt'), make('dd')), (item, [name, value]) => {
     text(item.children[0], name);

@@ -5,7 +5,7 @@ import { Connection } from './connection.js';
 import { Controls } from './controls.js';
 import { byId, data, show, text } from './dom.js';
 import { showFigures } from './figures.js';
-import { showGuide } from './guide.js';
+import { seePictures, showGuide } from './guide.js';
 import { Live } from './live.js';
 import { showOwnCamera } from './own_camera.js';
 import { connectSetup, showSetup } from './setup.js';
@@ -59,6 +59,10 @@ const connection = new Connection({
     draw();
   },
   pair: (pair) => {
+    if (state?.activity === 'calibrating' && pair.head.begun === state.begun) {
+      seePictures(pair, state);
+      return;
+    }
     live.show(pair);
     data(document.body, 'ready', 'yes');
   },
@@ -79,13 +83,22 @@ function draw() {
   want();
 }
 
+/** What is looked at: parts of the pair, and the frame that tells their width. @returns {[string[], string]} */
+function looked() {
+  const { step } = document.body.dataset;
+  const view = byId('views').dataset.shown;
+  if (document.visibilityState !== 'visible') return [[], 'map-frame'];
+  if (step === 'calibration' && state?.activity === 'calibrating') return [['left', 'right'], 'guide-left'];
+  if (step !== 'run') return [[], 'map-frame'];
+  if (WIDE.matches) return [['left', 'right', 'disparity'], 'left-frame'];
+  if (view === 'pictures') return [['left', 'right'], 'left-frame'];
+  return [view === 'cloud' ? ['left', 'disparity'] : ['disparity'], 'map-frame'];
+}
+
 /** Ask for what is looked at, no more. */
 function want() {
-  const isShown = document.visibilityState === 'visible' && document.body.dataset.step === 'run';
-  const view = byId('views').dataset.shown;
-  const views = !isShown ? [] : WIDE.matches ? ['left', 'right', 'disparity'] : view === 'pictures' ? ['left', 'right'] : view === 'cloud' ? ['left', 'disparity'] : ['disparity'];
-  const frame = byId(view === 'pictures' || WIDE.matches ? 'left-frame' : 'map-frame');
-  const width = Math.max(320, frame.clientWidth * Math.min(2, window.devicePixelRatio));
+  const [views, frame] = looked();
+  const width = Math.max(320, byId(frame).clientWidth * Math.min(2, window.devicePixelRatio));
   connection.want(views, WIDTHS_PX.find((each) => each >= width) ?? 1280, HZ);
 }
 

@@ -1,16 +1,16 @@
-// The token of the first URL. The server hands it over in the address's fragment, once; commands need it (reading does not).
+// The token of the first URL: commands need it (reading does not). A wrong one never comes as far as here.
 
 const KEY = 'token';
 
-/** Take the token from the address, and the address is clean again. */
+/** Take the token from the address, and the address is clean again; the step that it names stays. */
 export function takeToken() {
-  const found = /^#token=(.+)$/.exec(location.hash);
+  const found = new URLSearchParams(location.search).get('token');
   if (!found) return;
-  history.replaceState(null, '', location.pathname);
+  history.replaceState(null, '', location.pathname + location.hash);
   try {
-    localStorage.setItem(KEY, decodeURIComponent(found[1]));
+    localStorage.setItem(KEY, found);
   } catch {
-    kept = decodeURIComponent(found[1]); // storage is switched off: for this visit
+    kept = found; // storage is switched off: for this visit
   }
 }
 

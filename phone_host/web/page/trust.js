@@ -32,6 +32,14 @@ function last(state) {
   return isOver ? { ...trust, level: trust.level === 'good' ? 'unknown' : trust.level, headline: `The last run: ${trust.headline}` } : trust;
 }
 
+/** What the headline does not say already; of a doubt that it names without a remedy, the remedy. @param {Trust} trust @returns {Concern[]} */
+export function unsaid({ headline, concerns }) {
+  const said = headline.toLowerCase();
+  return concerns
+    .map(({ problem, remedy }) => ({ problem: said.includes(problem.toLowerCase()) ? '' : problem, remedy }))
+    .filter(({ problem, remedy }) => problem || !said.includes(remedy.toLowerCase()));
+}
+
 /** @param {HTMLElement} box @param {any} state */
 function keepHeight(box, state) {
   const { width, height } = box.getBoundingClientRect();
@@ -51,8 +59,9 @@ export function showTrust(state) {
   text(byId('headline'), sentence(trust.headline));
   say(`${trust.level === 'good' || trust.level === 'unknown' ? '' : `${trust.level}: `}${trust.headline}`);
   const list = byId('concerns');
-  show(list, trust.concerns.length > 0);
-  keep(list, trust.concerns, (one) => one.problem.replace(/\d+([.,]\d+)?/g, '#'), () => make('li', '', make('b'), ' ', make('span')), (item, one) => {
+  const others = unsaid(trust);
+  show(list, others.length > 0);
+  keep(list, others, (one) => one.problem.replace(/\d+([.,]\d+)?/g, '#'), () => make('li', '', make('b'), ' ', make('span')), (item, one) => {
     text(item.children[0], sentence(one.problem));
     text(item.children[1], sentence(one.remedy));
   });
