@@ -134,7 +134,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--serve",
         nargs="?",
-        const="",
+        const=True,
         metavar="HOST:PORT",
         help="show the run on a page of this machine (default 127.0.0.1:8765, with --lan 0.0.0.0:8765); phone-host serve does more",
     )

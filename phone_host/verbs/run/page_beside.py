@@ -78,7 +78,8 @@ def page_beside(options: argparse.Namespace, found: Resolved[PhoneHostSettings])
         recordings=recording_folder(options.out),
         axes=Axes(options.axes),
     )
-    settings = page_settings(options.serve, key_folder(values.keys).path, lan=options.lan)
+    address = None if options.serve is True else options.serve
+    settings = page_settings(address, key_folder(values.keys).path, lan=options.lan)
     with served(beside, settings) as server:
         _tell(server, settings, values.camera)
         yield beside
