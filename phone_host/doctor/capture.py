@@ -130,12 +130,15 @@ def check_capture(
     plan = Plan(whole_s, min(8.0, whole_s / 6), whole_s * 2 / 3)
     report = film_capture(camera, rig, plan, stopped, tell)
     findings = findings_of(report)
-    if calibration is not None and not stopped():
-        findings.append(_kept(report, capture_path(calibration)))
+    if not stopped():
+        findings.append(_kept(report, calibration))
     return CheckedCapture(report, findings)
 
 
-def _kept(report: CaptureReport, path: Path) -> Finding:
+def _kept(report: CaptureReport, calibration: Path | None) -> Finding:
+    if calibration is None:
+        return ok("capture", "not kept, for there is no calibration yet: check again after it")
+    path = capture_path(calibration)
     try:
         write_text(path, capture_text(report))
     except OSError as error:

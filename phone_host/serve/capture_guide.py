@@ -20,6 +20,10 @@ class CaptureGuide:
     def __init__(self, show: Callable[[Sequence[Checked]], None]) -> None:
         self._show, self._shown = show, ("", -1, -1)
 
+    def wait(self) -> None:
+        """Say that the camera is waited for; a phone's may take seconds."""
+        self._show([Checked("film", "ok", "waiting for the camera", "")])
+
     def tell(self, progress: Progress) -> None:
         """Take the progress; called with each frame."""
         now = (stage_words(progress), int(progress.share * _STEPS), progress.told)

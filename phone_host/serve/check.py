@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 from common.doctor.finding import Finding, Grade
 from common.words import counted
+from phone_host.calibration.capture.words import CHECK_AGAIN
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.web.source import Checked
@@ -12,7 +13,11 @@ from phone_host.web.source import Checked
 
 def checked(findings: Iterable[Finding]) -> list[Checked]:
     """Return findings as the page shows them."""
-    return [Checked(each.what, each.verdict.value, each.text, each.remedy) for each in findings]
+    return [Checked(each.what, each.verdict.value, each.text, _remedy(each)) for each in findings]
+
+
+def _remedy(finding: Finding) -> str:
+    return "press \u201cCheck the film\u201d" if finding.remedy == CHECK_AGAIN else finding.remedy
 
 
 def obstacle(findings: list[Finding]) -> Trouble | None:

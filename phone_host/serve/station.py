@@ -225,10 +225,14 @@ class Station:
             raise SettingsError("no camera of this machine is chosen", "find one, or type its address")
 
         def work(task: Task) -> None:
-            guide = CaptureGuide(self._show_checks)
-            with task.held():
-                findings = self._program.capture(choices, task.stopped, guide.tell)
-            self._show_checks([] if task.stopped() else check.checked(findings))
+            guide, found = CaptureGuide(self._show_checks), list[Checked]()
+            guide.wait()
+            try:
+                with task.held():
+                    findings = self._program.capture(choices, task.stopped, guide.tell)
+                found = [] if task.stopped() else check.checked(findings)
+            finally:
+                self._show_checks(found)  # whatever ended it: nobody is to hold the camera any more
 
         return self._begun(Activity.CHECKING, work, "hold the camera still")
 

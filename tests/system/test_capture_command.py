@@ -82,4 +82,9 @@ def test_the_page_leads_through_the_check_and_can_stop_it(film: Path, tmp_path: 
         until(lambda: [each["what"] for each in client.state()["checks"]] == ["film"], "the guide's words")
         assert client.do("stop") == {"words": "stopped"}
         assert client.until_idle()["trouble"] is None
+        client.do("set", camera=f"replay:{film}/film")
+        client.do("capture")
+        over = client.until_idle()
+        assert "on demand" in over["trouble"]["problem"]
+        assert over["checks"] == []  # nobody is asked to hold it any more
     assert not (tmp_path / "capture.json").exists()

@@ -141,7 +141,9 @@ def test_a_check_leads_from_still_over_moving_to_its_end() -> None:
     assert stage(check) is Stage.WATCH  # unless they tell nothing
     check.take(Reading(Unseen.STILL))
     assert stage(check) is Stage.MOVE
-    assert "too little" in stage_words(check.progress)
+    assert stage_words(check.progress).startswith("the picture moved too little: turn the camera")
+    flat = stage_words(replace(check.progress, last=Unseen.FLAT))
+    assert flat == "the scene is flat: film a shelf or a desk with things on it, near and far; go on turning"
     (_,) = fed(check, 220, FRAMES + 1)
     for _ in range(ENOUGH):
         check.take(RIGID)
@@ -211,7 +213,7 @@ def test_rows_of_one_moment_are_a_programs_work() -> None:
 
 def test_a_missing_calibration_and_a_global_shutter_are_named() -> None:
     """A good film without a lens says what is missing; rows that are read at once are called so."""
-    assert "--calibration" in warp_finding(rigidity_of([RIGID] * 3)).text
+    assert "once the lens is calibrated" in warp_finding(rigidity_of([RIGID] * 3)).text
     assert (
         "global"
         in findings_of(

@@ -12,6 +12,8 @@ def test_the_page_is_told_what_is_new_and_no_more() -> None:
     """A hundred frames of one stage are told in steps; a reason why film tells nothing stands in the words at once."""
     told: list[Sequence[Checked]] = []
     guide = CaptureGuide(told.append)
+    guide.wait()
+    assert [each.words for each in told.pop()] == ["waiting for the camera"]
     for number in range(100):
         guide.tell(Progress(Stage.STILL, number / 1000, 0, None))
     assert len(told) == 2

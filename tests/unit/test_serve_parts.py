@@ -8,13 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.camera_identity import CameraIdentity
 from common.doctor.finding import fail, ok
 from common.errors import DataError, SettingsError, UnavailableError
 from common.ledger import StageTimes
 from common.peers import Peer
 from phone_host.boards.found import Found
+from phone_host.calibration.capture.words import stored_finding
 from phone_host.measure.trouble import Trouble
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result
+from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes
 from phone_host.serve import check
 from phone_host.serve.activities import Activities, Task
@@ -335,6 +338,8 @@ def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
     """Pairs, rate and skew; or which camera sent nothing; or the finding that stops everything."""
     assert check.obstacle([ok("python", "there")]) is None
     assert check.obstacle([ok("a", "b"), fail("camera", "gone", "plug it in")]) == Trouble("camera: gone", "plug it in")
+    never = stored_finding(None, CaptureSource(camera=CameraIdentity("browser", "back"), width_px=640, height_px=480))
+    assert [each.remedy for each in check.checked([never, ok("a", "b")])] == ["press \u201cCheck the film\u201d", ""]
     assert check.seen(run(21)) == "both cameras are seen: 21 pairs, 20 a second, time skew 0.0 ms"
     assert check.seen(run(0)) == ""
     nothing = run(0)

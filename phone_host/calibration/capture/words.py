@@ -24,6 +24,10 @@ _JITTER: Final = 0.15
 """Share of the frame period by which stamps of a sensor never scatter; arrivals do."""
 
 
+CHECK_AGAIN: Final = "phone-host doctor --capture with this --camera and --calibration"
+"""The remedy on the command line; the page has a button."""
+
+
 def findings_of(report: CaptureReport) -> list[Finding]:
     """Judge a report.
 
@@ -106,13 +110,15 @@ def _heat(pace: Pace) -> Finding:
     return ok("slow-down", f"none: {text}")
 
 
+_SCENE: Final = "film a shelf or a desk with things on it, near and far"
+
 _REASONS: Final = {
     Unseen.STILL: (
         "the picture moved too little",
         "turn the camera by some degrees, to and fro, up and down, for 20 seconds",
     ),
-    Unseen.PLAIN: ("too few details in the picture", "film a shelf, a poster or a desk with things on it"),
-    Unseen.FLAT: ("the scene is flat", "film a shelf or a desk with things on it, near and far"),
+    Unseen.PLAIN: ("too few details in the picture", _SCENE),
+    Unseen.FLAT: ("the scene is flat", _SCENE),
     Unseen.LIVELY: ("too much in the picture moves by itself", "film something that stands still"),
     Unseen.VAGUE: (
         "the stretches of film contradict each other",
@@ -120,7 +126,7 @@ _REASONS: Final = {
     ),
 }
 
-_UNCALIBRATED: Final = "; the lens is not calibrated: check again with --calibration"
+_UNCALIBRATED: Final = "; without its calibration a crop is not seen: check again once the lens is calibrated"
 
 
 def warp_finding(rigidity: Rigidity) -> Finding:
@@ -148,17 +154,17 @@ def warp_finding(rigidity: Rigidity) -> Finding:
 _STAGES: Final = {
     Stage.STILL: "hold the camera still",
     Stage.MOVE: "turn it a little, to and fro, up and down, before a scene that stands still",
-    Stage.WATCH: "enough; put it down, its rate is watched",
+    Stage.WATCH: "put it down, and let it film: its rate is watched",
     Stage.DONE: "done",
 }
 
 
 def stage_words(progress: Progress) -> str:
     """Say what the user shall do now, and why if it does not help yet."""
-    what = _STAGES[progress.stage]
     if progress.stage is not Stage.MOVE or progress.last is None:
-        return what
-    return f"{what}: {_REASONS[progress.last][0]}"
+        return _STAGES[progress.stage]
+    go_on = "" if progress.last is Unseen.STILL else "; go on turning"
+    return f"{': '.join(_REASONS[progress.last])}{go_on}"
 
 
 def stored_finding(kept: CaptureReport | None, source: CaptureSource) -> Finding:
@@ -168,11 +174,10 @@ def stored_finding(kept: CaptureReport | None, source: CaptureSource) -> Finding
         kept: the report beside the calibration; None: there is none.
         source: the camera as it is now.
     """
-    again = "phone-host doctor --capture with this --camera and --calibration"
     if kept is None:
-        return warn("capture", "this camera's images were never checked for stabilisation", again)
+        return warn("capture", "this camera's images were never checked for stabilisation", CHECK_AGAIN)
     if not holds_for(kept.source, source):
-        return warn("capture", f"the check was of {_named(kept.source)}, this is {_named(source)}", again)
+        return warn("capture", f"the check was of {_named(kept.source)}, this is {_named(source)}", CHECK_AGAIN)
     found = warp_finding(kept.rigidity)
     return Finding(what="capture", verdict=found.verdict, text=f"checked: {found.text}", remedy=found.remedy)
 

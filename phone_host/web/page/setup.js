@@ -63,7 +63,7 @@ function showChecks(checks) {
       sign.setAttribute('role', 'img');
       text(what, one.what);
       text(words, one.words);
-      text(remedy, one.grade === 'ok' ? '' : one.what === 'capture' ? 'Press \u201cCheck the film\u201d.' : sentence(one.remedy));
+      text(remedy, one.grade === 'ok' ? '' : sentence(one.remedy));
     },
   );
 }
