@@ -211,6 +211,19 @@ def test_one_browser_feeds_and_a_second_is_told_so_until_the_first_stops(camera:
     assert len({each["track"] for each in camera.of_kind("hello")}) == 2
 
 
+def test_a_tab_in_the_background_says_so_on_both_sides(camera: PlayedFeed, opened: Opener) -> None:
+    """The program is told at once that the tab is hidden; the page says what to do, and streams again in front."""
+    page = started(opened)
+    says(page, "Streaming")
+    show = "state => { Object.defineProperty(document, 'visibilityState', { value: state, configurable: true }); document.dispatchEvent(new Event('visibilitychange')); }"
+    page.evaluate(show, "hidden")
+    assert "Bring it to the front" in says(page, "This tab is in the background")
+    camera.until(lambda: not camera.of_kind("track")[-1]["visible"])
+    page.evaluate(show, "visible")
+    says(page, "Streaming")
+    camera.until(lambda: camera.of_kind("track")[-1]["visible"])
+
+
 def test_when_the_program_goes_and_comes_the_same_camera_goes_on(camera: PlayedFeed, opened: Opener) -> None:
     """The page says that nobody answers, comes back by itself, and goes on with its numbers; a page that is loaded again is the camera again."""
     page = started(opened)

@@ -122,7 +122,7 @@ _REASONS: Final = {
     Unseen.LIVELY: ("too much in the picture moves by itself", "film something that stands still"),
     Unseen.VAGUE: (
         "the stretches of film contradict each other",
-        "check again, in more light and before something with more details",
+        "film something with more details, in more light",
     ),
 }
 
