@@ -114,6 +114,7 @@ class Tracker:
         if self.volume.blocks.count == 0:
             return self._fused(view, believed, moved, Weakness.NONE, None)
         depth, geometry = halved(view.depth_m, view.geometry)
+        depth[depth > self.volume.settings.far_m] = np.nan  # these were never fused, so they have no partners
         voxel_m = self.volume.settings.voxel_m
         surface = self.volume.cast(Camera(geometry, depth.shape, believed), depth)
         sure = moved.is_known and moved.inliers >= self._gate.weak_inliers

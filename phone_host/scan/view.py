@@ -76,7 +76,7 @@ def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeome
         cy_px=geometry.cy_px / 2,
         doffs_px=geometry.doffs_px / 2,
     )
-    return np.ascontiguousarray(depth_m[::2, ::2]), half
+    return depth_m[::2, ::2].copy(), half
 
 
 def reduced(view: View) -> View:
