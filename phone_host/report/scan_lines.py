@@ -31,7 +31,9 @@ def scan_lines(report: ScanReport, out: str) -> list[str]:
     told = [f"note: {stretch.sentence}" for stretch in stretches(report.scanned)]
     lines += told[:_MOST_LINES]
     if len(told) > _MOST_LINES:
-        lines.append(f"note: {counted(len(told) - _MOST_LINES, 'further stretch', 'further stretches')}: see report.json")
+        lines.append(
+            f"note: {counted(len(told) - _MOST_LINES, 'further stretch', 'further stretches')}: see report.json"
+        )
     lines += [f"warning: {pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed[:_MOST_LINES]]
     lines += [remark.line for remark in report.remarks]
     return [*lines, f"written to {out}: {', '.join((MODEL, TRAJECTORY, *ALWAYS))}"]

@@ -125,7 +125,8 @@ def _fits(report: ScanReport) -> str:
     return section(
         "How well the pairs fit",
         _FITS,
-        legend(rows) + two_widths(partial(over_views, names, off, "mm", "distance of each pair's depths from the model")),
+        legend(rows)
+        + two_widths(partial(over_views, names, off, "mm", "distance of each pair's depths from the model")),
     ) + section(
         "What the pairs show",
         _SHARES,

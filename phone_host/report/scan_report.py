@@ -16,7 +16,7 @@ from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.report.report_page import Headline
 from phone_host.report.stereo_report import FailedPair, Remark, Size
-from phone_host.scan.mesh_parts import MeshSize
+from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
 from phone_host.scan.scan import ScannedPair
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
@@ -63,7 +63,7 @@ class ModelFigures:
 
     points: int = 0
     triangles: int = 0
-    size: MeshSize = MeshSize(0.0, 0.0, (0.0, 0.0, 0.0))
+    size: MeshSize = NO_SIZE
     noise_m: float = math.nan
     noise_p95_m: float = math.nan
     memory_bytes: int = 0

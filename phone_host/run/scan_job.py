@@ -54,8 +54,8 @@ class ScanJob:
     out: Path
     make_core: Callable[[Size], StereoCore]
     matcher: str
+    wanted: ScanWanted
     matcher_note: str = ""
-    wanted: ScanWanted = ScanWanted()
     axes: Axes = Axes.CAMERA
     most_pixels: int = MOST_PIXELS
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
@@ -115,7 +115,8 @@ def _require_something(report: ScanReport) -> None:
         why = next((remark for remark in report.remarks if not remark.is_note), None)
         raise DataError(
             f"none of the {len(report.scanned)} pairs has depth{f': {why.problem}' if why else ''}",
-            (why.remedy if why else "") or "check that the pictures are sharp and bright, and that --calibration fits them",
+            (why.remedy if why else "")
+            or "check that the pictures are sharp and bright, and that --calibration fits them",
         )
 
 
@@ -164,9 +165,7 @@ class _Work:
     def _judge(self, core: StereoCore, processed: Processed) -> None:
         for concern in judge_pair(core, processed, self._job.mounted).concerns:
             blocks = concern.is_certain and concern.doubt is not Doubt.NO_DEPTH
-            self._doubts.setdefault(
-                concern.doubt.value, Remark(concern.sentence, concern.remedy, is_blocking=blocks)
-            )
+            self._doubts.setdefault(concern.doubt.value, Remark(concern.sentence, concern.remedy, is_blocking=blocks))
 
     def finished(self) -> FinishedScan:
         """Make the surface and the report of the pairs so far."""

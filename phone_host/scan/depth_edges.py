@@ -27,5 +27,7 @@ def without_edges(depth_m: Depth, geometry: StereoGeometry) -> Depth:
     known, around = np.isfinite(disparity), np.ones((3, 3), np.uint8)
     highest = cv2.dilate(np.where(known, disparity, np.float32(-np.inf)), around)
     lowest = cv2.erode(np.where(known, disparity, np.float32(np.inf)), around)
-    flat = known & (np.maximum(highest - disparity, disparity - lowest, where=known, out=np.zeros_like(disparity)) <= _STEP_PX)
+    flat = known & (
+        np.maximum(highest - disparity, disparity - lowest, where=known, out=np.zeros_like(disparity)) <= _STEP_PX
+    )
     return np.where(flat, depth_m, np.float32(np.nan))

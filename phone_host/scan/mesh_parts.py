@@ -31,10 +31,14 @@ class MeshSize:
     extent_m: tuple[float, float, float]
 
 
+NO_SIZE: Final = MeshSize(0.0, 0.0, (0.0, 0.0, 0.0))
+"""Of a mesh without triangles."""
+
+
 def size_of(mesh: Mesh) -> MeshSize:
     """Measure a mesh."""
     if not len(mesh.triangles):
-        return MeshSize(0.0, 0.0, (0.0, 0.0, 0.0))
+        return NO_SIZE
     points = mesh.points_m.astype(np.float64)
     a, b, c = (points[mesh.triangles[:, corner]] for corner in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
@@ -101,7 +105,9 @@ def _clustered(mesh: Mesh, cell_m: float) -> tuple[Mesh, NDArray[np.int64]]:
     cells = np.floor(mesh.points_m / cell_m).astype(np.int64)
     _, first, cluster, counts = np.unique(cells, axis=0, return_index=True, return_inverse=True, return_counts=True)
     cluster = cluster.reshape(-1)
-    points = np.column_stack([np.bincount(cluster, mesh.points_m[:, axis]) for axis in range(3)]) / counts[:, np.newaxis]
+    points = (
+        np.column_stack([np.bincount(cluster, mesh.points_m[:, axis]) for axis in range(3)]) / counts[:, np.newaxis]
+    )
     triangles = cluster[mesh.triangles]
     a, b, c = triangles.T
     whole = triangles[(a != b) & (b != c) & (c != a)].astype(np.int32)

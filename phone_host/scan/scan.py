@@ -180,7 +180,8 @@ class Scan:
         volume = self.tracker.volume
         mesh = mesh_of(volume.blocks, volume.settings.voxel_m, _LEAST_WEIGHT)
         if self._wanted.box is not None:
-            mesh = only(mesh, self._wanted.box.holds(mesh.points_m)[mesh.triangles].all(axis=1))
+            inside = self._wanted.box.holds(mesh.points_m)
+            mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))
         mesh = without_crumbs(mesh)
         return ScanModel(mesh, surface_noise_m(mesh.points_m, volume.blocks, volume.settings))
 
