@@ -73,7 +73,7 @@ def model_view(shown: ShownModel, file: str) -> str:
         '<canvas aria-hidden="true"></canvas>'
         f'<p class="nocloud" hidden>This browser cannot draw the model (no WebGL 2); {escape(file)} holds it.</p></div>'
         f"<figcaption>{escape(_words(len(mesh.triangles), total))}</figcaption></figure>"
-        f'<div class="buttons">{_buttons()}</div>{_paints(best, worst)}'
+        f'<div class="buttons">{_buttons()}</div><div class="buttons">{_paints(best, worst)}</div>'
         f"<noscript><p>The model needs a browser that runs the script in this page; {escape(file)} holds it.</p></noscript></div>"
     )
 

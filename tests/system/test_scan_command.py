@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.support.still_life import left_axes, off_surfaces_m, photographed, still_life
+from phone_host.run.scan_job import ScanJob, run_scan
+from phone_host.scan.scan import ScanWanted
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.view_files import pair_files
+from tests.support.programs import on_a_full_disk
+from tests.support.still_life import left_axes, off_surfaces_m, photographed, small_rig, still_life
 
 TURNS_DEG = [0.0, 5.0, 10.0, 15.0, 20.0]
 
@@ -62,3 +72,58 @@ def test_a_walk_around_a_still_life_gives_its_surfaces(walk: Path, tmp_path: Pat
     scan(walk, tmp_path / "two")
     for name in ("model.ply", "trajectory.txt", "report.json", "index.html"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_what_somebody_moved_meanwhile_does_not_spoil_the_rest(walk: Path, tmp_path: Path) -> None:
+    """Somebody moves the ball at the third view, and back: table and cube stay within 2 mm on average, all other pairs are in the model."""
+    for name in ("left", "right"):
+        shutil.copytree(walk / name, tmp_path / name)
+    shutil.copy(walk / "rig.yaml", tmp_path)
+    (tmp_path / "moved").mkdir()
+    moved = photographed(tmp_path / "moved", TURNS_DEG[2:3], [still_life(0.12)])
+    for name in ("left", "right"):
+        shutil.copy(moved / name / "000.jpg", tmp_path / name / "002.jpg")
+    report = scan(tmp_path, tmp_path / "out")
+    assert {pair["name"] for pair in report["pairs"] if pair["state"] == "lost"} <= {"2"}
+    off = off_surfaces_m(left_axes(surface_of(tmp_path / "out" / "model.ply")[0]))
+    assert max(off[name].mean() for name in ("table", "cube")) < 0.002
+
+
+def test_a_full_disk_keeps_the_model(walk: Path, tmp_path: Path) -> None:
+    """A disk on which model.ply still fits, and the page no more: one line that says so, exit code 3, and the whole model."""
+    out = tmp_path / "out"
+    words = ["scan", walk / "left", walk / "right", "--calibration", walk / "rig.yaml", "--out", out]
+    done = on_a_full_disk("phone_host.cli", list(map(str, words)), tmp_path, 700_000)
+    assert done.returncode == 3
+    assert f"{out / 'model.ply'} is written" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert len(surface_of(out / "model.ply")[1]) > 10_000
+
+
+class _Impatient:
+    """Somebody who presses Ctrl-C while the fourth pair is matched."""
+
+    def __call__(self, amount: int = 1) -> None:
+        """Wait on."""
+
+    def say(self, what: str) -> None:
+        """Read what is being done."""
+        if what == "matching 3":
+            raise KeyboardInterrupt
+
+
+def test_ctrl_c_keeps_what_was_scanned(walk: Path, tmp_path: Path) -> None:
+    """The model of the first three pairs, and a report that says so."""
+    core = StereoCore(MatchSettings(MatcherName.TANDEM), Rectifier(small_rig()), None, DepthWanted(search_from_m=0.3))
+    job = ScanJob(
+        files=pair_files(str(walk / "left"), str(walk / "right")),
+        out=tmp_path / "o",
+        make_core=lambda _: core,
+        matcher="tandem",
+        wanted=ScanWanted(),
+    )
+    with pytest.raises(KeyboardInterrupt):
+        run_scan(job, _Impatient())
+    report = json.loads((tmp_path / "o" / "report.json").read_text())
+    assert (report["interrupted_of"], report["in_model"]) == (5, 3)
+    assert len(surface_of(tmp_path / "o" / "model.ply")[1]) == report["model"]["triangles"] > 5000

@@ -7,6 +7,7 @@ from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
+from phone_host.report.scan_report import MODEL
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES
 from phone_host.run.scan_job import ScanJob, run_scan
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
         with step_bar("reading", len(files.pairs)) as watcher:
             report = run_scan(job, watcher)
     except OSError as error:
-        raise unwritable(options.out, error) from error
+        raise unwritable(options.out, error, beside=options.out / MODEL) from error
     if options.json:
         print(json_text(scan_json(report)))
     else:
