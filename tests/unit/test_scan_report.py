@@ -189,7 +189,7 @@ def test_a_large_model_is_shown_coarser() -> None:
     """No more triangles than a page can hold, and it says so."""
     side = 320
     rows, columns = np.mgrid[0:side, 0:side].astype(np.float32)
-    points = np.column_stack([columns.ravel(), rows.ravel(), np.zeros(side**2)]).astype(np.float32) / 100
+    points = np.column_stack([columns.ravel(), rows.ravel(), np.zeros(side**2)]).astype(np.float32) * np.float32(0.01)
     corner = np.arange(side**2).reshape(side, side)[:-1, :-1].ravel()
     upper, lower = (
         np.column_stack([corner, corner + 1, corner + side]),
