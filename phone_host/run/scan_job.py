@@ -3,12 +3,9 @@
 A pair that cannot be computed is named, and the others go on. After Ctrl-C the model of the pairs so far is written.
 """
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 from common import now
 from common.errors import DataError
@@ -18,18 +15,18 @@ from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
 from phone_host.output.axes import Axes
 from phone_host.report.page_links import NextCommand
-from phone_host.report.scan_report import ModelFigures, ScanReport
+from phone_host.report.scan_report import ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark, Size, alone_remarks
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted
 from phone_host.run.scan_files import FinishedScan, write_scan
+from phone_host.run.scan_result import report_of, require_something
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_trust import judge_pair
-from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import decode_files, open_image, size_px
+from phone_host.stereo.images import decode_files, open_image
 from phone_host.stereo.view_files import ViewFiles
 
 
@@ -98,26 +95,9 @@ def run_scan(job: ScanJob, watcher: Watcher) -> ScanReport:
             watcher()
         watcher.say("making the surface")
         finished = work.finished()
-    _require_something(finished.report)
+    require_something(finished.report)
     write_scan(job.out, finished)
     return finished.report
-
-
-def _require_something(report: ScanReport) -> None:
-    """Refuse pairs of which nothing at all came.
-
-    Raises:
-        DataError: none was computed, or none has depth.
-    """
-    if not report.scanned:
-        raise report.failed[0].none_of(len(report.pairs))
-    if report.settings is None:
-        why = next((remark for remark in report.remarks if not remark.is_note), None)
-        raise DataError(
-            f"none of the {len(report.scanned)} pairs has depth{f': {why.problem}' if why else ''}",
-            (why.remedy if why else "")
-            or "check that the pictures are sharp and bright, and that --calibration fits them",
-        )
 
 
 class _Work:
@@ -129,7 +109,6 @@ class _Work:
         self.scan = Scan(job.wanted)
         self._pairs: list[ScannedPair | FailedPair] = []
         self._doubts: dict[str, Remark] = {}
-        self._last: Processed | None = None
 
     def tried(self, name: str, left: Path, right: Path) -> None:
         """Take a pair; one that cannot be computed is noted.
@@ -157,7 +136,6 @@ class _Work:
         if index & (index - 1) == 0:  # 0, 1, 2, 4, 8 ...: what is wrong with a rig is wrong with all of its pairs
             self._judge(core, processed)
         pair = self.scan.take(name, float(name) if self._job.files.by_number else float(index), processed)
-        self._last = processed
         if pair.weakness.advice:
             self._watcher.say(f"{name}: {pair.weakness.advice}")
         return pair
@@ -170,60 +148,14 @@ class _Work:
     def finished(self) -> FinishedScan:
         """Make the surface and the report of the pairs so far."""
         model = self.scan.model()
-        files, last = self._job.files, self._last
+        files = self._job.files
         left, right = ([path.name for path in alone] for alone in (files.left_alone, files.right_alone))
         is_told = files.by_number or files.by_name
         note = [Remark(self._job.matcher_note, is_note=True)] if self._job.matcher_note else []
-        report = ScanReport(
-            pairs=tuple(self._pairs),
-            model=figures_of(self.scan, model),
-            settings=self.scan.settings,
-            geometry=None if last is None else last.geometry,
-            rectified_px=(0, 0) if last is None else size_px(last.pair.left),
-            matcher=self._job.matcher,
-            axes=self._job.axes,
-            remarks=(
-                *self._doubts.values(),
-                *memory_remarks(self.scan),
-                *alone_remarks(left, right, is_told=is_told, pairs=len(files.pairs)),
-                *note,
-            ),
+        remarks = (
+            *self._doubts.values(),
+            *alone_remarks(left, right, is_told=is_told, pairs=len(files.pairs)),
+            *note,
         )
+        report = report_of(self.scan, model, self._pairs, remarks, matcher=self._job.matcher, axes=self._job.axes)
         return FinishedScan(report, model, self._job.commands)
-
-
-def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
-    """Return a model in numbers.
-
-    Args:
-        scan: that made it.
-        model: its surface.
-    """
-    known = model.noise_m[np.isfinite(model.noise_m)]
-    noise_m, noise_p95_m = (float(np.percentile(known, share)) if len(known) else math.nan for share in (50, 95))
-    volume = None if scan.tracker is None else scan.tracker.volume
-    return ModelFigures(
-        points=len(model.mesh.points_m),
-        triangles=len(model.mesh.triangles),
-        size=size_of(model.mesh),
-        noise_m=noise_m,
-        noise_p95_m=noise_p95_m,
-        memory_bytes=0 if volume is None else volume.memory_bytes,
-        left_out=0 if volume is None else volume.left_out,
-    )
-
-
-def memory_remarks(scan: Scan) -> Sequence[Remark]:
-    """Say whether the model outgrew its memory.
-
-    Args:
-        scan: that made it.
-    """
-    if scan.tracker is None or not scan.tracker.volume.left_out:
-        return ()
-    return (
-        Remark(
-            "the model has reached its greatest size: what was seen later is missing from it",
-            "give a greater --memory or --voxel, or a nearer --far",
-        ),
-    )

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.imagesize.head import size_text
 from phone_host.geometry.se3 import SE3
-from phone_host.model import Processed
+from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
 from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.fineness import fineness_for
@@ -23,7 +24,7 @@ from phone_host.scan.tracker import PoseGate, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.images import to_grey
+from phone_host.stereo.images import size_px, to_grey
 
 NOISE_PX: Final = 0.5
 """Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
@@ -99,6 +100,8 @@ class Scan:
 
     Attributes:
         tracker: of the pairs since the first that has depth; None before it.
+        geometry: of these.
+        size_px: width and height of their rectified images.
 
     Args:
         wanted: what for.
@@ -107,7 +110,8 @@ class Scan:
     def __init__(self, wanted: ScanWanted) -> None:
         self._wanted = wanted
         self.tracker: Tracker | None = None
-        self._shape = (0, 0)
+        self.geometry: StereoGeometry | None = None
+        self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
 
     @property
@@ -142,7 +146,7 @@ class Scan:
         view = view_of(processed)
         density = float(np.isfinite(view.depth_m).mean())
         if self.tracker is None and density >= PoseGate().least_depths:
-            self._shape = view.grey.shape
+            self.geometry, self.size_px = view.geometry, size_px(view.grey)
             wanted = self._wanted
             self.tracker = Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
         if self.tracker is None:
@@ -155,8 +159,8 @@ class Scan:
                 density=density,
             )
         else:
-            if view.grey.shape != self._shape:
-                here, before = ("x".join(map(str, shape[::-1])) for shape in (view.grey.shape, self._shape))
+            if size_px(view.grey) != self.size_px:
+                here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
                 raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
             told = self.tracker.track(view)
             pair = ScannedPair(

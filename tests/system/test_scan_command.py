@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from phone_host.report.scan_report import ScanReport
 from phone_host.run.scan_job import ScanJob, run_scan
 from phone_host.scan.scan import ScanWanted
 from phone_host.stereo.core import StereoCore
@@ -20,7 +21,7 @@ from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.view_files import pair_files
-from tests.support.programs import on_a_full_disk
+from tests.support.programs import board, host, on_a_full_disk
 from tests.support.still_life import left_axes, off_surfaces_m, photographed, small_rig, still_life
 
 TURNS_DEG = [0.0, 5.0, 10.0, 15.0, 20.0]
@@ -32,14 +33,38 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return photographed(tmp_path_factory.mktemp("walk"), TURNS_DEG, [still_life()] * len(TURNS_DEG))
 
 
-def scan(walk: Path, out: Path, *words: str) -> dict[str, Any]:
+def scan(walk: Path, out: Path) -> dict[str, Any]:
     """Run it; return its report."""
-    given = ["scan", walk / "left", walk / "right", "--calibration", walk / "rig.yaml", "--out", out, "--json", *words]
+    given = ["scan", walk / "left", walk / "right", "--calibration", walk / "rig.yaml", "--out", out, "--json"]
     command = [sys.executable, "-m", "phone_host.cli", *map(str, given)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
     assert done.returncode == 0, done.stderr
     report: dict[str, Any] = json.loads(done.stdout)
     return report
+
+
+class _Watcher:
+    """Somebody who watches, and perhaps presses Ctrl-C when these words are shown."""
+
+    def __init__(self, until: str = "") -> None:
+        self._until = until
+
+    def __call__(self, amount: int = 1) -> None:
+        """Wait on."""
+
+    def say(self, what: str) -> None:
+        """Read what is being done."""
+        if what == self._until:
+            raise KeyboardInterrupt
+
+
+def scan_here(walk: Path, out: Path, until: str = "") -> ScanReport:
+    """The same in this process, which saves seconds; Ctrl-C when the words `until` are shown."""
+    core = StereoCore(MatchSettings(MatcherName.TANDEM), Rectifier(small_rig()), None, DepthWanted(search_from_m=0.3))
+    files = pair_files(str(walk / "left"), str(walk / "right"))
+    return run_scan(
+        ScanJob(files=files, out=out, make_core=lambda _: core, matcher="tandem", wanted=ScanWanted()), _Watcher(until)
+    )
 
 
 def surface_of(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
@@ -69,7 +94,7 @@ def test_a_walk_around_a_still_life_gives_its_surfaces(walk: Path, tmp_path: Pat
     # q = (0, sin(turn / 2), 0, cos): about the vertical axis, which rectification tilts by a degree or two.
     turned_deg = np.degrees(2 * np.arccos(stations[:, 7]))
     assert turned_deg == pytest.approx(np.array(TURNS_DEG), abs=0.5)
-    scan(walk, tmp_path / "two")
+    scan_here(walk, tmp_path / "two")
     for name in ("model.ply", "trajectory.txt", "report.json", "index.html"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
@@ -83,8 +108,8 @@ def test_what_somebody_moved_meanwhile_does_not_spoil_the_rest(walk: Path, tmp_p
     moved = photographed(tmp_path / "moved", TURNS_DEG[2:3], [still_life(0.12)])
     for name in ("left", "right"):
         shutil.copy(moved / name / "000.jpg", tmp_path / name / "002.jpg")
-    report = scan(tmp_path, tmp_path / "out")
-    assert {pair["name"] for pair in report["pairs"] if pair["state"] == "lost"} <= {"2"}
+    report = scan_here(tmp_path, tmp_path / "out")
+    assert {pair.name for pair in report.scanned if not pair.is_fused} <= {"2"}
     off = off_surfaces_m(left_axes(surface_of(tmp_path / "out" / "model.ply")[0]))
     assert max(off[name].mean() for name in ("table", "cube")) < 0.002
 
@@ -100,30 +125,25 @@ def test_a_full_disk_keeps_the_model(walk: Path, tmp_path: Path) -> None:
     assert len(surface_of(out / "model.ply")[1]) > 10_000
 
 
-class _Impatient:
-    """Somebody who presses Ctrl-C while the fourth pair is matched."""
-
-    def __call__(self, amount: int = 1) -> None:
-        """Wait on."""
-
-    def say(self, what: str) -> None:
-        """Read what is being done."""
-        if what == "matching 3":
-            raise KeyboardInterrupt
-
-
 def test_ctrl_c_keeps_what_was_scanned(walk: Path, tmp_path: Path) -> None:
     """The model of the first three pairs, and a report that says so."""
-    core = StereoCore(MatchSettings(MatcherName.TANDEM), Rectifier(small_rig()), None, DepthWanted(search_from_m=0.3))
-    job = ScanJob(
-        files=pair_files(str(walk / "left"), str(walk / "right")),
-        out=tmp_path / "o",
-        make_core=lambda _: core,
-        matcher="tandem",
-        wanted=ScanWanted(),
-    )
     with pytest.raises(KeyboardInterrupt):
-        run_scan(job, _Impatient())
+        scan_here(walk, tmp_path / "o", "matching 3")
     report = json.loads((tmp_path / "o" / "report.json").read_text())
     assert (report["interrupted_of"], report["in_model"]) == (5, 3)
     assert len(surface_of(tmp_path / "o" / "model.ply")[1]) == report["model"]["triangles"] > 5000
+
+
+def test_two_cameras_give_the_model_of_the_files(walk: Path, tmp_path: Path) -> None:
+    """The same pictures from a board's camera and this machine's, shown on demand: the same bytes."""
+    link = f"ipc://{tmp_path}/link"
+    words = ["scan", "--link", link, "--camera", f"replay:{walk / 'right'}", "--calibration", str(walk / "rig.yaml")]
+    with board(["run", "--camera", f"replay:{walk / 'left'}", "--link", link], tmp_path) as sender:
+        with host([*words, "--pairs", "5", "--out", str(tmp_path / "live")], tmp_path) as receiver:
+            assert receiver.wait() == 0
+        sender.wait()
+    scan_here(walk, tmp_path / "files")
+    for name in ("model.ply", "trajectory.txt"):
+        assert (tmp_path / "live" / name).read_bytes() == (tmp_path / "files" / name).read_bytes()
+    report = json.loads((tmp_path / "live" / "report.json").read_text())
+    assert (report["in_model"], report["verdict"]) == (5, "good")

@@ -3,8 +3,9 @@
 import argparse
 from pathlib import Path
 
-from common.program.quantities import file_size, reading
+from common.program.quantities import file_size, reading, seconds
 from phone_host.verbs.orientation_arguments import add_image_arguments
+from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
 from phone_host.verbs.stereo_arguments import (
     PAIRED,
     add_core_arguments,
@@ -18,6 +19,8 @@ EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup   
   phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
   phone-host scan left/ right/ --calibration rig.yaml --box 400x300x400@0,100,900 --out cup    # only what is in this box
   phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
+  phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out cup    # live
+  phone-host scan --replay session.mcap --calibration rig.yaml --out cup    # every pair of a recording
 """
 
 
@@ -25,10 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
     parser.add_argument(
         "images",
-        nargs="+",
+        nargs="*",
         metavar="LEFT RIGHT",
-        help=f"images in the order in which they were taken, each pair sharing most of what the last one shows: {PAIRED}",
+        help=f"images in the order in which they were taken, each pair sharing most of what the last one shows; without them two cameras are"
+        f" scanned live: {PAIRED}",
     )
+    _add_live_arguments(parser)
     add_core_arguments(parser)
     add_limit_arguments(parser)
     add_overlay_argument(parser)
@@ -40,6 +45,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="DIR",
         help="folder for model.ply, trajectory.txt, report.json and index.html, not that of the images; it is created if it does not exist",
+    )
+
+
+def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--config", type=Path, metavar="FILE", help="live: settings file (TOML)")
+    add_source_arguments(parser, "live: ")
+    add_tolerance_argument(parser, "live: ")
+    parser.add_argument(
+        "--board-side",
+        choices=("left", "right"),
+        help="live: which view the board's camera gives (default: as in the calibration, else left)",
+    )
+    parser.add_argument(
+        "--replay",
+        metavar="FILE.mcap",
+        help="play a recording in place of --link and --camera: all of its pairs, the same each time",
+    )
+    parser.add_argument("--pairs", type=int, default=0, metavar="N", help="live: end after N pairs")
+    parser.add_argument(
+        "--seconds",
+        type=reading(seconds, "--seconds"),
+        default=0.0,
+        metavar="S",
+        help="live: end S seconds after the first pair (default: with Ctrl-C or SIGTERM)",
     )
 
 

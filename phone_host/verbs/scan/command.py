@@ -1,13 +1,14 @@
-"""phone-host scan: put pairs of images from several places together to one model."""
+"""phone-host scan: put pairs from several places together to one model."""
 
 import argparse
 from typing import Final
 
+from common.errors import SettingsError
 from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
-from phone_host.report.scan_report import MODEL
+from phone_host.report.scan_report import MODEL, ScanReport
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES
 from phone_host.run.scan_job import ScanJob, run_scan
@@ -25,7 +26,25 @@ _CHECK_FAILED: Final = 4
 
 
 def run(options: argparse.Namespace) -> int:
-    """Pair the files, scan them, and print what came of it."""
+    """Scan pictures, or what two cameras give, and print what came of it."""
+    if options.images:
+        report, code = _scan_pictures(options), 0
+    else:
+        from phone_host.verbs.scan.live import scan_live  # noqa: PLC0415 - pictures need neither links nor cameras
+
+        report, code = scan_live(options)
+    if options.json:
+        print(json_text(scan_json(report)))
+    else:
+        say(scan_lines(report, str(options.out)))
+    return code or (0 if report.is_sound else _CHECK_FAILED)
+
+
+def _scan_pictures(options: argparse.Namespace) -> ScanReport:
+    """Pair the files and scan them."""
+    for name in ("camera", "link", "replay", "pairs", "seconds"):
+        if getattr(options, name):
+            raise SettingsError(f"--{name} beside pictures", "give either pictures or cameras")
     require_metres(options)
     wanted = scan_wanted(options)
     matcher = options.matcher or default_matcher().value
@@ -46,11 +65,6 @@ def run(options: argparse.Namespace) -> int:
     )
     try:
         with step_bar("reading", len(files.pairs)) as watcher:
-            report = run_scan(job, watcher)
+            return run_scan(job, watcher)
     except OSError as error:
         raise unwritable(options.out, error, beside=options.out / MODEL) from error
-    if options.json:
-        print(json_text(scan_json(report)))
-    else:
-        say(scan_lines(report, str(options.out)))
-    return 0 if report.is_sound else _CHECK_FAILED
