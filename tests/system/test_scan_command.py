@@ -24,6 +24,7 @@ from phone_host.stereo.view_files import pair_files
 from tests.support.programs import board, host, on_a_full_disk
 from tests.support.still_life import left_axes, off_surfaces_m, photographed, small_rig, still_life
 
+EXAMPLE = Path(__file__).parents[2] / "examples" / "scan_object.py"
 TURNS_DEG = [0.0, 5.0, 10.0, 15.0, 20.0]
 
 
@@ -147,3 +148,16 @@ def test_two_cameras_give_the_model_of_the_files(walk: Path, tmp_path: Path) -> 
         assert (tmp_path / "live" / name).read_bytes() == (tmp_path / "files" / name).read_bytes()
     report = json.loads((tmp_path / "live" / "report.json").read_text())
     assert (report["in_model"], report["verdict"]) == (5, "good")
+
+
+def test_the_example_scans_the_same(walk: Path, tmp_path: Path) -> None:
+    """examples/scan_object.py tells the state of each pair, and leaves the model that the command makes of the same pictures."""
+    link = f"ipc://{tmp_path}/link"
+    with board(["run", "--camera", f"replay:{walk / 'left'}", "--link", link], tmp_path):
+        words = [EXAMPLE, link, f"replay:{walk / 'right'}", walk / "rig.yaml", "5"]
+        command = [sys.executable, *map(str, words)]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[:2] == ["pair 0: tracking", "pair 1: tracking"]
+    scan_here(walk, tmp_path / "files")
+    assert (tmp_path / "model.ply").read_bytes() == (tmp_path / "files" / "model.ply").read_bytes()
