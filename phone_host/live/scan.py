@@ -42,6 +42,7 @@ class LiveScan:
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
         self._is_board_left = board_side is Side.LEFT
         self._last: ScannedPair | None = None
+        self._first_ns: int | None = None
 
     @property
     def words(self) -> str:
@@ -75,5 +76,7 @@ class LiveScan:
     def _take(self, result: Result) -> None:
         ledger = result.ledger
         marks = ledger.board if self._is_board_left else ledger.host
-        stamp_s = float(result.number) if self._is_timeless else marks.exposed_ns / _NS
+        if self._first_ns is None:
+            self._first_ns = marks.exposed_ns
+        stamp_s = float(result.number) if self._is_timeless else (marks.exposed_ns - self._first_ns) / _NS
         self._last = self.scan.take(str(result.number), stamp_s, result.processed)

@@ -56,7 +56,7 @@ class ScannedPair:
 
     Attributes:
         name: of the pair.
-        stamp_s: when it was taken, s; its number where nobody knows.
+        stamp_s: when it was taken, s, from any beginning; its number where nobody knows.
         world_camera: where the rectified left camera was; where it is lost, as far as odometry tells.
         state: how sure that is.
         weakness: why it is not surer.

@@ -14,6 +14,7 @@ from common.program.terminal import say
 from common.protocol.message import Pacing
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.live.scan import LiveScan
+from phone_host.recording.playback import Playback
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.host_settings import EndReason
 from phone_host.run.progress_bar import step_bar
@@ -48,8 +49,10 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     _require_place(options)
     logs.set_up(log_level(found.values.log_level))
     opened = open_run(of_run, found, _tell)
-    waits = opened.camera.description.pacing is Pacing.DEMAND
-    live = LiveScan(wanted, opened.board_side, waits=waits, is_timeless=waits and options.replay is None)
+    camera = opened.camera
+    pacing = camera.pacing if isinstance(camera, Playback) else camera.description.pacing
+    is_stills = pacing is Pacing.DEMAND and not isinstance(camera, Playback)
+    live = LiveScan(wanted, opened.board_side, waits=pacing is Pacing.DEMAND, is_timeless=is_stills)
     signals = StopSignals()
     prepared = opened.prepared(sys.argv, (live.sink,))
 
