@@ -28,7 +28,8 @@ class View:
         depth_m: (H, W) float32, m, NaN = none.
         geometry: of the rectified pair.
         noise_px: standard deviation of a disparity, px, > 0.
-        patch_px: side of the patches whose depths err together, px: what a matcher smooths; a depth camera's window is smaller.
+        patch_px: side of the patches whose depths err together, px; a depth camera's window is smaller. A matcher smooths over 40 px, but the
+            rectification's errors reach over a quarter of the image: with 160 a rig at rest stays within 2 mm, with 40 it wanders 3.4.
     """
 
     grey: Image
@@ -36,7 +37,7 @@ class View:
     depth_m: Depth
     geometry: StereoGeometry
     noise_px: float
-    patch_px: float = 40.0
+    patch_px: float = 160.0
 
     @property
     def noise_per_m(self) -> float:
