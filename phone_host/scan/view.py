@@ -1,7 +1,7 @@
 """One pair as the scan takes it: the rectified left image, its depth, and how sure that is. Pure."""
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -43,6 +43,13 @@ class View:
     def noise_per_m(self) -> float:
         """Standard deviation of the depth 1 m away, m; it grows with the depth squared."""
         return self.noise_px / (self.geometry.focal_px * self.geometry.baseline_m)
+
+    def observed(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return u, v and the disparity of the nearest pixel, (N, 3), px, NaN = none, at pixels (N, 2) inside the image."""
+        geometry, places = self.geometry, np.rint(pixels).astype(np.int64)
+        depth = self.depth_m[places[:, 1], places[:, 0]].astype(np.float64)
+        disparity = geometry.focal_px * geometry.baseline_m / depth - geometry.doffs_px
+        return np.column_stack([pixels.astype(np.float64), disparity])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
