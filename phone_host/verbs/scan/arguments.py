@@ -19,7 +19,7 @@ EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup   
   phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
   phone-host scan left/ right/ --calibration rig.yaml --box 400x300x400@0,100,900 --out cup    # only what is in this box
   phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
-  phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out cup    # live
+  phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --record cup.mcap --out cup    # live
   phone-host scan --replay session.mcap --calibration rig.yaml --out cup    # every pair of a recording
 """
 
@@ -61,6 +61,12 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         "--replay",
         metavar="FILE.mcap",
         help="play a recording in place of --link and --camera: all of its pairs, the same each time",
+    )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="FILE.mcap",
+        help="live: also keep what both cameras give, to scan it again with --replay: finer, or after a crash",
     )
     parser.add_argument("--pairs", type=int, default=0, metavar="N", help="live: end after N pairs")
     parser.add_argument(

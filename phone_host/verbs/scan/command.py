@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _scan_pictures(options: argparse.Namespace) -> ScanReport:
     """Pair the files and scan them."""
-    for name in ("camera", "link", "replay", "pairs", "seconds"):
+    for name in ("camera", "link", "replay", "record", "pairs", "seconds"):
         if getattr(options, name):
             raise SettingsError(f"--{name} beside pictures", "give either pictures or cameras")
     require_metres(options)
