@@ -100,6 +100,6 @@ export class Model extends Viewer {
   place() {
     if (!this.surface) return null;
     const { low, size } = this.surface;
-    return { middle: low.map((value, axis) => value + size[axis] / 2), away: 0.8 * Math.hypot(...size) };
+    return { middle: low.map((value, axis) => value + size[axis] / 2), away: 0.65 * Math.hypot(...size) };
   }
 }
