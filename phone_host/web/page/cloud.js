@@ -3,7 +3,7 @@
 //
 // There are no vertex buffers: a point's number is gl_VertexID.
 
-import { lengthOf, middleOf } from './depth.js';
+import { lengthOf, middleOf, places } from './depth.js';
 import { RAMP } from './ramp.js';
 import * as three from './vendor/three.js';
 import { opaque, Viewer } from './viewer.js';
@@ -116,12 +116,14 @@ export class Cloud extends Viewer {
     return !this.data;
   }
 
-  /** @returns {?{middle: number[], away: number}} */
-  place() {
+  /** @returns {?import('./viewer.js').Stand} */
+  stand() {
     if (!this.data) return null;
     const { grid, geometry, limits } = this.data;
     const middle = middleOf(grid, geometry, limits) ?? this.pivot ?? [0, 0, 1];
-    return { middle, away: lengthOf(middle) };
+    const points = places(grid, geometry, limits);
+    const { focal } = geometry;
+    return { middle, front: lengthOf(middle), points, reach: [grid.width / 2 / focal, grid.height / 2 / focal], scale: middle[2] };
   }
 
   /** While it moves, points are thinned on slow machines; at rest all are shown. */

@@ -20,6 +20,9 @@ import { opaque, Viewer } from './viewer.js';
 /** What lights it: the order is that of the shader's cases. @type {Paint[]} */
 const PAINTS = ['colour', 'shape', 'noise'];
 
+/** Points that decide from where all fits in. */
+const LOOKED_AT = 3000;
+
 const VERTEX = `
 precision highp float;
 in vec3 colour;
@@ -96,10 +99,14 @@ export class Model extends Viewer {
     return !this.surface;
   }
 
-  /** @returns {?{middle: number[], away: number}} */
-  place() {
+  /** @returns {?import('./viewer.js').Stand} */
+  stand() {
     if (!this.surface) return null;
-    const { low, size } = this.surface;
-    return { middle: low.map((value, axis) => value + size[axis] / 2), away: 0.65 * Math.hypot(...size) };
+    const { low, step, size, points } = this.surface;
+    const by = 3 * Math.max(1, Math.floor(points.length / 3 / LOOKED_AT));
+    const some = [];
+    for (let at = 0; at < points.length; at += by) some.push(low.map((value, axis) => value + step * points[at + axis]));
+    const middle = low.map((value, axis) => value + size[axis] / 2);
+    return { middle, front: null, points: some, reach: [0.5, 0.5], scale: Math.hypot(...size) };
   }
 }

@@ -3,21 +3,32 @@
 // Axes inside: X right, Y up, Z towards the viewer, so that the left camera looks along -Z. A picture is drawn only when the data, the
 // camera or the size changed.
 
-import { lengthOf } from './depth.js';
+import { fitted, lengthOf } from './depth.js';
 import { CloudLegend } from './legend.js';
 import * as three from './vendor/three.js';
 
 /** @typedef {'turned' | 'front' | 'side' | 'above'} ViewName */
 
-/** Yaw and pitch of the views by name, and the distance as a share of the usual one. */
-const VIEWS = { turned: [-0.36, 0.22, 1.2], front: [0, 0, 1], side: [-1.25, 0.1, 1.1], above: [0, 1.25, 1.1] };
+/** Yaw and pitch of the views by name. */
+const VIEWS = { turned: [-0.28, 0.2], front: [0, 0], side: [-1.25, 0.1], above: [0, 1.25] };
+
+/**
+ * @typedef {object} Stand  how a thing is looked at; lengths are m, places X right, Y down, Z forward
+ * @property {number[]} middle - what it turns about
+ * @property {?number} front - from so far the front view is seen; null: from where all fits in, as in the other views
+ * @property {number[][]} points - that have to fit in
+ * @property {[number, number]} reach - tangents of half the angles across and down that a picture shows at least
+ * @property {number} scale - a typical length
+ */
+
+const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 /** @returns {boolean} whether this browser can show something that turns */
 export function canShowClouds() {
   return !!document.createElement('canvas').getContext('webgl2');
 }
 
-/** Something that can be turned. What it shows says where its middle is (`place`), how large it is drawn (`zoom`), and gets ready. */
+/** Something that can be turned. What it shows says how it is looked at (`stand`), how large it is drawn (`zoom`), and gets ready. */
 export class Viewer {
   /**
    * @param {HTMLCanvasElement} canvas - takes the keyboard, too
@@ -45,11 +56,8 @@ export class Viewer {
     return true;
   }
 
-  /**
-   * Where the thing in the middle is: X right, Y down, Z forward, m, and from how far it is looked at, m; null: there is none.
-   * @returns {?{middle: number[], away: number}}
-   */
-  place() {
+  /** @returns {?Stand} null: there is nothing to look at */
+  stand() {
     return null;
   }
 
@@ -63,27 +71,36 @@ export class Viewer {
     void pixels;
   }
 
-  /** Go to a view by name, around the thing in the middle. @param {ViewName} name */
+  /** Go to a view by name: from where the camera stood, or all of it, turned around the thing in the middle. @param {ViewName} name */
   view(name) {
-    const place = this.place();
-    if (!place) return;
-    this.pivot = place.middle;
-    const [yaw, pitch, farther] = VIEWS[name];
-    const [x, y, z] = place.middle;
-    const away = farther * place.away;
-    // The front view looks from where the camera stood; turns are about the thing.
-    const bearing = [Math.atan2(-x, z) + yaw, Math.asin(y / lengthOf(place.middle)) + pitch];
-    const flat = Math.cos(bearing[1]) * away;
+    const stand = this.stand();
+    if (!stand) return;
+    this.pivot = stand.middle;
+    const [yaw, pitch] = VIEWS[name];
+    const [x, y, z] = stand.middle;
+    const [turn, tilt] = [Math.atan2(-x, z) + yaw, Math.asin(y / lengthOf(stand.middle)) + pitch];
+    const right = [Math.cos(turn), 0, -Math.sin(turn)];
+    const up = [-Math.sin(tilt) * Math.sin(turn), Math.cos(tilt), -Math.sin(tilt) * Math.cos(turn)];
+    const back = [Math.cos(tilt) * Math.sin(turn), Math.sin(tilt), Math.cos(tilt) * Math.cos(turn)];
+    let stands = [0, 0, stand.front ?? 0];
+    if (name !== 'front' || stand.front === null) {
+      const points = stand.points.map(([px, py, pz]) => [px - x, -(py - y), -(pz - z)]);
+      const seen = (/** @type {number[]} */ axis) => points.map((point) => ({ across: dot(point, axis), away: -dot(point, back) }));
+      const wide = fitted(seen(right), stand.reach[0]);
+      const high = fitted(seen(up), stand.reach[1]);
+      stands = [wide.aside, high.aside, Math.max(wide.back, high.back)];
+    }
+    const target = [x, -y, -z].map((v, k) => v + stands[0] * right[k] + stands[1] * up[k]);
     // An orbit that still swings ends here: an update without damping takes all that is left of it.
     const { enableDamping } = this.controls;
     this.controls.enableDamping = false;
     this.controls.update();
-    this.controls.target.set(x, -y, -z);
-    this.camera.position.set(x + flat * Math.sin(bearing[0]), -y + away * Math.sin(bearing[1]), -z + flat * Math.cos(bearing[0]));
-    this.camera.near = place.away * 0.02;
-    this.camera.far = place.away * 60;
-    this.controls.minDistance = place.away * 0.06;
-    this.controls.maxDistance = place.away * 12;
+    this.controls.target.set(target[0], target[1], target[2]);
+    this.camera.position.set(target[0] + stands[2] * back[0], target[1] + stands[2] * back[1], target[2] + stands[2] * back[2]);
+    this.camera.near = stand.scale * 0.02;
+    this.camera.far = stand.scale * 60 + stands[2];
+    this.controls.minDistance = stand.scale * 0.06;
+    this.controls.maxDistance = stand.scale * 12 + stands[2];
     this.controls.update();
     this.controls.enableDamping = enableDamping;
     this.draw();
