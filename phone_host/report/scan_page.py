@@ -25,8 +25,8 @@ _FITS: Final = (
     " of them agree; it does not tell an error that they share, such as a wrong baseline."
 )
 _SHARES: Final = (
-    "Depth: the pixels that the matcher could measure. On the model: of these, what lies on surface that earlier pairs have seen; below 35 % a pair"
-    " is not believed."
+    "Depth: the pixels that the matcher could measure. On the model: of these, what lies on surface that earlier pairs have seen; below 15 % a pair"
+    " is not believed, below 35 % if few corners agree on its motion."
 )
 
 
@@ -78,6 +78,7 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
         return ()
     area, unit = area_text(model.size.area_m2).split(" ")
     width, height, depth = (f"{length * 1e3:.0f}" for length in model.size.extent_m)
+    border, border_unit = distance_text(model.size.border_m).split(" ")
     off = f"{report.off_m * 1e3:.2g}" if math.isfinite(report.off_m) else "\u2013"
     return (
         Figure(label="pairs in the model", value=f"{report.fused}", unit=f"of {len(report.pairs)}"),
@@ -91,8 +92,8 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
         Figure(label="surface", value=area, unit=unit, note=f"{width} x {height} x {depth} mm"),
         Figure(
             label="open border",
-            value=f"{model.size.border_m:.3g}",
-            unit="m",
+            value=border,
+            unit=border_unit,
             note="where the surface ends, because nothing more was seen; 0 is closed",
         ),
         Figure(

@@ -42,6 +42,7 @@ class PoseGate:
         most_shift_m: the model may correct odometry by this much, m.
         most_turn: and by this much, rad.
         least_overlap: share of the pixels in view that must have a partner in the model.
+        sure_overlap: the same where corners enough agree on the motion: a street seen at 9 degrees gives 0.25.
         least_near: share of the partners that must lie within 3 standard deviations.
         most_off: times the usual mean distance to the model.
         least_depths: share of the pixels that must have a depth.
@@ -51,6 +52,7 @@ class PoseGate:
     most_shift_m: float = 0.08
     most_turn: float = 0.105
     least_overlap: float = 0.35
+    sure_overlap: float = 0.15
     least_near: float = 0.5
     most_off: float = 2.0
     least_depths: float = 0.02
@@ -162,7 +164,9 @@ class Tracker:
     def _doubt(self, moved: Moved, fit: Registered) -> Weakness:
         """Return why a pose is not believed; NONE: it is."""
         gate, correction = self._gate, fit.start_now.pose()
-        if not np.isfinite(correction).all() or fit.overlap < gate.least_overlap:
+        is_sure = moved.is_known and moved.inliers >= gate.weak_inliers
+        least = gate.sure_overlap if is_sure else gate.least_overlap
+        if not np.isfinite(correction).all() or fit.overlap < least:
             return Weakness.LITTLE_OVERLAP if moved.is_known else Weakness.TOO_FAST
         far = np.linalg.norm(correction[3:]) > gate.most_shift_m or np.linalg.norm(correction[:3]) > gate.most_turn
         if far:
