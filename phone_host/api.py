@@ -40,10 +40,12 @@ from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import trouble_of
 from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
+from phone_host.output.ply import PointCloud, write_surface
 from phone_host.output.rig_files.imported import Imported, import_rig, read_own_rig
 from phone_host.report.run_json import build
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
+from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
@@ -60,11 +62,16 @@ __all__ = [
     "Intersections",
     "Result",
     "RunSnapshot",
+    "Scan",
+    "ScanModel",
+    "ScanWanted",
+    "ScannedPair",
     "Scanner",
     "StereoGeometry",
     "import_rig",
     "open_scanner",
     "triangulate",
+    "write_model",
 ]
 
 _DEPTH = 2
@@ -147,6 +154,20 @@ def open_scanner(
         scanner = Scanner(settings, own, links, core, lossless=lossless)
         opened.pop_all()
     return scanner
+
+
+def write_model(path: str | Path, model: ScanModel) -> None:
+    """Write the surface of a scan as PLY: metres, in the axes of the rectified left camera at the first pair that has depth.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        model: from `Scan.model()`.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    mesh = model.mesh
+    write_surface(Path(path), PointCloud(mesh.points_m, mesh.colours), mesh.triangles)
 
 
 def _addresses(link: str | Sequence[str]) -> list[LinkUri]:

@@ -22,6 +22,7 @@ from phone_host.verbs.pair import arguments as pair
 from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.record import arguments as record
 from phone_host.verbs.run import arguments as run
+from phone_host.verbs.scan import arguments as scan
 from phone_host.verbs.serve import arguments as serve
 from phone_host.verbs.sessions import arguments as sessions
 from phone_host.verbs.settings import arguments as settings
@@ -49,6 +50,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "calibrate": calibrate,
     "calibrate-time": calibrate_time,
     "stereo": stereo,
+    "scan": scan,
     "measure": measure,
     "quality": quality,
     "pair": pair,
@@ -57,7 +59,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "settings": settings,
 }
 
-_NATIVE: Final = frozenset({"calibrate", "measure", "quality", "stereo"})
+_NATIVE: Final = frozenset({"calibrate", "measure", "quality", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
 
 _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.
@@ -69,6 +71,7 @@ your own photographs, taken by two cameras side by side (first of a chessboard t
   phone-host target chessboard
   phone-host calibrate left/ right/ --square 25mm --out rig.yaml
   phone-host stereo left/ right/ --calibration rig.yaml --out scans
+  phone-host scan left/ right/ --calibration rig.yaml --out model    # pictures from all around: one model
 
 two photographs whose rows already match, without a calibration:
   phone-host stereo left.png right.png --rectified --disparities 64 --out scan

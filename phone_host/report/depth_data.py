@@ -116,7 +116,7 @@ def drawing(image: Image) -> bytes:
     return data.tobytes()
 
 
-def text_of(values: NDArray[np.uint16] | NDArray[np.uint8]) -> str:
+def text_of(values: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]) -> str:
     """Write numbers as base64, little endian, row by row."""
     return base64.b64encode(values.astype(values.dtype.newbyteorder("<")).tobytes()).decode("ascii")
 

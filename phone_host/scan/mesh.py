@@ -36,6 +36,11 @@ class Mesh:
     colours: NDArray[np.uint8]
     triangles: NDArray[np.int32]
 
+    @staticmethod
+    def empty() -> "Mesh":
+        """Return a mesh of nothing."""
+        return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.int32))
+
 
 def mesh_of(blocks: Blocks, voxel_m: float, least_weight: int = 1) -> Mesh:
     """Make the mesh of a volume.
@@ -57,7 +62,7 @@ def mesh_of(blocks: Blocks, voxel_m: float, least_weight: int = 1) -> Mesh:
         colours.append(part.colours)
         corners.append(part.corners)
     if not keys:
-        return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.int32))
+        return Mesh.empty()
     # An edge on the border of two parts was met by both: its point is one.
     whole, chosen = np.unique(np.concatenate(keys), return_index=True)
     wanted = np.searchsorted(whole, np.concatenate(corners)).reshape(-1, 3).astype(np.int32)

@@ -141,7 +141,7 @@ class Odometry:
         """Follow the held points into the view; return how many were."""
         pixels, found = followed(before, view.grey, self._held.observed_px[:, :2].astype(np.float32))
         held = self._held.only(found)
-        self._held = replace(held, observed_px=_observed(pixels[found], view))
+        self._held = replace(held, observed_px=view.observed(pixels[found]))
         return len(held.ids)
 
     def _is_keyframe(self) -> bool:
@@ -185,7 +185,7 @@ class Odometry:
             settings.apart_px,
             np.isfinite(view.depth_m),
         )
-        observations = _observed(pixels, view)
+        observations = view.observed(pixels)
         observations = observations[np.isfinite(observations[:, 2])]
         ids = np.arange(self._next_id, self._next_id + len(observations))
         self._next_id += len(observations)
@@ -194,11 +194,3 @@ class Odometry:
             observed_px=np.concatenate([held.observed_px, observations]),
             points_m=np.concatenate([held.points_m, self._pose.apply(observer.points(observations))]),
         )
-
-
-def _observed(pixels: NDArray[np.float32], view: View) -> Floats:
-    """Return (N, 3) float64 u, v and the disparity of the nearest pixel, px; NaN = none."""
-    geometry, places = view.geometry, np.rint(pixels).astype(np.int64)
-    depth = view.depth_m[places[:, 1], places[:, 0]].astype(np.float64)
-    disparity = geometry.focal_px * geometry.baseline_m / depth - geometry.doffs_px
-    return np.column_stack([pixels.astype(np.float64), disparity])

@@ -1,7 +1,7 @@
 """One pair as the scan takes it: the rectified left image, its depth, and how sure that is. Pure."""
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -28,7 +28,8 @@ class View:
         depth_m: (H, W) float32, m, NaN = none.
         geometry: of the rectified pair.
         noise_px: standard deviation of a disparity, px, > 0.
-        patch_px: side of the patches whose depths err together, px: what a matcher smooths; a depth camera's window is smaller.
+        patch_px: side of the patches whose depths err together, px; a depth camera's window is smaller. A matcher smooths over 40 px, but the
+            rectification's errors reach over half of the image: with 320 a rig at rest stays within 2 mm, with 40 it wanders 6.
     """
 
     grey: Image
@@ -36,12 +37,19 @@ class View:
     depth_m: Depth
     geometry: StereoGeometry
     noise_px: float
-    patch_px: float = 40.0
+    patch_px: float = 320.0
 
     @property
     def noise_per_m(self) -> float:
         """Standard deviation of the depth 1 m away, m; it grows with the depth squared."""
         return self.noise_px / (self.geometry.focal_px * self.geometry.baseline_m)
+
+    def observed(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+        """Return u, v and the disparity of the nearest pixel, (N, 3), px, NaN = none, at pixels (N, 2) inside the image."""
+        geometry, places = self.geometry, np.rint(pixels).astype(np.int64)
+        depth = self.depth_m[places[:, 1], places[:, 0]].astype(np.float64)
+        disparity = geometry.focal_px * geometry.baseline_m / depth - geometry.doffs_px
+        return np.column_stack([pixels.astype(np.float64), disparity])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +84,7 @@ def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeome
         cy_px=geometry.cy_px / 2,
         doffs_px=geometry.doffs_px / 2,
     )
-    return np.ascontiguousarray(depth_m[::2, ::2]), half
+    return depth_m[::2, ::2].copy(), half
 
 
 def reduced(view: View) -> View:

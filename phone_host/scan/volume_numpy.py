@@ -23,8 +23,10 @@ _AT_ONCE: Final = 64
 """Blocks that are fused together: they fit the cache."""
 
 _SEED_TRUNCATIONS: Final = F(1.5)
-_JUMP: Final = F(0.05)
+_JUMP: Final = F(0.025)
+_KNOWN: Final = F(0.75)
 _ROOT_STEPS: Final = 2
+_MEMORY: Final = 2
 
 
 def _turned(pose: Floats, x: Floats, y: Floats, z: Floats) -> Floats:
@@ -133,17 +135,19 @@ class _Field:
         return blocks.field[safe, at].astype(F), there & (blocks.weights[safe, at] > 0), there
 
     def between(self, points: Floats) -> Floats:
-        """Return the field between voxels at (N, 3) points, trilinear; NaN where one of the eight is unknown."""
+        """Return the field between voxels at (N, 3) points, trilinear among the known voxels; NaN where less than three quarters are."""
         floored = np.floor(points)
         low, share = floored.astype(np.int32), points - floored
-        total, known = np.zeros(len(points), F), np.ones(len(points), np.bool_)
+        total, known = np.zeros(len(points), F), np.zeros(len(points), F)
         for corner in range(8):
             step = np.array([corner & 1, corner >> 1 & 1, corner >> 2], np.int32)
             values, here, _ = self.at(low + step)
             parts = np.where(step == 1, share, F(1) - share)
-            total += parts[:, 0] * parts[:, 1] * parts[:, 2] * values
-            known &= here
-        return np.where(known, total, F(np.nan))
+            whole = parts[:, 0] * parts[:, 1] * parts[:, 2]
+            total += np.where(here, whole * values, F(0))
+            known += np.where(here, whole, F(0))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(known >= _KNOWN, total / known, F(np.nan))
 
 
 def cast(blocks: Blocks, settings: VolumeSettings, camera: Camera, seeds: Depth | None) -> tuple[Floats, Floats]:
@@ -184,19 +188,19 @@ class _Rays:
 def _found(field: _Field, settings: VolumeSettings, rays: _Rays, start: Floats, end: Floats) -> Floats:
     """Return the depth of the surface on each ray, (N,), NaN = none."""
     voxel, truncation, scale = F(settings.voxel_m), F(settings.truncation_m), F(1) / F(settings.voxel_m)
-    depth, has_before, result = start.copy(), np.zeros(len(start), np.bool_), np.full(len(start), F(np.nan))
+    depth, before, result = start.copy(), np.zeros(len(start), np.int64), np.full(len(start), F(np.nan))
     walking = np.flatnonzero(depth < end)
     while len(walking):
         at = rays.only(walking).at(depth[walking], scale)
         values, known, there = field.at(np.floor(at + F(0.5)).astype(np.int32))
         values = values / F(ONE)
         behind = known & (values <= 0)
-        ends = walking[behind & has_before[walking]]
+        ends = walking[behind & (before[walking] > 0)]
         result[ends] = _root(field, rays.only(ends), depth[ends] - F(2) * voxel, depth[ends] + voxel, scale)
         step = np.where(
             known, np.maximum(F(0.8) * values * truncation, voxel), np.where(there, voxel, F(0.5) * truncation)
         )
-        has_before[walking] = known
+        before[walking] = np.where(known, _MEMORY, np.maximum(before[walking] - 1, 0))
         depth[walking] += step
         walking = walking[~behind]
         walking = walking[depth[walking] < end[walking]]
@@ -224,12 +228,20 @@ def _root(field: _Field, rays: _Rays, before: Floats, behind: Floats, scale: np.
 def _normals(points: Floats) -> Floats:
     """Return the normals of a point image from each point's neighbours."""
     normals = np.full(points.shape, F(np.nan))
+    here = points[1:-1, 1:-1]
     with np.errstate(invalid="ignore", divide="ignore"):
-        a, b = points[1:-1, 2:] - points[1:-1, :-2], points[2:, 1:-1] - points[:-2, 1:-1]
-        most = _JUMP * points[1:-1, 1:-1, 2]
-        smooth = (np.abs(a[..., 2]) <= most) & (np.abs(b[..., 2]) <= most)
+        a = _slope(here, points[1:-1, :-2], points[1:-1, 2:])
+        b = _slope(here, points[:-2, 1:-1], points[2:, 1:-1])
         cross = np.cross(b, a).astype(F)
         x, y, z = (cross[..., axis] for axis in range(3))
-        unit = cross / np.sqrt(x * x + y * y + z * z)[..., np.newaxis]
-    normals[1:-1, 1:-1] = np.where(smooth[..., np.newaxis], unit, F(np.nan))
+        normals[1:-1, 1:-1] = cross / np.sqrt(x * x + y * y + z * z)[..., np.newaxis]
     return normals
+
+
+def _slope(here: Floats, low: Floats, high: Floats) -> Floats:
+    """Return how the points go on, to the neighbours on both sides if they lie on one slope, else to the one that does; NaN: neither."""
+    most = _JUMP * here[..., 2]
+    both = np.abs((low[..., 2] + high[..., 2]) * F(0.5) - here[..., 2]) <= most
+    after, before = (np.abs(beside[..., 2] - here[..., 2]) <= most for beside in (high, low))
+    ways = [high - low, high - here, here - low]
+    return np.select([flags[..., np.newaxis] for flags in (both, after, before)], ways, F(np.nan))

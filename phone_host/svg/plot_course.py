@@ -30,7 +30,7 @@ class Course:
         label: what it is.
         colour: its index into the palette.
         values: (V,), in the plot's unit; NaN = none.
-        limits: (V,) half the length of its bar, in that unit.
+        limits: (V,) half the length of its bar, in that unit; 0: it has none.
     """
 
     label: str
@@ -71,7 +71,8 @@ def over_views(names: Sequence[str], courses: Sequence[Course], unit: str, label
                 parts.append(
                     f'<path style="stroke:var(--c{one.colour});stroke-width:1.5" d="M{x:.1f} {up.px(value - limit):.1f}V{up.px(value + limit):.1f}"/>'
                 )
-            title = f"{names[index]}: {one.label} {value:+.3g} ± {limit:.2g} {unit}"
+            spread = f" ± {limit:.2g}" if limit > 0 else ""
+            title = f"{names[index]}: {one.label} {value:+.3g}{spread} {unit}"
             parts.append(point(one.colour, (x, up.px(value)), 3.6, title))
     return svg(width_px, _HEIGHT_PX, label, parts)
 

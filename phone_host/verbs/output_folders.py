@@ -36,7 +36,7 @@ _OWN_KEYS: Final = (
 )
 """For reports before that key: one that only this verb's report has, or only with one of those before it."""
 
-_VERBS: Final = frozenset({"quality", *(verb for _, verb in _OWN_KEYS)})
+_VERBS: Final = frozenset({"quality", "scan", *(verb for _, verb in _OWN_KEYS)})
 """No other name in a report becomes part of a file's name."""
 
 

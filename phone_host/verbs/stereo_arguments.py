@@ -23,6 +23,16 @@ PAIRED: Final = (
 def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare --calibration, --rectified and their related options, and those that say which points are written."""
     add_core_arguments(parser)
+    add_limit_arguments(parser)
+    parser.add_argument(
+        "--complete",
+        action="store_true",
+        help="also write completed.pfm: the disparity with its holes completed from their surroundings, and completed.png, which marks them; no other file contains them",
+    )
+
+
+def add_limit_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare --far, --crop and --axes: which points are written, and how."""
     parser.add_argument(
         "--far",
         metavar="MM",
@@ -30,11 +40,6 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--crop", metavar="X,Y,W,H", help="only this part of the rectified left image gets depth, px of the full size"
-    )
-    parser.add_argument(
-        "--complete",
-        action="store_true",
-        help="also write completed.pfm: the disparity with its holes completed from their surroundings, and completed.png, which marks them; no other file contains them",
     )
     parser.add_argument(
         "--axes",

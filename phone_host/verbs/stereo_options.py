@@ -101,6 +101,42 @@ def build_core(
     return StereoCore(_matcher(chosen, options.disparities, temporal=temporal), None, geometry, wanted), None
 
 
+def metric_core(options: argparse.Namespace, matcher: str, size_px: tuple[int, int], images: Path) -> StereoCore:
+    """Build the stereo core for files, corrected by --overlay, which must give metres.
+
+    Args:
+        options: options as `add_core_arguments` and `add_overlay_argument` declare them.
+        matcher: name of the matcher.
+        size_px: width and height of the images, px.
+        images: one of them.
+
+    Raises:
+        SettingsError: the options contradict each other, or give no metres.
+        DataError: rig.yaml or calib.txt is invalid, or the rig was rejected by its calibration.
+    """
+    core, _ = build_core(options, options.calibration or "", matcher, size_px, images)
+    if core is None or core.geometry is None:
+        raise SettingsError(
+            "the images have neither a focal length nor a baseline, so there are no distances",
+            "add --focal PX and --baseline MM, or give --calibration",
+        )
+    core.correct(overlay_of(options, core))
+    return core
+
+
+def require_metres(options: argparse.Namespace) -> None:
+    """Refuse options that name no geometry at all, before anything is read.
+
+    Raises:
+        SettingsError: there is neither --calibration nor --rectified.
+    """
+    if not options.calibration and not options.rectified:
+        raise SettingsError(
+            "neither --calibration nor --rectified is given",
+            "give the rig.yaml of `phone-host calibrate`, or --rectified --focal PX --baseline MM",
+        )
+
+
 def overlay_of(options: argparse.Namespace, core: StereoCore | None) -> Departure:
     """Read --overlay; no correction without it.
 

@@ -19,6 +19,7 @@ class Topic(Enum):
     """The page's sections, in order, by their headings."""
 
     DEPTH = "Depth"
+    SCAN = "Scan"
     CALIBRATION = "Calibration"
     LINKS = "Links"
     CLOCK = "Clock"
@@ -327,6 +328,7 @@ SOURCES: Final = (
     Source("matcher", Topic.DEPTH, "The default matcher's time beside OpenCV's, in turns, on two threads.", f"{_BENCH}bench_matcher --json", _matcher, 60),
     Source("demo", Topic.DEPTH, "The demo: a rendered scene of known depth, both programs live.", "phone-host demo --out out/figures/demo --json", _demo, 40),
     Source("sizes", Topic.DEPTH, "Photographs of a rendered scene through `phone-host stereo` and a rig, from start to exit. Time counts other jobs of the machine, CPU time does not.", f"{_BENCH}bench_sizes --quick --json", _sizes, 150),
+    Source("scan", Topic.SCAN, "Sequences of others: a street's pairs by odometry alone, a depth camera's clip of a room through the tracker, whole and thinned out, a stereo rig at rest.", f"{_BENCH}bench_scan --runs 3 --seeds 5 --json", _verdicts, 150),
     Source("rig1", Topic.CALIBRATION, "A published rig, 1280x720.", _CALIBRATE.format(left="simplestereo_rig1/calib/*_L.png", right="simplestereo_rig1/calib/*_R.png", board="7x6", square="60.5mm", name="rig1"), _published, 20),
     Source("opencv", Topic.CALIBRATION, "OpenCV's example images, 640x480. The side of the squares is unknown.", _CALIBRATE.format(left="opencv_stereo_calib/left*.jpg", right="opencv_stereo_calib/right*.jpg", board="9x6", square="25mm", name="opencv"), _opencv_images, 10),
     Source("rigs", Topic.CALIBRATION, "Real rigs, the same made unlike (right images cropped, scaled by 0.6, re-exposed, compressed again), and ten rendered rigs whose truth is known, beside OpenCV's `stereo_calib` recipe.", f"{_BENCH}bench_calibration --json", _rigs, 90),

@@ -32,6 +32,7 @@ _HARDWARE: Final = (
     "host.toml",
     "wall",
     "session.mcap",
+    "walk/",  # pictures on the way around a thing: tests/system/test_scan_command.py
     "host.mcap",
     "opencv-bm",
     "phone-host serve",  # until it is stopped; tests/system/test_serve.py

@@ -12,10 +12,12 @@ import pytest
 from phone_host.model import Epipolar
 from phone_host.report.calibration_page import calibration_page
 from phone_host.report.chart_view import stacked_chart
+from phone_host.report.model_view import ShownModel, model_view
 from phone_host.report.page_frame import document
 from phone_host.report.page_links import NextCommand
 from phone_host.report.page_script import Script
 from phone_host.report.stereo_page import stereo_page
+from phone_host.scan.mesh import Mesh
 from phone_host.svg.plots import Quantity
 from tests.support import calibration_series
 from tests.support.browser import Browser, browser, needs_chromium
@@ -192,3 +194,42 @@ def box(page: Browser, selector: str) -> list[float]:
 def drawn(page: Browser) -> list[float]:
     """Return azimuth, polar angle and distance at which the cloud was last drawn."""
     return [float(value) for value in page.ask(DRAWN)]
+
+
+def test_a_scan_turns_and_shows_how_exactly_it_is_known(shown: tuple[Browser, str], tmp_path: Path) -> None:
+    """The model is drawn in its colours, red; `shape alone` is grey; a button turns it; its policy refuses nothing."""
+    points = np.array([[-0.5, -0.5, 2], [0.5, -0.5, 2], [-0.5, 0.5, 2], [0.5, 0.5, 2]], np.float32)
+    mesh = Mesh(
+        points, np.tile(np.array([[200, 20, 20]], np.uint8), (4, 1)), np.array([[0, 2, 1], [1, 2, 3]], np.int32)
+    )
+    path = tmp_path / "index.html"
+    view = model_view(ShownModel(mesh, np.array([0.001, 0.002, 0.003, 0.004], np.float32), 0.01), "model.ply")
+    path.write_text(document("Scan", view, Script.DEPTH))
+    page, _ = shown
+    page.complaints.clear()
+    page.open(path.as_uri())
+    page.wait("document.querySelector('.turn canvas').dataset.drawn")
+    page.ask("document.querySelector('button[data-to=front]').click()")
+    left, top, width, height = box(page, ".turn canvas")
+
+    def middle() -> list[float]:
+        page.picture(tmp_path / "seen.png")
+        seen = cv2.imread(str(tmp_path / "seen.png"))
+        assert seen is not None
+        row, column = round(top + page.ask("scrollY") + height / 2), round(left + width / 2)
+        blue, green, red = seen[row - 9 : row + 9, column - 9 : column + 9].reshape(-1, 3).mean(axis=0).tolist()
+        return [red, green, blue]
+
+    page.wait(f"Math.abs({DRAWN}[1] - Math.PI / 2) < 0.02")
+    red, green, blue = middle()
+    assert red > 150
+    assert max(green, blue) < 60
+    page.ask("document.querySelector('[data-paint=shape]').click()")
+    page.wait("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+    shape = middle()
+    assert min(shape) > 100
+    assert max(shape) - min(shape) < 5
+    before = drawn(page)
+    page.ask("document.querySelector('button[data-to=side]').click()")
+    page.wait(f"Math.abs({DRAWN}[0] - {before[0]}) > 0.5")
+    assert page.complaints == []

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.model import Lens, Rig
+from phone_host.output.quaternion import quaternion_of
 from phone_host.output.rig_files.stated import StatedCamera, StatedRig, stated_of
 from phone_host.output.rig_files.texts import RigText, number
 from phone_host.output.rig_files.tree import Node
@@ -173,22 +174,6 @@ def _rotation(node: Node, quaternion: tuple[float, ...]) -> NDArray[np.float64]:
     )
 
 
-def _quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return w, x, y, z of a rotation, w >= 0: the eigenvector of Bar-Itzhack's matrix (2000), which no angle divides by 0."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
-    matrix = np.array(
-        [
-            [xx - yy - zz, 0, 0, 0],
-            [yx + xy, yy - xx - zz, 0, 0],
-            [zx + xz, zy + yz, zz - xx - yy, 0],
-            [zy - yz, xz - zx, yx - xy, xx + yy + zz],
-        ]
-    )
-    _, vectors = np.linalg.eigh(matrix, UPLO="L")
-    x, y, z, w = vectors[:, -1]
-    return np.array([w, x, y, z]) * (1.0 if w >= 0 else -1.0)
-
-
 def colmap_texts(rig: Rig) -> tuple[RigText, ...]:
     """Write cameras.txt, images.txt and an empty points3D.txt; the world's axes are the left camera's, its unit metres.
 
@@ -212,7 +197,7 @@ def colmap_texts(rig: Rig) -> tuple[RigText, ...]:
         centre = (value + _CENTRE_PX for value in camera.centre_px)
         values = " ".join(number(value) for value in (*camera.focal_px, *centre, *coefficients))
         cameras.append(f"{id_} {name} {camera.width_px} {camera.height_px} {values}")
-        pose = " ".join(number(value) for value in (*_quaternion(rotation), *translation))
+        pose = " ".join(number(value) for value in (*quaternion_of(rotation), *translation))
         images += [f"{id_} {pose} {id_} {('left', 'right')[id_ - 1]}.png", ""]
     return (
         RigText(CAMERAS, "\n".join(cameras) + "\n"),

@@ -9,11 +9,9 @@ from phone_host.calibration.target import Board, parse_board
 from phone_host.output.json_text import json_text
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_lines import quality_lines
-from phone_host.report.stereo_report import Size
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.quality_job import NAMES, QualityJob, run_quality
 from phone_host.settings import most_pixels
-from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from phone_host.verbs.given_pictures import given_pictures
@@ -21,7 +19,7 @@ from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
 from phone_host.verbs.stereo_numbers import crop_of
-from phone_host.verbs.stereo_options import build_core, overlay_of
+from phone_host.verbs.stereo_options import metric_core, require_metres
 from phone_host.verbs.units import limit_mm, square_mm
 
 _CHECK_FAILED: Final = 4
@@ -29,11 +27,7 @@ _CHECK_FAILED: Final = 4
 
 def run(options: argparse.Namespace) -> int:
     """Pair the files, measure them, and print what came of it."""
-    if not options.calibration and not options.rectified:
-        raise SettingsError(
-            "neither --calibration nor --rectified is given",
-            "give the rig.yaml of `phone-host calibrate`, or --rectified --focal PX --baseline MM",
-        )
+    require_metres(options)
     board = _board(options)
     roi = None if options.roi is None else crop_of(options.roi, "--roi")
     matcher = options.matcher or default_matcher().value
@@ -45,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     job = QualityJob(
         files=files,
         out=options.out,
-        make_core=lambda size_px: _core(options, matcher, size_px, files),
+        make_core=lambda size_px: metric_core(options, matcher, size_px, files.pairs[0][1]),
         matcher=matcher,
         matcher_note="" if options.matcher else default_note(),
         distances_m=distances_m,
@@ -104,14 +98,3 @@ def _distances_m(options: argparse.Namespace, files: ViewFiles) -> tuple[float, 
             "give one for all, or one for each in the order of their names, such as 500mm,1m,2m",
         )
     return found
-
-
-def _core(options: argparse.Namespace, matcher: str, size_px: Size, files: ViewFiles) -> StereoCore:
-    core, _ = build_core(options, options.calibration or "", matcher, size_px, files.pairs[0][1])
-    if core is None or core.geometry is None:
-        raise SettingsError(
-            "the images have neither a focal length nor a baseline, so there are no distances",
-            "add --focal PX and --baseline MM, or give --calibration",
-        )
-    core.correct(overlay_of(options, core))
-    return core

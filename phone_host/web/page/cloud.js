@@ -1,23 +1,16 @@
-// The point cloud: disparity and colours are textures, the vertex shader reprojects. The project's only viewer: the live page loads this
-// module, the static pages hold it inlined.
+// The point cloud: disparity and colours are textures, the vertex shader reprojects. The live page loads this module, the static pages
+// hold it inlined.
 //
-// There are no vertex buffers: a point's number is gl_VertexID. Axes inside: X right, Y up, Z towards the viewer, so that the left camera
-// looks along -Z. A picture is drawn only when the data, the camera or the size changed.
+// There are no vertex buffers: a point's number is gl_VertexID.
 
-import { fitted, lengthOf, middleOf, places } from './depth.js';
-import { CloudLegend } from './legend.js';
+import { lengthOf, middleOf, places } from './depth.js';
 import { RAMP } from './ramp.js';
 import * as three from './vendor/three.js';
+import { opaque, Viewer } from './viewer.js';
 
 /** @typedef {import('./depth.js').Grid} Grid */
 /** @typedef {import('./depth.js').Geometry} Geometry */
 /** @typedef {import('./depth.js').Limits} Limits */
-/** @typedef {'turned' | 'front' | 'side' | 'above'} ViewName */
-
-/** Yaw and pitch of the views by name. */
-const VIEWS = { turned: [-0.28, 0.2], front: [0, 0], side: [-1.25, 0.1], above: [0, 1.25] };
-
-const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 const VERTEX = `
 precision highp float;
@@ -53,25 +46,17 @@ in vec3 colour;
 out vec4 shown;
 void main() { shown = vec4(colour, 1.0); }`;
 
-/** @returns {boolean} whether this browser can show a cloud */
-export function canShowClouds() {
-  return !!document.createElement('canvas').getContext('webgl2');
-}
+export { canShowClouds } from './viewer.js';
 
 /** A cloud that can be turned. */
-export class Cloud {
+export class Cloud extends Viewer {
   /**
    * @param {HTMLCanvasElement} canvas - takes the keyboard, too
    * @param {HTMLCanvasElement} over - lies on it, for scale and axes
    * @throws {Error} where there is no WebGL 2
    */
   constructor(canvas, over) {
-    this.canvas = canvas;
-    this.legend = new CloudLegend(over);
-    this.renderer = new three.WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' });
-    this.renderer.setClearAlpha(0);
-    this.camera = new three.PerspectiveCamera(45, 1, 0.01, 100);
-    this.scene = new three.Scene();
+    super(canvas, over);
     this.material = shaders();
     this.points = new three.Points(new three.BufferGeometry(), this.material);
     this.points.frustumCulled = false;
@@ -79,17 +64,10 @@ export class Cloud {
     this.scene.add(this.points);
     /** @type {?{grid: Grid, geometry: Geometry, limits: Limits}} */
     this.data = null;
-    /** @type {?number[]} */
-    this.pivot = null;
-    this.asked = 0;
     this.thin = 1;
     this.lastMove = 0;
     this.slow = 0;
     this.rest = 0;
-    this.controls = orbit(this.camera, canvas, () => this.moved());
-    listen(this, canvas);
-    new ResizeObserver(() => this.draw()).observe(canvas);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
   }
 
   /**
@@ -113,7 +91,7 @@ export class Cloud {
     uniforms.range.value = range.map((d) => Math.max(d + geometry.doffs, 1e-3));
     this.points.visible = true;
     this.data = { grid, geometry, limits };
-    if (!this.pivot && (this.pivot = middleOf(grid, geometry, limits))) this.view('turned');
+    if (!this.pivot && middleOf(grid, geometry, limits)) this.view('turned');
     this.draw();
   }
 
@@ -133,44 +111,19 @@ export class Cloud {
     this.draw();
   }
 
-  /** Go to a view by name: from where the camera stood, or all of the cloud, turned around the thing in the middle. @param {ViewName} name */
-  view(name) {
-    if (!this.data) return;
-    const { grid, geometry, limits } = this.data;
-    this.pivot = middleOf(grid, geometry, limits) ?? this.pivot ?? [0, 0, 1];
-    const [yaw, pitch] = VIEWS[name];
-    const [x, y, z] = this.pivot;
-    const [turn, tilt] = [Math.atan2(-x, z) + yaw, Math.asin(y / lengthOf(this.pivot)) + pitch];
-    const right = [Math.cos(turn), 0, -Math.sin(turn)];
-    const up = [-Math.sin(tilt) * Math.sin(turn), Math.cos(tilt), -Math.sin(tilt) * Math.cos(turn)];
-    const back = [Math.cos(tilt) * Math.sin(turn), Math.sin(tilt), Math.cos(tilt) * Math.cos(turn)];
-    let stands = [0, 0, lengthOf(this.pivot)];
-    if (name !== 'front') {
-      const points = places(grid, geometry, limits).map(([px, py, pz]) => [px - x, y - py, z - pz]);
-      const seen = (/** @type {number[]} */ axis) => points.map((point) => ({ across: dot(point, axis), away: -dot(point, back) }));
-      const wide = fitted(seen(right), grid.width / 2 / geometry.focal);
-      const high = fitted(seen(up), grid.height / 2 / geometry.focal);
-      stands = [wide.aside, high.aside, Math.max(wide.back, high.back)];
-    }
-    const target = [x, -y, -z].map((v, k) => v + stands[0] * right[k] + stands[1] * up[k]);
-    // An orbit that still swings ends here: an update without damping takes all that is left of it.
-    const { enableDamping } = this.controls;
-    this.controls.enableDamping = false;
-    this.controls.update();
-    this.controls.target.set(target[0], target[1], target[2]);
-    this.camera.position.set(target[0] + stands[2] * back[0], target[1] + stands[2] * back[1], target[2] + stands[2] * back[2]);
-    this.camera.near = z * 0.02;
-    this.camera.far = z * 60 + stands[2];
-    this.controls.minDistance = z * 0.06;
-    this.controls.maxDistance = z * 12 + stands[2];
-    this.controls.update();
-    this.controls.enableDamping = enableDamping;
-    this.draw();
+  /** @returns {boolean} */
+  isEmpty() {
+    return !this.data;
   }
 
-  /** Have the next frame drawn. */
-  draw() {
-    this.asked ||= requestAnimationFrame(() => this.frame());
+  /** @returns {?import('./viewer.js').Stand} */
+  stand() {
+    if (!this.data) return null;
+    const { grid, geometry, limits } = this.data;
+    const middle = middleOf(grid, geometry, limits) ?? this.pivot ?? [0, 0, 1];
+    const points = places(grid, geometry, limits);
+    const { focal } = geometry;
+    return { middle, front: lengthOf(middle), points, reach: [grid.width / 2 / focal, grid.height / 2 / focal], scale: middle[2] };
   }
 
   /** While it moves, points are thinned on slow machines; at rest all are shown. */
@@ -188,29 +141,20 @@ export class Cloud {
     this.draw();
   }
 
-  frame() {
-    this.asked = 0;
-    if (!this.data || !this.canvas.clientWidth) return;
-    const { controls } = this;
-    const { grid, geometry } = this.data;
-    const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(w, h, false);
-    // What the left camera sees fits in: the same angle across the tighter side.
-    const zoom = Math.min(w / grid.width, h / grid.height) * geometry.focal;
-    this.camera.aspect = w / h;
-    this.camera.fov = (2 * Math.atan(h / 2 / zoom) * 180) / Math.PI;
-    this.camera.updateProjectionMatrix();
-    controls.update();
+  /** What the left camera sees fits in: the same angle across the tighter side. @param {number} w @param {number} h @returns {number} */
+  zoom(w, h) {
+    const { grid, geometry } = /** @type {{grid: Grid, geometry: Geometry}} */ (this.data);
+    return Math.min(w / grid.width, h / grid.height) * geometry.focal;
+  }
+
+  /** @param {number} pixels - device pixels per unit of tangent */
+  ready(pixels) {
+    const { grid } = /** @type {{grid: Grid}} */ (this.data);
     const { uniforms } = this.material;
     uniforms.thin.value = this.thin;
-    uniforms.pixels.value = zoom * ratio;
+    uniforms.pixels.value = pixels;
     const count = Math.ceil(grid.columns / this.thin) * Math.ceil(grid.rows / this.thin);
     this.points.geometry.setDrawRange(0, count);
-    this.renderer.render(this.scene, this.camera);
-    this.legend.draw(this.camera, controls.target, zoom, ratio);
-    this.canvas.dataset.drawn = [controls.getAzimuthalAngle(), controls.getPolarAngle(), controls.getDistance()].map((v) => v.toFixed(3)).join(' ');
   }
 }
 
@@ -226,13 +170,6 @@ function shaders() {
     byDepth: { value: false }, cells: { value: null }, picture: { value: null }, ramp: { value: ramp },
   };
   return new three.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, glslVersion: three.GLSL3, uniforms });
-}
-
-/** @param {Uint8Array} rgb @returns {Uint8Array} with alpha */
-function opaque(rgb) {
-  const all = new Uint8Array((rgb.length / 3) * 4).fill(255);
-  for (let i = 0; i < rgb.length / 3; i++) all.set(rgb.subarray(3 * i, 3 * i + 3), 4 * i);
-  return all;
 }
 
 /** Put cells into an R16UI texture, the same one as long as the size stays. @param {{value: any}} uniform @param {Grid} grid */
@@ -270,38 +207,4 @@ function paint(uniform, picture) {
     uniform.value = made;
   }
   uniform.value.needsUpdate = true;
-}
-
-/** @param {three.PerspectiveCamera} camera @param {HTMLCanvasElement} canvas @param {() => void} moved */
-function orbit(camera, canvas, moved) {
-  const controls = new three.OrbitControls(camera, canvas);
-  controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
-  controls.dampingFactor = 0.12;
-  controls.rotateSpeed = 0.7;
-  controls.enableZoom = false; // until it has the focus: the wheel scrolls the page
-  controls.touches = { ONE: three.TOUCH.ROTATE, TWO: three.TOUCH.DOLLY_PAN };
-  controls.addEventListener('change', moved);
-  return controls;
-}
-
-/** Keys, and the wheel only with the focus. @param {Cloud} cloud @param {HTMLCanvasElement} canvas */
-function listen(cloud, canvas) {
-  const { controls } = cloud;
-  canvas.addEventListener('focus', () => (controls.enableZoom = true));
-  canvas.addEventListener('blur', () => (controls.enableZoom = false));
-  canvas.addEventListener('pointerdown', () => canvas.focus({ preventScroll: true }), { capture: true });
-  canvas.addEventListener('dblclick', () => cloud.view('turned'));
-  /** @type {Record<string, () => void>} */
-  const keys = {
-    ArrowLeft: () => controls.rotateLeft(0.1), ArrowRight: () => controls.rotateLeft(-0.1),
-    ArrowUp: () => controls.rotateUp(0.1), ArrowDown: () => controls.rotateUp(-0.1),
-    '+': () => controls.dollyIn(0.9), '-': () => controls.dollyOut(0.9), Home: () => cloud.view('turned'),
-  };
-  canvas.addEventListener('keydown', (event) => {
-    const action = event.ctrlKey || event.metaKey || event.altKey ? undefined : keys[event.key];
-    if (!action) return;
-    event.preventDefault();
-    action();
-    cloud.draw();
-  });
 }

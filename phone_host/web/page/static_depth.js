@@ -1,9 +1,10 @@
 // The script of static pages with depth: a pointer reads metres, the cloud turns by the same viewer as on the live page. Prebuilt:
-// phone_host/report/page_depth.js. It takes all values from attributes (report/depth_view.py writes them) and loads nothing.
+// phone_host/report/page_depth.js. It takes all values from attributes (report/depth_view.py and model_view.py write them) and loads nothing.
 
 import { Cloud } from './cloud.js';
 import { connectCopying } from './copying.js';
 import { cellAt, depthOf, metres, placeOf, sigmaOf } from './depth.js';
+import { Model } from './model.js';
 
 /** @typedef {import('./depth.js').Grid} Grid */
 /** @typedef {import('./depth.js').Geometry} Geometry */
@@ -79,18 +80,49 @@ async function turnCloud(root, pictures, m) {
     const cloud = new Cloud(canvas, over);
     await left.decode();
     cloud.show(m, m, { near: null, far: null }, left, m.range);
-    for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (root.querySelectorAll('button[data-to]')))
-      button.addEventListener('click', () => cloud.view(/** @type {any} */ (button.dataset.to)));
+    connectViews(root, cloud);
   } catch {
-    const sentence = /** @type {HTMLElement} */ (root.querySelector('.nocloud'));
-    sentence.hidden = false;
+    tellNone(root);
   }
+}
+
+/** @param {HTMLElement} root - a .modelview */
+function turnModel(root) {
+  const [canvas, over] = /** @type {HTMLCanvasElement[]} */ ([...root.querySelectorAll('canvas')]);
+  const { mesh, points, triangles, colours, noise } = /** @type {Record<string, string>} */ (root.dataset);
+  try {
+    const model = new Model(canvas, over);
+    model.show({
+      ...JSON.parse(mesh),
+      points: new Uint16Array(bytes(points).buffer),
+      triangles: new Uint32Array(bytes(triangles).buffer),
+      colours: bytes(colours),
+      noise: bytes(noise),
+    });
+    connectViews(root, model);
+    for (const choice of /** @type {NodeListOf<HTMLInputElement>} */ (root.querySelectorAll('input[data-paint]')))
+      choice.addEventListener('change', () => model.paint(/** @type {any} */ (choice.dataset.paint)));
+  } catch {
+    tellNone(root);
+  }
+}
+
+/** @param {HTMLElement} root @param {import('./viewer.js').Viewer} viewer */
+function connectViews(root, viewer) {
+  for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (root.querySelectorAll('button[data-to]')))
+    button.addEventListener('click', () => viewer.view(/** @type {any} */ (button.dataset.to)));
+}
+
+/** Say that this browser cannot draw it. @param {HTMLElement} root */
+function tellNone(root) {
+  /** @type {HTMLElement} */ (root.querySelector('.nocloud')).hidden = false;
 }
 
 /** @type {?{root: HTMLElement, m: Values}} */
 let last = null;
-for (const root of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('.depthview, .cloudview'))) {
-  if (root.matches('.depthview')) {
+for (const root of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('.depthview, .cloudview, .modelview'))) {
+  if (root.matches('.modelview')) turnModel(root);
+  else if (root.matches('.depthview')) {
     last = { root, m: valuesOf(root) };
     readDepth(root, last.m);
   } else if (last) turnCloud(root, last.root, last.m);

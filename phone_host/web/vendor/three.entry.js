@@ -1,10 +1,13 @@
 // What the page uses of three.js. esbuild leaves the rest out.
 export {
+  BufferAttribute,
   BufferGeometry,
   DataTexture,
+  DoubleSide,
   GLSL3,
   LinearFilter,
   MOUSE,
+  Mesh,
   NearestFilter,
   NoColorSpace,
   PerspectiveCamera,

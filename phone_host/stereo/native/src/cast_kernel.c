@@ -12,9 +12,13 @@
 #include "volume.h"
 
 #define SEED_TRUNCATIONS 1.5f
-#define JUMP 0.05f /* neighbours whose depths differ by more, as a share, lie on different surfaces */
+#define JUMP 0.025f /* a point this share off the middle of its neighbours' depths lies beside a step, not on a slope */
+#define KNOWN 0.75f /* least share of a place between eight voxels that must be known */
 
-enum { ROOT_STEPS = 2 }; /* of the false position: the field is nearly linear there */
+enum {
+    ROOT_STEPS = 2, /* of the false position: the field is nearly linear there */
+    MEMORY = 2      /* unknown voxels after one before the surface: at a slant, views leave single ones out */
+};
 
 struct walk {
     const struct tandem_volume *volume;
@@ -38,30 +42,31 @@ static int64_t voxel_at(struct walk *walk, int32_t x, int32_t y, int32_t z)
     return (int64_t)walk->number * BLOCK_VOXELS + (x & 7) + 8 * (y & 7) + 64 * (z & 7);
 }
 
-/* The field between voxels, trilinear; NAN where one of the eight is unknown. */
+/* The field between voxels, trilinear among those that are known; NAN where less than three quarters of the place are. */
 static float between(struct walk *walk, const float *at)
 {
     int32_t low[3];
-    float share[3], sum = 0;
+    float share[3], sum = 0, known = 0;
     for (int axis = 0; axis < 3; axis++) {
         low[axis] = floor_of(at[axis]);
         share[axis] = at[axis] - (float)low[axis];
     }
     const int in_one = (low[0] & 7) < 7 && (low[1] & 7) < 7 && (low[2] & 7) < 7; /* block: two in three */
     const int64_t first = voxel_at(walk, low[0], low[1], low[2]);
-    if (first < 0) {
+    if (in_one && first < 0) {
         return NAN;
     }
     for (int corner = 0; corner < 8; corner++) {
         const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
         const int64_t voxel = in_one ? first + dx + 8 * dy + 64 * dz : voxel_at(walk, low[0] + dx, low[1] + dy, low[2] + dz);
         if (voxel < 0 || walk->volume->weights[voxel] == 0) {
-            return NAN;
+            continue;
         }
         const float x = dx ? share[0] : 1 - share[0], y = dy ? share[1] : 1 - share[1], z = dz ? share[2] : 1 - share[2];
         sum += x * y * z * (float)walk->volume->field[voxel];
+        known += x * y * z;
     }
-    return sum;
+    return known >= KNOWN ? sum / known : NAN;
 }
 
 static void point_at(const struct tandem_cast_job *job, const float *ray, float depth, float *at)
@@ -102,22 +107,22 @@ static float found(const struct tandem_cast_job *job, struct walk *walk, const f
 {
     const float voxel = job->volume->voxel_m, truncation = job->volume->truncation_m;
     float depth = from;
-    int has_before = 0;
+    int before = 0;
     while (depth < to) {
         float at[3];
         point_at(job, ray, depth, at);
         const int64_t place = voxel_at(walk, floor_of(at[0] + 0.5f), floor_of(at[1] + 0.5f), floor_of(at[2] + 0.5f));
         if (place < 0 || job->volume->weights[place] == 0) {
-            has_before = 0;
+            before -= before > 0;
             depth += place < 0 ? 0.5f * truncation : voxel; /* farther would jump over the front of a surface */
             continue;
         }
         const float value = (float)job->volume->field[place] / FIELD_ONE;
         if (value <= 0) {
             /* the nearest voxel lies up to 0.87 voxels off: the sign changes about so far before or behind */
-            return has_before ? root(job, walk, ray, depth - 2 * voxel, depth + voxel) : NAN;
+            return before ? root(job, walk, ray, depth - 2 * voxel, depth + voxel) : NAN;
         }
-        has_before = 1;
+        before = MEMORY;
         const float step = 0.8f * value * truncation;
         depth += step > voxel ? step : voxel;
     }
@@ -150,25 +155,41 @@ void ISA_NAME(cast_row)(const struct tandem_cast_job *job, int32_t v)
     }
 }
 
-/* From the neighbours' points; NAN at the border and where one of them is missing or belongs to another surface. */
+/* How the points go on from a pixel along a row or column: to the neighbours on both sides if they lie on one slope, else to the one that
+ * does. 0: neither does. */
+static int slope(const float *points, ptrdiff_t at, ptrdiff_t next, float *way)
+{
+    const float *here = points + 3 * at, *low = here - 3 * next, *high = here + 3 * next;
+    const float most = JUMP * here[2];
+    const float *from = here, *to = here;
+    if (fabsf((low[2] + high[2]) * 0.5f - here[2]) <= most) {
+        from = low;
+        to = high;
+    } else if (fabsf(high[2] - here[2]) <= most) {
+        to = high;
+    } else if (fabsf(low[2] - here[2]) <= most) {
+        from = low;
+    }
+    for (int axis = 0; axis < 3; axis++) {
+        way[axis] = to[axis] - from[axis];
+    }
+    return from != to;
+}
+
+/* From the neighbours' points; NAN at the border and where a step lies on both sides. */
 void ISA_NAME(cast_normals)(const struct tandem_cast_job *job, int32_t v)
 {
     const ptrdiff_t wide = job->width;
     for (int32_t u = 0; u < job->width; u++) {
         const ptrdiff_t at = v * wide + u;
-        float *normal = job->normals + 3 * at;
+        float *normal = job->normals + 3 * at, a[3], b[3];
         normal[0] = normal[1] = normal[2] = NAN;
         if (u == 0 || v == 0 || u + 1 == job->width || v + 1 == job->height) {
             continue;
         }
-        const float *left = job->points_m + 3 * (at - 1), *right = job->points_m + 3 * (at + 1);
-        const float *up = job->points_m + 3 * (at - wide), *down = job->points_m + 3 * (at + wide);
-        const float most = JUMP * job->points_m[3 * at + 2];
-        if (!(fabsf(right[2] - left[2]) <= most && fabsf(down[2] - up[2]) <= most)) {
+        if (!slope(job->points_m, at, 1, a) || !slope(job->points_m, at, wide, b)) {
             continue;
         }
-        const float a[3] = {right[0] - left[0], right[1] - left[1], right[2] - left[2]};
-        const float b[3] = {down[0] - up[0], down[1] - up[1], down[2] - up[2]};
         /* b x a: towards the camera */
         const float x = b[1] * a[2] - b[2] * a[1], y = b[2] * a[0] - b[0] * a[2], z = b[0] * a[1] - b[1] * a[0];
         const float length = sqrtf(x * x + y * y + z * z);

@@ -1,0 +1,82 @@
+"""The root of a live scan: a run of the host whose pairs a model takes.
+
+    host (receiver, camera, pairing, depth) -> sink: track, fuse
+
+The sink takes one pair at a time, always the newest: while it is busy, pairs pass, and are counted. Where the cameras wait for the host,
+as in a replay, it takes them all.
+"""
+
+from typing import Final
+
+from common.words import counted
+from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.measure.trust import Doubt
+from phone_host.model import Result, Side
+from phone_host.output.axes import Axes
+from phone_host.report.stereo_report import Remark
+from phone_host.run.scan_files import FinishedScan
+from phone_host.run.scan_result import report_of
+from phone_host.run.sinks import FunctionSink
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+
+_SINK: Final = "scan"
+_NS: Final = 1e9
+
+
+class LiveScan:
+    """Takes the pairs of a run.
+
+    Attributes:
+        scan: what has become of them; whole once the run has ended.
+        sink: for the host.
+
+    Args:
+        wanted: how the model is made.
+        board_side: the side on which the board's camera stands.
+        waits: whether no pair may be missed.
+        is_timeless: whether the images have no time, because they were shown on demand; their numbers stand for it.
+    """
+
+    def __init__(self, wanted: ScanWanted, board_side: Side, *, waits: bool, is_timeless: bool) -> None:
+        self.scan, self._is_timeless = Scan(wanted), is_timeless
+        self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
+        self._is_board_left = board_side is Side.LEFT
+        self._last: ScannedPair | None = None
+        self._first_ns: int | None = None
+
+    @property
+    def words(self) -> str:
+        """What is to be told whoever holds the cameras: how many pairs are in the model, and what helps now."""
+        last = self._last
+        if last is None:
+            return "waiting for the first pair"
+        count = f"{counted(self.scan.fused, 'pair')} in the model"
+        return f"{count}: {last.weakness.advice}" if last.weakness.advice else f"{count}: go on"
+
+    def finished(self, snapshot: RunSnapshot, matcher: str, axes: Axes) -> FinishedScan:
+        """Make the surface and the report. The run has ended.
+
+        Args:
+            snapshot: its last one.
+            matcher: its name.
+            axes: of the files.
+        """
+        remarks = [
+            Remark(one.sentence, one.remedy, is_blocking=one.is_certain and one.doubt is not Doubt.NO_DEPTH)
+            for one in concerns(snapshot)
+        ]
+        missed = sum(account.dropped for account in snapshot.sinks if account.name == _SINK)
+        if missed:
+            words = f"{counted(missed, 'pair')} came while others were taken into the model, and passed"
+            remarks.append(Remark(words, "a greater --voxel is faster", is_note=True))
+        model = self.scan.model()
+        report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
+        return FinishedScan(report, model)
+
+    def _take(self, result: Result) -> None:
+        ledger = result.ledger
+        marks = ledger.board if self._is_board_left else ledger.host
+        if self._first_ns is None:
+            self._first_ns = marks.exposed_ns
+        stamp_s = float(result.number) if self._is_timeless else (marks.exposed_ns - self._first_ns) / _NS
+        self._last = self.scan.take(str(result.number), stamp_s, result.processed)

@@ -1,0 +1,148 @@
+"""The page of `scan`: whether there is a model, the model to turn, how well each pair fits it; one self-contained HTML document. Pure."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from common.imagesize.head import size_text
+from common.words import counted, distance_text
+from phone_host.report.model_view import ShownModel, model_view
+from phone_host.report.page_frame import document, section, table, two_widths
+from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
+from phone_host.report.page_script import Script
+from phone_host.report.report_page import Figure, figures_row, heading
+from phone_host.report.scan_lines import area_text
+from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict, stretches
+from phone_host.scan.scan import ScannedPair
+from phone_host.svg.plot_course import Course, over_views
+from phone_host.svg.plot_parts import legend
+
+_FITS: Final = (
+    "Each pair is laid against the model that the pairs before it have made. How far its depths lie off, on average, tells how well all"
+    " of them agree; it does not tell an error that they share, such as a wrong baseline."
+)
+_SHARES: Final = (
+    "Depth: the pixels that the matcher could measure. On the model: of these, what lies on surface that earlier pairs have seen; below 15 % a pair"
+    " is not believed, below 35 % if few corners agree on its motion."
+)
+
+
+def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand, ...] = ()) -> str:
+    """Make the page.
+
+    Args:
+        report: of the scan.
+        shown: its surface.
+        commands: what to do next.
+
+    Returns:
+        An HTML document.
+    """
+    verdict, sentence = scan_verdict(report)
+    view = model_view(shown, MODEL)
+    remarks = [
+        *(stretch.sentence for stretch in stretches(report.scanned)),
+        *(f"{pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed),
+        *(remark.text for remark in report.remarks),
+    ]
+    files = (
+        FileLink(MODEL, f"the surface with its colours, metres; {report.axes.text} at the first pair"),
+        FileLink(TRAJECTORY, "where the camera was, a line a pair: s, m, quaternion x y z w (TUM's format)"),
+        FileLink("report.json", "all figures, with those of every pair"),
+    )
+    parts = [
+        heading("Scan", _subtitle(report), verdict, sentence),
+        figures_row(_figures(report)),
+        section("Model", "", view) if view else "",
+        list_section("Remarks", remarks),
+        next_section((), commands),
+        _fits(report),
+        files_section(files),
+    ]
+    runs = (Script.DEPTH,) if view else (Script.COPY,) if commands else ()
+    return document("Scan", "".join(parts), *runs)
+
+
+def _subtitle(report: ScanReport) -> str:
+    names = [pair.name for pair in report.pairs]
+    which = f"{counted(len(names), 'pair')}, {names[0]} to {names[-1]}" if names else "no pairs"
+    return f"{which}; {size_text(report.rectified_px)} px, matcher {report.matcher}"
+
+
+def _figures(report: ScanReport) -> tuple[Figure, ...]:
+    model, settings = report.model, report.settings
+    if settings is None or not model.triangles:
+        return ()
+    area, unit = area_text(model.size.area_m2).split(" ")
+    width, height, depth = (f"{length * 1e3:.0f}" for length in model.size.extent_m)
+    border, border_unit = distance_text(model.size.border_m).split(" ")
+    off = f"{report.off_m * 1e3:.2g}" if math.isfinite(report.off_m) else "\u2013"
+    return (
+        Figure(label="pairs in the model", value=f"{report.fused}", unit=f"of {len(report.pairs)}"),
+        Figure(
+            label="surface known to",
+            value=f"\u00b1 {model.noise_m * 1e3:.2g}",
+            unit="mm",
+            note=f"median; 19 in 20 points to \u00b1 {model.noise_p95_m * 1e3:.2g} mm, if the pairs err independently",
+        ),
+        Figure(label="pairs off the model", value=off, unit="mm", note="mean; median of the pairs"),
+        Figure(label="surface", value=area, unit=unit, note=f"{width} x {height} x {depth} mm"),
+        Figure(
+            label="open border",
+            value=border,
+            unit=border_unit,
+            note="where the surface ends, because nothing more was seen; 0 is closed",
+        ),
+        Figure(
+            label="voxels",
+            value=f"{settings.voxel_m * 1e3:.3g}",
+            unit="mm",
+            note=f"depths to {distance_text(settings.far_m)}, {model.memory_bytes / 1e6:.0f} MB",
+        ),
+    )
+
+
+def _fits(report: ScanReport) -> str:
+    pairs = report.scanned
+    if len(pairs) < 2:
+        return ""
+    names = [pair.name for pair in pairs]
+
+    def course(label: str, colour: int, value: Callable[[ScannedPair], float]) -> Course:
+        return Course(label, colour, np.array([value(pair) for pair in pairs]), np.zeros(len(pairs)))
+
+    off = (
+        course("off the model", 5, lambda pair: pair.off_m * 1e3 if pair.is_fused else math.nan),
+        course("not in the model", 4, lambda pair: math.nan if pair.is_fused else pair.off_m * 1e3),
+    )
+    shares = (
+        course("depth", 0, lambda pair: pair.density * 100),
+        course("on the model", 2, lambda pair: pair.overlap * 100),
+    )
+    rows = [(one.label, one.colour) for one in off]
+    return section(
+        "How well the pairs fit",
+        _FITS,
+        legend(rows)
+        + two_widths(partial(over_views, names, off, "mm", "distance of each pair's depths from the model")),
+    ) + section(
+        "What the pairs show",
+        _SHARES,
+        legend([(one.label, one.colour) for one in shares])
+        + two_widths(partial(over_views, names, shares, "%", "depth and share on the model of each pair"))
+        + table(
+            ("camera", "figure"),
+            (
+                ("went", distance_text(report.path_m)),
+                ("from first to last place", distance_text(_reach_m(report))),
+            ),
+        ),
+    )
+
+
+def _reach_m(report: ScanReport) -> float:
+    places = [pair.world_camera.t_m for pair in report.scanned if pair.is_fused]
+    return float(np.linalg.norm(places[-1] - places[0])) if places else 0.0

@@ -1,0 +1,167 @@
+"""The report of `scan`: what became of each pair, and how good the model is. Pure.
+
+`scan_json`, `scan_lines` and `scan_page` tell it to programs, on a terminal and on a page.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Final
+
+import numpy as np
+
+from common.words import counted
+from phone_host.model import StereoGeometry
+from phone_host.output.axes import Axes
+from phone_host.report.report_page import Headline
+from phone_host.report.stereo_report import FailedPair, Remark, Size
+from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
+from phone_host.scan.scan import ScannedPair
+from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.volume_settings import VolumeSettings
+
+MODEL, TRAJECTORY = "model.ply", "trajectory.txt"
+_LEAST_SHARE: Final = 0.5
+"""Of the pairs in the model; with fewer it is not what was walked around."""
+
+_USUAL_SHARE: Final = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Pairs in a row that went alike.
+
+    Attributes:
+        pairs: in order.
+    """
+
+    pairs: tuple[ScannedPair, ...]
+
+    @property
+    def sentence(self) -> str:
+        """Which pairs, what happened, what helps."""
+        first, last, one = self.pairs[0].name, self.pairs[-1].name, len(self.pairs) == 1
+        which = f"pair {first} is" if one else f"pairs {first} to {last} are"
+        how = "not in the model" if not self.pairs[0].is_fused else "in the model, but not surely"
+        return f"{which} {how}: {self.pairs[0].weakness.advice}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelFigures:
+    """A model in numbers.
+
+    Attributes:
+        points: of its surface.
+        triangles: of its surface.
+        size: area, border and extent.
+        noise_m: median standard deviation of its points, if the views err independently, m; NaN without points.
+        noise_p95_m: of which 19 in 20 are better.
+        memory_bytes: of the field.
+        left_out: blocks for which there was no memory.
+    """
+
+    points: int = 0
+    triangles: int = 0
+    size: MeshSize = NO_SIZE
+    noise_m: float = math.nan
+    noise_p95_m: float = math.nan
+    memory_bytes: int = 0
+    left_out: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanReport:
+    """Everything that is told of a scan.
+
+    Attributes:
+        pairs: in order.
+        model: its figures.
+        settings: how the model was made; None: no pair had depth.
+        geometry: of the rectified pairs; None: as above.
+        rectified_px: their size.
+        matcher: its name.
+        axes: of model.ply.
+        remarks: what the user must know.
+        interrupted_of: how many pairs were to be taken when it was interrupted; 0: it was not.
+    """
+
+    pairs: tuple[ScannedPair | FailedPair, ...]
+    model: ModelFigures
+    settings: VolumeSettings | None
+    geometry: StereoGeometry | None
+    rectified_px: Size
+    matcher: str
+    axes: Axes = Axes.CAMERA
+    remarks: tuple[Remark, ...] = ()
+    interrupted_of: int = 0
+
+    @property
+    def scanned(self) -> tuple[ScannedPair, ...]:
+        """The pairs that were computed."""
+        return tuple(pair for pair in self.pairs if isinstance(pair, ScannedPair))
+
+    @property
+    def failed(self) -> tuple[FailedPair, ...]:
+        """The pairs that were not."""
+        return tuple(pair for pair in self.pairs if isinstance(pair, FailedPair))
+
+    @property
+    def fused(self) -> int:
+        """Pairs that are in the model."""
+        return sum(pair.is_fused for pair in self.scanned)
+
+    @property
+    def off_m(self) -> float:
+        """Mean distance of a pair's depths from the model, median of the pairs in it, m; NaN: fewer than two are."""
+        off = [pair.off_m for pair in self.scanned if pair.is_fused and math.isfinite(pair.off_m)]
+        return float(np.median(off)) if off else math.nan
+
+    @property
+    def path_m(self) -> float:
+        """How far the camera went between the pairs in the model, m."""
+        places = np.array([pair.world_camera.t_m for pair in self.scanned if pair.is_fused]).reshape(-1, 3)
+        return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether there is a model of most pairs and nothing failed. Everything that makes the exit code 4 is here."""
+        return scan_verdict(self)[0] is not Headline.BAD and not self.failed
+
+
+def stretches(pairs: Sequence[ScannedPair]) -> tuple[Stretch, ...]:
+    """Gather pairs in a row that are weak or lost for the same reason.
+
+    Args:
+        pairs: all, in order.
+    """
+    groups = groupby(pairs, lambda pair: (pair.is_fused, pair.weakness))
+    return tuple(Stretch(tuple(group)) for (_, weakness), group in groups if weakness is not Weakness.NONE)
+
+
+def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
+    """Judge a scan.
+
+    Args:
+        report: of it.
+
+    Returns:
+        The verdict, and one sentence.
+    """
+    if report.interrupted_of:
+        verdict, sentence = scan_verdict(replace(report, interrupted_of=0))
+        stopped = f"Interrupted after {len(report.pairs)} of {counted(report.interrupted_of, 'pair')}. "
+        return Headline.WARNING if verdict is Headline.GOOD else verdict, stopped + sentence
+    blocking = next((remark.problem for remark in report.remarks if remark.is_blocking), "")
+    fused, count = report.fused, len(report.pairs)
+    if blocking:
+        return Headline.BAD, f"The model cannot be right: {blocking}."
+    if not report.model.triangles:
+        return Headline.BAD, f"There is no surface: {fused} of {counted(count, 'pair')} could be put together."
+    told = f"{fused} of {counted(count, 'pair')} are in the model"
+    if fused < max(2, _LEAST_SHARE * count):
+        return Headline.BAD, f"Only {told}."
+    sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
+    noise = f"its surface is known to \u00b1 {report.model.noise_m * 1e3:.2g} mm if the pairs err independently"
+    verdict = Headline.GOOD if min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
+    return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}; {noise}."

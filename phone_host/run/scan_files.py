@@ -1,0 +1,72 @@
+"""The results folder of `scan`: the model first, because it is what took the time."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from phone_host.output.atomic import write_text
+from phone_host.output.json_text import json_text
+from phone_host.output.listed import ListedFolder
+from phone_host.output.ply import PointCloud, write_surface
+from phone_host.output.trajectory_text import Station, tum_text
+from phone_host.report.model_view import ShownModel
+from phone_host.report.page_links import NextCommand
+from phone_host.report.scan_json import scan_json
+from phone_host.report.scan_page import scan_page
+from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
+from phone_host.report.stereo_report import ALWAYS
+from phone_host.scan.scan import ScanModel
+
+NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html"
+"""The names that `scan` writes into its folder."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FinishedScan:
+    """What is written of a scan.
+
+    Attributes:
+        report: of it.
+        model: its surface.
+        commands: what to do next, for the page.
+    """
+
+    report: ScanReport
+    model: ScanModel
+    commands: tuple[NextCommand, ...] = ()
+
+
+def write_scan(out: Path, scan: FinishedScan) -> None:
+    """Write model.ply, trajectory.txt, report.json and index.html; those of an earlier run are removed.
+
+    Args:
+        out: the folder.
+        scan: what is written.
+
+    Raises:
+        UnavailableError: a file there was not written by this program.
+        OSError: as the operating system reports it.
+    """
+    report, mesh = scan.report, scan.model.mesh
+    folder = ListedFolder(out, NAMES)
+    try:
+        folder.add(MODEL, TRAJECTORY, *ALWAYS)
+        write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes)
+        write_text(out / TRAJECTORY, trajectory_of(report))
+        write_text(out / "report.json", json_text(scan_json(report), indent=2) + "\n")
+        voxel_m = report.settings.voxel_m if report.settings else 1.0
+        shown = ShownModel(mesh, scan.model.noise_m, voxel_m)
+        write_text(out / "index.html", scan_page(report, shown, scan.commands))
+    finally:
+        folder.close()
+
+
+def trajectory_of(report: ScanReport) -> str:
+    """Return the content of trajectory.txt: the pairs in the model, in the axes of model.ply."""
+    stations = []
+    for pair in report.scanned:
+        if pair.is_fused:
+            pose = pair.world_camera
+            signs = report.axes.signs.astype(float)
+            stations.append(Station(pair.stamp_s, signs[:, None] * pose.R, signs * pose.t_m))
+    return tum_text(stations)

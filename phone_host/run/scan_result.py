@@ -1,0 +1,98 @@
+"""What a scan has come to, from files or live: its report, and what must be said of it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from common.errors import DataError
+from phone_host.output.axes import Axes
+from phone_host.report.scan_report import ModelFigures, ScanReport
+from phone_host.report.stereo_report import FailedPair, Remark
+from phone_host.scan.mesh_parts import size_of
+from phone_host.scan.scan import Scan, ScanModel, ScannedPair
+
+
+def report_of(
+    scan: Scan,
+    model: ScanModel,
+    pairs: Sequence[ScannedPair | FailedPair],
+    remarks: Sequence[Remark],
+    *,
+    matcher: str,
+    axes: Axes,
+) -> ScanReport:
+    """Make the report of a scan.
+
+    Args:
+        scan: that took the pairs.
+        model: its surface.
+        pairs: all, with those that could not be computed.
+        remarks: what the user must know.
+        matcher: its name.
+        axes: of model.ply.
+    """
+    return ScanReport(
+        pairs=tuple(pairs),
+        model=figures_of(scan, model),
+        settings=scan.settings,
+        geometry=scan.geometry,
+        rectified_px=scan.size_px,
+        matcher=matcher,
+        axes=axes,
+        remarks=(*remarks, *memory_remarks(scan)),
+    )
+
+
+def require_something(report: ScanReport) -> None:
+    """Refuse pairs of which nothing at all came.
+
+    Raises:
+        DataError: none was computed, or none has depth.
+    """
+    if report.failed and not report.scanned:
+        raise report.failed[0].none_of(len(report.pairs))
+    if report.settings is None:
+        why = next((remark for remark in report.remarks if not remark.is_note), None)
+        raise DataError(
+            f"none of the {len(report.scanned)} pairs has depth{f': {why.problem}' if why else ''}",
+            (why.remedy if why else "")
+            or "check that the pictures are sharp and bright, and that --calibration fits them",
+        )
+
+
+def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
+    """Return a model in numbers.
+
+    Args:
+        scan: that made it.
+        model: its surface.
+    """
+    known = model.noise_m[np.isfinite(model.noise_m)]
+    noise_m, noise_p95_m = (float(np.percentile(known, share)) if len(known) else math.nan for share in (50, 95))
+    volume = None if scan.tracker is None else scan.tracker.volume
+    return ModelFigures(
+        points=len(model.mesh.points_m),
+        triangles=len(model.mesh.triangles),
+        size=size_of(model.mesh),
+        noise_m=noise_m,
+        noise_p95_m=noise_p95_m,
+        memory_bytes=0 if volume is None else volume.memory_bytes,
+        left_out=0 if volume is None else volume.left_out,
+    )
+
+
+def memory_remarks(scan: Scan) -> Sequence[Remark]:
+    """Say whether the model outgrew its memory.
+
+    Args:
+        scan: that made it.
+    """
+    if scan.tracker is None or not scan.tracker.volume.left_out:
+        return ()
+    return (
+        Remark(
+            "the model has reached its greatest size: what was seen later is missing from it",
+            "give a greater --memory or --voxel, or a nearer --far",
+        ),
+    )

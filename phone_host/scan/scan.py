@@ -1,0 +1,209 @@
+"""Pairs go in one after another, a model comes out. Pure: no files, no clock.
+
+The world's axes are those of the rectified left camera at the first pair that has depth.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from common.imagesize.head import size_text
+from phone_host.geometry.se3 import SE3
+from phone_host.model import Processed, StereoGeometry
+from phone_host.scan.box import Box
+from phone_host.scan.depth_edges import without_edges
+from phone_host.scan.fineness import fineness_for
+from phone_host.scan.mesh import Mesh, mesh_of
+from phone_host.scan.mesh_parts import only, without_crumbs
+from phone_host.scan.surface_noise import surface_noise_m
+from phone_host.scan.tracker import PoseGate, Tracker
+from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.view import View
+from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.stereo.images import size_px, to_grey
+
+NOISE_PX: Final = 0.5
+"""Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
+
+_LEAST_WEIGHT: Final = 8
+"""Of a voxel on the surface: an eighth of a sure depth. One view at a slant gives less, and is off by 5 mm where others are off by 4."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanWanted:
+    """What the user asked for.
+
+    Attributes:
+        voxel_m: distance of two values of the field, m; NaN: as the depths' noise deserves.
+        most_bytes: memory of the model at most.
+        box: what lies outside does not belong to the model; None: everything belongs.
+        threads: that compute; results do not depend on them.
+    """
+
+    voxel_m: float = math.nan
+    most_bytes: int = 300_000_000
+    box: Box | None = None
+    threads: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ScannedPair:
+    """What became of a pair.
+
+    Attributes:
+        name: of the pair.
+        stamp_s: when it was taken, s, from any beginning; its number where nobody knows.
+        world_camera: where the rectified left camera was; where it is lost, as far as odometry tells.
+        state: how sure that is.
+        weakness: why it is not surer.
+        density: share of the pixels that have a depth, 0..1.
+        corners: that agree on the motion since the last pair; 0 for the first.
+        overlap: share of its depths that lie on the model, 0..1; NaN: not compared.
+        off_m: mean distance of these from the model, m; NaN: not compared.
+    """
+
+    name: str
+    stamp_s: float
+    world_camera: SE3
+    state: Tracking
+    weakness: Weakness
+    density: float
+    corners: int = 0
+    overlap: float = math.nan
+    off_m: float = math.nan
+
+    @property
+    def is_fused(self) -> bool:
+        """Whether it became part of the model."""
+        return self.state is not Tracking.LOST
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanModel:
+    """A surface.
+
+    Attributes:
+        mesh: its triangles.
+        noise_m: (V,) float32 standard deviation of its points, m, if the views err independently.
+    """
+
+    mesh: Mesh
+    noise_m: NDArray[np.float32]
+
+
+class Scan:
+    """Takes pairs and grows a model.
+
+    Attributes:
+        tracker: of the pairs since the first that has depth; None before it.
+        geometry: of these.
+        size_px: width and height of their rectified images.
+
+    Args:
+        wanted: what for.
+    """
+
+    def __init__(self, wanted: ScanWanted) -> None:
+        self._wanted = wanted
+        self.tracker: Tracker | None = None
+        self.geometry: StereoGeometry | None = None
+        self.size_px = (0, 0)
+        self._pairs: list[ScannedPair] = []
+
+    @property
+    def pairs(self) -> tuple[ScannedPair, ...]:
+        """What became of each pair, in order."""
+        return tuple(self._pairs)
+
+    @property
+    def fused(self) -> int:
+        """Pairs that became part of the model."""
+        return sum(pair.is_fused for pair in self._pairs)
+
+    @property
+    def settings(self) -> VolumeSettings | None:
+        """How the model is made; None before the first pair that has depth."""
+        return None if self.tracker is None else self.tracker.volume.settings
+
+    def take(self, name: str, stamp_s: float, processed: Processed) -> ScannedPair:
+        """Take the next pair.
+
+        Args:
+            name: of the pair.
+            stamp_s: when it was taken, s.
+            processed: with disparity and cloud.
+
+        Returns:
+            What became of it.
+
+        Raises:
+            DataError: its size is not that of the pairs before it.
+        """
+        view = view_of(processed)
+        density = float(np.isfinite(view.depth_m).mean())
+        if self.tracker is None and density >= PoseGate().least_depths:
+            self.geometry, self.size_px = view.geometry, size_px(view.grey)
+            wanted = self._wanted
+            self.tracker = Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
+        if self.tracker is None:
+            pair = ScannedPair(
+                name=name,
+                stamp_s=stamp_s,
+                world_camera=SE3.identity(),
+                state=Tracking.LOST,
+                weakness=Weakness.NO_DEPTH,
+                density=density,
+            )
+        else:
+            if size_px(view.grey) != self.size_px:
+                here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
+                raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
+            told = self.tracker.track(view)
+            pair = ScannedPair(
+                name=name,
+                stamp_s=stamp_s,
+                world_camera=told.world_camera,
+                state=told.state,
+                weakness=told.weakness,
+                density=density,
+                corners=told.moved.inliers,
+                overlap=math.nan if told.fit is None else told.fit.overlap,
+                off_m=math.nan if told.fit is None else told.fit.off_m,
+            )
+        self._pairs.append(pair)
+        return pair
+
+    def model(self) -> ScanModel:
+        """Return the surface so far, without crumbs and what lies outside the box; without triangles before any was seen."""
+        if self.tracker is None:
+            return ScanModel(Mesh.empty(), np.zeros(0, np.float32))
+        volume = self.tracker.volume
+        mesh = mesh_of(volume.blocks, volume.settings.voxel_m, _LEAST_WEIGHT)
+        if self._wanted.box is not None:
+            inside = self._wanted.box.holds(mesh.points_m)
+            mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))
+        mesh = without_crumbs(mesh)
+        return ScanModel(mesh, surface_noise_m(mesh.points_m, volume.blocks, volume.settings))
+
+
+def view_of(processed: Processed) -> View:
+    """Return a pair as the tracker takes it, without the depths beside steps.
+
+    Args:
+        processed: with disparity and cloud.
+    """
+    assert processed.geometry is not None
+    assert processed.cloud is not None
+    left = processed.pair.left
+    scale = 1.0 if processed.search is None else processed.search.scale
+    return View(
+        grey=to_grey(left),
+        colours=left if left.ndim == 3 else np.repeat(left[..., np.newaxis], 3, axis=2),
+        depth_m=without_edges(processed.cloud[..., 2], processed.geometry),
+        geometry=processed.geometry,
+        noise_px=NOISE_PX / scale,
+    )

@@ -1,0 +1,1 @@
+"""phone-host scan: its options (light), and its command."""

@@ -1,0 +1,99 @@
+"""The options of phone-host scan. Light, because every start of the command imports them."""
+
+import argparse
+from pathlib import Path
+
+from common.program.quantities import file_size, reading, seconds
+from phone_host.verbs.orientation_arguments import add_image_arguments
+from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
+from phone_host.verbs.stereo_arguments import (
+    PAIRED,
+    add_core_arguments,
+    add_limit_arguments,
+    add_overlay_argument,
+)
+
+SUMMARY = "put pairs from several places together to one model with colours"
+
+EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup    # folders: photographs on the way around the cup
+  phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
+  phone-host scan left/ right/ --calibration rig.yaml --box 400x300x400@0,100,900 --out cup    # only what is in this box
+  phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
+  phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --record cup.mcap --out cup    # live
+  phone-host scan --replay session.mcap --calibration rig.yaml --out cup    # every pair of a recording
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's options."""
+    parser.add_argument(
+        "images",
+        nargs="*",
+        metavar="LEFT RIGHT",
+        help=f"images in the order in which they were taken, each pair sharing most of what the last one shows; without them two cameras are"
+        f" scanned live: {PAIRED}",
+    )
+    _add_live_arguments(parser)
+    add_core_arguments(parser)
+    add_limit_arguments(parser)
+    add_overlay_argument(parser)
+    add_image_arguments(parser)
+    add_model_arguments(parser)
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="folder for model.ply, trajectory.txt, report.json and index.html, not that of the images; it is created if it does not exist",
+    )
+
+
+def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--config", type=Path, metavar="FILE", help="live: settings file (TOML)")
+    add_source_arguments(parser, "live: ")
+    add_tolerance_argument(parser, "live: ")
+    parser.add_argument(
+        "--board-side",
+        choices=("left", "right"),
+        help="live: which view the board's camera gives (default: as in the calibration, else left)",
+    )
+    parser.add_argument(
+        "--replay",
+        metavar="FILE.mcap",
+        help="play a recording in place of --link and --camera: all of its pairs, the same each time",
+    )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="FILE.mcap",
+        help="live: also keep what both cameras give, to scan it again with --replay: finer, or after a crash",
+    )
+    parser.add_argument("--pairs", type=int, default=0, metavar="N", help="live: end after N pairs")
+    parser.add_argument(
+        "--seconds",
+        type=reading(seconds, "--seconds"),
+        default=0.0,
+        metavar="S",
+        help="live: end S seconds after the first pair (default: with Ctrl-C or SIGTERM)",
+    )
+
+
+def add_model_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare --voxel, --box and --memory: how the model is made."""
+    parser.add_argument(
+        "--voxel",
+        metavar="MM",
+        help="how fine the model is, such as 2mm (default: half the noise of the near depths of the first pair)",
+    )
+    parser.add_argument(
+        "--box",
+        metavar="WxHxD@X,Y,Z",
+        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward)",
+    )
+    parser.add_argument(
+        "--memory",
+        type=reading(file_size, "--memory"),
+        default=300e6,
+        metavar="SIZE",
+        help="memory of the model at most; what does not fit is left out, and told (default 300MB)",
+    )

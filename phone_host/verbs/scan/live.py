@@ -1,0 +1,139 @@
+"""phone-host scan with cameras, or with a recording of both: a run whose pairs become a model."""
+
+import argparse
+import sys
+from contextlib import suppress
+
+from common.errors import SettingsError
+from common.orientation import UPRIGHT
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.settings import log_level
+from common.program.signals import StopSignals
+from common.program.terminal import say
+from common.protocol.message import Pacing
+from phone_host.declared_settings import PhoneHostSettings
+from phone_host.live.scan import LiveScan
+from phone_host.recording.playback import Playback
+from phone_host.report.scan_report import ScanReport
+from phone_host.run.host_settings import EndReason
+from phone_host.run.progress_bar import step_bar
+from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
+from phone_host.run.scan_result import require_something
+from phone_host.run.stereo_results import require_writable
+from phone_host.verbs.orientation_arguments import orientations
+from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
+from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
+from phone_host.verbs.scan.wanted import scan_wanted
+from phone_host.verbs.serve.choices import run_options
+from phone_host.verbs.stereo_options import output_options
+
+
+def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
+    """Run until stopped, until the number of pairs is reached, or until a stream ends; write the model.
+
+    Args:
+        options: of `scan`, without pictures.
+
+    Returns:
+        The report, and the exit code if the model is sound: 0, 4 (fewer pairs than were asked for) or 130.
+
+    Raises:
+        SettingsError: options contradict each other, or give no depth in metres.
+        UnavailableError: a camera, a link or the folder cannot be had.
+        DataError: the rig cannot be used, or no pair has depth.
+    """
+    wanted, of_run = scan_wanted(options), _run_options(options)
+    found = checked(of_run)
+    _require(options, found.values)
+    _require_place(options)
+    logs.set_up(log_level(found.values.log_level))
+    opened = open_run(of_run, found, _tell)
+    camera = opened.camera
+    pacing = camera.pacing if isinstance(camera, Playback) else camera.description.pacing
+    is_stills = pacing is Pacing.DEMAND and not isinstance(camera, Playback)
+    live = LiveScan(wanted, opened.board_side, waits=pacing is Pacing.DEMAND, is_timeless=is_stills)
+    signals = StopSignals()
+    prepared = opened.prepared(sys.argv, (live.sink,))
+
+    def finished() -> FinishedScan:
+        return live.finished(prepared.host.snapshot(), found.values.matcher, output_options(options).axes)
+
+    try:
+        ended = _followed(prepared, live, signals)
+    except BaseException:
+        if live.scan.fused:
+            with suppress(Exception):  # tell what ended the run, not what followed
+                write_scan(options.out, finished())
+        raise
+    prepared.ended(ended)
+    last = finished()
+    require_something(last.report)
+    try:
+        write_scan(options.out, last)
+    except OSError as error:
+        raise unwritable(options.out, error) from error
+    too_few = options.pairs and ended is EndReason.STREAM_ENDED
+    return last.report, INTERRUPTED if signals.interrupted else 4 if too_few else 0
+
+
+def _followed(prepared: PreparedRun, live: LiveScan, signals: StopSignals) -> EndReason:
+    """Run, and tell whoever holds the cameras what helps: in a bar on a terminal, else a line when it changes."""
+    told = ""
+
+    def tell() -> None:
+        nonlocal told
+        advice = live.words.partition(": ")[2]
+        if advice != told and not sys.stderr.isatty():
+            _tell(live.words)
+        told = advice
+        watcher.say(live.words)
+
+    with step_bar("waiting for the board", None) as watcher:
+        return prepared.host.run(lambda: signals.stop, tell)
+
+
+def _run_options(options: argparse.Namespace) -> argparse.Namespace:
+    """Return the options of the run beneath: it writes nothing itself."""
+    of_run = run_options([])
+    own = {name: value for name, value in vars(options).items() if hasattr(of_run, name)}
+    return argparse.Namespace(**{**vars(of_run), **own, "out": None})
+
+
+def _require(options: argparse.Namespace, settings: PhoneHostSettings) -> None:
+    """Refuse options that give no depth in metres, and those that only files know.
+
+    Raises:
+        SettingsError: so it is.
+    """
+    if options.replay is None and not settings.camera:
+        raise SettingsError(
+            "neither pictures nor cameras are given",
+            "give two folders, LEFT and RIGHT, or --camera and --link, or --replay FILE.mcap",
+        )
+    if not settings.calibration and not (options.rectified and options.focal):
+        raise SettingsError(
+            "no --calibration is given, so there are no metres",
+            "give the rig.yaml of `phone-host calibrate`, or --rectified --focal PX --baseline MM",
+        )
+    if orientations(options) != (UPRIGHT, UPRIGHT):
+        raise SettingsError(
+            "--rotate-... and --flip-... turn pictures in files",
+            "put rotate= and flip= into the camera's address",
+        )
+
+
+def _require_place(options: argparse.Namespace) -> None:
+    """Refuse a results folder that cannot be written to, or would lose the inputs."""
+    require_folder(options.out)
+    try:
+        require_writable(options.out)
+    except OSError as error:
+        raise unwritable(options.out, error) from error
+    inputs = {"--calibration": options.calibration, "--replay": options.replay, "--overlay": options.overlay}
+    spare_inputs(options.out, NAMES, {name: path for name, path in inputs.items() if path})
+    keep_other_report(options.out, "scan")
+
+
+def _tell(line: str) -> None:
+    say(f"phone-host: {line}", sys.stderr)
