@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from common import now
+from phone_host.calibration.guide.snapshot import Ended
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.serve.program import Calibrated, Choices
@@ -88,12 +89,12 @@ class Memory:
 
     def calibrated(self, done: Calibrated) -> None:
         """Take what a calibration came to: its words stay with the guide."""
-        self.result(done.words)
+        self._guide = {**(self._guide or {}), "result": done.words}
         self._trouble = done.trouble
 
-    def result(self, words: str) -> None:
-        """Take in one sentence how a live calibration ended."""
-        self._guide = {**(self._guide or {}), "result": words}
+    def calibration_stopped(self, words: str) -> None:
+        """Take in one sentence how far a live calibration came that was stopped: its verdict so far is not that of a rig."""
+        self._guide = {**(self._guide or {}), "result": words, "state": Ended.STOPPED.value}
 
     def fail(self, trouble: Trouble) -> None:
         """Something went wrong."""

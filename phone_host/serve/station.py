@@ -253,7 +253,7 @@ class Station:
                 self._shelf.clear()  # these pairs are not those of a run
             if task.stopped():
                 views = counted(ready.live.snapshot().views, "view")
-                self._memory.result(f"stopped: {views} taken and kept, nothing computed from them")
+                self._memory.calibration_stopped(f"stopped: {views} taken and kept, nothing computed from them")
                 return
             done = ready.finish(task.go_on)
             if done.rig is not None:

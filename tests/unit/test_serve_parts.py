@@ -348,6 +348,15 @@ def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
     assert "belong" in check.unseen(replace(nothing, counts=PairCounts(received=3, host_frames=3))).problem
 
 
+def test_a_calibration_that_was_stopped_is_told_from_one_that_was_computed() -> None:
+    """What the guide last showed stays, with how it ended."""
+    memory = Memory({})
+    memory.guide({"state": "running", "verdict": "usable"})
+    memory.calibration_stopped("stopped: 5 views taken")
+    told = memory.state(Activity.IDLE, memory.choices, "").guide
+    assert told == {"state": "stopped", "verdict": "usable", "result": "stopped: 5 views taken"}
+
+
 def test_the_memory_tells_a_change_once() -> None:
     """`changed` grows with each change and only then; a run is asked at most a few times a second; a new activity forgets the last run."""
     memory, asked = Memory({"camera": "v4l2:auto"}), []

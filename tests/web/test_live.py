@@ -210,6 +210,7 @@ def test_the_page_comes_back_with_the_host(running: Played, opened: Opener, serv
     page.wait_for_selector("body[data-line=ended]")
     page.wait_for_selector("#trust[data-level=unknown]")
     assert "The program has ended" in page.text_content("#headline")
+    assert not page.is_visible("#activity")
     assert page.evaluate("() => getComputedStyle(document.querySelector('.stage')).opacity") == "0.45"
     again = PageServer(running, PageSettings(port=server.port, token=TOKEN))
     again.start()

@@ -172,3 +172,12 @@ def test_axe_is_not_in_the_package() -> None:
     """Only tests use it."""
     folder = Path(__file__).resolve().parents[2] / "phone_host"
     assert not [path for path in folder.rglob("*axe*") if path.suffix == ".js"]
+
+
+def test_only_a_calibration_that_was_computed_is_called_done(opened: Opener) -> None:
+    """Stopped with a verdict so far: there is no rig, and the heading says so."""
+    page = opened("calibration")
+    shown = "async guide => { (await import('/static/guide.js')).showGuide({ guide, activity: 'idle' }); return document.querySelector('#guide-words').textContent; }"
+    over = {**guide_snapshot().as_json(), "result": "in one sentence"}
+    for state, words in (("good", "Done: usable."), ("stopped", "No calibration was made.")):
+        assert page.evaluate(shown, {**over, "state": state}) == words

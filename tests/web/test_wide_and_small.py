@@ -97,6 +97,8 @@ def test_words_of_the_command_line_are_those_of_the_page(opened: Opener) -> None
         "check that --calibration or --rectified fits": "Check that Calibration fits.",
         "check --board, or name that board with --board; see --help": "Check Inner corners, or name that board with Inner corners.",
         "--board-side left contradicts it": "--board-side left contradicts it.",
+        "give --near 0.65m without --disparities, or --disparities 80.": "Give Near 0.65m.",
+        "divide, as in --square 25mm; or as in --square '2px*1mm'": "Divide, as in 25mm; or as in '2px*1mm'.",
         "give a larger --tolerance": "Give a larger --tolerance.",
         "run `phone-host run --near 3`": "Run \u201cphone-host run --near 3\u201d.",
     }.items():

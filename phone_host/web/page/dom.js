@@ -114,7 +114,7 @@ const FIELDS = /** @type {Record<string, string>} */ ({
 
 /** Words of the command line in words of the page; commands stay as they are typed. @param {string} words @returns {string} */
 const ofThePage = (words) =>
-  words.replace(/`([^`]*)`/g, '\u201c$1\u201d').replace(/ or --rectified\b|; see --help\b/g, '').replace(/(?<!\u201c[^\u201d]*)--([a-z]+)(?![\w-])/g, (option, name) => FIELDS[name] ?? option);
+  words.replace(/`([^`]*)`/g, '\u201c$1\u201d').replace(/ or --rectified\b|; see --help\b| without --disparities, or --disparities \d+|(?<=\bas in )--[a-z]+ /g, '').replace(/(?<!\u201c[^\u201d]*)--([a-z]+)(?![\w-])/g, (option, name) => FIELDS[name] ?? option);
 
 /** With a capital letter and a full stop, but for addresses, commands and file names: those stay as they are typed. @param {string} words @returns {string} */
 export function sentence(words) {

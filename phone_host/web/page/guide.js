@@ -72,6 +72,12 @@ export function figuresOf(guide) {
   ];
 }
 
+/** A verdict is that of a rig only if one was computed. @param {any} guide @returns {string} */
+function headOf(guide) {
+  if (guide.state === 'stopped') return 'No calibration was made.';
+  return guide.verdict ? `Done: ${guide.verdict}.` : 'Ended.';
+}
+
 const VERDICTS = /** @type {Record<string, string>} */ ({ good: 'good', usable: 'warning', reject: 'bad' });
 
 /** @param {any} state */
@@ -81,7 +87,7 @@ export function showGuide(state) {
   show(byId('guide'), !!guide);
   if (!guide) return;
   const isOver = !!guide.result;
-  text(byId('guide-words'), isOver ? (guide.verdict ? `Done: ${guide.verdict}.` : 'Ended.') : sentence(guide.words || 'show the board to both cameras'));
+  text(byId('guide-words'), isOver ? headOf(guide) : sentence(guide.words || 'show the board to both cameras'));
   text(byId('guide-note'), sentence(guide.result || guide.note || ''));
   show(byId('guide-wish'), !isOver);
   if (state.activity === 'calibrating' && guide.words) say(guide.words);
