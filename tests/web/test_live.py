@@ -277,7 +277,7 @@ def test_range_and_crop_are_set_typed_or_drawn(running: Played, opened: Opener) 
 
 
 def test_what_is_refused_stays_to_be_mended(running: Played, opened: Opener) -> None:
-    """The field keeps what was typed and is marked; once it is right, the mark goes. Escape ends the drawing of a crop."""
+    """The field keeps what was typed and is marked, and the reason stays while others are set; once it is right, both go. Escape ends the drawing of a crop."""
     page = opened("run")
     shows(page, 0)
     running.answers[Do.SET] = Answer(trouble=Trouble("--near '1 mile' is no length", "give mm, cm or m"))
@@ -288,9 +288,14 @@ def test_what_is_refused_stays_to_be_mended(running: Played, opened: Opener) -> 
     shows(page, 1)
     assert page.input_value("#near") == "1 mile"
     del running.answers[Do.SET]
+    page.fill("#far", "2000")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#far[data-dirty=no]")
+    assert "1 mile" in page.text_content("#settings-answer")
     page.fill("#near", "300")
     page.keyboard.press("Enter")
     page.wait_for_selector("#near[aria-invalid=false]")
+    assert "1 mile" not in page.text_content("#settings-answer")
     page.click("#crop-draw")
     page.wait_for_selector("#crop-draw[aria-pressed=true]")
     page.keyboard.press("Escape")

@@ -28,6 +28,8 @@ export class Controls {
     this.state = state;
     this.size = size;
     this.drawing = false;
+    /** @type {Map<string, {words?: string, problem?: string, remedy?: string}>} why fields that are still red were refused */
+    this.refusals = new Map();
     this.answer = byId('run-answer');
     this.settingsAnswer = byId('settings-answer');
     this.cropAnswer = byId('crop-answer');
@@ -74,7 +76,10 @@ export class Controls {
     // What was refused stays as it was typed, to be mended.
     data(byId(name), 'dirty', answer.problem ? 'yes' : 'no');
     byId(name).setAttribute('aria-invalid', String(!!answer.problem));
-    tell(place, answer);
+    if (answer.problem) this.refusals.set(name, answer);
+    else this.refusals.delete(name);
+    const [before] = this.refusals.values();
+    tell(place, answer.problem ? answer : (before ?? answer));
     if (this.state()) this.show(this.state());
   }
 
