@@ -131,7 +131,7 @@ def test_a_budget_that_cannot_be_reached_gets_the_best_of_the_fastest() -> None:
 def test_what_was_measured_too_slow_is_not_tried_again(
     step_ns: float, pixel_ns: float, block_ns: float, rest_ms: float, budget_ms: int
 ) -> None:
-    """On any steady machine no step that is too slow is entered twice where another holds the budget, and after a minute nothing changes."""
+    """On any steady machine no step that is too slow is entered twice and after a minute nothing changes, where one holds the budget with room to spare; where none does, tries become rare."""
     costs: dict[AnyMatcher, UsualCost] = {
         MatcherName.SGBM: UsualCost(step_ns=step_ns, pixel_ns=pixel_ns),
         MatcherName.BLOCK: UsualCost(step_ns=block_ns, pixel_ns=1.0),
@@ -143,7 +143,8 @@ def test_what_was_measured_too_slow_is_not_tried_again(
     fitting = [step for step in LADDER if machine.total_ns(step) <= budget_ns]
     if fitting:
         assert all(entered[step] <= 1 for step in LADDER if machine.total_ns(step) > budget_ns)
-    assert not [change for change in changes(pairs) if change.at_ns > 60 * S]
+    has_room = any(machine.total_ns(step) <= 0.9 * budget_ns for step in LADDER)
+    assert sum(change.at_ns > 60 * S for change in changes(pairs)) <= (0 if has_room else 1)
 
 
 def test_new_evidence_opens_a_step_again() -> None:
