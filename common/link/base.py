@@ -75,7 +75,7 @@ class Link(Protocol):
 
     @property
     def pollables(self) -> Sequence[Any]:
-        """Sockets or file descriptors to wait on with a Waiter; readable means that `receive` has something."""
+        """What to wait on with a Waiter, which also tells `receive` where to look; readable means that `receive` may have something."""
 
     @property
     def due_ns(self) -> int:

@@ -14,7 +14,7 @@ from zmq.utils import z85
 from common import now
 from common.errors import TandemError
 from common.keys import KeyFolder, OwnKey
-from common.link.waiter import is_readable
+from common.link.waiter import Inbox
 from common.peers import Peer
 from common.program.logs import event
 from common.protocol import zap
@@ -74,8 +74,8 @@ class Guard:
         self._is_sound = True
         self._denied = Seldom()
         self._let_in = ""
-        self.socket = context.socket(zmq.REP)
-        self.socket.bind(zap.ENDPOINT)
+        self.inbox = Inbox(context.socket(zmq.REP))
+        self.inbox.socket.bind(zap.ENDPOINT)
 
     def knows_nobody(self) -> bool:
         """Read the keys; return whether no peer is known at all. False if the file is bad, since it says nothing."""
@@ -89,9 +89,9 @@ class Guard:
     def answer(self) -> None:
         """Answer everyone who asks to be let in."""
         for _ in range(_AT_ONCE):
-            if not is_readable(self.socket):
+            if not (self.inbox.may_have and self.inbox.has_news()):
                 return
-            request = zap.read_request(self.socket.recv_multipart(_NOW))
+            request = zap.read_request(self.inbox.socket.recv_multipart(_NOW))
             self._refresh()
             name = self._names.get(request.key)
             if name is None:
@@ -101,7 +101,9 @@ class Guard:
             elif name != self._let_in:
                 self._let_in = name
                 _LOG.info(event("key_known", peer=name, address=request.address))
-            self.socket.send_multipart(zap.deny(request) if name is None else zap.allow(request, _user(request.key)))
+            self.inbox.socket.send_multipart(
+                zap.deny(request) if name is None else zap.allow(request, _user(request.key))
+            )
 
     def _refresh(self) -> None:
         """Read the known keys if their file has changed. While it is bad, nobody is let in."""

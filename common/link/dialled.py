@@ -12,7 +12,7 @@ from typing import Final
 import zmq
 
 from common.errors import UnavailableError
-from common.link.waiter import is_readable
+from common.link.waiter import Inbox
 from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)
@@ -54,9 +54,9 @@ class Dialled:
     """
 
     def __init__(self, sock: "zmq.Socket[bytes]", address: str, peer: str, lane: str) -> None:
-        self.socket = sock
-        self.monitor = sock.get_monitor_socket(_WATCHED)
-        is_readable(self.monitor)  # the descriptor signals news only after a look that found none
+        self.inbox = Inbox(sock)
+        self.news = Inbox(sock.get_monitor_socket(_WATCHED))
+        self.news.has_news()  # the descriptor signals news only after a look that found none
         self.due_ns = _NEVER
         self._address, self._peer, self._lane = address, peer, lane
         self._hang_ups = 0
@@ -70,10 +70,10 @@ class Dialled:
         """
         if now_ns < self.due_ns:
             return
-        self.due_ns = _NEVER
+        self.due_ns, self.inbox.may_have = _NEVER, True
         with suppress(zmq.ZMQError):  # it may have forgotten the address with the refusal
-            self.socket.disconnect(self._address)
-        self.socket.connect(self._address)
+            self.inbox.socket.disconnect(self._address)
+        self.inbox.socket.connect(self._address)
 
     def hang_up(self, now_ns: int) -> None:
         """Drop the peer that answered; redial later, when it may be a different one.
@@ -81,9 +81,9 @@ class Dialled:
         Args:
             now_ns: CLOCK_MONOTONIC now, ns.
         """
-        self.due_ns = now_ns + REDIAL_NS
+        self.due_ns, self.inbox.may_have = now_ns + REDIAL_NS, True
         with suppress(zmq.ZMQError):
-            self.socket.disconnect(self._address)
+            self.inbox.socket.disconnect(self._address)
 
     def broke(self, now_ns: int) -> bool:
         """Handle one monitor event; return whether it says that the connection broke.
@@ -94,7 +94,7 @@ class Dialled:
         Raises:
             UnavailableError: the peer has turned us away; it will be redialled later.
         """
-        kind, value = _NEWS.unpack(self.monitor.recv_multipart(_NOW)[0])
+        kind, value = _NEWS.unpack(self.news.socket.recv_multipart(_NOW)[0])
         match kind:
             case zmq.EVENT_DISCONNECTED:
                 return True

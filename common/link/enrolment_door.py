@@ -26,7 +26,7 @@ from common.errors import ProtocolError, SettingsError, TandemError
 from common.keys import KeyFolder
 from common.link.callers import Call, Callers, Left, Nonsense, Said
 from common.link.curve import Guard, Seldom
-from common.link.waiter import is_readable
+from common.link.waiter import Inbox
 from common.peers import Peer, clean_name
 from common.program.logs import event
 from common.protocol.enrolment_code import Desk, Enrolled, Failed, Output, Say, ShowCode, code_text
@@ -123,6 +123,7 @@ class Door:
         self._bind_control(
             keys.path / f"{CONTROL_PREFIX}{sha256(_as_given(links[0]).encode()).hexdigest()[:_NAME_DIGITS]}"
         )
+        self._inbox = Inbox(self._control)
         self._is_open = False
         self._owner_until_ns = 0
         self._state = self._before = DoorState(
@@ -133,14 +134,14 @@ class Door:
         self.due_ns = 0
 
     @property
-    def pollables(self) -> "tuple[Callers, zmq.Socket[bytes]]":
+    def pollables(self) -> tuple[Callers, Inbox]:
         """What to wait on."""
-        return self._callers, self._control
+        return self._callers, self._inbox
 
     def answer(self) -> None:
         """Do everything that is due now."""
         now_ns = now.monotonic_ns()
-        if is_readable(self._control):
+        if self._inbox.may_have and self._inbox.has_news():
             self._hear_owner(now_ns)
         for call in self._callers.receive(now_ns):
             self._hear(call, now_ns)

@@ -1,8 +1,9 @@
 """Waits for links, cameras and signals in one place, with few system calls.
 
 On machines without a cheap cycle counter (ARM), each call into ZeroMQ costs two system calls. A zmq.Poller rebuilds its lists for each wait and
-asks each socket twice. Here each socket is asked once, by the rule of ZMQ_FD (zmq_getsockopt(3)): a ZeroMQ socket's descriptor signals news only
-once, and any call on the socket may have consumed it. So ZMQ_EVENTS is read right before waiting, and a readable descriptor only means: look.
+asks each socket twice. Here a socket is asked only if it may have news, by the rule of ZMQ_FD (zmq_getsockopt(3)): a ZeroMQ socket's descriptor
+signals news only once, and any call on the socket may have consumed it. So a socket that was used is asked right before waiting; one that said
+it has nothing, and was not used since, has nothing until its descriptor is readable. A readable descriptor only means: look.
 """
 
 import os
@@ -25,30 +26,53 @@ _ASLEEP_NS: Final = 1_000_000_000
 """For this long a contended core is left to others. Who yields a core waits milliseconds for it; who sleeps is woken before them."""
 
 
-def is_readable(sock: "zmq.Socket[bytes]") -> bool:
-    """Whether a ZeroMQ socket has something to receive. Cheaper than the exception of an empty one."""
-    return bool(int(sock.getsockopt(_EVENTS)) & _READABLE)
+class Inbox:
+    """A ZeroMQ socket, and whether it may have something to receive. Whoever uses the socket in any other way sets `may_have`.
+
+    Attributes:
+        socket: the socket.
+        may_have: whether `has_news` may say yes.
+
+    Args:
+        sock: the socket.
+    """
+
+    __slots__ = ("_fd", "_get", "may_have", "socket")
+
+    def __init__(self, sock: "zmq.Socket[bytes]") -> None:
+        self.socket = sock
+        self.may_have = True
+        self._fd, self._get = sock.fileno(), sock.getsockopt
+
+    def fileno(self) -> int:
+        """The descriptor that becomes readable when there may be news."""
+        return self._fd
+
+    def has_news(self) -> bool:
+        """Ask the socket whether there is something to receive."""
+        self.may_have = bool(int(self._get(_EVENTS)) & _READABLE)
+        return self.may_have
 
 
 class Waiter:
     """Waits on a set of pollables.
 
     Args:
-        pollables: ZeroMQ sockets, descriptors, or objects that have one.
+        pollables: inboxes, descriptors, or objects that have one.
         clock: monotonic clock, ns.
     """
 
     def __init__(self, pollables: Iterable[Any], clock: Callable[[], int] = now.monotonic_ns) -> None:
         self._poll = select.poll()
-        self._sockets: list[tuple[int, zmq.Socket[bytes]]] = []
+        self._inboxes: dict[int, Inbox] = {}
         self._clock = clock
         self._awake_until_ns = 0
         self._asleep_until_ns = 0
         for item in pollables:
             fd = item if isinstance(item, int) else item.fileno()
             self.add(fd)
-            if isinstance(item, zmq.Socket):
-                self._sockets.append((fd, item))
+            if isinstance(item, Inbox):
+                self._inboxes[fd] = item
 
     def add(self, fd: int, events: int = select.POLLIN) -> None:
         """Also wait on this descriptor.
@@ -81,7 +105,7 @@ class Waiter:
         Returns:
             Descriptors, including those of ZeroMQ sockets. A socket may turn out to have nothing to receive.
         """
-        ready = [fd for fd, sock in self._sockets if is_readable(sock)]
+        ready = [fd for fd, inbox in self._inboxes.items() if inbox.may_have and inbox.has_news()]
         now_ns = self._clock() if wait_ms and not ready else self._awake_until_ns
         while now_ns < self._awake_until_ns:
             os.sched_yield()  # ZeroMQ's thread may share the core
@@ -90,5 +114,12 @@ class Waiter:
             if now_ns - before_ns > _AWAKE_NS:
                 self._asleep_until_ns = now_ns + _ASLEEP_NS
             if found:
-                return [fd for fd, _ in found]
-        return ready + [fd for fd, _ in self._poll.poll(0 if ready else wait_ms)]
+                return self._signalled(found)
+        return ready + self._signalled(self._poll.poll(0 if ready else wait_ms))
+
+    def _signalled(self, found: list[tuple[int, int]]) -> list[int]:
+        """Return the readable descriptors; the sockets behind them may have news."""
+        for fd, _ in found:
+            if (inbox := self._inboxes.get(fd)) is not None:
+                inbox.may_have = True
+        return [fd for fd, _ in found]

@@ -18,7 +18,7 @@ from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
 from common.link.dialled import Dialled
 from common.link.ipc import check_folder, check_peer, check_socket, let_in, trusted_users
-from common.link.waiter import is_readable
+from common.link.waiter import Inbox
 from common.link.zeromq_address import explained, free_path, plain_endpoint
 from common.peers import Peer
 from common.protocol.message import Lane
@@ -81,10 +81,12 @@ def _configure(sock: zmq.Socket[bytes], most_bytes: int) -> None:
         sock.setsockopt(option, value)
 
 
-def _send(sock: zmq.Socket[bytes], prefix: list[bytes], header: bytes, payload: Buffer) -> SendResult:
+def _send(inbox: Inbox, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
+    """Send a packet; on a listening socket, to the connection with this name."""
+    sock, inbox.may_have = inbox.socket, True
     try:
-        for part in prefix:
-            sock.send(part, _NOW_AND_MORE)
+        if connection:
+            sock.send(connection, _NOW_AND_MORE)
         if not len(payload):
             sock.send(header, _NOW)
             # ZeroMQ's own thread writes to the socket. If both threads share a core, or a board has only one, that thread (and the echo) would wait
@@ -183,6 +185,7 @@ class ZeroMqListener(_AlwaysReady):
                 self._context.destroy(linger=0)
                 raise
         self.endpoint = plain_endpoint(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
+        self._inbox = Inbox(self._socket)
         self._door: Door | None = None
 
     def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
@@ -206,8 +209,8 @@ class ZeroMqListener(_AlwaysReady):
     def pollables(self) -> Sequence[Any]:
         """The main socket, the gate, and the sockets of the guard and the door."""
         gates = (self._gate,) if self._gate else ()
-        guard = (self._guard.socket,) if self._guard else ()
-        return (self._socket, *gates, *guard, *(self._door.pollables if self._door else ()))
+        guard = (self._guard.inbox,) if self._guard else ()
+        return (self._inbox, *gates, *guard, *(self._door.pollables if self._door else ()))
 
     @property
     def due_ns(self) -> int:
@@ -223,7 +226,7 @@ class ZeroMqListener(_AlwaysReady):
             self._guard.answer()
         if self._door:
             self._door.answer()
-        while is_readable(self._socket):
+        while self._inbox.may_have and self._inbox.has_news():
             connection = self._socket.recv(_NOW)
             if self._guard:
                 yield from _receive_known(self._socket, connection, self._guard)
@@ -232,7 +235,7 @@ class ZeroMqListener(_AlwaysReady):
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Send a packet over one connection."""
-        return _send(self._socket, [connection], header, payload)
+        return _send(self._inbox, connection, header, payload)
 
     def close(self) -> None:
         """Let accepted packets leave, then close."""
@@ -293,12 +296,12 @@ class ZeroMqDialer(_AlwaysReady):
     @property
     def pollables(self) -> Sequence[Any]:
         """Both sockets and their monitors' descriptors. Only `receive` calls a monitor, so no other call consumes its news."""
-        return tuple(item for known in self._connections.values() for item in (known.socket, known.monitor.fileno()))
+        return tuple(item for known in self._connections.values() for item in (known.inbox, known.news))
 
     @property
     def due_ns(self) -> int:
         """When `receive` must be called even if nothing is readable: to redial."""
-        return min(known.due_ns for known in self._connections.values())
+        return min([known.due_ns for known in self._connections.values()])
 
     def receive(self) -> Iterator[Incoming]:
         """Return all packets that have arrived, frames first, then the broken connections: a peer's last words precede its end.
@@ -317,12 +320,12 @@ class ZeroMqDialer(_AlwaysReady):
             while talking:  # take turns while any has something to say: each check costs some us
                 lanes, talking = talking, []
                 for connection, known in lanes:
-                    if is_readable(known.socket):
+                    if known.inbox.may_have and known.inbox.has_news():
                         talking.append((connection, known))
                         yield self._received(known, connection, now_ns)
             for connection, known in self._connections.items():
-                if is_readable(known.monitor):
-                    going_on = True
+                if known.news.may_have and known.news.has_news():
+                    going_on = known.inbox.may_have = True  # its last words may have come since it was asked
                     try:
                         if known.broke(now_ns):
                             broken.append(Broken(connection))
@@ -333,8 +336,9 @@ class ZeroMqDialer(_AlwaysReady):
         yield from broken
 
     def _received(self, known: Dialled, connection: bytes, now_ns: int) -> Incoming:
-        header = known.socket.recv(_NOW, copy=False)
-        packet = _complete(known.socket, connection, header)
+        sock = known.inbox.socket
+        header = sock.recv(_NOW, copy=False)
+        packet = _complete(sock, connection, header)
         if self._trusted:
             try:
                 check_peer(self._path, header, self._trusted)
@@ -345,12 +349,12 @@ class ZeroMqDialer(_AlwaysReady):
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Send a packet. Before the peer is there, the result is FULL (ZMQ_IMMEDIATE)."""
-        return _send(self._connections[connection].socket, [], header, payload)
+        return _send(self._connections[connection].inbox, b"", header, payload)
 
     def close(self) -> None:
         """Let accepted packets leave, then close."""
         for known in self._connections.values():
-            known.socket.disable_monitor()
+            known.inbox.socket.disable_monitor()
         self._context.destroy(linger=_LINGER_MS)
 
 

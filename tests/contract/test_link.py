@@ -16,6 +16,7 @@ from common.errors import ProtocolError, UnavailableError
 from common.keys import KeyFolder
 from common.link.base import Link, SendResult
 from common.link.factory import open_link, parse_link
+from common.link.waiter import Waiter
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_PAYLOAD_BYTES, decode
 from tests.support.devices import MissingError, gadget_uris, rfcomm_uri
@@ -274,11 +275,13 @@ def test_what_was_received_before_the_break_comes_before_its_news(
     """If a listener's words on a connection are still delivered after the break, they come before that connection's `Broken`."""
     listener, dialler, names = pair
     order: list[tuple[str, bytes]] = []
+    waiter = Waiter(dialler.link.pollables)
     for connection in names.values():
         send_until_sent(listener, connection, b"bye", b"")
     ends.close(listener)
 
     def both_broke() -> bool:
+        waiter.wait(20)
         order.extend((type(incoming).__name__, incoming.connection) for incoming in dialler.link.receive())
         return sum(kind == "Broken" for kind, _ in order) == 2
 

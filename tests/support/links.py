@@ -6,10 +6,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-import zmq
-
 from common.link.base import Broken, Garbage, Link, Packet, SendResult
 from common.link.stream import StreamLink
+from common.link.waiter import Waiter
 from common.protocol.message import Lane
 
 PATIENCE_S = float(os.environ.get("TEST_PATIENCE_S", "60"))
@@ -44,14 +43,11 @@ class End:
 
 def wait_until(condition: Callable[[], bool], *ends: End) -> None:
     """Take what arrives at these ends until the condition holds; check it at least every 20 ms."""
-    poller = zmq.Poller()
-    for end in ends:
-        for pollable in end.link.pollables:
-            poller.register(pollable, zmq.POLLIN)
+    waiter = Waiter(pollable for end in ends for pollable in end.link.pollables)
     deadline = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < deadline, f"the condition was not met in {PATIENCE_S:.0f} s: {_told(ends)}"
-        poller.poll(20)
+        waiter.wait(20)
         for end in ends:
             end.take()
 

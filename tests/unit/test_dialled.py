@@ -8,7 +8,7 @@ import zmq
 from common.errors import UnavailableError
 from common.link.base import Broken
 from common.link.dialled import Dialled
-from common.link.waiter import Waiter, is_readable
+from common.link.waiter import Waiter
 from common.link.zeromq import ZeroMqDialer
 from tests.support.keys import acquainted
 from tests.support.programs import until
@@ -26,7 +26,7 @@ def test_news_from_before_the_first_wait_wakes_who_waits() -> None:
             accepted, _ = server.accept()
             with accepted:
                 accepted.recv(64)
-        descriptor = int(dialled.monitor.fileno())
+        descriptor = dialled.news.fileno()
         told = Waiter([descriptor]).wait(10_000)
         sock.disable_monitor()
         context.destroy(linger=0)
@@ -42,8 +42,8 @@ def test_both_lanes_of_a_link_that_is_refused_are_dialled_again(tmp_path: Path) 
     dialler = ZeroMqDialer(address, keys, keys.peers()[0])
     try:
         lanes = dialler._connections.values()
-        until(lambda: all(is_readable(lane.monitor) for lane in lanes), "both lanes have news")
-        waiter = Waiter(lane.monitor.fileno() for lane in lanes)
+        until(lambda: all(lane.news.has_news() for lane in lanes), "both lanes have news")
+        waiter = Waiter([lane.news for lane in lanes])
         refusals = receive(dialler)
         while any(lane.due_ns == NEVER for lane in lanes):
             assert waiter.wait(10_000), "news wakes"
