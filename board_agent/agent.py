@@ -31,7 +31,7 @@ from common.protocol.message import (
     Rung,
 )
 from common.protocol.session import Outgoing
-from common.protocol.wire import VersionError, decode, encode, encode_for_any_version, encode_stamped
+from common.protocol.wire import VersionError, decode, encode, encode_for_any_version, encode_frame, encode_stamped
 from common.versions import other_protocol
 
 _LOG = logging.getLogger(__name__)
@@ -123,7 +123,7 @@ class Agent:
         self._camera = camera
         self._links = links
         self._several = SeveralLinks(links)
-        self._wake = wake
+        self._wake_fd = wake.fileno()
         self._on_demand = camera.description.pacing is Pacing.DEMAND
         self._outbox = Outbox()
         dialled = tuple(
@@ -137,6 +137,7 @@ class Agent:
         self._camera_ended = False
         self._held_back = False
         self._retry_ns = 0
+        self._heard = False
         self._garbage = 0
         self._refused = 0
         self._stopping = False
@@ -155,15 +156,14 @@ class Agent:
             now_ns = now.monotonic_ns()
             if camera_ready or self._on_demand or now_ns >= self._camera.due_ns(now_ns):
                 self._grab(now_ns)
-            if later_ns := self._session.take_steering():
-                self._camera.steer(later_ns, now_ns)
-            if locks := self._session.take_locks():
-                self._hold(locks, now_ns)
-            self._watch_clock()
-            self._flush()
+            if self._outbox.waiting is not None:
+                self._watch_clock()
+                self._flush()
+            if self._heard:
+                self._heard = False
+                self._obey(now_ns)
             if self._control is not None and self._control.is_due(now_ns):
                 self._adapt(self._control, now_ns)
-            now_ns = now.monotonic_ns()
             if now_ns >= self._session.due_ns:
                 self._watch_locks()
                 self._send_all(self._session.tick(now_ns, self._outbox.counts))
@@ -182,6 +182,13 @@ class Agent:
             ended=self._camera_ended,
             camera=self._camera.health,
         )
+
+    def _obey(self, now_ns: int) -> None:
+        """Do to the camera what the host's last words ask for."""
+        if later_ns := self._session.take_steering():
+            self._camera.steer(later_ns, now_ns)
+        if locks := self._session.take_locks():
+            self._hold(locks, now_ns)
 
     def _hold(self, locks: Locks, now_ns: int) -> None:
         """Hold the camera's controls as the host asks, and tell it what became of that."""
@@ -209,17 +216,15 @@ class Agent:
         Returns:
             Whether the camera's descriptor is readable.
         """
-        self._camera_watch.look()
-        due_ns = min(due_ns, *(link.due_ns for link in self._links))
-        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
-        ready = self._waiter.wait(wait_ms)
-        if self._wake.fileno() in ready:
+        camera_fd = self._camera_watch.look()
+        links_due_ns = min([link.due_ns for link in self._links])
+        wait_ns = min(due_ns, links_due_ns) - now_ns
+        ready = self._waiter.wait(min(_LONGEST_WAIT_MS, -(-wait_ns // 1_000_000)) if wait_ns > 0 else 0)
+        if self._wake_fd in ready:
             self._stopping = True
-        if any(fd != self._camera_watch.fd for fd in ready) or now.monotonic_ns() >= min(
-            link.due_ns for link in self._links
-        ):
+        if (ready and ready != [camera_fd]) or now.monotonic_ns() >= links_due_ns:
             self._receive()
-        return self._camera_watch.fd in ready
+        return camera_fd in ready
 
     def _receive(self) -> None:
         """Receive all packets."""
@@ -229,6 +234,7 @@ class Agent:
     def _take(self, index: int, incoming: Packet | Broken | Garbage) -> None:
         arrived_ns = now.monotonic_ns()
         connection = _address(index, incoming.connection)
+        self._heard = True
         match incoming:
             case Broken():
                 self._send_all(self._session.unreachable(connection))
@@ -285,18 +291,22 @@ class Agent:
 
     def _flush(self) -> None:
         """Send the waiting frame if there is credit for it. If it reaches nobody, it waits until the host returns or a newer frame replaces it."""
-        frame = self._outbox.waiting
+        frame, lane = self._outbox.waiting, self._session.frames_lane
         self._held_back = False
-        if frame is None or not self._session.has_credit:
+        if frame is None or lane is None:
             return
-        outgoing = self._session.send(frame)
-        if not self._links[outgoing.connection[0]].ready(outgoing.connection[1:]):
+        link, connection = self._links[lane[0]], lane[1:]
+        if not link.ready(connection):
             self._held_back = True  # the previous frame is still leaving; this one waits, or a newer one
             return
-        match self._send(outgoing):
+        session = self._session
+        header = encode_frame(session.session, session.next_index, frame, now.monotonic_ns)
+        match link.send(connection, header, frame.payload):
             case SendResult.SENT:
-                self._session.sent(now.monotonic_ns())
+                session.sent(now.monotonic_ns())
                 self._outbox.sent()
+            case SendResult.UNREACHABLE:
+                self._send_all(session.unreachable(lane))
             case SendResult.FULL if not self._on_demand:
                 self._outbox.discard(DropReason.LINK_FULL)
             case SendResult.FULL:
@@ -319,8 +329,7 @@ class Agent:
 
     def _send(self, outgoing: Outgoing) -> SendResult:
         link = self._links[outgoing.connection[0]]
-        header, payload = encode_stamped(outgoing.message, now.monotonic_ns)
-        result = link.send(outgoing.connection[1:], header, payload)
+        result = link.send(outgoing.connection[1:], *encode_stamped(outgoing.message, now.monotonic_ns))
         if result is SendResult.UNREACHABLE:
             self._send_all(self._session.unreachable(outgoing.connection))
         if isinstance(outgoing.message, Pong):

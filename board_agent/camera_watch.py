@@ -21,12 +21,13 @@ class CameraWatch:
         self._camera, self._waiter = camera, waiter
         self.fd: int | None = None
 
-    def look(self) -> None:
-        """Wait on what is the camera's descriptor now. Called before each wait."""
-        if self._camera.pollable == self.fd:
-            return
+    def look(self) -> int | None:
+        """Wait on what is the camera's descriptor now, and return it. Called before each wait."""
+        if (fd := self._camera.pollable) == self.fd:
+            return fd
         if self.fd is not None:
             self._waiter.remove(self.fd)
-        self.fd = self._camera.pollable
-        if self.fd is not None:
-            self._waiter.add(self.fd, select.POLLIN | select.POLLPRI)
+        self.fd = fd
+        if fd is not None:
+            self._waiter.add(fd, select.POLLIN | select.POLLPRI)
+        return fd

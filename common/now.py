@@ -9,10 +9,8 @@ _LEAST_SLEEP_NS: Final = 5_000_000
 """A shorter sleep would spoil no pair. A process that is delayed between two clock readings sees a sleep as shorter, never as longer."""
 
 
-def monotonic_ns() -> int:
-    """Nanoseconds of CLOCK_MONOTONIC, which never steps. V4L2 stamps with this clock; a board without an RTC has no other honest one."""
-    return time.monotonic_ns()
-
+monotonic_ns: Final = time.monotonic_ns
+"""Nanoseconds of CLOCK_MONOTONIC, which never steps. V4L2 stamps with this clock; a board without an RTC has no other honest one."""
 
 _RUNS_ON: Final = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 """The clock that keeps running during a suspend. Where the kernel has none, no sleep is seen."""
@@ -55,8 +53,9 @@ class StandstillWatch:
 
     def look(self) -> tuple[int, bool]:
         """Return the ns of sleep not yet reported, and whether the time of day has jumped. A pause between the readings does not count as a jump."""
-        slept_ns, now_ns, wall_ns = self._sleep.slept_ns(), time.monotonic_ns(), time.time_ns()
-        moved_ns = wall_ns - now_ns - self._apart_ns
+        slept_ns = self._sleep.slept_ns()
+        now_ns = time.monotonic_ns()
+        moved_ns = time.time_ns() - now_ns - self._apart_ns
         jumped = not -_LEAST_SLEEP_NS < moved_ns < _LEAST_SLEEP_NS
         if jumped and time.monotonic_ns() - now_ns >= _LEAST_SLEEP_NS // 5:
             return slept_ns, False  # check again at the next call

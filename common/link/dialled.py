@@ -62,14 +62,8 @@ class Dialled:
         self._hang_ups = 0
         sock.connect(address)
 
-    def redial(self, now_ns: int) -> None:
-        """Redial if that is due.
-
-        Args:
-            now_ns: CLOCK_MONOTONIC now, ns.
-        """
-        if now_ns < self.due_ns:
-            return
+    def redial(self) -> None:
+        """Dial again; call this when it is due."""
         self.due_ns, self.inbox.may_have = _NEVER, True
         with suppress(zmq.ZMQError):  # it may have forgotten the address with the refusal
             self.inbox.socket.disconnect(self._address)

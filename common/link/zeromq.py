@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 _SOCKET_BUFFER_BYTES: Final = 256 * 1024
 """At most about five 50 KB JPEGs in the kernel, so that a frame is not handed over long before it can leave."""
 
-_QUEUE_PACKETS: Final = 8
-"""Packets in ZeroMQ's own queue per connection: a wave of echoes and a few accounts. Frames wait in the outbox instead."""
+_QUEUE_PACKETS: Final = 32
+"""Packets in ZeroMQ's own queue per connection. A sound host's credit keeps it at a wave of echoes and a few frames. Each time that half of the
+queue's length has passed, ZeroMQ wakes the sender, so a short queue costs a wake-up every few frames."""
 
 _LINGER_MS: Final = 500
 _GONE_S: Final = 30
@@ -312,17 +313,17 @@ class ZeroMqDialer(_AlwaysReady):
         now_ns = now.monotonic_ns()
         broken, refused = [], None
         for known in self._connections.values():
-            known.redial(now_ns)
+            if now_ns >= known.due_ns:
+                known.redial()
         going_on = True
         while going_on:
             going_on = False
-            talking = list(self._connections.items())
-            while talking:  # take turns while any has something to say: each check costs some us
-                lanes, talking = talking, []
-                for connection, known in lanes:
-                    if known.inbox.may_have and known.inbox.has_news():
-                        talking.append((connection, known))
-                        yield self._received(known, connection, now_ns)
+            for connection, known in self._connections.items():  # one packet of each in turn
+                if known.inbox.may_have and known.inbox.has_news():
+                    going_on = True
+                    yield self._received(known, connection, now_ns)
+            if going_on:
+                continue
             for connection, known in self._connections.items():
                 if known.news.may_have and known.news.has_news():
                     going_on = known.inbox.may_have = True  # its last words may have come since it was asked

@@ -8,8 +8,6 @@ come from anywhere. Any frame that this answer counts and that has not come is t
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from common.frame import Frame
-from common.ledger import BoardMarks
 from common.orientation import UPRIGHT
 from common.protocol.absence import Presence
 from common.protocol.message import (
@@ -196,8 +194,18 @@ class BoardSession:
     @property
     def has_credit(self) -> bool:
         """Whether the next frame may be sent now."""
+        return self.frames_lane is not None
+
+    @property
+    def frames_lane(self) -> bytes | None:
+        """The connection to which the next frame may be sent now; None without credit."""
         host = self._host
-        return host is not None and host.frames is not None and self._sent < host.below_index
+        return None if host is None or self._sent >= host.below_index else host.frames
+
+    @property
+    def next_index(self) -> int:
+        """The next frame's number among those sent. `sent` spends the credit."""
+        return self._sent
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int, counts: BoardCounts
@@ -289,28 +297,6 @@ class BoardSession:
         if self._host is not None:
             due = min(due, self._host.silence_due_ns, self._host.status_due_ns)
         return due
-
-    def send(self, frame: Frame) -> Outgoing:
-        """Turn a frame into a message. The shell sets its `sent` mark when it stamps it; `sent` spends the credit.
-
-        Args:
-            frame: a sound frame. Call this only while `has_credit`.
-        """
-        assert self._host is not None
-        assert self._host.frames is not None
-        marks = BoardMarks(exposed_ns=frame.exposed.ns, grabbed_ns=frame.grabbed.ns, sent_ns=frame.grabbed.ns)
-        message = FrameMessage(
-            session=self.session,
-            sent_index=self._sent,
-            sequence=frame.sequence,
-            width_px=frame.width_px,
-            height_px=frame.height_px,
-            pixel_format=frame.pixel_format,
-            exposure_ns=frame.exposure_ns,
-            marks=marks,
-            payload=frame.payload,
-        )
-        return Outgoing(self._host.frames, message)
 
     def sent(self, now_ns: int) -> None:
         """Record that the link took the frame. Where frames are far apart, accounts become rarer too."""

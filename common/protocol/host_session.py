@@ -102,7 +102,7 @@ class HostSession:
     @property
     def due_ns(self) -> int:
         """When `tick` must be called next, host's clock, ns."""
-        return min((self._carriage.due_ns, *(path.due_ns for path in self._paths)))
+        return min(self._carriage.due_ns, *[path.due_ns for path in self._paths])
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int
@@ -119,6 +119,8 @@ class HostSession:
         """
         self._notice_absence(now_ns)
         path = self._paths[connection[0]]
+        if isinstance(message, FrameMessage):
+            return self._take_frame(path, message, now_ns)
         match message:
             case Knock():
                 return [] if self._leaving else self._answer_knock(path, connection, message, now_ns)
@@ -132,8 +134,6 @@ class HostSession:
                 if connection == path.lanes.get(Lane.CONTROL):
                     return self._open(path, message, now_ns)
                 return self._accept(path, message, now_ns) if connection == path.lanes.get(Lane.FRAMES) else []
-            case FrameMessage():
-                return self._take_frame(path, message, now_ns)
             case HostHello() | Ping() | Credit() | Steer() | SetLocks():
                 return []  # only a host sends these; a sound board never does
             case Pong() | Status() | End() | LockState():

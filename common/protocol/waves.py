@@ -10,7 +10,13 @@ WAVE_ECHOES_EARLY: Final = 5
 """Echoes back to back. The first wakes both sides; the others measure without that bias (study of links, 3d)."""
 
 WAVE_NS: Final = 500 * MS
-"""Time between two waves. An echo costs the board as much as half a frame (bench_link). 6 a second suffice once the skew is known."""
+"""Time between two waves once the skew is known. An echo costs the board as much as half a frame (bench_link)."""
+
+WAVE_OLD_NS: Final = 1000 * MS
+"""The same after the first minute. The skew is known so well then that an offset ages by nanoseconds a second (bench_clock), and each wave
+costs both sides as much processor time as a frame. A frame whose transit time is unusual asks for an echo at once."""
+
+OLD_NS: Final = 60_000 * MS
 
 WAVE_STANDBY_NS: Final = 1000 * MS
 """The same on a link that carries no frames. It only needs to show that it is alive and how long its delay is."""
@@ -94,7 +100,7 @@ class Waves:
         self._wave_ns = now_ns
         age_ns = now_ns - self._opened_ns
         early = age_ns < EARLY_NS
-        old_ns = WAVE_STANDBY_NS if standby else WAVE_NS
+        old_ns = WAVE_STANDBY_NS if standby else WAVE_NS if age_ns < OLD_NS else WAVE_OLD_NS
         self._due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_YOUNG_NS if age_ns < YOUNG_NS else old_ns)
         self._wave += 1
         self._echoes_left = WAVE_ECHOES_EARLY if early else WAVE_ECHOES

@@ -11,7 +11,7 @@ from typing import Any, Final, assert_never
 import msgpack
 
 from common.errors import ProtocolError
-from common.frame import Buffer
+from common.frame import Buffer, Frame
 from common.ledger import BoardMarks
 from common.protocol.message import (
     BoardCounts,
@@ -76,6 +76,7 @@ _KINDS: Final[tuple[type, ...]] = (
     LockState,
 )
 _KIND_OF: Final = {kind: index for index, kind in enumerate(_KINDS)}
+_FRAME: Final = _KIND_OF[FrameMessage]
 _FRAME_RANGES: Final = (
     (0, MAX_COUNT),
     (0, MAX_COUNT),
@@ -139,6 +140,37 @@ def encode_stamped(message: Message, clock: Callable[[], int]) -> tuple[bytes, B
     return header[:-8] + clock().to_bytes(8, "big"), payload
 
 
+def encode_frame(session: str, sent_index: int, frame: Frame, clock: Callable[[], int]) -> bytes:
+    """Encode the header of a `FrameMessage` straight from a frame, thirty times a second. The send time is read last of all.
+
+    Args:
+        session: of the board process.
+        sent_index: the frame's number among those sent.
+        frame: a sound frame; its payload travels beside the header.
+        clock: returns the sender's clock, ns.
+
+    Returns:
+        Header bytes.
+    """
+    header: bytes = _PACKER.pack(
+        (
+            PROTOCOL_VERSION,
+            _FRAME,
+            session,
+            sent_index,
+            frame.sequence,
+            frame.width_px,
+            frame.height_px,
+            PIXEL_FORMATS.index(frame.pixel_format),
+            frame.exposure_ns,
+            frame.exposed.ns,
+            frame.grabbed.ns,
+            MOST_NS,
+        )
+    )
+    return header[:-8] + clock().to_bytes(8, "big")
+
+
 def decode(header: Buffer, payload: Buffer = b"") -> Message:
     """Decode one message.
 
@@ -176,7 +208,7 @@ def decode(header: Buffer, payload: Buffer = b"") -> Message:
         raise VersionError(version)
     if type(kind) is not int or not 0 <= kind < len(_KINDS):
         raise bad_field(f"unknown kind {kind!r:.40}")
-    if kind == _KIND_OF[FrameMessage]:
+    if kind == _FRAME:
         return _read_frame(items, payload)
     if len(payload):
         raise bad_field(f"{_KINDS[kind].__name__} with a payload")
@@ -317,6 +349,14 @@ def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: C901, PLR0911 
     return Bye(reader.counts())
 
 
+def _check_frame(items: list[Any]) -> None:
+    """Check type and range of a frame's numbers."""
+    for at, (low, high) in enumerate(_FRAME_RANGES):
+        value = items[at + 3]
+        if (type(value) is not int or not low <= value <= high) and not (at == _EXPOSURE_AT and value is None):
+            raise bad_field(f"a frame's number {at} is no integer in {low}..{high}")
+
+
 def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
     """Decode the message that comes thirty times a second, with the checks of FieldReader in one loop.
 
@@ -328,14 +368,12 @@ def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
         raise bad_field(f"payload of {len(payload)} bytes")
     if len(items) != 3 + len(_FRAME_RANGES):
         raise bad_field(f"frame of {len(items)} fields")
-    _, _, session, *numbers = items
+    _, _, session, sent_index, sequence, width_px, height_px, encoding, exposure_ns, exposed_ns, grabbed_ns, sent_ns = (
+        items
+    )
     if type(session) is not str or len(session) > MAX_TEXT:
         raise bad_field("a frame's session is not a short text")
-    for at, (low, high) in enumerate(_FRAME_RANGES):
-        value = numbers[at]
-        if (type(value) is not int or not low <= value <= high) and not (at == _EXPOSURE_AT and value is None):
-            raise bad_field(f"a frame's number {at} is no integer in {low}..{high}")
-    sent_index, sequence, width_px, height_px, encoding, exposure_ns, exposed_ns, grabbed_ns, sent_ns = numbers
+    _check_frame(items)
     marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=grabbed_ns, sent_ns=sent_ns)
     pixel_format = PIXEL_FORMATS[encoding]
     return FrameMessage(

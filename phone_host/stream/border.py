@@ -68,7 +68,7 @@ class Border:
     @property
     def waits_for_echo(self) -> bool:
         """Whether the next echo is wanted as soon as possible."""
-        return self._quarantine.held > 0 or self._clock.in_doubt
+        return self._quarantine.held > 0 or (self._clock.estimate is None and self._clock.in_doubt)
 
     @property
     def takes_frames(self) -> bool:

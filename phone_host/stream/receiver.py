@@ -8,7 +8,7 @@ from typing import Final
 
 from common import now
 from common.errors import ProtocolError
-from common.link.base import Broken, Garbage, Incoming, Link, Packet
+from common.link.base import Broken, Garbage, Incoming, Link
 from common.link.several import SeveralLinks
 from common.link.waiter import Waiter
 from common.protocol.message import BoardHello, Locks, LockState, Ping
@@ -165,10 +165,9 @@ class Receiver:
 
     def _step(self) -> None:
         now_ns = now.monotonic_ns()
-        links_due_ns = min(link.due_ns for link in self._links)
-        due_ns = min(self._reception.due_ns, links_due_ns)
-        wait_ms = min(_LONGEST_WAIT_MS, max(0, -((now_ns - due_ns) // 1_000_000)))
-        ready = self._waiter.wait(wait_ms)
+        links_due_ns = min([link.due_ns for link in self._links])
+        wait_ns = min(self._reception.due_ns, links_due_ns) - now_ns
+        ready = self._waiter.wait(min(_LONGEST_WAIT_MS, -(-wait_ns // 1_000_000)) if wait_ns > 0 else 0)
         self._watch_clock()
         if ready or now.monotonic_ns() >= links_due_ns:
             self._receive()
@@ -199,23 +198,23 @@ class Receiver:
 
     def _take(self, link: int, incoming: Incoming, now_ns: int) -> None:
         reception, connection = self._reception, connection_name(link, incoming.connection)
-        match incoming:
-            case Broken():
-                reception.interrupted(connection, now_ns)
-            case Garbage():
-                reception.count_garbage("not a packet")
-            case Packet(_, header, payload):
-                try:
-                    message = decode(header, payload)
-                except VersionError as error:
-                    reception.refuse_version(connection, error.theirs, now_ns)
-                except ProtocolError as error:
-                    reception.count_garbage(error.problem)
-                else:
-                    reception.receive(connection, message, now_ns)
+        if isinstance(incoming, Broken):
+            reception.interrupted(connection, now_ns)
+            return
+        if isinstance(incoming, Garbage):
+            reception.count_garbage("not a packet")
+            return
+        try:
+            message = decode(incoming.header, incoming.payload)
+        except VersionError as error:
+            reception.refuse_version(connection, error.theirs, now_ns)
+        except ProtocolError as error:
+            reception.count_garbage(error.problem)
+        else:
+            reception.receive(connection, message, now_ns)
 
     def _send(self, outgoing: Outgoing) -> None:
-        header, payload = encode_stamped(outgoing.message, now.monotonic_ns)
-        self._links[outgoing.connection[0]].send(outgoing.connection[1:], header, payload)
+        link = self._links[outgoing.connection[0]]
+        link.send(outgoing.connection[1:], *encode_stamped(outgoing.message, now.monotonic_ns))
         if isinstance(outgoing.message, Ping):
             self._waiter.stay_awake()

@@ -84,6 +84,7 @@ class Reception:
         self._streamed_over: int | None = None
         self._refusals = Refusals()
         self._locks = LockAsking()
+        self._due_ns = 0
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self._border = Border(self.account, sink.void)
@@ -125,8 +126,8 @@ class Reception:
 
     @property
     def due_ns(self) -> int:
-        """When to call `tick` next even if nothing comes, ns."""
-        return self._session.due_ns
+        """When to call `tick` next even if nothing comes, ns; as of the last `tick`."""
+        return self._due_ns
 
     def receive(self, connection: bytes, message: Message, now_ns: int) -> None:
         """Take a message.
@@ -160,8 +161,8 @@ class Reception:
 
     def tick(self, now_ns: int) -> None:
         """Do what is due, and grant credit if there is room for frames."""
-        self._border.tick(now_ns)
         if self._border.waits_for_echo:
+            self._border.tick(now_ns)
             self._session.probe(now_ns)
         if now_ns >= self._session.due_ns:
             self._handle(self._session.tick(now_ns), now_ns)
@@ -171,6 +172,7 @@ class Reception:
             self._handle(self._session.set_locks(self._locks.wanted), now_ns)
         self._sink.tick()
         self._grant(now_ns)
+        self._due_ns = self._session.due_ns
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""

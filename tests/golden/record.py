@@ -43,6 +43,7 @@ from common.protocol.message import (
 from common.protocol.session import Accepted, Counted, Outgoing, connection_name
 from common.protocol.wire import decode, encode, encode_for_any_version, encode_stamped
 from common.stamp import Stamp
+from tests.support.sent_frames import frame_outgoing
 
 MS: Final = 1_000_000
 OFFSET_NS: Final = 5_000_000_000_000
@@ -228,7 +229,7 @@ class World:
         now_ns, sequence = board_ns(self.now_ns), self.grabbed
         self.grabbed += 1
         if self.board.has_credit:
-            self.note("board", "send", [self.board.send(frame_at(now_ns, sequence))], sequence=sequence)
+            self.note("board", "send", [frame_outgoing(self.board, frame_at(now_ns, sequence))], sequence=sequence)
             self.board.sent(now_ns)
             self.sent += 1
         else:

@@ -15,6 +15,7 @@ from common.protocol.message import BoardCounts, DropReason, Message
 from common.protocol.session import Outgoing, Output
 from common.protocol.wire import decode, encode_stamped
 from tests.golden.record import CAMERA, LOWERED, frame_at, sessions
+from tests.support.sent_frames import frame_outgoing
 
 FOLDER = Path(__file__).resolve().parents[1] / "golden"
 RECORDED = ("v0_1",)
@@ -131,9 +132,9 @@ def _board_step(board: BoardSession, step: dict[str, Any], words: list[Words], c
         case "receive":
             return board.receive(bytes.fromhex(step["connection"]), received(step, words), ns, counts)
         case "send":
-            outgoing = board.send(frame_at(ns, step["sequence"]))
+            sent = frame_outgoing(board, frame_at(ns, step["sequence"]))
             board.sent(ns)
-            return [outgoing]
+            return [sent]
         case "unreachable":
             return board.unreachable(bytes.fromhex(step["connection"]))
         case "describe":

@@ -42,6 +42,7 @@ from common.protocol.session import (
     connection_name,
 )
 from common.stamp import Stamp
+from tests.support.sent_frames import frame_outgoing
 
 CAMERA = CameraDescription(
     name="simulated",
@@ -228,7 +229,7 @@ class World:
                 exposure_ns=None,
                 payload=b"",
             )
-            if self._board_sends(self.board.send(frame)):
+            if self._board_sends(frame_outgoing(self.board, frame)):
                 self.board.sent(self.now_ns)
                 self.clocks[self.board.session, index] = self.boot_id
                 self.sent[self.board.session] += 1

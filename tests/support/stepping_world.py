@@ -30,6 +30,7 @@ from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import Reception
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.quarantine import Disbelief
+from tests.support.sent_frames import frame_outgoing
 from tests.support.witness import PERIOD_NS, Witness, WrongPair
 
 _STEP_NS: Final = 5 * MS
@@ -335,7 +336,7 @@ class SteppingWorld:
             return
         now_ns = self.board_clock()
         if self._outbox is not None and self._board.has_credit:
-            outgoing = self._board.send(self._outbox)
+            outgoing = frame_outgoing(self._board, self._outbox)
             self._board_says(outgoing)
             self._board.sent(now_ns)
             self._sent += 1

@@ -38,6 +38,7 @@ from common.protocol.session import Outgoing
 from common.protocol.wire import decode, encode
 from common.stamp import Stamp
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX
+from tests.support.sent_frames import frame_outgoing
 from tests.system.hostile.scene import FPS, FRAMES, PERIOD_NS, Pair, film
 
 Twist = Callable[[Message], Iterable[Message]]
@@ -233,7 +234,7 @@ class LyingBoard:
         waiting = self._outbox.waiting
         if waiting is None or not self.session.has_credit:
             return
-        if self._send(self.session.send(waiting)) is SendResult.SENT:
+        if self._send(frame_outgoing(self.session, waiting)) is SendResult.SENT:
             self.session.sent(now.monotonic_ns())
             self._outbox.sent()
         else:
