@@ -45,7 +45,11 @@ _FAREWELL_NS: Final = 300_000_000
 _FULL_RETRY_NS: Final = 2_000_000
 """If a link is full, a frame that must not be dropped is offered again after this time. ZeroMQ does not say when it has room."""
 
+_AHEAD_NS: Final = 40_000_000
+"""After a frame the board is awake anyway, so an account that is due before the next one goes now: each wake-up costs as much as the account."""
+
 _LONGEST_WAIT_MS: Final = 1000
+_NEVER_NS: Final = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,22 +156,19 @@ class Agent:
         """
         now_ns = now.monotonic_ns()
         while not self._stopping and not (self._camera_ended and self._outbox.waiting is None):
-            camera_ready = self._poll(self._due_ns(now_ns), now_ns)
+            session_due_ns = self._session.due_ns
+            camera_ready = self._poll(min(session_due_ns, self._camera_due_ns(now_ns)), now_ns)
             now_ns = now.monotonic_ns()
             if camera_ready or self._on_demand or now_ns >= self._camera.due_ns(now_ns):
                 self._grab(now_ns)
             if self._outbox.waiting is not None:
                 self._watch_clock()
-                self._flush()
-            if self._heard:
-                self._heard = False
-                self._obey(now_ns)
+                if self._flush():
+                    session_due_ns -= _AHEAD_NS
             if self._control is not None and self._control.is_due(now_ns):
                 self._adapt(self._control, now_ns)
-            if now_ns >= self._session.due_ns:
-                self._watch_locks()
-                self._send_all(self._session.tick(now_ns, self._outbox.counts))
-            self._watch_host(now_ns)
+            if self._heard or now_ns >= session_due_ns or not self._had_host:
+                self._attend(now_ns)
             if self._service is not None and self._service.notifier.due(now_ns):
                 rung = None if self._control is None else self._control.rung
                 self._service.alive(now_ns, self._outbox.counts, self._session, rung, self._camera.health.state)
@@ -183,12 +184,16 @@ class Agent:
             camera=self._camera.health,
         )
 
-    def _obey(self, now_ns: int) -> None:
-        """Do to the camera what the host's last words ask for."""
+    def _attend(self, now_ns: int) -> None:
+        """Do what the host's last words ask for, and what the session has to do by the next frame."""
+        self._heard = False
         if later_ns := self._session.take_steering():
             self._camera.steer(later_ns, now_ns)
         if locks := self._session.take_locks():
             self._hold(locks, now_ns)
+        self._watch_locks()
+        self._send_all(self._session.tick(now_ns, self._outbox.counts, _AHEAD_NS))
+        self._watch_host(now_ns)
 
     def _hold(self, locks: Locks, now_ns: int) -> None:
         """Hold the camera's controls as the host asks, and tell it what became of that."""
@@ -203,12 +208,11 @@ class Agent:
             self._held = held
             self._session.hold(held)
 
-    def _due_ns(self, now_ns: int) -> int:
-        if self._on_demand:
-            if self._session.has_credit and not self._held_back:
-                return max(now_ns, self._retry_ns)
-            return self._session.due_ns
-        return min(self._session.due_ns, self._camera.due_ns(now_ns))
+    def _camera_due_ns(self, now_ns: int) -> int:
+        """When the camera is to be read next without its descriptor's asking."""
+        if not self._on_demand:
+            return self._camera.due_ns(now_ns)
+        return max(now_ns, self._retry_ns) if self._session.has_credit and not self._held_back else _NEVER_NS
 
     def _poll(self, due_ns: int, now_ns: int) -> bool:
         """Wait for whatever comes first and receive all packets. The wait is rounded up, because waking early would only spin.
@@ -289,28 +293,34 @@ class Agent:
         self._session.begin_clock(now.random_id())
         _LOG.info(event("slept", session=self._session.session, seconds=round(slept_ns / 1e9, 1)))
 
-    def _flush(self) -> None:
-        """Send the waiting frame if there is credit for it. If it reaches nobody, it waits until the host returns or a newer frame replaces it."""
+    def _flush(self) -> bool:
+        """Send the waiting frame if there is credit for it. If it reaches nobody, it waits until the host returns or a newer frame replaces it.
+
+        Returns:
+            Whether it was sent.
+        """
         frame, lane = self._outbox.waiting, self._session.frames_lane
         self._held_back = False
         if frame is None or lane is None:
-            return
+            return False
         link, connection = self._links[lane[0]], lane[1:]
         if not link.ready(connection):
             self._held_back = True  # the previous frame is still leaving; this one waits, or a newer one
-            return
+            return False
         session = self._session
         header = encode_frame(session.session, session.next_index, frame, now.monotonic_ns)
         match link.send(connection, header, frame.payload):
             case SendResult.SENT:
                 session.sent(now.monotonic_ns())
                 self._outbox.sent()
+                return True
             case SendResult.UNREACHABLE:
                 self._send_all(session.unreachable(lane))
             case SendResult.FULL if not self._on_demand:
                 self._outbox.discard(DropReason.LINK_FULL)
             case SendResult.FULL:
                 self._retry_ns = now.monotonic_ns() + _FULL_RETRY_NS
+        return False
 
     def _adapt(self, control: RateControl, now_ns: int) -> None:
         """Set the camera to what the link carries."""

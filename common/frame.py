@@ -1,10 +1,10 @@
 """One image of one camera with its header. Its bytes stay as the camera encoded them."""
 
-from dataclasses import dataclass
 from enum import Enum
 
 from common.errors import DataError
 from common.stamp import Stamp
+from common.value import value
 
 Buffer = bytes | bytearray | memoryview
 """Bytes that are passed on without a copy."""
@@ -70,7 +70,7 @@ NOT_AS_SAID = frozenset(
 """Faults of images that are not what their headers say. A camera or cable that cuts off an end never causes them."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Frame:
     """One image and what the camera says about it.
 

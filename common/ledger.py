@@ -7,6 +7,8 @@ differences on the board's own clock. So the delays add up to end-to-end to the 
 import json
 from dataclasses import asdict, dataclass
 
+from common.value import value
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageTimes:
@@ -20,7 +22,7 @@ class StageTimes:
     write: int = 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class BoardMarks:
     """A frame's marks on one clock (ns): exposure mid-point, dequeue from the driver, and the moment before its first byte was written."""
 

@@ -48,14 +48,17 @@ class StandstillWatch:
     """
 
     def __init__(self) -> None:
-        self._sleep = SleepWatch()
+        self._asleep_ns = max(asleep_ns() for _ in range(3))
         self._apart_ns = time.time_ns() - time.monotonic_ns()
 
     def look(self) -> tuple[int, bool]:
         """Return the ns of sleep not yet reported, and whether the time of day has jumped. A pause between the readings does not count as a jump."""
-        slept_ns = self._sleep.slept_ns()
-        now_ns = time.monotonic_ns()
-        moved_ns = time.time_ns() - now_ns - self._apart_ns
+        runs_on_ns, now_ns, wall_ns = time.clock_gettime_ns(_RUNS_ON), time.monotonic_ns(), time.time_ns()
+        slept_ns = runs_on_ns - now_ns - self._asleep_ns
+        if slept_ns < _LEAST_SLEEP_NS:
+            slept_ns = 0
+        self._asleep_ns += slept_ns
+        moved_ns = wall_ns - now_ns - self._apart_ns
         jumped = not -_LEAST_SLEEP_NS < moved_ns < _LEAST_SLEEP_NS
         if jumped and time.monotonic_ns() - now_ns >= _LEAST_SLEEP_NS // 5:
             return slept_ns, False  # check again at the next call

@@ -1,8 +1,7 @@
 """Points in time that know their clock, so that the times of two machines cannot be mixed by accident."""
 
-from dataclasses import dataclass
-
 from common.errors import ClockMismatchError
+from common.value import value
 
 HOST_CLOCK = "host"
 """Name of the clock on which pairs are formed and delays are summed: CLOCK_MONOTONIC of the host."""
@@ -17,7 +16,7 @@ def board_clock(boot_id: str) -> str:
     return f"board:{boot_id}"
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Stamp:
     """A moment: nanoseconds on a named clock.
 

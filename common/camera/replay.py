@@ -201,16 +201,21 @@ class ReplayCamera:
         Raises:
             DataError: a file has become unreadable.
         """
+        grabs: list[Grab]
         if self._settings.pacing is Pacing.DEMAND:
             if self._first_ns is None:
                 self.anchor(self._time_of(0) if self.images.are_times else now_ns, 0)
             return [self._grab(now_ns)]
         if now_ns < self._due_ns:
             return []
+        if now_ns < (next_ns := self._time_of(self._next + self._stride)):  # the usual case: one image
+            grabs = [self._grab(now_ns)]
+            self._due_ns = next_ns
+            return grabs
         newest = self._index_at(now_ns) // self._stride * self._stride
         # After a long stall (a stopped process) only the newest images are read; the others are reported by number.
         passed = max(0, (newest - self._next) // self._stride + 1 - _BACKLOG) if self._settings.loop else 0
-        grabs: list[Grab] = [Skipped(self._sequence, passed)] if passed else []
+        grabs = [Skipped(self._sequence, passed)] if passed else []
         self._sequence += passed
         self._next += passed * self._stride
         while self._next <= newest and not (grabs and isinstance(grabs[-1], Ended)):

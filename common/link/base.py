@@ -16,9 +16,10 @@ from typing import Any, Protocol, runtime_checkable
 from common.frame import Buffer
 from common.keys import KeyFolder
 from common.protocol.message import Lane
+from common.value import value
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Packet:
     """A packet received over a connection.
 

@@ -15,8 +15,7 @@ import zmq
 
 from common import now
 
-# As plain integers: pyzmq's flags are enums, whose operators cost more than the call that takes them.
-_EVENTS: Final = int(zmq.EVENTS)
+# As a plain integer: pyzmq's flags are enums, whose operators cost more than the call that takes them.
 _READABLE: Final = int(zmq.POLLIN)
 
 _AWAKE_NS: Final = 200_000
@@ -37,12 +36,15 @@ class Inbox:
         sock: the socket.
     """
 
-    __slots__ = ("_fd", "_get", "may_have", "socket")
+    __slots__ = ("_asked", "_fd", "may_have", "socket")
 
     def __init__(self, sock: "zmq.Socket[bytes]") -> None:
         self.socket = sock
         self.may_have = True
-        self._fd, self._get = sock.fileno(), sock.getsockopt
+        self._fd = sock.fileno()
+        self._asked = [
+            (sock, _READABLE)
+        ]  # asked by zmq_poll: getsockopt makes two enum members, and takes half as long again
 
     def fileno(self) -> int:
         """The descriptor that becomes readable when there may be news."""
@@ -50,7 +52,7 @@ class Inbox:
 
     def has_news(self) -> bool:
         """Ask the socket whether there is something to receive."""
-        self.may_have = bool(int(self._get(_EVENTS)) & _READABLE)
+        self.may_have = bool(zmq.zmq_poll(self._asked, 0))
         return self.may_have
 
 
@@ -105,8 +107,20 @@ class Waiter:
         Returns:
             Descriptors, including those of ZeroMQ sockets. A socket may turn out to have nothing to receive.
         """
-        ready = [fd for fd, inbox in self._inboxes.items() if inbox.may_have and inbox.has_news()]
-        now_ns = self._clock() if wait_ms and not ready else self._awake_until_ns
+        ready = []
+        for fd, inbox in self._inboxes.items():
+            if inbox.may_have and inbox.has_news():
+                ready.append(fd)
+        found = self._found_awake() if wait_ms and not ready and self._awake_until_ns else []
+        for fd, _ in found or self._poll.poll(0 if ready else wait_ms):
+            if fd in self._inboxes:
+                self._inboxes[fd].may_have = True
+            ready.append(fd)
+        return ready
+
+    def _found_awake(self) -> list[tuple[int, int]]:
+        """Poll again and again while the time to stay awake lasts; return what was found."""
+        now_ns = self._clock()
         while now_ns < self._awake_until_ns:
             os.sched_yield()  # ZeroMQ's thread may share the core
             found = self._poll.poll(0)
@@ -114,12 +128,6 @@ class Waiter:
             if now_ns - before_ns > _AWAKE_NS:
                 self._asleep_until_ns = now_ns + _ASLEEP_NS
             if found:
-                return self._signalled(found)
-        return ready + self._signalled(self._poll.poll(0 if ready else wait_ms))
-
-    def _signalled(self, found: list[tuple[int, int]]) -> list[int]:
-        """Return the readable descriptors; the sockets behind them may have news."""
-        for fd, _ in found:
-            if (inbox := self._inboxes.get(fd)) is not None:
-                inbox.may_have = True
-        return [fd for fd, _ in found]
+                return found
+        self._awake_until_ns = 0
+        return []

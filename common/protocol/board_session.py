@@ -269,8 +269,14 @@ class BoardSession:
         self._is_asked = False
         return locks
 
-    def tick(self, now_ns: int, counts: BoardCounts) -> list[Outgoing]:
-        """Do what is due: send the account, give up a silent host, knock on connections that this side dialled."""
+    def tick(self, now_ns: int, counts: BoardCounts, ahead_ns: int = 0) -> list[Outgoing]:
+        """Do what is due: send the account, give up a silent host, knock on connections that this side dialled.
+
+        Args:
+            now_ns: the board's clock, ns.
+            counts: the current account of this session's frames.
+            ahead_ns: an account that will be due within this time is sent now: the board is awake for another reason.
+        """
         self._notice_absence(now_ns)
         outgoing: list[Outgoing] = []
         host = self._host
@@ -278,7 +284,7 @@ class BoardSession:
             host.lose_silent_links(now_ns)
             if not host.heard_by:
                 self._host = host = None
-        if host is not None and now_ns >= host.status_due_ns:
+        if host is not None and now_ns + ahead_ns >= host.status_due_ns:
             host.status_due_ns = now_ns + self._status_ns
             outgoing += self._account(host, counts)
         if self._dialled and now_ns >= self._knock_due_ns:

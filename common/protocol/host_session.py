@@ -81,6 +81,7 @@ class HostSession:
         self._stream: Stream | None = None
         self._boot_id = ""
         self._presence = Presence()
+        self._due = lambda: self.due_ns
 
     @property
     def is_open(self) -> bool:
@@ -102,7 +103,10 @@ class HostSession:
     @property
     def due_ns(self) -> int:
         """When `tick` must be called next, host's clock, ns."""
-        return min(self._carriage.due_ns, *[path.due_ns for path in self._paths])
+        due_ns = self._carriage.due_ns
+        for path in self._paths:
+            due_ns = min(due_ns, path.due_ns)
+        return due_ns
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int
@@ -244,7 +248,7 @@ class HostSession:
 
     def _notice_absence(self, now_ns: int) -> None:
         """Do not count the time in which this process did not run as anyone's silence."""
-        absent_ns = self._presence.absent_ns(lambda: self.due_ns, now_ns)
+        absent_ns = self._presence.absent_ns(self._due, now_ns)
         if absent_ns <= 0:
             return
         for path in self._paths:

@@ -12,6 +12,7 @@ from common.camera_identity import UNKNOWN_CAMERA, CameraIdentity, Lock
 from common.frame import Buffer, PixelFormat
 from common.ledger import BoardMarks
 from common.orientation import UPRIGHT, Orientation
+from common.value import value
 
 
 class Lane(Enum):
@@ -177,14 +178,14 @@ class Refusal:
     reason: RefusalReason
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Credit:
     """Host: you may send frames whose `sent_index` is below this one."""
 
     below_index: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class FrameMessage:
     """Board: one frame. Marks are on the board's clock."""
 
@@ -199,7 +200,7 @@ class FrameMessage:
     payload: Buffer = field(repr=False)
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Ping:
     """Host: clock echo, please. `t0_ns` is the host's clock just before sending; `wave` keeps late answers out of later estimates."""
 
@@ -207,7 +208,7 @@ class Ping:
     t0_ns: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Pong:
     """Board: the echo. `t1_ns` is the arrival and `t2_ns` the moment just before sending, both on the board's clock."""
 

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Final
 
 from common.protocol.message import BoardCounts, BoardHello, FrameMessage, LockState, Message, RefusalReason, Rung
+from common.value import value
 
 MS: Final = 1_000_000
 
@@ -30,7 +31,7 @@ STATUS_SLOW_NS: Final = 1000 * MS
 """The same where frames are further apart than this: one account a second takes 0.5 % of a 115200 baud line."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Outgoing:
     """Send this message on that connection.
 
@@ -80,7 +81,7 @@ class OtherBoard:
     hello: BoardHello
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Arrived:
     """Host: a frame of the running session. `lost` frames before it never came."""
 
@@ -110,7 +111,7 @@ class Stale:
     reason: StaleReason
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Echo:
     """Host: one clock echo. t0 and t3 are on the host's clock, t1 and t2 on the board's; ns. Each link numbers its own waves."""
 

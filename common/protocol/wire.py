@@ -350,7 +350,7 @@ def _read(kind: type, reader: "FieldReader") -> Message:  # noqa: C901, PLR0911 
 
 
 def _check_frame(items: list[Any]) -> None:
-    """Check type and range of a frame's numbers."""
+    """Say which of a frame's numbers is not of its type or in its range, if any is not."""
     for at, (low, high) in enumerate(_FRAME_RANGES):
         value = items[at + 3]
         if (type(value) is not int or not low <= value <= high) and not (at == _EXPOSURE_AT and value is None):
@@ -358,7 +358,7 @@ def _check_frame(items: list[Any]) -> None:
 
 
 def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
-    """Decode the message that comes thirty times a second, with the checks of FieldReader in one loop.
+    """Decode the message that comes thirty times a second, with the checks of FieldReader in one expression.
 
     Args:
         items: the whole header, version and kind included.
@@ -373,7 +373,20 @@ def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
     )
     if type(session) is not str or len(session) > MAX_TEXT:
         raise bad_field("a frame's session is not a short text")
-    _check_frame(items)
+    if not (
+        type(sent_index) is type(sequence) is type(width_px) is type(height_px) is type(encoding) is int
+        and type(exposed_ns) is type(grabbed_ns) is type(sent_ns) is int
+        and (exposure_ns is None or (type(exposure_ns) is int and 0 <= exposure_ns <= MOST_NS))
+        and 0 <= sent_index <= MAX_COUNT
+        and 0 <= sequence <= MAX_COUNT
+        and 1 <= width_px <= MAX_SIZE_PX
+        and 1 <= height_px <= MAX_SIZE_PX
+        and 0 <= encoding < len(PIXEL_FORMATS)
+        and -MOST_NS <= exposed_ns <= MOST_NS
+        and -MOST_NS <= grabbed_ns <= MOST_NS
+        and -MOST_NS <= sent_ns <= MOST_NS
+    ):
+        _check_frame(items)
     marks = BoardMarks(exposed_ns=exposed_ns, grabbed_ns=grabbed_ns, sent_ns=sent_ns)
     pixel_format = PIXEL_FORMATS[encoding]
     return FrameMessage(

@@ -6,6 +6,7 @@ from common.frame import Frame
 from common.ledger import BoardMarks, PairLedger, StageTimes
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import FrameMessage
+from common.value import value
 from phone_host.model.drift import AS_CALIBRATED, Departure
 from phone_host.model.images import (
     CloudImage,
@@ -21,7 +22,7 @@ from phone_host.model.matching import Completed, Confidence, MatchReport
 from phone_host.model.temporal import TemporalAccount
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class BoardFrame:
     """A frame that came over a link, with its marks on the host's clock.
 

@@ -6,12 +6,12 @@ believed. The stamps of a frame that has passed need no further check. Used by t
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from common.program.logs import event
 from common.protocol.message import CameraDescription, FrameMessage, Pacing
 from common.protocol.session import Echo
+from common.value import value
 from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.model import BoardFrame
 from phone_host.sync.clock import ClockEstimate, Heard
@@ -24,7 +24,7 @@ _MOST_HELD: Final = 4
 """While this many frames wait for an echo, the board gets no further credit."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Arrival:
     """A frame that came, with its link, session account and camera at that time, and the last byte's arrival, ns."""
 

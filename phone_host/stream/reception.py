@@ -164,15 +164,17 @@ class Reception:
         if self._border.waits_for_echo:
             self._border.tick(now_ns)
             self._session.probe(now_ns)
-        if now_ns >= self._session.due_ns:
+        due_ns = self._session.due_ns
+        if now_ns >= due_ns:
             self._handle(self._session.tick(now_ns), now_ns)
             if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
                 self._handle(self._session.carry(best, now_ns), now_ns)
+            due_ns = self._session.due_ns
         if self._locks.is_due(now_ns):
             self._handle(self._session.set_locks(self._locks.wanted), now_ns)
         self._sink.tick()
         self._grant(now_ns)
-        self._due_ns = self._session.due_ns
+        self._due_ns = due_ns
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
