@@ -213,7 +213,8 @@ def _corners(data: Data) -> Iterator[Figure]:
 
 
 _TRANSPORTS: Final = {
-    "tandemscan": "tandemscan over tcp",
+    "tandemscan": "tandemscan over tcp, after ten seconds",
+    "tandemscan-steady": "tandemscan over tcp, after the first minute",
     "tandemscan-curve": "tandemscan over tcp with keys",
     "tandemscan-ipc": "tandemscan over ipc",
     "pyzmq": "bare pyzmq PUSH/PULL",
@@ -226,8 +227,8 @@ def _link(data: Data) -> Iterator[Figure]:
     yield from _verdicts(data)
     for payload, found in data["payloads"].items():
         for name, row in found["transports"].items():
-            what = f"{_TRANSPORTS[name]}, {payload} of {found['bytes'] / 1000:.0f} KB: one-way p50 / p99; sender's CPU a frame; lost"
-            times = f"{_number(row['p50_us'])} / {_number(row['p99_us'])} us; {_number(row['sender_us'])} us; {row['lost_frames']}"
+            what = f"{_TRANSPORTS[name]}, {payload} of {found['bytes'] / 1000:.0f} KB: one-way p50 / p99; CPU a frame of sender / receiver; lost"
+            times = f"{_number(row['p50_us'])} / {_number(row['p99_us'])} us; {_number(row['sender_us'])} / {_number(row['receiver_us'])} us; {row['lost_frames']}"
             yield Figure(what, times)
 
 
@@ -341,7 +342,7 @@ SOURCES: Final = (
     Source("capture", Topic.CALIBRATION, "Films with and without stabilisation, told apart.", f"{_BENCH}bench_capture --json", _verdicts, 300),
     Source("measure", Topic.DEPTH, "Points of rendered rooms, measured as `phone-host measure` does: does the truth lie within what is stated?", f"{_BENCH}bench_measure --json", _verdicts, 300),
     Source("quality", Topic.DEPTH, "A rendered wall, measured as `phone-host quality` does, beside what the exact disparity and depth of every pixel give.", f"{_BENCH}bench_quality --json", _verdicts, 60),
-    Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 130),
+    Source("link", Topic.LINKS, "640x480 JPEGs at 30 per second between two processes, all transports in turns.", f"{_BENCH}bench_link --runs 2 --seconds 4 --payloads jpeg --transports {' '.join(_TRANSPORTS)} --json", _link, 270),
     Source("serial", Topic.LINKS, "Serial lines: a pseudo terminal, and emulated slow cables.", f"{_BENCH}bench_serial --runs 2 --seconds 10 --json", _serial, 80),
     Source("switches", Topic.LINKS, "The better of two links is lost and comes back.", f"{_BENCH}bench_links --losses 2 --json", _switches, 70),
     Source("clock", Topic.CLOCK, "How well the host knows the board's clock. Why radio misses its figure without echoes: [decision 0009](decisions/0009-clock-estimate.md).", f"{_BENCH}bench_clock --runs 400 --long-runs 40 --real-runs 1 --json", _clock, 230),
