@@ -16,6 +16,7 @@ from phone_host.verbs.calibrate import arguments as calibrate
 from phone_host.verbs.calibrate_time import arguments as calibrate_time
 from phone_host.verbs.demo import arguments as demo
 from phone_host.verbs.doctor import arguments as doctor
+from phone_host.verbs.export import arguments as export
 from phone_host.verbs.keys import arguments as keys
 from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
@@ -51,6 +52,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "calibrate-time": calibrate_time,
     "stereo": stereo,
     "scan": scan,
+    "export": export,
     "measure": measure,
     "quality": quality,
     "pair": pair,
