@@ -22,6 +22,7 @@ from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
 from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.record import arguments as record
+from phone_host.verbs.relief import arguments as relief
 from phone_host.verbs.run import arguments as run
 from phone_host.verbs.scan import arguments as scan
 from phone_host.verbs.serve import arguments as serve
@@ -53,6 +54,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "stereo": stereo,
     "scan": scan,
     "export": export,
+    "relief": relief,
     "measure": measure,
     "quality": quality,
     "pair": pair,
@@ -61,7 +63,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "settings": settings,
 }
 
-_NATIVE: Final = frozenset({"calibrate", "measure", "quality", "scan", "stereo"})
+_NATIVE: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
 
 _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.

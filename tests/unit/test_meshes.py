@@ -18,9 +18,9 @@ from common.errors import DataError, TandemError
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.decimated import decimated
 from phone_host.output.meshes.formats import FORMATS, READABLE, mesh_bytes, read_mesh
-from phone_host.output.model_file import read_model
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.meshes.three_ds import MOST, three_ds_bytes
+from phone_host.output.model_file import read_model
 
 _NONE = np.zeros((0, 3), np.uint8)
 

@@ -12,8 +12,8 @@ from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
 from phone_host.output.meshes.decimated import NoLibraryError, decimated
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
-from phone_host.output.model_file import Model, read_model
 from phone_host.output.meshes.solid import Solid
+from phone_host.output.model_file import Model, read_model
 from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
 from phone_host.verbs.units import length_mm
 
