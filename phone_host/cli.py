@@ -16,11 +16,13 @@ from phone_host.verbs.calibrate import arguments as calibrate
 from phone_host.verbs.calibrate_time import arguments as calibrate_time
 from phone_host.verbs.demo import arguments as demo
 from phone_host.verbs.doctor import arguments as doctor
+from phone_host.verbs.export import arguments as export
 from phone_host.verbs.keys import arguments as keys
 from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
 from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.record import arguments as record
+from phone_host.verbs.relief import arguments as relief
 from phone_host.verbs.run import arguments as run
 from phone_host.verbs.scan import arguments as scan
 from phone_host.verbs.serve import arguments as serve
@@ -51,6 +53,8 @@ _VERBS: Final[dict[str, Arguments]] = {
     "calibrate-time": calibrate_time,
     "stereo": stereo,
     "scan": scan,
+    "export": export,
+    "relief": relief,
     "measure": measure,
     "quality": quality,
     "pair": pair,
@@ -59,7 +63,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "settings": settings,
 }
 
-_NATIVE: Final = frozenset({"calibrate", "measure", "quality", "scan", "stereo"})
+_NATIVE: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
 
 _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.

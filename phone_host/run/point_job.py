@@ -1,50 +1,21 @@
 """Measures points of one pair of image files. The root of `measure`."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from common import now
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
-from common.orientation import Orientation
 from phone_host.measure.trust import Concern
+from phone_host.run.one_pair import PairJob, Size, compute_pair
 from phone_host.run.seen_pair import MissedPoint, Outcome, Point, SeenPair, seen_pair
 from phone_host.run.stereo_job import Watcher
-from phone_host.run.stereo_trust import judge_pair
-from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import decode_files, open_image, require_same_size
 from phone_host.stereo.rectify import rectify_points
 from phone_host.stereo.rig_errors import Known
 
-Size = tuple[int, int]
-
 ELSEWHERE: Final = "choose a point on a surface with texture, away from its edges and not too far"
 """What helps a point that cannot be measured."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PointJob:
-    """What to measure.
-
-    Attributes:
-        left: image file of the left camera.
-        right: image file of the right camera.
-        points_px: x and y of points in the upright left image, px.
-        make_core: makes the stereo core for images of this size (width and height of the left one, px).
-        most_pixels: an image that claims more is refused.
-        mounted: by which turns the images become upright, after what their EXIF headers say.
-    """
-
-    left: Path
-    right: Path
-    points_px: tuple[Point, ...]
-    make_core: Callable[[Size], StereoCore]
-    most_pixels: int
-    mounted: tuple[Orientation, Orientation]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,48 +33,34 @@ class Measured:
     doubts: tuple[Concern, ...]
 
 
-def measure_points(job: PointJob, watcher: Watcher) -> Measured:
+def measure_points(job: PairJob, points_px: tuple[Point, ...], watcher: Watcher) -> Measured:
     """Measure points.
 
     Args:
-        job: what to measure.
+        job: the pair.
+        points_px: x and y of points in the upright left image, px.
         watcher: is told how far it is.
 
     Raises:
         SettingsError: a point lies outside the left image.
         DataError: the pair cannot be computed, cannot be right, or none of the points can be measured.
     """
-    watcher.say("reading")
-    opened = tuple(
-        open_image(path, job.most_pixels, turn) for path, turn in zip((job.left, job.right), job.mounted, strict=True)
-    )
-    left_px, right_px = (image.size_px for image in opened)
-    for point in job.points_px:
-        if not all(0 <= at <= size - 1 for at, size in zip(point, left_px, strict=True)):
-            raise SettingsError(
-                f"--points {point_text(point)} lies outside the left image of {size_text(left_px)} px",
-                "give X,Y inside it; the centre of the first pixel is 0,0",
-            )
-    core = job.make_core(left_px)
-    if core.rig is None:
-        require_same_size(left_px, right_px, str(job.left), str(job.right))
-    core.require_sizes(left_px, right_px)
-    images = decode_files(opened[0], opened[1], core.reductions(left_px, right_px))
-    watcher.say("matching")
-    processed = core.compute(*images, now.monotonic_ns, whole_px=(left_px, right_px))
-    seen = seen_pair(core, processed)
-    if seen is None:
-        raise SettingsError("there are no millimetres without focal length and baseline", "give --calibration")
-    watcher.say("checking")
-    concerns = judge_pair(core, processed, job.mounted).concerns
-    blocking = next((concern for concern in concerns if concern.doubt.blocks), None)
-    if blocking is not None:
-        why = f"these images cannot be measured, because {blocking.sentence} ({blocking.remedy})"
-        raise DataError(why, "mend that, then measure again")
+
+    def check(left_px: Size) -> None:
+        for point in points_px:
+            if not all(0 <= at <= size - 1 for at, size in zip(point, left_px, strict=True)):
+                raise SettingsError(
+                    f"--points {point_text(point)} lies outside the left image of {size_text(left_px)} px",
+                    "give X,Y inside it; the centre of the first pixel is 0,0",
+                )
+
+    pair = compute_pair(job, watcher, check)
+    seen = seen_pair(pair.core, pair.processed)
+    assert seen is not None, "a computed pair has geometry"
     watcher.say("measuring")
-    points = tuple(_measured(point, seen) for point in job.points_px)
-    _require_one(job.points_px, points)
-    return Measured(points, seen.errors.known, concerns)
+    points = tuple(_measured(point, seen) for point in points_px)
+    _require_one(points_px, points)
+    return Measured(points, seen.errors.known, pair.concerns)
 
 
 def _require_one(asked_px: tuple[Point, ...], points: tuple[Outcome, ...]) -> None:

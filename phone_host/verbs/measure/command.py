@@ -15,7 +15,8 @@ from common.places import Kind, kind_of
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_text
-from phone_host.run.point_job import ELSEWHERE, Measured, PointJob, measure_points, point_text
+from phone_host.run.one_pair import PairJob
+from phone_host.run.point_job import ELSEWHERE, Measured, measure_points, point_text
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.seen_pair import FoundPoint, MissedPoint, Outcome
 from phone_host.settings import most_pixels
@@ -50,16 +51,15 @@ def run(options: argparse.Namespace) -> int:
     for path in (options.left, options.right):
         _require_image(path)
     points = tuple(point_px(text, "--points", "X,Y in px, for example 312,240") for text in options.points)
-    job = PointJob(
+    job = PairJob(
         left=Path(options.left),
         right=Path(options.right),
-        points_px=points,
         make_core=lambda size_px: _core(options, size_px),
         most_pixels=most_pixels(None, options.max_megapixels),
         mounted=orientations(options),
     )
     with step_bar("reading", None) as watcher:
-        found = measure_points(job, watcher)
+        found = measure_points(job, points, watcher)
     if options.json:
         print(json_text(_report(options, points, found)))
     else:

@@ -1,0 +1,1 @@
+"""Meshes as files that other programs read, and read back: one module a format."""

@@ -1,0 +1,81 @@
+"""A model as the user names it: the folder of a scan, or a mesh file."""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common.errors import DataError, UnavailableError
+from common.files import read_whole
+from common.places import Kind, kind_of
+from phone_host.output.axes import Axes
+from phone_host.output.meshes.formats import OURS_MM, read_mesh
+from phone_host.output.meshes.solid import Solid
+
+_MODEL, _REPORT = "model.ply", "report.json"
+_MOST_BYTES: Final = 2 << 30
+_MOST_REPORT_BYTES: Final = 16 << 20
+_HEAD: Final = 256
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Model:
+    """A mesh, and what its scan says of it.
+
+    Attributes:
+        path: of the mesh.
+        stem: name for files made of it.
+        solid: the mesh.
+        axes: in which its points are; None: nobody says.
+        voxel_m: fineness of its scan, m; NaN: of no scan.
+    """
+
+    path: Path
+    stem: str
+    solid: Solid
+    axes: Axes | None
+    voxel_m: float
+
+
+def read_model(path: Path, unit_m: float) -> Model:
+    """Read a model.
+
+    Args:
+        path: the folder of a scan, or a mesh file.
+        unit_m: unit of a mesh file, m; NaN: what the file says if we wrote it, or else the metre. A scan's is the metre.
+
+    Raises:
+        UnavailableError: there is none.
+        DataError: it is no mesh, or a spoiled one.
+    """
+    kind = kind_of(path)
+    if kind is Kind.MISSING:
+        raise UnavailableError(f"{path} does not exist", "give the folder of a scan, or a mesh file")
+    is_scan = kind is Kind.FOLDER
+    file = path / _MODEL if is_scan else path
+    if is_scan and kind_of(file) is Kind.MISSING:
+        raise DataError(f"{path} holds no {_MODEL}", "give the folder that phone-host scan wrote")
+    try:
+        content = read_whole(file, _MOST_BYTES)
+    except OSError as error:
+        raise UnavailableError(f"{file} cannot be read ({error.strerror})", "check its permissions") from None
+    report = _report(path / _REPORT) if is_scan else {}
+    if is_scan or math.isnan(unit_m):
+        unit_m = 0.001 if OURS_MM in content[:_HEAD] else 1.0
+    solid = read_mesh(content, file.name, unit_m)
+    stem = (path.resolve().name or "model") if is_scan else path.stem
+    axes = next((axes for axes in Axes if axes.text == report.get("axes")), None)
+    voxel = report.get("voxel_m")
+    voxel_m = float(voxel) if isinstance(voxel, int | float) and 0 < voxel < 1 else math.nan
+    return Model(path=file, stem=stem, solid=solid, axes=axes, voxel_m=voxel_m)
+
+
+def _report(path: Path) -> dict[str, object]:
+    """Return what a scan's report says of its model; nothing if it is not there or spoiled: the mesh is what counts."""
+    try:
+        told = json.loads(read_whole(path, _MOST_REPORT_BYTES))
+    except (OSError, ValueError, DataError, RecursionError):
+        return {}
+    model = told.get("model") if isinstance(told, dict) else None
+    return model if isinstance(model, dict) else {}

@@ -1,0 +1,1 @@
+"""phone-host export: its options (light), and its command."""

@@ -1,0 +1,119 @@
+"""phone-host export: write a scan or a mesh for other programs and printers."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any, Final
+
+from common.errors import SettingsError
+from common.places import make_folder
+from common.program.terminal import say
+from phone_host.output.atomic import write_bytes
+from phone_host.output.json_text import json_text
+from phone_host.output.meshes.decimated import NoLibraryError, decimated
+from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
+from phone_host.output.meshes.solid import Solid
+from phone_host.output.model_file import Model, read_model
+from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
+from phone_host.verbs.units import length_mm
+
+_SHARE_OF_VOXEL: Final = 0.1
+"""How far the surface may move when triangles are left out; with twice that it intersects itself in places (decision 0070)."""
+
+_UNITS_M: Final = {"m": 1.0, "mm": 0.001}
+_LARGE_MM: Final = 2000.0
+"""Longer than any printer's bed: more likely millimetres taken for metres."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read the model, leave out triangles that say nothing, write each format, say how large it is."""
+    kinds = _kinds(options.to)
+    require_folder(options.out)
+    model = read_model(Path(options.model), _UNITS_M.get(options.unit, math.nan))
+    tolerance_m = _tolerance_m(options.tolerance, model)
+    solid, notes = _decimated(model, tolerance_m)
+    files = {f"{model.stem}.{kind}": kind for kind in kinds}
+    try:
+        make_folder(options.out)
+        claim_names(options.out, options.out, *files)
+        sizes = {}
+        for name, kind in files.items():
+            content = mesh_bytes(solid, kind, model.axes)
+            write_bytes(options.out / name, content)
+            sizes[name] = len(content)
+    except OSError as error:
+        raise unwritable(options.out, error) from error
+    if options.json:
+        print(json_text(_told(options.out, solid, model, sizes, notes)))
+    else:
+        say(_lines(options.out, solid, model, sizes, notes))
+    return 0
+
+
+def _kinds(text: str) -> list[str]:
+    kinds = [word.strip().lower() for word in text.split(",")]
+    for kind in kinds:
+        if kind not in FORMATS:
+            raise SettingsError(
+                f"--to {text!r} names {kind!r}, which is no format", f"give some of {','.join(FORMATS)}"
+            )
+    return list(dict.fromkeys(kinds))
+
+
+def _tolerance_m(text: str | None, model: Model) -> float:
+    """Return how far the surface may move, m; 0: not at all."""
+    if text is None:
+        return 0.0 if math.isnan(model.voxel_m) else _SHARE_OF_VOXEL * model.voxel_m
+    return 0.0 if text.strip() in {"0", "0mm"} else length_mm(text, "--tolerance", "0.1mm") / 1000
+
+
+def _decimated(model: Model, tolerance_m: float) -> tuple[Solid, list[str]]:
+    """Return the mesh to write, and what is to be said of it."""
+    if not tolerance_m:
+        return model.solid, []
+    try:
+        fewer = decimated(model.solid, tolerance_m)
+    except NoLibraryError:
+        note = "every triangle is written: manifold3d is not installed (pip install 'tandemscan[print]')"
+        return model.solid, [note]
+    if not fewer.is_closed:
+        return model.solid, ["the mesh is not closed, so every triangle is written, and printers may refuse it"]
+    return fewer.solid, []
+
+
+def _told(out: Path, solid: Solid, model: Model, sizes: dict[str, int], notes: list[str]) -> dict[str, Any]:
+    return {
+        "command": "export",
+        "model": str(model.path),
+        "points": len(solid.points_m),
+        "triangles": len(solid.triangles),
+        "triangles_before": len(model.solid.triangles),
+        "size_mm": [round(length, 3) for length in solid.size_mm],
+        "axes": None if model.axes is None else model.axes.text,
+        "has_colours": solid.has_colours,
+        "files": [{"path": str(out / name), "bytes": size, "unit": _unit(name)} for name, size in sizes.items()],
+        "notes": notes,
+    }
+
+
+def _unit(name: str) -> str:
+    return "m" if name.endswith(f".{METRES}") else "mm"
+
+
+def _lines(out: Path, solid: Solid, model: Model, sizes: dict[str, int], notes: list[str]) -> list[str]:
+    x, y, z = solid.size_mm
+    before, after = len(model.solid.triangles), len(solid.triangles)
+    fewer = f" of {before}" if after < before else ""
+    lines = [f"{x:.1f} x {y:.1f} x {z:.1f} mm, {after} triangles{fewer}"]
+    if model.axes is not None:
+        lines.append(f"axes: {model.axes.text}")
+    for name, size in sizes.items():
+        lost = "; without colours" if solid.has_colours and name.rpartition(".")[2] in WITHOUT_COLOUR else ""
+        unit = "metres, y up" if _unit(name) == "m" else "mm"
+        lines.append(f"written to {out / name} ({size / 1e6:.1f} MB, {unit}{lost})")
+    if max(solid.size_mm) > _LARGE_MM:
+        notes = [
+            *notes,
+            f"{max(solid.size_mm) / 1000:.1f} m is large for a print: give --unit mm if the file is in millimetres",
+        ]
+    return [*lines, *(f"note: {note}" for note in notes)]

@@ -1,0 +1,1 @@
+"""phone-host relief: its options (light), and its command."""

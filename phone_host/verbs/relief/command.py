@@ -1,0 +1,100 @@
+"""phone-host relief: make a printable relief of one pair of images."""
+
+import argparse
+from pathlib import Path
+from typing import Final
+
+from common.places import make_folder
+from common.program.terminal import say
+from phone_host.output.atomic import write_bytes
+from phone_host.output.json_text import json_text
+from phone_host.output.meshes.decimated import NoLibraryError, decimated
+from phone_host.output.meshes.formats import mesh_bytes
+from phone_host.output.meshes.relief import Relief, Sizes, relief_of
+from phone_host.output.meshes.solid import Solid
+from phone_host.run.one_pair import PairJob, compute_pair
+from phone_host.run.progress_bar import step_bar
+from phone_host.settings import most_pixels
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.default_matcher import default_matcher
+from phone_host.verbs.orientation_arguments import orientations
+from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
+from phone_host.verbs.stereo_options import build_core, overlay_of
+from phone_host.verbs.units import length_mm
+
+_NAMES: Final = ("relief.stl", "relief.3mf")
+_TOLERANCE_M: Final = 0.00005
+"""0.05 mm: a quarter of a layer."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Match the pair, raise its depth out of a plate, write it for a slicer."""
+    width_m = length_mm(options.width, "--width", "100mm") / 1000
+    height_m = length_mm(options.height, "--height", "30mm") / 1000 if options.height else width_m / 3
+    sizes = Sizes(width_m=width_m, height_m=height_m, base_m=length_mm(options.base, "--base", "2mm") / 1000)
+    require_folder(options.out)
+    job = PairJob(
+        left=Path(options.left),
+        right=Path(options.right),
+        make_core=lambda size_px: _core(options, size_px),
+        most_pixels=most_pixels(None, options.max_megapixels),
+        mounted=orientations(options),
+    )
+    with step_bar("reading", None) as watcher:
+        pair = compute_pair(job, watcher)
+        processed = pair.processed
+        assert processed.cloud is not None
+        assert processed.geometry is not None
+        watcher.say("raising")
+        relief = relief_of(processed.cloud, processed.pair.left, processed.geometry.focal_px, sizes)
+        solid = _fewer(relief.solid)
+    try:
+        make_folder(options.out)
+        claim_names(options.out, options.out, *_NAMES)
+        for name in _NAMES:
+            write_bytes(options.out / name, mesh_bytes(solid, name.rpartition(".")[2], None))
+    except OSError as error:
+        raise unwritable(options.out, error) from error
+    doubts = [f"{one.sentence}; {one.remedy}" for one in pair.concerns]
+    files = [str(options.out / name) for name in _NAMES]
+    if options.json:
+        told = {
+            "command": "relief",
+            "size_mm": [round(length, 3) for length in solid.size_mm],
+            "triangles": len(solid.triangles),
+            "scale": relief.scale,
+            "flattened": relief.flattened,
+            "covered": round(relief.covered, 4),
+            "files": files,
+            "doubts": doubts,
+        }
+        print(json_text(told))
+    else:
+        say([*_lines(relief, solid), f"written to {' and '.join(files)}", *(f"doubt: {doubt}" for doubt in doubts)])
+    return 0
+
+
+def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:
+    matcher = options.matcher or default_matcher().value
+    core, _ = build_core(options, options.calibration, matcher, size_px, Path(options.left))
+    assert core is not None, "a calibration always makes one"
+    core.correct(overlay_of(options, core))
+    return core
+
+
+def _fewer(solid: Solid) -> Solid:
+    """Leave out triangles that no printer shows, where the library for it is installed."""
+    try:
+        return decimated(solid, _TOLERANCE_M).solid
+    except NoLibraryError:
+        return solid
+
+
+def _lines(relief: Relief, solid: Solid) -> list[str]:
+    x, y, z = solid.size_mm
+    scale = f"1:{1 / relief.scale:.3g}" if relief.scale < 1 else f"{relief.scale:.3g}:1"
+    depth = "" if relief.flattened == 1 else f", depth flattened to {relief.flattened:.0%}"
+    return [
+        f"{x:.1f} x {y:.1f} x {z:.1f} mm, scale {scale}{depth}, {len(solid.triangles)} triangles",
+        f"{relief.covered:.0%} of the picture has a depth; the rest is bare plate",
+    ]
