@@ -20,6 +20,7 @@ from phone_host.verbs.export import arguments as export
 from phone_host.verbs.keys import arguments as keys
 from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
+from phone_host.verbs.printcheck import arguments as printcheck
 from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.record import arguments as record
 from phone_host.verbs.relief import arguments as relief
@@ -55,6 +56,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "scan": scan,
     "export": export,
     "relief": relief,
+    "printcheck": printcheck,
     "measure": measure,
     "quality": quality,
     "pair": pair,

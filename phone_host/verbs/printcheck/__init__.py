@@ -1,0 +1,1 @@
+"""phone-host printcheck: its options (light), and its command."""

@@ -1,0 +1,142 @@
+"""phone-host printcheck: whether a scan or mesh can be printed."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError, SettingsError
+from common.places import make_folder
+from common.program.terminal import say
+from phone_host.output.atomic import write_bytes
+from phone_host.output.axes import Axes
+from phone_host.output.json_text import json_text
+from phone_host.output.meshes.decimated import NoLibraryError
+from phone_host.output.meshes.formats import mesh_bytes
+from phone_host.output.meshes.printable import Flaw, Printer, Problem, problems
+from phone_host.output.meshes.printable_fix import Fixed, NotClosedError, fixed
+from phone_host.output.meshes.printable_view import picture
+from phone_host.output.meshes.solid import Solid
+from phone_host.output.model_file import Model, read_model
+from phone_host.run.progress_bar import step_bar
+from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
+from phone_host.verbs.units import length_mm
+
+_CHECK_FAILED: Final = 4
+_UNITS_M: Final = {"m": 1.0, "mm": 0.001}
+_UP: Final = {"z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}  # fmt: skip
+"""Rows of the rotation that puts this axis up."""
+
+_UP_OF: Final = {Axes.CAMERA: "-y", Axes.Y_UP: "y", None: "z"}
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check the model, draw what is wrong, mend it if asked, and check what came of that."""
+    printer = _printer(options)
+    require_folder(options.out)
+    model = read_model(Path(options.model), _UNITS_M.get(options.unit, math.nan))
+    turn = np.array(_UP[options.up or _UP_OF[model.axes]], np.float64)
+    points, triangles = model.solid.points_m.astype(np.float64) * 1000 @ turn.T, model.solid.triangles
+    with step_bar("edges", None) as watcher:
+        found = problems(points, triangles, printer, watcher.say)
+        mended = _mended(points, triangles, printer, found) if options.fix else None
+        left = found if mended is None else problems(mended.points_mm, mended.triangles, printer, watcher.say)
+        watcher.say("drawing")
+        drawing = _png(points, triangles, found)
+    files = {f"{model.stem}-printcheck.png": drawing}
+    if mended is not None:
+        solid = Solid((mended.points_mm / 1000).astype(np.float32), mended.triangles, np.zeros((0, 3), np.uint8))
+        files[f"{model.stem}-fixed.stl"] = mesh_bytes(solid, "stl", None)
+    try:
+        make_folder(options.out)
+        claim_names(options.out, options.out, *files)
+        for name, content in files.items():
+            write_bytes(options.out / name, content)
+    except OSError as error:
+        raise unwritable(options.out, error) from error
+    paths = [str(options.out / name) for name in files]
+    if options.json:
+        print(json_text(_told(model, found, left, mended, paths)))
+    else:
+        say(_lines(found, left, mended, paths))
+    return _CHECK_FAILED if any(problem.blocks for problem in left) else 0
+
+
+def _printer(options: argparse.Namespace) -> Printer:
+    words = options.bed.split(",")
+    if len(words) != 3:
+        raise SettingsError(f"--bed is {options.bed!r}", "give three lengths, for example 220,220,250")
+    x, y, z = (length_mm(word, "--bed", "220,220,250") for word in words)
+    if not 0 < options.overhang < 90:
+        raise SettingsError(f"--overhang is {options.overhang:g}", "give degrees between 0 and 90, for example 45")
+    wall_mm = length_mm(options.wall, "--wall", "0.8mm")
+    return Printer(bed_mm=(x, y, z), least_wall_mm=wall_mm, overhang_deg=options.overhang)
+
+
+def _mended(points: NDArray[np.float64], triangles: NDArray[np.int32], printer: Printer, found: list[Problem]) -> Fixed:
+    needs_base = any(problem.flaw is Flaw.NO_BASE for problem in found)
+    try:
+        return fixed(points, triangles, printer, needs_base=needs_base)
+    except NoLibraryError:
+        raise DataError(
+            "manifold3d is not installed, so nothing can be mended", "pip install 'tandemscan[print]'"
+        ) from None
+    except NotClosedError:
+        raise DataError(
+            "the mesh is not closed, so nothing can be mended", "scan what is missing, or make a relief of one pair"
+        ) from None
+
+
+def _png(points: NDArray[np.float64], triangles: NDArray[np.int32], found: list[Problem]) -> bytes:
+    wrong = np.zeros(len(triangles), np.bool_)
+    for problem in found:
+        if not problem.triangles.all():  # what is wrong everywhere shows nothing
+            wrong |= problem.triangles
+    return np.asarray(cv2.imencode(".png", picture(points, triangles, wrong))[1]).tobytes()
+
+
+def _told(
+    model: Model, found: list[Problem], left: list[Problem], mended: Fixed | None, files: list[str]
+) -> dict[str, object]:
+    return {
+        "command": "printcheck",
+        "model": str(model.path),
+        "size_mm": [round(length, 3) for length in model.solid.size_mm],
+        "is_printable": not any(problem.blocks for problem in left),
+        "problems": [_problem(problem) for problem in found],
+        "done": None if mended is None else list(mended.said),
+        "left": None if mended is None else [_problem(problem) for problem in left],
+        "files": files,
+    }
+
+
+def _problem(problem: Problem) -> dict[str, object]:
+    return {
+        "kind": problem.flaw.value,
+        "problem": problem.sentence,
+        "remedy": problem.remedy,
+        "triangles": int(problem.triangles.sum()),
+        "blocks": problem.blocks,
+    }
+
+
+def _lines(found: list[Problem], left: list[Problem], mended: Fixed | None, files: list[str]) -> list[str]:
+    lines = [_verdict(found), *_sentences(found)]
+    if mended is not None:
+        lines += [f"done: {done}" for done in mended.said] or ["done: nothing, there was nothing to mend"]
+        lines += [f"now: {_verdict(left)}", *_sentences(left)]
+    return [*lines, f"written to {' and '.join(files)}"]
+
+
+def _verdict(found: list[Problem]) -> str:
+    if any(problem.blocks for problem in found):
+        return "it cannot be printed as it is"
+    return "it can be printed, with care" if found else "it can be printed"
+
+
+def _sentences(found: list[Problem]) -> list[str]:
+    return [f"  {'stop' if problem.blocks else 'note'}: {problem.sentence} ({problem.remedy})" for problem in found]
