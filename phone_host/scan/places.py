@@ -39,8 +39,14 @@ class _Features:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Place:
-    """Where it was, (N, 3) points in the world, m, and their (N, 32) descriptors."""
+class Place:
+    """A place that was seen.
+
+    Attributes:
+        world_camera: where it was seen from.
+        points_m: (N, 3) float64, its points in the world, m.
+        descriptors: (N, 32) uint8, of these.
+    """
 
     world_camera: SE3
     points_m: Floats
@@ -64,7 +70,7 @@ class Places:
     """Remembers places, and recognises them."""
 
     def __init__(self) -> None:
-        self._places: list[_Place] = []
+        self._places: list[Place] = []
 
     @property
     def count(self) -> int:
@@ -84,7 +90,15 @@ class Places:
         seen, observer = _features(view), Observer(view.geometry, view.noise_px)
         known = np.isfinite(seen.observed_px[:, 2])
         points = world_camera.apply(observer.points(seen.observed_px[known]))
-        self._places.append(_Place(world_camera, points, seen.descriptors[known]))
+        self._places.append(Place(world_camera, points, seen.descriptors[known]))
+
+    def since(self, count: int) -> tuple[Place, ...]:
+        """Return all places but the first ones."""
+        return tuple(self._places[count:])
+
+    def add(self, places: tuple[Place, ...]) -> None:
+        """Remember places that others have seen."""
+        self._places.extend(places)
 
     def recognised(self, view: View) -> Recognised | None:
         """Find the place on which most of a view's features agree; None: none has enough."""
