@@ -208,10 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Measure, print and judge."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--seconds",
-        type=int,
-        default=15,
-        help="of each run and recording; p99 of six seconds is two pairs' (default 15)",
+        "--seconds", type=int, default=15, help="of each run and recording; p99 of six seconds is two pairs' (default 15)"
     )
     parser.add_argument("--rounds", type=int, default=5, help="runs with and without a recording, in turn (default 5)")
     parser.add_argument(
