@@ -6,6 +6,7 @@ The sink takes one pair at a time, always the newest: while it is busy, pairs pa
 as in a replay, it takes them all.
 """
 
+from pathlib import Path
 from typing import Final
 
 from common.words import counted
@@ -14,10 +15,11 @@ from phone_host.measure.trust import Doubt
 from phone_host.model import Result, Side
 from phone_host.output.axes import Axes
 from phone_host.report.stereo_report import Remark
+from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import report_of
 from phone_host.run.sinks import FunctionSink
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, Submap
 
 _SINK: Final = "scan"
 _NS: Final = 1e9
@@ -33,12 +35,25 @@ class LiveScan:
     Args:
         wanted: how the model is made.
         board_side: the side on which the board's camera stands.
-        waits: whether no pair may be missed.
+        kept_in: folder for the submaps.
+        resumed: submaps of a scan that was killed, to go on from.
+        waits: whether no pair may be missed; then the same pairs come again, and those in the submaps pass.
         is_timeless: whether the images have no time, because they were shown on demand; their numbers stand for it.
     """
 
-    def __init__(self, wanted: ScanWanted, board_side: Side, *, waits: bool, is_timeless: bool) -> None:
+    def __init__(
+        self,
+        wanted: ScanWanted,
+        board_side: Side,
+        kept_in: Path,
+        resumed: tuple[Submap, ...] = (),
+        *,
+        waits: bool,
+        is_timeless: bool,
+    ) -> None:
         self.scan, self._is_timeless = Scan(wanted), is_timeless
+        self.kept = KeptSubmaps(kept_in, self.scan, resumed)
+        self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
         self._is_board_left = board_side is Side.LEFT
         self._last: ScannedPair | None = None
@@ -69,6 +84,7 @@ class LiveScan:
         if missed:
             words = f"{counted(missed, 'pair')} came while others were taken into the model, and passed"
             remarks.append(Remark(words, "a greater --voxel is faster", is_note=True))
+        remarks.extend(self.kept.remarks)
         model = self.scan.model()
         report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
         return FinishedScan(report, model)
@@ -79,4 +95,10 @@ class LiveScan:
         if self._first_ns is None:
             self._first_ns = marks.exposed_ns
         stamp_s = float(result.number) if self._is_timeless else (marks.exposed_ns - self._first_ns) / _NS
-        self._last = self.scan.take(str(result.number), stamp_s, result.processed)
+        number, earlier = result.number, self._earlier
+        if self._is_replayed and any(pair.name == str(number) for pair in earlier):
+            return
+        if earlier and not self._is_replayed:  # numbers and times go on where they ended
+            number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
+        self._last = self.scan.take(str(number), stamp_s, result.processed)
+        self.kept.after_pair()

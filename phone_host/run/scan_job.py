@@ -20,11 +20,12 @@ from phone_host.report.stereo_report import FailedPair, Remark, Size, alone_rema
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted
+from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import report_of, require_something
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_trust import judge_pair
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, Submap
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image
 from phone_host.stereo.view_files import ViewFiles
@@ -45,6 +46,7 @@ class ScanJob:
         most_pixels: an image that claims more is refused.
         mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
         commands: what to do next, for the page.
+        resumed: submaps of a scan that was killed, to go on from; their pairs are not computed again.
     """
 
     files: ViewFiles
@@ -57,6 +59,7 @@ class ScanJob:
     most_pixels: int = MOST_PIXELS
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
     commands: tuple[NextCommand, ...] = ()
+    resumed: tuple[Submap, ...] = ()
 
 
 def run_scan(job: ScanJob, watcher: Watcher) -> ScanReport:
@@ -91,12 +94,14 @@ def run_scan(job: ScanJob, watcher: Watcher) -> ScanReport:
 
     with kept_if_interrupted(write_so_far):
         for name, left, right in job.files.pairs:
-            work.tried(name, left, right)
+            if not work.is_known(name):
+                work.tried(name, left, right)
             watcher()
         watcher.say("making the surface")
         finished = work.finished()
     require_something(finished.report)
     write_scan(job.out, finished)
+    work.kept.done()
     return finished.report
 
 
@@ -107,8 +112,18 @@ class _Work:
         self._job, self._watcher = job, watcher
         self._cores = Cores(job.make_core)
         self.scan = Scan(job.wanted)
+        self.kept = KeptSubmaps(job.out, self.scan, job.resumed)
+        self._known = {pair.name: pair for pair in self.scan.pairs}
+        self._is_judged = False
         self._pairs: list[ScannedPair | FailedPair] = []
         self._doubts: dict[str, Remark] = {}
+
+    def is_known(self, name: str) -> bool:
+        """Note a pair that is in the submaps; return whether it is."""
+        known = self._known.get(name)
+        if known is not None:
+            self._pairs.append(known)
+        return known is not None
 
     def tried(self, name: str, left: Path, right: Path) -> None:
         """Take a pair; one that cannot be computed is noted.
@@ -133,14 +148,18 @@ class _Work:
         images = decode_files(*opened, core.reductions(*sizes_px))
         self._watcher.say(f"matching {name}")
         processed = core.compute(*images, now.monotonic_ns, whole_px=sizes_px)
-        if index & (index - 1) == 0:  # 0, 1, 2, 4, 8 ...: what is wrong with a rig is wrong with all of its pairs
+        if (
+            index & (index - 1) == 0 or not self._is_judged
+        ):  # 0, 1, 2, 4, 8 ...: what is wrong with a rig is wrong with all of its pairs
             self._judge(core, processed)
         pair = self.scan.take(name, float(name) if self._job.files.by_number else float(index), processed)
+        self.kept.after_pair()
         if pair.weakness.advice:
             self._watcher.say(f"{name}: {pair.weakness.advice}")
         return pair
 
     def _judge(self, core: StereoCore, processed: Processed) -> None:
+        self._is_judged = True
         for concern in judge_pair(core, processed, self._job.mounted).concerns:
             blocks = concern.is_certain and concern.doubt is not Doubt.NO_DEPTH
             self._doubts.setdefault(concern.doubt.value, Remark(concern.sentence, concern.remedy, is_blocking=blocks))
@@ -156,6 +175,7 @@ class _Work:
             *self._doubts.values(),
             *alone_remarks(left, right, is_told=is_told, pairs=len(files.pairs)),
             *note,
+            *self.kept.remarks,
         )
         report = report_of(self.scan, model, self._pairs, remarks, matcher=self._job.matcher, axes=self._job.axes)
         return FinishedScan(report, model, self._job.commands)

@@ -21,12 +21,15 @@ Floats = NDArray[np.float64]
 LEAST_INLIERS: Final = 25
 """Fewer may agree by accident: of 276 pairs of a room's views, those with 25 and more were at most 81 mm off, which the registration mends."""
 
-_FEATURES: Final = 800
+_FEATURES: Final = 1500
+_CORNER_STEP: Final = 7
+"""Grey levels that make a corner. With 20, and 800 features, a room seen from 11 degrees and 0.2 m away agrees with no place; with 7 and 1500 on 29."""
+
 _RATIO: Final = 0.8
 """Of the distances to the best and to the second best descriptor."""
 
-_APART_DEG: Final = 8.0
-_APART_SHARE: Final = 0.15
+_APART_DEG: Final = 4.0
+_APART_SHARE: Final = 0.05
 """Of the median depth: as far apart as this, or turned by so much, a view is a place of its own."""
 
 
@@ -39,8 +42,14 @@ class _Features:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Place:
-    """Where it was, (N, 3) points in the world, m, and their (N, 32) descriptors."""
+class Place:
+    """A place that was seen.
+
+    Attributes:
+        world_camera: where it was seen from.
+        points_m: (N, 3) float64, its points in the world, m.
+        descriptors: (N, 32) uint8, of these.
+    """
 
     world_camera: SE3
     points_m: Floats
@@ -64,7 +73,7 @@ class Places:
     """Remembers places, and recognises them."""
 
     def __init__(self) -> None:
-        self._places: list[_Place] = []
+        self._places: list[Place] = []
 
     @property
     def count(self) -> int:
@@ -84,7 +93,15 @@ class Places:
         seen, observer = _features(view), Observer(view.geometry, view.noise_px)
         known = np.isfinite(seen.observed_px[:, 2])
         points = world_camera.apply(observer.points(seen.observed_px[known]))
-        self._places.append(_Place(world_camera, points, seen.descriptors[known]))
+        self._places.append(Place(world_camera, points, seen.descriptors[known]))
+
+    def since(self, count: int) -> tuple[Place, ...]:
+        """Return all places but the first ones."""
+        return tuple(self._places[count:])
+
+    def add(self, places: tuple[Place, ...]) -> None:
+        """Remember places that others have seen."""
+        self._places.extend(places)
 
     def recognised(self, view: View) -> Recognised | None:
         """Find the place on which most of a view's features agree; None: none has enough."""
@@ -109,7 +126,9 @@ def _is_near(one: SE3, other: SE3, apart_m: float) -> bool:
 
 def _features(view: View) -> _Features:
     """Find features; those that lie on a pixel without a depth have no disparity."""
-    points, descriptors = cv2.ORB.create(nfeatures=_FEATURES).detectAndCompute(view.grey, None)
+    points, descriptors = cv2.ORB.create(nfeatures=_FEATURES, fastThreshold=_CORNER_STEP).detectAndCompute(
+        view.grey, None
+    )
     if not points:
         return _Features(np.zeros((0, 32), np.uint8), np.zeros((0, 3)))
     return _Features(np.asarray(descriptors, np.uint8), view.observed(np.array([point.pt for point in points])))

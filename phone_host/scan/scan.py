@@ -4,13 +4,14 @@ The world's axes are those of the rectified left camera at the first pair that h
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common.errors import DataError
+from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
@@ -20,9 +21,10 @@ from phone_host.scan.fineness import fineness_for
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import only, without_crumbs
 from phone_host.scan.surface_noise import surface_noise_m
-from phone_host.scan.tracker import PoseGate, Tracker
+from phone_host.scan.tracker import PoseGate, Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
+from phone_host.scan.volume import BlockValues
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.images import size_px, to_grey
 
@@ -31,6 +33,13 @@ NOISE_PX: Final = 0.5
 
 _LEAST_WEIGHT: Final = 8
 """Of a voxel on the surface: an eighth of a sure depth. One view at a slant gives less, and is off by 5 mm where others are off by 4."""
+
+
+_SUBMAP_PAIRS: Final = 20
+"""Fused pairs after which a submap is closed: four seconds at five pairs a second."""
+
+_MOST_COPIES: Final = 3
+"""Submaps hold no more than this many times the model's blocks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +91,39 @@ class ScannedPair:
         return self.state is not Tracking.LOST
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Submap:
+    """What a scan has learnt since its last submap was closed; all of them together are the scan.
+
+    Attributes:
+        is_whole: whether it holds everything since the beginning; what was closed before is not needed any more.
+        pairs: since then, in order.
+        settings: of the model.
+        geometry: of the pairs.
+        size_px: width and height of their rectified images.
+        blocks: those that got something since then, with all that they hold.
+        tracker: where it stood at the end, and the places since then.
+    """
+
+    is_whole: bool
+    pairs: tuple[ScannedPair, ...]
+    settings: VolumeSettings
+    geometry: StereoGeometry
+    size_px: tuple[int, int]
+    blocks: BlockValues
+    tracker: TrackerState
+
+
+@dataclass(frozen=True, slots=True)
+class _Closed:
+    """What is in submaps: pairs, how many of these are fused, places, and blocks, those that were written several times counted so."""
+
+    pairs: int = 0
+    fused: int = 0
+    places: int = 0
+    blocks: int = 0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanModel:
     """A surface.
@@ -113,6 +155,7 @@ class Scan:
         self.geometry: StereoGeometry | None = None
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
+        self._closed = _Closed()
 
     @property
     def pairs(self) -> tuple[ScannedPair, ...]:
@@ -159,6 +202,11 @@ class Scan:
                 density=density,
             )
         else:
+            if view.geometry != self.geometry and self._closed.pairs == len(self._pairs):
+                raise SettingsError(
+                    "the scan that is gone on with has another calibration, size or crop",
+                    "give the same options as then, or begin a new scan",
+                )
             if size_px(view.grey) != self.size_px:
                 here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
                 raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
@@ -176,6 +224,58 @@ class Scan:
             )
         self._pairs.append(pair)
         return pair
+
+    @property
+    def is_submap_due(self) -> bool:
+        """Whether enough pairs were fused since the last submap was closed that losing them would hurt."""
+        return self.fused - self._closed.fused >= _SUBMAP_PAIRS
+
+    def close_submap(self, *, whole: bool = False) -> Submap:
+        """Close a submap: give what was learnt since the last one. Some pair had depth.
+
+        Where submaps hold the same blocks again and again, it is one that holds everything.
+
+        Args:
+            whole: whether it is one in any case.
+        """
+        assert self.tracker is not None
+        assert self.geometry is not None
+        before, volume = self._closed, self.tracker.volume
+        blocks = volume.changed_blocks()
+        is_whole = whole or before.blocks + len(blocks.places) > _MOST_COPIES * volume.blocks.count
+        if is_whole:
+            before, blocks = _Closed(), volume.changed_blocks(every=True)
+        tracker = self.tracker.kept(before.places)
+        self._closed = _Closed(
+            len(self._pairs), self.fused, before.places + len(tracker.places), before.blocks + len(blocks.places)
+        )
+        return Submap(
+            is_whole=is_whole or before.pairs == 0,
+            pairs=tuple(self._pairs[before.pairs :]),
+            settings=volume.settings,
+            geometry=self.geometry,
+            size_px=self.size_px,
+            blocks=blocks,
+            tracker=tracker,
+        )
+
+    def go_on(self, submaps: Sequence[Submap]) -> None:
+        """Go on where the last of some submaps was closed. Nothing was taken yet.
+
+        Args:
+            submaps: of another scan, from its last whole one on, in order.
+        """
+        first = submaps[0]
+        self.geometry, self.size_px = first.geometry, first.size_px
+        self.tracker = Tracker(replace(first.settings, most_bytes=self._wanted.most_bytes), self._wanted.threads)
+        places = 0
+        for each in submaps:
+            self._pairs.extend(each.pairs)
+            self.tracker.volume.put(each.blocks)
+            self.tracker.go_on(each.tracker)
+            places += len(each.tracker.places)
+        written = sum(len(each.blocks.places) for each in submaps)
+        self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
     def model(self) -> ScanModel:
         """Return the surface so far, without crumbs and what lies outside the box; without triangles before any was seen."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
 from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
-from phone_host.scan.places import Places
+from phone_host.scan.places import Place, Places
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, halved, reduced
@@ -83,6 +83,21 @@ class Tracked:
         return self.state is not Tracking.LOST
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackerState:
+    """What a tracker knows beside the model.
+
+    Attributes:
+        pose: of the last view.
+        usual_off_m: usual distance of a view from the model, m; NaN: none was compared yet.
+        places: that were seen.
+    """
+
+    pose: SE3
+    usual_off_m: float
+    places: tuple[Place, ...]
+
+
 class Tracker:
     """Follows a camera and builds the model.
 
@@ -126,6 +141,23 @@ class Tracker:
         if doubt is Weakness.NONE:
             return self._fused(view, _orthonormal(believed @ fit.start_now), moved, self._weakness(moved, fit), fit)
         return self._found_again(view, moved) or self._lost(believed, moved, doubt, fit)
+
+    def kept(self, places_before: int) -> TrackerState:
+        """Return what a later tracker needs to go on, beside the model's blocks.
+
+        Args:
+            places_before: how many of the places are known there already.
+        """
+        return TrackerState(self._pose, self._usual_off_m, self._places.since(places_before))
+
+    def go_on(self, state: TrackerState) -> None:
+        """Go on where another tracker stood. How the camera has moved since is not known: the next view is looked for like a lost one.
+
+        Args:
+            state: of the other one; its places are added to those that are known.
+        """
+        self._pose, self._usual_off_m, self._was_lost = state.pose, state.usual_off_m, True
+        self._places.add(state.places)
 
     def _found_again(self, view: View, moved: Moved) -> Tracked | None:
         """Look whether a view that does not fit where it was expected shows another place that was seen."""

@@ -40,6 +40,23 @@ class Surface:
     normals: NDArray[np.float32]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BlockValues:
+    """Blocks and what they hold, as in `Blocks`.
+
+    Attributes:
+        places: (N, 3) int32, each once.
+        field: (N, 512) int16.
+        weights: (N, 512) uint16.
+        colours: (N, 512, 3) uint8.
+    """
+
+    places: NDArray[np.int32]
+    field: NDArray[np.int16]
+    weights: NDArray[np.uint16]
+    colours: NDArray[np.uint8]
+
+
 class Volume:
     """A distance field that grows where views show something.
 
@@ -55,6 +72,7 @@ class Volume:
         self._library = found if isinstance(found, Library) else None
         self.blocks = Blocks()
         self.left_out = 0
+        self._changed = np.zeros(0, np.bool_)
 
     @property
     def memory_bytes(self) -> int:
@@ -78,7 +96,7 @@ class Volume:
         self._make_room(depth, Camera(view.geometry, view.grey.shape, world_camera))
         if self._library is None:
             packed = replace(view, depth_m=depth, colours=colours)
-            return volume_numpy.fuse(self.blocks, self.settings, packed, world_camera.inverse())
+            return self._noted(volume_numpy.fuse(self.blocks, self.settings, packed, world_camera.inverse()))
         changed = np.zeros(self.blocks.count, np.uint8)
         arrays = self._arrays()
         job = FuseJob(
@@ -96,6 +114,37 @@ class Volume:
         )
         aim(job, view.geometry, depth.shape)
         self._library.fuse(job)
+        return self._noted(changed)
+
+    def changed_blocks(self, *, every: bool = False) -> BlockValues:
+        """Return copies of the blocks that got something since the last call; with `every`, of all blocks."""
+        numbers = np.arange(self.blocks.count) if every else np.flatnonzero(self._changed)
+        self._changed = np.zeros(0, np.bool_)
+        of = self.blocks
+        return BlockValues(of.places[numbers], of.field[numbers], of.weights[numbers], of.colours[numbers])
+
+    def put(self, values: BlockValues) -> None:
+        """Give blocks these values, in place of those that they have; new ones for which there is no memory are added to `left_out`."""
+        missing = values.places[self.blocks.find(values.places) < 0]
+        wanted, room = self.blocks.count + len(missing), self.blocks.room
+        while room < min(wanted, self.settings.most_blocks):
+            room = min(2 * room, self.settings.most_blocks)
+        if room > self.blocks.room:
+            self.blocks = self.blocks.grown(room)
+        fit = max(self.blocks.room - self.blocks.count, 0)
+        self.left_out += len(missing[fit:])
+        self.blocks.add(missing[:fit])
+        numbers = self.blocks.find(values.places)
+        there = numbers >= 0
+        self.blocks.field[numbers[there]] = values.field[there]
+        self.blocks.weights[numbers[there]] = values.weights[there]
+        self.blocks.colours[numbers[there]] = values.colours[there]
+
+    def _noted(self, changed: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Remember which blocks got something."""
+        noted = changed > 0
+        noted[: len(self._changed)] |= self._changed
+        self._changed = noted
         return changed
 
     def cast(self, camera: Camera, seeds_m: Depth | None = None) -> Surface:

@@ -2,7 +2,7 @@
 
 Uses the sequences of $SCAN_DATA. street: odometry alone on 24 rectified pairs of KITTI, matched by `tandem`, and the same from the right
 camera in a mirror; "left against right" needs no truth. room: a clip of 7-Scenes through the tracker's depth input, the given depths in place of
-a matcher's; whole, every 2nd to 6th view, and with a tenth dropped at random (20 seeds). rest: 12 pairs of EuRoC's rig, matched by `tandem`, 50 times back and forth. self: every second view is fused, the others are
+a matcher's; whole, every 2nd to 6th view, and with a tenth dropped at random (20 seeds). rest: 12 pairs of EuRoC's rig, matched by `tandem`, 50 times back and forth. kidnapped: 30 of the room's views cut out, or 15 of them (1 s) black. self: every second view is fused, the others are
 only compared, at the pose that tracking gives them.
 
 ATE: root mean square after rigid alignment. step: median error of a motion from view to view. end: error of the last pose. The room's
@@ -16,7 +16,7 @@ import os
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -46,6 +46,9 @@ FINE: Final = VolumeSettings(voxel_m=0.008, far_m=3.0)
 
 TURNS: Final = 50
 STRIDES: Final = (2, 3, 4, 6)
+KIDNAPPED_AT: Final = 40
+"""The view at which the camera is covered, or goes elsewhere unseen."""
+
 _DROPPED: Final = 0.1
 _OFF_M: Final = 0.03
 
@@ -148,6 +151,7 @@ def room_verdicts(clip: Clip, rows: list[Row], options: Options) -> list[Verdict
     parts = [*strided, *dropped]
     off_mm, far = self_consistency(clip, poses, options.threads)
     return [
+        *kidnap_verdicts(clip, poses, options.threads),
         _below("room: ATE", whole.errors.ate_mm, 19, "mm"),
         _below("room: end", whole.errors.end_mm, 28, "mm"),
         _below("room: self, median", off_mm, 10.5, "mm"),
@@ -158,6 +162,37 @@ def room_verdicts(clip: Clip, rows: list[Row], options: Options) -> list[Verdict
         _below("room: CPU time of a view", cpu_ms, 45, "ms"),
         Verdict(f"room: the same poses in {len(every)} runs", same, "yes" if same else "no", "yes"),
     ]
+
+
+def kidnap_verdicts(clip: Clip, whole: Sequence[SE3], threads: int) -> list[Verdict]:
+    """The room with 30 views cut out, and with the camera covered for 15 views, one second: is it found again, and is nothing wrong fused?"""
+    height, width = clip.views[0].grey.shape
+    black = replace(
+        clip.views[0],
+        grey=np.zeros((height, width), np.uint8),
+        colours=np.zeros((height, width, 3), np.uint8),
+        depth_m=np.full((height, width), np.nan, np.float32),
+    )
+    verdicts, begin = [], KIDNAPPED_AT
+    for name, seen_again in (("30 views cut out", begin + 30), ("covered for 1 s", begin + 15)):
+        is_cut = name.startswith("30")
+        tracker, fused_black, waited, off_mm, found = Tracker(ROOM, threads), 0, 0, [0.0], False
+        for at, view in enumerate(clip.views):
+            is_hidden = begin <= at < seen_again
+            if is_hidden and is_cut:
+                continue
+            told = tracker.track(black if is_hidden else view)
+            fused_black += is_hidden and told.is_fused
+            found = found or (at >= seen_again and told.is_fused)
+            waited += at >= seen_again and not found
+            if told.is_fused and not is_hidden:
+                off_mm.append(1e3 * float(np.linalg.norm((told.world_camera.inverse() @ whole[at]).t_m)))
+        verdicts += [
+            _below(f"room, {name}: views until it is found again", float(waited + 1), 3, "views"),
+            _below(f"room, {name}: farthest fused pose from the whole clip's", max(off_mm), 50, "mm"),
+            _below(f"room, {name}: black views fused", float(fused_black), 0, "views"),
+        ]
+    return verdicts
 
 
 def rest_verdicts(clip: Clip, rows: list[Row], threads: int) -> list[Verdict]:

@@ -19,7 +19,7 @@ from phone_host.verbs.given_pictures import given_pictures
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
-from phone_host.verbs.scan.wanted import scan_wanted
+from phone_host.verbs.scan.wanted import resumed_of, scan_wanted
 from phone_host.verbs.stereo_options import metric_core, output_options, require_metres
 
 _CHECK_FAILED: Final = 4
@@ -62,6 +62,7 @@ def _scan_pictures(options: argparse.Namespace) -> ScanReport:
         axes=output_options(options).axes,
         most_pixels=limit,
         mounted=orientations(options),
+        resumed=resumed_of(options),
     )
     try:
         with step_bar("reading", len(files.pairs)) as watcher:

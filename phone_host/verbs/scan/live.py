@@ -24,7 +24,7 @@ from phone_host.run.stereo_results import require_writable
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
 from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
-from phone_host.verbs.scan.wanted import scan_wanted
+from phone_host.verbs.scan.wanted import resumed_of, scan_wanted
 from phone_host.verbs.serve.choices import run_options
 from phone_host.verbs.stereo_options import output_options
 
@@ -47,12 +47,15 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     found = checked(of_run)
     _require(options, found.values)
     _require_place(options)
+    resumed = resumed_of(options)
     logs.set_up(log_level(found.values.log_level))
     opened = open_run(of_run, found, _tell)
     camera = opened.camera
     pacing = camera.pacing if isinstance(camera, Playback) else camera.description.pacing
     is_stills = pacing is Pacing.DEMAND and not isinstance(camera, Playback)
-    live = LiveScan(wanted, opened.board_side, waits=pacing is Pacing.DEMAND, is_timeless=is_stills)
+    live = LiveScan(
+        wanted, opened.board_side, options.out, resumed, waits=pacing is Pacing.DEMAND, is_timeless=is_stills
+    )
     signals = StopSignals()
     prepared = opened.prepared(sys.argv, (live.sink,))
 
@@ -73,6 +76,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
         write_scan(options.out, last)
     except OSError as error:
         raise unwritable(options.out, error) from error
+    live.kept.done()
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return last.report, INTERRUPTED if signals.interrupted else 4 if too_few else 0
 

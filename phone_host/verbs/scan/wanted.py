@@ -3,12 +3,16 @@
 import argparse
 import math
 import re
+import sys
 from typing import Final
 
-from common.errors import SettingsError
+from common.errors import SettingsError, UnavailableError
 from common.program.quantities import decimal_number
+from common.program.terminal import say
+from common.words import counted
+from phone_host.run.kept_submaps import read_submaps
 from phone_host.scan.box import Box
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.units import length_mm
 
@@ -35,6 +39,39 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
     )
+
+
+def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
+    """Read the submaps that --resume names, and say what goes on.
+
+    Args:
+        options: options as `scan` declares them.
+
+    Raises:
+        DataError: there are none, or they are damaged.
+        SettingsError: they were made with another --voxel.
+        UnavailableError: they cannot be read.
+    """
+    if options.resume is None:
+        return ()
+    try:
+        submaps = read_submaps(options.resume)
+    except OSError as error:
+        raise UnavailableError(
+            f"--resume {options.resume}: {error.strerror}", "give a folder that can be read"
+        ) from error
+    voxel_m = submaps[-1].settings.voxel_m
+    if options.voxel is not None and not math.isclose(_voxel_mm(options.voxel) / 1000, voxel_m):
+        raise SettingsError(
+            f"--voxel is {options.voxel}, the scan in {options.resume} has {voxel_m * 1000:g} mm", "leave --voxel out"
+        )
+    pairs = [pair for submap in submaps for pair in submap.pairs]
+    say(
+        f"phone-host: going on after pair {pairs[-1].name}, with {counted(len(pairs), 'pair')};"
+        " what was taken into the model after it is lost, and is taken again where it is given again",
+        sys.stderr,
+    )
+    return submaps
 
 
 def _voxel_mm(text: str) -> float:

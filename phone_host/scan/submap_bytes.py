@@ -1,0 +1,163 @@
+"""A submap as bytes, and back. Pure.
+
+A head line, then a deflated npz of arrays: nothing in it is code, and whatever the bytes are, they are read or refused in one line.
+"""
+
+import io
+import zipfile
+import zlib
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from phone_host.geometry.se3 import SE3
+from phone_host.model import StereoGeometry
+from phone_host.scan.blocks import VOXELS
+from phone_host.scan.places import Place
+from phone_host.scan.scan import ScannedPair, Submap
+from phone_host.scan.tracker import TrackerState
+from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.volume import BlockValues
+from phone_host.scan.volume_settings import VolumeSettings
+
+_HEAD: Final = b"tandemscan submap 1\n"
+_LEVEL: Final = 1
+"""Ten times as fast as the usual 6, for a tenth more bytes."""
+
+_MOST_BYTES: Final = 4 << 30
+Arrays = dict[str, NDArray[Any]]
+
+
+def submap_bytes(submap: Submap) -> bytes:
+    """Return a submap as bytes.
+
+    Args:
+        submap: any.
+    """
+    file = io.BytesIO()
+    pairs, places, of = submap.pairs, submap.tracker.places, submap.geometry
+    np.savez(
+        file,
+        is_whole=np.array(submap.is_whole),
+        names=np.array([pair.name for pair in pairs], np.str_),
+        states=np.array([pair.state.value for pair in pairs], np.str_),
+        weaknesses=np.array([pair.weakness.value for pair in pairs], np.str_),
+        numbers=np.array(
+            [(pair.stamp_s, pair.density, pair.corners, pair.overlap, pair.off_m) for pair in pairs], np.float64
+        ),
+        poses=_rows([pair.world_camera for pair in pairs]),
+        model=np.array(
+            [
+                submap.settings.voxel_m,
+                submap.settings.far_m,
+                submap.settings.most_bytes,
+                submap.settings.truncation_voxels,
+            ],
+            np.float64,
+        ),
+        geometry=np.array([of.focal_px, of.baseline_m, of.cx_px, of.cy_px, of.doffs_px], np.float64),
+        size_px=np.array(submap.size_px),
+        block_places=submap.blocks.places,
+        field=submap.blocks.field,
+        weights=submap.blocks.weights,
+        colours=submap.blocks.colours,
+        pose=_rows([submap.tracker.pose]),
+        usual_off_m=np.array(submap.tracker.usual_off_m),
+        place_poses=_rows([place.world_camera for place in places]),
+        place_sizes=np.array([len(place.points_m) for place in places], np.int64),
+        place_points=np.concatenate([np.zeros((0, 3)), *(place.points_m for place in places)]),
+        descriptors=np.concatenate([np.zeros((0, 32), np.uint8), *(place.descriptors for place in places)]),
+    )
+    return _HEAD + zlib.compress(file.getvalue(), _LEVEL)
+
+
+def submap_of(content: bytes, name: str) -> Submap:
+    """Read a submap.
+
+    Args:
+        content: what `submap_bytes` gave.
+        name: of the file, for the error.
+
+    Raises:
+        DataError: it is damaged, or no submap.
+    """
+    try:
+        return _read(content)
+    except (ValueError, KeyError, IndexError, EOFError, OSError, zlib.error, zipfile.BadZipFile) as error:
+        raise DataError(
+            f"{name} is damaged, or no submap of this version",
+            "remove it and those with higher numbers, to go on from the one before; without any, begin a new scan",
+        ) from error
+
+
+def _read(content: bytes) -> Submap:
+    if not content.startswith(_HEAD):
+        raise ValueError("another head")
+    inflater = zlib.decompressobj()
+    plain = inflater.decompress(content[len(_HEAD) :], _MOST_BYTES)
+    if not inflater.eof:
+        raise EOFError
+    with np.load(io.BytesIO(plain), allow_pickle=False) as found:
+        held = dict(found)
+    model, count = held["model"], len(held["names"])
+    settings = VolumeSettings(
+        voxel_m=float(model[0]), far_m=float(model[1]), most_bytes=int(model[2]), truncation_voxels=float(model[3])
+    )
+    focal_px, baseline_m, cx_px, cy_px, doffs_px = held["geometry"].tolist()
+    width_px, height_px = held["size_px"].tolist()
+    numbers = held["numbers"].reshape(count, 5).tolist()
+    pairs = tuple(
+        ScannedPair(
+            name=str(held["names"][at]),
+            stamp_s=stamp_s,
+            world_camera=pose,
+            state=Tracking(str(held["states"][at])),
+            weakness=Weakness(str(held["weaknesses"][at])),
+            density=density,
+            corners=int(corners),
+            overlap=overlap,
+            off_m=off_m,
+        )
+        for at, ((stamp_s, density, corners, overlap, off_m), pose) in enumerate(
+            zip(numbers, _poses(held["poses"]), strict=True)
+        )
+    )
+    return Submap(
+        is_whole=bool(held["is_whole"]),
+        pairs=pairs,
+        settings=settings,
+        geometry=StereoGeometry(focal_px=focal_px, baseline_m=baseline_m, cx_px=cx_px, cy_px=cy_px, doffs_px=doffs_px),
+        size_px=(width_px, height_px),
+        blocks=_blocks(held),
+        tracker=TrackerState(_poses(held["pose"])[0], float(held["usual_off_m"]), _places(held)),
+    )
+
+
+def _blocks(held: Arrays) -> BlockValues:
+    count = len(held["block_places"])
+    return BlockValues(
+        held["block_places"].astype(np.int32).reshape(count, 3),
+        held["field"].astype(np.int16).reshape(count, VOXELS),
+        held["weights"].astype(np.uint16).reshape(count, VOXELS),
+        held["colours"].astype(np.uint8).reshape(count, VOXELS, 3),
+    )
+
+
+def _places(held: Arrays) -> tuple[Place, ...]:
+    ends = np.cumsum(held["place_sizes"])[:-1]
+    points, descriptors = np.split(held["place_points"], ends), np.split(held["descriptors"], ends)
+    poses = _poses(held["place_poses"])
+    if not poses:
+        return ()
+    return tuple(Place(*each) for each in zip(poses, points, descriptors, strict=True))
+
+
+def _rows(poses: list[SE3]) -> NDArray[np.float64]:
+    """Return (N, 3, 4) matrices, exact to the last bit."""
+    return np.array([np.column_stack([pose.R, pose.t_m]) for pose in poses], np.float64).reshape(-1, 3, 4)
+
+
+def _poses(rows: NDArray[np.float64]) -> list[SE3]:
+    return [SE3(row[:, :3].copy(), row[:, 3].copy()) for row in rows]
