@@ -90,7 +90,7 @@ class Link(Protocol):
         """Whether a frame would be accepted now, as far as can be known without trying."""
 
     def receive(self) -> Iterator[Incoming]:
-        """Return everything that has arrived, without waiting."""
+        """Return everything that has arrived, without waiting. Comes after a Waiter's `wait`, be it for no time at all."""
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Hand a packet over, without waiting."""

@@ -22,6 +22,7 @@ from common.errors import SettingsError, TakenError, UnavailableError
 from common.link.base import Incoming, Link
 from common.link.factory import open_link, parse_link
 from common.link.ipc_folder import runtime_folder
+from common.link.waiter import Waiter
 
 NOBODY = 65534
 PATIENCE_S = 30.0
@@ -186,10 +187,12 @@ def test_root_and_oneself_are_trusted(shared: Path) -> None:
     with closing(listen(f"ipc://{shared}/board")) as board, closing(dial(f"ipc://{shared}/board")) as host:
         assert stat.S_IMODE((shared / "board").stat().st_mode) == 0o600
         heard: list[Incoming] = []
+        waiter = Waiter(board.pollables)
         deadline = time.monotonic() + PATIENCE_S
         while len(heard) < 2 and time.monotonic() < deadline:
             for connection in host.dialled.values():
                 host.send(connection, b"hello", b"")
+            waiter.wait(20)
             heard += list(board.receive())
         assert len(heard) >= 2
 
