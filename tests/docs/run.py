@@ -13,7 +13,9 @@ from typing import Final
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from phone_host.output.ply import PointCloud, write_surface
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.docs.commands import Command, documented
@@ -33,6 +35,7 @@ _HARDWARE: Final = (
     "wall",
     "session.mcap",
     "walk/",  # pictures on the way around a thing: tests/system/test_scan_command.py
+    "--resume cup",  # after a scan that was killed: tests/system/test_scan_resume.py
     "host.mcap",
     "opencv-bm",
     "phone-host serve",  # until it is stopped; tests/system/test_serve.py
@@ -75,6 +78,16 @@ def prepare(folder: Path) -> None:
     wide = cv2.GaussianBlur(np.random.default_rng(3).integers(0, 256, (240, 340), dtype=np.uint8), (0, 0), 1.0)
     cv2.imwrite(str(folder / "im0.png"), wide[:, :320])
     cv2.imwrite(str(folder / "im1.png"), wide[:, 20:])  # rectified, 20 px of disparity everywhere
+    (folder / "scan").mkdir()
+    write_surface(folder / "scan" / "model.ply", *_cube())
+
+
+def _cube() -> tuple[PointCloud, NDArray[np.int32]]:
+    """A closed cube of 50 mm, as the model of a scan."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    squares = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]], np.int32)
+    triangles = np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]])
+    return PointCloud((0.05 * corners).astype(np.float32), (255 * corners).astype(np.uint8)), triangles
 
 
 def run(command: Command, folder: Path) -> subprocess.CompletedProcess[str]:
