@@ -6,9 +6,12 @@ The sink takes one pair at a time, always the newest: while it is busy, pairs pa
 as in a replay, it takes them all.
 """
 
+import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from common import now
 from common.words import counted
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trust import Doubt
@@ -19,10 +22,17 @@ from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import report_of
 from phone_host.run.sinks import FunctionSink
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, Submap
+from phone_host.scan.patches import Patch, Patches
+from phone_host.scan.scan import LEAST_WEIGHT, Scan, ScannedPair, ScanWanted, Submap
 
 _SINK: Final = "scan"
 _NS: Final = 1e9
+
+_RENEW_NS: Final = 900_000_000
+"""The surface is made again so often, if somebody watches."""
+
+_WATCHED_NS: Final = 5_000_000_000
+"""Who has not asked for so long does not watch any more."""
 
 
 class LiveScan:
@@ -58,6 +68,36 @@ class LiveScan:
         self._is_board_left = board_side is Side.LEFT
         self._last: ScannedPair | None = None
         self._first_ns: int | None = None
+        self._patches: Patches | None = None
+        self._watching = threading.Lock()
+        self._asked_ns = self._renewed_ns = -_WATCHED_NS
+
+    @property
+    def last(self) -> ScannedPair | None:
+        """What became of the last pair; None: there was none."""
+        return self._last
+
+    def surface_since(self, number: int, most_points: int) -> Sequence[Patch]:
+        """Return what of the surface is newer than a patch. Safe from any thread; it is made again at most once a second.
+
+        Args:
+            number: of the newest patch that is known; 0: none is.
+            most_points: of all patches together; one comes in any case.
+        """
+        with self._watching:
+            self._asked_ns = now.monotonic_ns()
+            return () if self._patches is None else self._patches.since(number, most_points)
+
+    def renew_surface(self) -> None:
+        """Make the surface again. The run has ended, or calls this itself."""
+        tracker = self.scan.tracker
+        if tracker is None:
+            return
+        with self._watching:
+            if self._patches is None:
+                self._patches = Patches(tracker.volume, LEAST_WEIGHT)
+            self._patches.renew()
+            self._renewed_ns = now.monotonic_ns()
 
     @property
     def words(self) -> str:
@@ -102,3 +142,6 @@ class LiveScan:
             number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
         self._last = self.scan.take(str(number), stamp_s, result.processed)
         self.kept.after_pair()
+        now_ns = now.monotonic_ns()
+        if now_ns - self._asked_ns < _WATCHED_NS and now_ns - self._renewed_ns >= _RENEW_NS:
+            self.renew_surface()

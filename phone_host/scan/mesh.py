@@ -42,18 +42,22 @@ class Mesh:
         return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.int32))
 
 
-def mesh_of(blocks: Blocks, voxel_m: float, least_weight: int = 1) -> Mesh:
-    """Make the mesh of a volume.
+def mesh_of(
+    blocks: Blocks, voxel_m: float, least_weight: int = 1, numbers: NDArray[np.int64] | None = None
+) -> Mesh:
+    """Make the mesh of a volume, or of some of its blocks.
 
     Args:
         blocks: of the volume.
         voxel_m: distance of two values, m.
         least_weight: of a voxel that counts as seen; more leaves out what was seen only once.
+        numbers: of the blocks whose cubes are wanted; None: of all.
 
     Returns:
         The mesh; without triangles where there is no surface.
     """
-    order = np.lexsort(blocks.places[: blocks.count].T)
+    wanted = np.arange(blocks.count) if numbers is None else numbers
+    order = wanted[np.lexsort(blocks.places[wanted].T)]
     keys, points, colours, corners = [], [], [], []
     for first in range(0, len(order), _AT_ONCE):
         part = _part(blocks, order[first : first + _AT_ONCE], least_weight)
@@ -65,9 +69,9 @@ def mesh_of(blocks: Blocks, voxel_m: float, least_weight: int = 1) -> Mesh:
         return Mesh.empty()
     # An edge on the border of two parts was met by both: its point is one.
     whole, chosen = np.unique(np.concatenate(keys), return_index=True)
-    wanted = np.searchsorted(whole, np.concatenate(corners)).reshape(-1, 3).astype(np.int32)
+    triangles = np.searchsorted(whole, np.concatenate(corners)).reshape(-1, 3).astype(np.int32)
     metres = (np.concatenate(points)[chosen] * voxel_m).astype(np.float32)
-    return Mesh(metres, np.ascontiguousarray(np.concatenate(colours)[chosen][:, ::-1]), wanted)
+    return Mesh(metres, np.ascontiguousarray(np.concatenate(colours)[chosen][:, ::-1]), triangles)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

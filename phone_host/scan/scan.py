@@ -31,7 +31,7 @@ from phone_host.stereo.images import size_px, to_grey
 NOISE_PX: Final = 0.5
 """Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
 
-_LEAST_WEIGHT: Final = 8
+LEAST_WEIGHT: Final = 8
 """Of a voxel on the surface: an eighth of a sure depth. One view at a slant gives less, and is off by 5 mm where others are off by 4."""
 
 
@@ -282,7 +282,7 @@ class Scan:
         if self.tracker is None:
             return ScanModel(Mesh.empty(), np.zeros(0, np.float32))
         volume = self.tracker.volume
-        mesh = mesh_of(volume.blocks, volume.settings.voxel_m, _LEAST_WEIGHT)
+        mesh = mesh_of(volume.blocks, volume.settings.voxel_m, LEAST_WEIGHT)
         if self._wanted.box is not None:
             inside = self._wanted.box.holds(mesh.points_m)
             mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))

@@ -72,7 +72,13 @@ class Volume:
         self._library = found if isinstance(found, Library) else None
         self.blocks = Blocks()
         self.left_out = 0
-        self._changed = np.zeros(0, np.bool_)
+        self._fused = self._copied = 0
+        self._changes = np.zeros(0, np.int64)  # for each block, number of the view that changed it last
+
+    @property
+    def fused(self) -> int:
+        """How many times something went in."""
+        return self._fused
 
     @property
     def memory_bytes(self) -> int:
@@ -118,10 +124,18 @@ class Volume:
 
     def changed_blocks(self, *, every: bool = False) -> BlockValues:
         """Return copies of the blocks that got something since the last call; with `every`, of all blocks."""
-        numbers = np.arange(self.blocks.count) if every else np.flatnonzero(self._changed)
-        self._changed = np.zeros(0, np.bool_)
+        numbers = np.arange(self.blocks.count) if every else self.changed_since(self._copied)
+        self._copied = self._fused
         of = self.blocks
         return BlockValues(of.places[numbers], of.field[numbers], of.weights[numbers], of.colours[numbers])
+
+    def changed_since(self, fused: int) -> NDArray[np.int64]:
+        """Return the numbers of the blocks that got something since so much went in.
+
+        Args:
+            fused: a value that `fused` had; 0: everything.
+        """
+        return np.flatnonzero(self._changes > fused)
 
     def put(self, values: BlockValues) -> None:
         """Give blocks these values, in place of those that they have; new ones for which there is no memory are added to `left_out`."""
@@ -139,12 +153,16 @@ class Volume:
         self.blocks.field[numbers[there]] = values.field[there]
         self.blocks.weights[numbers[there]] = values.weights[there]
         self.blocks.colours[numbers[there]] = values.colours[there]
+        changed = np.zeros(self.blocks.count, np.uint8)
+        changed[numbers[there]] = 1
+        self._noted(changed)
+        self._copied = self._fused  # whoever puts them has them
 
     def _noted(self, changed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Remember which blocks got something."""
-        noted = changed > 0
-        noted[: len(self._changed)] |= self._changed
-        self._changed = noted
+        self._fused += 1
+        self._changes = np.concatenate([self._changes, np.zeros(len(changed) - len(self._changes), np.int64)])
+        self._changes[changed > 0] = self._fused
         return changed
 
     def cast(self, camera: Camera, seeds_m: Depth | None = None) -> Surface:

@@ -189,12 +189,14 @@ def test_a_plain_picture_and_a_still_one_tell_nothing() -> None:
         ([RIGID] * 3 + [WARPED] * 2, Warping.UNKNOWN, Unseen.VAGUE),
         ([RIGID] + [WARPED] * 3, Warping.STABILISED, None),
         ([WARPED] * 3 + [Reading(Unseen.FLAT)] * 3, Warping.UNKNOWN, Unseen.FLAT),
+        ([WARPED] + [Reading(Unseen.FLAT, 0.9)] * 2 + [Reading(Unseen.FLAT, 0.5)] * 5, Warping.STABILISED, None),
+        ([Reading(Unseen.FLAT, 0.9)] * 2 + [Reading(Unseen.FLAT, 0.5)] * 5, Warping.UNKNOWN, Unseen.FLAT),
     ],
 )
 def test_all_stretches_together_give_the_verdict(
     readings: list[Reading], verdict: Warping, unseen: Unseen | None
 ) -> None:
-    """Three stretches must tell something; one that contradicts three others is overruled, two of five are not."""
+    """Three stretches must tell something; one that contradicts three others is overruled, two of five are not; before a wall only a strong warp tells."""
     found = rigidity_of(readings)
     assert (found.warping, found.unseen) == (verdict, unseen)
     grade = Grade.OK if verdict is Warping.GOOD else Grade.WARN

@@ -30,6 +30,12 @@ ENOUGH: Final = 6
 _FEWEST: Final = 3
 _WARPED_SHARE: Final = 0.5
 _RIGID_SHARE: Final = 0.75
+_CERTAIN: Final = 0.8
+"""Excess that no rigid camera leaves, not even before a wall, whose film fits many cameras: rendered posters leave 0.47 at most."""
+
+_CERTAINLY: Final = 2
+"""So many such stretches before a wall tell, however many others do not."""
+
 _GAP: Final = 1.5
 _BRIGHTNESS_STEP: Final = 8
 
@@ -186,13 +192,15 @@ def rigidity_of(readings: list[Reading], *, by_phone: bool = False) -> Rigidity:
         readings: in their order.
         by_phone: whether a phone's program, such as its browser, stands between the sensor and the images.
     """
-    told = [each for each in readings if each.unseen is None]
+    told = [each for each in readings if each.unseen is None or _is_certain(each)]
     if not told:
         return Rigidity(unseen=_usual([each.unseen for each in readings if each.unseen is not None]))
     warped = [each for each in told if each.is_warped]
     share = len(warped) / len(told)
     found, unseen = Warping.UNKNOWN, None
-    if len(told) >= max(_FEWEST, 1 + sum(each.unseen is Unseen.FLAT for each in readings)):
+    flat = sum(each.unseen is Unseen.FLAT for each in readings if not _is_certain(each))
+    is_certain = sum(_is_certain(each) for each in told) >= _CERTAINLY
+    if len(told) >= _FEWEST and (is_certain or len(told) > flat):
         if share >= _WARPED_SHARE:
             found = Warping.STABILISED
         elif share <= 1 - _RIGID_SHARE:
@@ -215,6 +223,11 @@ def rigidity_of(readings: list[Reading], *, by_phone: bool = False) -> Rigidity:
         readout_ms=readout_ms,
         readout_sigma_ms=readout_sigma_ms,
     )
+
+
+def _is_certain(reading: Reading) -> bool:
+    """Whether a stretch before a flat scene tells all the same."""
+    return reading.unseen is Unseen.FLAT and reading.excess >= _CERTAIN
 
 
 def _usual(reasons: list[Unseen]) -> Unseen:

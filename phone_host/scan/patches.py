@@ -1,0 +1,91 @@
+"""The surface in patches, for whoever watches it grow: only those that changed are made again, and only those travel.
+
+A patch is the surface in a cube of 8 x 8 x 8 blocks. Neighbours meet without a gap, but share no points.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.scan.blocks import SIDE
+from phone_host.scan.cube_cases import CORNERS
+from phone_host.scan.mesh import Mesh, mesh_of
+from phone_host.scan.mesh_parts import thinned
+from phone_host.scan.volume import Volume
+
+SIDE_BLOCKS: Final = 8
+"""Smaller patches cost more calls, larger ones are made again for less."""
+
+_MOST_POINTS: Final = 65_535
+"""What 16 bit count; a patch with more, which no real surface has, is thinned."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """A patch.
+
+    Attributes:
+        number: grows with each patch that is made, so that who has seen some knows which are newer.
+        place: of the cube, in cubes along x, y, z.
+        side_m: of the cube; points lie at most a voxel beyond it.
+        mesh: the surface in it; without triangles where there is none any more.
+    """
+
+    number: int
+    place: tuple[int, int, int]
+    side_m: float
+    mesh: Mesh
+
+
+class Patches:
+    """All patches of a volume, as they were when they were last renewed.
+
+    Args:
+        volume: grows; it must not change while `renew` runs.
+        least_weight: of a voxel that counts as seen.
+    """
+
+    def __init__(self, volume: Volume, least_weight: int) -> None:
+        self._volume, self._least_weight = volume, least_weight
+        self._made: dict[tuple[int, int, int], Patch] = {}
+        self._seen = self._number = 0
+
+    def renew(self) -> None:
+        """Make those again whose blocks have changed."""
+        volume = self._volume
+        blocks, changed = volume.blocks, volume.changed_since(self._seen)
+        self._seen = volume.fused
+        # The cubes of marching reach into the next block along each axis: what lies before a changed block changes with it.
+        touched = (blocks.places[changed][:, np.newaxis] - CORNERS.astype(np.int32)).reshape(-1, 3)
+        wanted = np.unique(touched // SIDE_BLOCKS, axis=0)
+        if not len(wanted):
+            return
+        cubes = blocks.places[: blocks.count] // SIDE_BLOCKS
+        for place in wanted:
+            self._make(place, np.flatnonzero((cubes == place).all(axis=1)))
+
+    def since(self, number: int, most_points: int) -> tuple[Patch, ...]:
+        """Return the patches that are newer than one, oldest first.
+
+        Args:
+            number: of the newest that is known; 0: none is.
+            most_points: of all of them together; one comes in any case.
+        """
+        newer = sorted((each for each in self._made.values() if each.number > number), key=lambda each: each.number)
+        ends = np.cumsum([len(each.mesh.points_m) for each in newer])
+        return tuple(newer[: max(1, int(np.searchsorted(ends, most_points, side="right")))])
+
+    def _make(self, place: NDArray[np.int32], numbers: NDArray[np.int64]) -> None:
+        voxel_m = self._volume.settings.voxel_m
+        mesh = mesh_of(self._volume.blocks, voxel_m, self._least_weight, numbers)
+        most = len(mesh.triangles)
+        while len(mesh.points_m) > _MOST_POINTS:
+            most //= 2
+            mesh, _ = thinned(mesh, most, voxel_m)
+        x, y, z = place.tolist()
+        known = self._made.get((x, y, z))
+        if len(mesh.triangles) or known is not None:
+            self._number += 1
+            self._made[x, y, z] = Patch(self._number, (x, y, z), SIDE * SIDE_BLOCKS * voxel_m, mesh)
