@@ -68,9 +68,15 @@ class LiveScan:
         self._is_board_left = board_side is Side.LEFT
         self._last: ScannedPair | None = None
         self._first_ns: int | None = None
+        self._counts = len(self._earlier), self.scan.fused
         self._patches: Patches | None = None
         self._watching = threading.Lock()
         self._asked_ns = self._renewed_ns = -_WATCHED_NS
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Pairs that were taken, and those of them that are in the model."""
+        return self._counts
 
     @property
     def last(self) -> ScannedPair | None:
@@ -105,7 +111,7 @@ class LiveScan:
         last = self._last
         if last is None:
             return "waiting for the first pair"
-        count = f"{counted(self.scan.fused, 'pair')} in the model"
+        count = f"{counted(self._counts[1], 'pair')} in the model"
         return f"{count}: {last.weakness.advice}" if last.weakness.advice else f"{count}: go on"
 
     def finished(self, snapshot: RunSnapshot, matcher: str, axes: Axes) -> FinishedScan:
@@ -141,6 +147,8 @@ class LiveScan:
         if earlier and not self._is_replayed:  # numbers and times go on where they ended
             number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
         self._last = self.scan.take(str(number), stamp_s, result.processed)
+        taken, fused = self._counts
+        self._counts = taken + 1, fused + self._last.is_fused
         self.kept.after_pair()
         now_ns = now.monotonic_ns()
         if now_ns - self._asked_ns < _WATCHED_NS and now_ns - self._renewed_ns >= _RENEW_NS:

@@ -42,9 +42,7 @@ class Mesh:
         return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.int32))
 
 
-def mesh_of(
-    blocks: Blocks, voxel_m: float, least_weight: int = 1, numbers: NDArray[np.int64] | None = None
-) -> Mesh:
+def mesh_of(blocks: Blocks, voxel_m: float, least_weight: int = 1, numbers: NDArray[np.int64] | None = None) -> Mesh:
     """Make the mesh of a volume, or of some of its blocks.
 
     Args:

@@ -20,6 +20,7 @@ _WORDS: Final = {
     Activity.CHECKING: "the cameras are being checked",
     Activity.CALIBRATING: "a calibration is going on",
     Activity.RUNNING: "a run is going on",
+    Activity.SCANNING: "a scan is going on",
     Activity.ENDING: "the last activity is still ending",
 }
 

@@ -19,7 +19,7 @@ from phone_host.serve.recordings import Recordings
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.stereo.core import StereoCore
-from phone_host.web.source import Activity, Answer, Command, Do, Measured, Newest, PageState
+from phone_host.web.source import Activity, Answer, Command, Do, Measured, Newest, PageState, Surface
 
 _NEEDS_SERVE: Final = Trouble(
     "this page stands beside a run that was started on the command line",
@@ -124,3 +124,12 @@ class BesideRun:
     def saved(self) -> str:
         """See Source."""
         return str(self._snapshots) if self._snapshots.is_dir() else ""
+
+    def surface(self, since: int, most_points: int) -> Surface | None:
+        """See Source: a run scans nothing."""
+        del since, most_points
+        return None
+
+    def scanned(self) -> str:
+        """See Source."""
+        return ""

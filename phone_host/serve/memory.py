@@ -11,7 +11,7 @@ from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.serve.program import Calibrated, Choices
 from phone_host.serve.steps import Facts, steps
-from phone_host.web.source import Activity, Checked, Choice, PageState
+from phone_host.web.source import Activity, Checked, Choice, PageState, ScanState
 
 _FRESH_NS: Final = 150_000_000
 """A snapshot of a run serves so long: however often the state is asked for, the run is read a few times a second."""
@@ -157,6 +157,7 @@ class Memory:
         matchers: tuple[str, ...] = (),
         stranger: str = "",
         browser: Choice | None = None,
+        scan: ScanState | None = None,
     ) -> PageState:
         """Return everything.
 
@@ -167,6 +168,7 @@ class Memory:
             matchers: names of the matchers.
             stranger: the chosen board that has to be enrolled first.
             browser: the camera of whichever browser gives one; None: no browser can.
+            scan: the newest scan; None: there was none.
         """
         with self._lock:
             run = self._fresh()
@@ -177,6 +179,8 @@ class Memory:
                 checked=self._checked[1] if same else "",
                 pairs=self._pairs,
                 is_running=activity is Activity.RUNNING,
+                scan="" if scan is None else scan.words,
+                has_scan=scan is not None and bool(scan.folder),
             )
             told = steps(facts)
             cameras = self._cameras if browser is None else (*(self._cameras or ()), browser)
@@ -190,6 +194,7 @@ class Memory:
                 stranger,
                 self._checks,
                 self._trouble,
+                scan,
             )
             if here != self._was:
                 self._was, self._changed = here, self._changed + 1
@@ -204,6 +209,7 @@ class Memory:
                 matchers=matchers,
                 run=run,
                 guide=self._guide,
+                scan=scan,
                 checks=self._checks,
                 trouble=self._trouble,
                 changed=self._changed,

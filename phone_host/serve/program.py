@@ -13,6 +13,7 @@ from phone_host.calibration.guide.view import View
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
+from phone_host.live.scan import LiveScan
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.output.axes import Axes
@@ -93,6 +94,43 @@ class ReadyCalibration(Protocol):
         """
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scanned:
+    """What came of a scan.
+
+    Attributes:
+        words: one sentence.
+        level: good, warning or bad.
+        folder: where its files lie.
+        files: their names.
+        snapshot: the last one of the run beneath.
+    """
+
+    words: str
+    level: str
+    folder: Path
+    files: tuple[str, ...]
+    snapshot: RunSnapshot
+
+
+class ReadyScan(Protocol):
+    """A scan that is ready to begin."""
+
+    @property
+    def host(self) -> Host:
+        """Runs, and closes camera and links at its end."""
+
+    @property
+    def live(self) -> LiveScan:
+        """Takes its pairs."""
+
+    def finish(self, ended: EndReason) -> Scanned:
+        """Make the surface, and write the files."""
+
+    def save(self) -> None:
+        """Write what there is after an error. Raises nothing."""
+
+
 class Program(Protocol):
     """What the commands do, for the page."""
 
@@ -145,6 +183,15 @@ class Program(Protocol):
 
     def calibration(self, choices: Choices, values: Choices, sinks: Sequence[Sink]) -> ReadyCalibration:
         """Open everything that a live calibration needs; the sinks take its pairs."""
+
+    def scan(self, choices: Choices, values: Choices, sinks_of: SinksOf) -> ReadyScan:
+        """Open everything that a live scan needs.
+
+        Args:
+            choices: of a run, with a calibration.
+            values: options of `scan` by name: voxel, box.
+            sinks_of: makes further sinks.
+        """
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """Return the folder of the snapshots, and the axes of their points."""

@@ -30,10 +30,11 @@ from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.program import Choices, Program, ReadyRun
 from phone_host.serve.recordings import Recordings
+from phone_host.serve.scanning import Scanning
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.stereo.core import StereoCore
-from phone_host.web.source import Activity, Answer, Checked, Command, Do, Measured, Newest, PageState
+from phone_host.web.source import Activity, Answer, Checked, Command, Do, Measured, Newest, PageState, Surface
 
 _END_S: Final = 20.0
 """A run that ends writes its report; a slow card takes seconds for that."""
@@ -58,7 +59,7 @@ class Station:
         kept = program.kept()
         self._memory = Memory(kept)
         self._choosing = Lock()
-        self._recordings = Recordings()
+        self._recordings, self._scanning = Recordings(), Scanning()
         self._activities = Activities(self._begins, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
             Do.FIND: self._find,
@@ -68,6 +69,7 @@ class Station:
             Do.CAPTURE: self._capture,
             Do.CALIBRATE: self._calibrate,
             Do.RUN: self._run,
+            Do.SCAN: self._scan,
             Do.STOP: self._stop,
             Do.SNAPSHOT: self._snapshot,
             Do.RECORD: self._record,
@@ -93,6 +95,7 @@ class Station:
             matchers=self._program.matchers,
             stranger=self._stranger(choices.get("link", "")),
             browser=find.browser_choice(self.feed.words),
+            scan=self._scanning.state,
         )
 
     def newest(self) -> Newest | None:
@@ -117,6 +120,14 @@ class Station:
     def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
         """See Source."""
         return answered(self._shelf, points_px, number)
+
+    def surface(self, since: int, most_points: int) -> Surface | None:
+        """See Source."""
+        return self._scanning.surface(since, most_points)
+
+    def scanned(self) -> str:
+        """See Source."""
+        return self._scanning.folder
 
     def saved(self) -> str:
         """See Source."""
@@ -276,6 +287,25 @@ class Station:
                 self._memory.ran(over.processed)
 
         return self._begun(Activity.RUNNING, work, "the run begins")
+
+    def _scan(self, values: Choices) -> Answer:
+        choices = self._both_chosen()
+
+        def work(task: Task) -> None:
+            ready = self._program.scan(choices, values, self._sinks)
+            host = ready.host
+            with task.held(), self._memory.live(host.snapshot), self._scanning.shown(ready.live, self._memory.begun):
+                try:
+                    ended = host.run(task.stopped)
+                except Exception:
+                    ready.save()
+                    raise
+                done = ready.finish(ended)
+            self._memory.last(done.snapshot)
+            self._memory.gave_up(host.has_given_up)
+            self._scanning.over(done)
+
+        return self._begun(Activity.SCANNING, work, "the scan begins")
 
     def _watched(self, task: Task, ready: ReadyRun) -> RunSnapshot:
         """Run, show it, and write its report; return its last snapshot."""

@@ -1,4 +1,4 @@
-"""The way from nothing to a run, in words. Pure."""
+"""The way from nothing to a run and a scan, in words. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,6 +17,8 @@ class Facts:
         checked: what the last check of these two cameras came to; empty: there was none, or it failed.
         pairs: how many pairs the last run processed.
         is_running: whether one goes on.
+        scan: how the scan goes, or went; empty: there was none.
+        has_scan: whether its files are written.
     """
 
     choices: Mapping[str, str]
@@ -24,6 +26,8 @@ class Facts:
     checked: str = ""
     pairs: int = 0
     is_running: bool = False
+    scan: str = ""
+    has_scan: bool = False
 
 
 def steps(facts: Facts) -> tuple[Step, ...]:
@@ -44,7 +48,19 @@ def steps(facts: Facts) -> tuple[Step, ...]:
             _run_words(facts),
             "run" if has_both else "choose both cameras first",
         ),
+        _scan(facts, has_both=has_both),
     )
+
+
+def _scan(facts: Facts, *, has_both: bool) -> Step:
+    if facts.scan:
+        return Step(name=StepName.SCAN, done=facts.has_scan, words=facts.scan)
+    if not has_both:
+        return Step(name=StepName.SCAN, done=False, words="choose both cameras first")
+    if not {"calibration", "rectified"} & facts.choices.keys():
+        return Step(name=StepName.SCAN, done=False, words="calibrate first: a scan needs metres")
+    words = "start, and move the cameras around the thing, slowly; press Stop when all of it was seen"
+    return Step(name=StepName.SCAN, done=False, words=words)
 
 
 def _run_words(facts: Facts) -> str:

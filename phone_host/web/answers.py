@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import partial
+from pathlib import Path
 from typing import BinaryIO, Final, TypeVar
 
 from aiohttp import web
@@ -17,13 +18,14 @@ from phone_host.web.encoder import FILES, has_data
 from phone_host.web.gate import Gate, is_loopback
 from phone_host.web.hub import Hub
 from phone_host.web.openapi import description
-from phone_host.web.saved_pairs import open_saved, saved_pairs
+from phone_host.web.saved_pairs import SCAN_FILES, open_plain, open_saved, saved_pairs
 from phone_host.web.settings import Limits
 from phone_host.web.source import Answer, Command, Do
 from phone_host.web.state_json import answer_values, measured_values, whole_text
 from phone_host.web.static_files import INDEX, StaticFile, chosen_encoding
+from phone_host.web.surface_bytes import surface_bytes
 from phone_host.web.viewers import Viewers
-from phone_host.web.wishes import read_command, read_measure
+from phone_host.web.wishes import read_command, read_measure, read_number
 
 T = TypeVar("T")
 
@@ -32,7 +34,13 @@ _LEAST_BYTES_PER_S: Final = 20_000
 """A reader that is slower than a Bluetooth line is cut off; it holds a place and memory."""
 _BODY_S: Final = 10.0
 
+_SURFACE_POINTS: Final = 200_000
+"""In one answer: 4 MB, a second of a phone's Wi-Fi; the rest comes with the next one."""
+
 _KINDS: Final = {
+    ".html": "application/octet-stream",
+    ".json": "application/octet-stream",
+    ".txt": "application/octet-stream",
     ".ply": "application/octet-stream",
     ".pfm": "application/octet-stream",
     ".png": "image/png",
@@ -41,6 +49,8 @@ _KINDS: Final = {
 _NOT_YET: Final = Trouble("there is no such thing yet", "start a run and wait for its first pair")
 _NO_DEPTH: Final = Trouble("this run has no depth", "give it a calibration")
 _NOT_SAVED: Final = Trouble("this file was not saved", "see /api/pairs; save pairs with --save-every")
+_NO_SCAN: Final = Trouble("there is no scan yet", "begin one on the page, or with the command scan")
+_NO_NUMBER: Final = Trouble("since is no number", "give that of the last answer, or 0")
 _NO_COMMAND: Final = Trouble("this is no command", "send JSON as /api/openapi.json describes it")
 _NO_POINTS: Final = Trouble("these are no points", "send JSON as /api/openapi.json describes it")
 _NO_AUTHORITY: Final = Trouble("this page has no certificate", "start it with --lan")
@@ -92,6 +102,8 @@ class Answers:
             web.get("/api/authority.pem", self._authority_file),
             web.get("/api/pairs", self._pairs),
             web.get(r"/api/pairs/{number:[0-9]{1,9}}/{name}", self._saved_file),
+            web.get("/api/surface", self._surface),
+            web.get("/api/scan/{name}", self._scan_file),
             web.post("/api/command", self._command),
             web.post("/api/measure", self._measure),
             *newest,
@@ -195,6 +207,30 @@ class Answers:
                     return await _send(request, size, _read(file, size), _file_headers(name))
         except FileNotFoundError:
             return problem(404, _NOT_SAVED)
+
+    async def _surface(self, request: web.Request) -> web.StreamResponse:
+        since = read_number(request.query.get("since", "0"))
+        if since is None:
+            return problem(400, _NO_NUMBER)
+        async with self._place(request):
+            surface = self._hub.source.surface(since, _SURFACE_POINTS)
+            if surface is None:
+                return problem(404, _NO_SCAN)
+            data = await self._hub.encoder.run(lambda: surface_bytes(surface, since))
+            return await _send(request, len(data), _blocks(data), _file_headers("surface.ply"))
+
+    async def _scan_file(self, request: web.Request) -> web.StreamResponse:
+        name, folder = request.match_info["name"], self._hub.source.scanned()
+        if not folder or name not in SCAN_FILES:
+            return problem(404, _NO_SCAN)
+        try:
+            async with self._place(request):
+                file = await _aside(lambda: open_plain(Path(folder), name))
+                with file:
+                    size = await _aside(lambda: file.seek(0, 2))
+                    return await _send(request, size, _read(file, size), _file_headers(name))
+        except FileNotFoundError:
+            return problem(404, _NO_SCAN)
 
     @asynccontextmanager
     async def _place(self, request: web.Request) -> AsyncIterator[None]:

@@ -4,6 +4,7 @@ from typing import Final
 
 from common.versions import PACKAGE_VERSION
 from phone_host.output.pair_files import RUN_FILES
+from phone_host.web.saved_pairs import SCAN_FILES
 from phone_host.web.source import Activity, Do, StepName
 from phone_host.web.wishes import MOST_NUMBER, MOST_POINTS, MOST_PX, MOST_TEXT, MOST_VALUES
 
@@ -26,7 +27,7 @@ _REFUSED: Final = (401, 403, 421, 429)
 _DO: Final = (
     "`record` begins a recording (MCAP) beside the run that goes on, in a new file of the folder `recordings`; `end_recording` ends it."
     " How it goes stands in the state: `live.recording`. `snapshot` saves the newest pair. `set` takes options of `phone-host run` as"
-    " values, `enrol` link and code, `calibrate` board and square; the others take none."
+    " values, `enrol` link and code, `calibrate` board and square, `scan` voxel and box, which may be missing; the others take none."
 )
 
 
@@ -51,6 +52,8 @@ def description() -> _Json:
             "/api/cloud.ply": _newest("Points in metres, with colours", "application/octet-stream"),
             "/api/pairs": _get("The saved pairs", _json("Pairs"), 503),
             "/api/pairs/{number}/{file}": _saved(),
+            "/api/surface": _surface(),
+            "/api/scan/{file}": _scanned(),
             "/api/openapi.json": _get("This description", _json("Report")),
             "/api/authority.pem": _get(
                 "Certificate of the page's own authority", _bytes("application/x-x509-ca-cert"), 404
@@ -78,6 +81,14 @@ def _schemas() -> _Json:
         "items": {"type": ["array", "null"], "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
     }
     numbers = {"type": "array", "items": _NUMBER}
+    scan = _object(
+        words=_TEXT,
+        level={"enum": ["good", "warning", "bad", "unknown"]},
+        pairs=_WHOLE,
+        fused=_WHOLE,
+        folder=_TEXT,
+        files={"type": "array", "items": _TEXT},
+    )
     state = _object(
         kind={"const": "state"},
         activity={"enum": [each.value for each in Activity]},
@@ -89,6 +100,7 @@ def _schemas() -> _Json:
         stranger=_TEXT,
         matchers={"type": "array", "items": _TEXT},
         guide={"type": ["object", "null"]},
+        scan={"anyOf": [scan, {"type": "null"}]},
         trouble={"anyOf": [_ref("Problem"), {"type": "null"}]},
         changed=_WHOLE,
         begun=_WHOLE,
@@ -159,6 +171,30 @@ def _saved() -> _Json:
     number = {"name": "number", "in": "path", "required": True, "schema": _WHOLE | {"maximum": 999_999_999}}
     file = {"name": "file", "in": "path", "required": True, "schema": {"enum": [each.value for each in RUN_FILES]}}
     return described | {"parameters": [number, file]}
+
+
+def _surface() -> _Json:
+    described = _get(
+        "What of the scan's surface is new, as triangles; docs/page.md describes the bytes",
+        _bytes("application/octet-stream"),
+        400,
+        404,
+        503,
+    )
+    since = {
+        "name": "since",
+        "in": "query",
+        "required": False,
+        "description": "`newest` of the last answer; 0: everything",
+        "schema": _WHOLE,
+    }
+    return described | {"parameters": [since]}
+
+
+def _scanned() -> _Json:
+    described = _get("A file of the last scan", _bytes("application/octet-stream"), 404, 503)
+    file = {"name": "file", "in": "path", "required": True, "schema": {"enum": list(SCAN_FILES)}}
+    return described | {"parameters": [file]}
 
 
 def _post(summary: str, body: str, answer: str, *statuses: int) -> _Json:

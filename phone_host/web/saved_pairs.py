@@ -1,4 +1,4 @@
-"""Finds the saved pairs of a run, and opens their files: only names that a run writes, and never through a link."""
+"""Finds the saved pairs of a run, and opens their files and those of a scan: only names that are written, and never through a link."""
 
 import os
 import re
@@ -16,6 +16,9 @@ _FILE: Final = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 SAVED_FILES: Final = frozenset(file.value for file in RUN_FILES)
 """Names of the files of a saved pair."""
+
+SCAN_FILES: Final = ("model.ply", "trajectory.txt", "report.json", "index.html")
+"""Names of a scan's files. They are saved, not shown: the page among them has scripts of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +57,25 @@ def open_saved(folder: str, number: int, name: str) -> BinaryIO:
     """
     if not folder or name not in SAVED_FILES:
         raise FileNotFoundError(name)
+    return open_plain(Path(folder) / _name(number), name)
+
+
+def open_plain(folder: Path, name: str) -> BinaryIO:
+    """Open a file, never through a link.
+
+    Args:
+        folder: where it is.
+        name: of the file, without separators.
+
+    Raises:
+        FileNotFoundError: there is none, or it is no plain file.
+    """
     try:
-        pair = os.open(Path(folder) / _name(number), _FOLDER)
+        opened = os.open(folder, _FOLDER)
         try:
-            descriptor = os.open(name, _FILE, dir_fd=pair)
+            descriptor = os.open(name, _FILE, dir_fd=opened)
         finally:
-            os.close(pair)
+            os.close(opened)
     except OSError as error:
         raise FileNotFoundError(name) from error
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.model import Result
@@ -21,17 +24,19 @@ class Activity(Enum):
     CHECKING = "checking"
     CALIBRATING = "calibrating"
     RUNNING = "running"
+    SCANNING = "scanning"
     ENDING = "ending"
 
 
 class StepName(Enum):
-    """The steps from nothing to a run, in their order."""
+    """The steps from nothing to a run and a scan, in their order."""
 
     BOARD = "board"
     CAMERA = "camera"
     CHECK = "check"
     CALIBRATION = "calibration"
     RUN = "run"
+    SCAN = "scan"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +87,76 @@ class Checked:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ScanState:
+    """How a scan goes, or went.
+
+    Attributes:
+        words: what to do now, or what came of it; one sentence.
+        level: good, warning (it goes on, but badly), bad (what is shown now is not taken) or unknown.
+        pairs: that were taken, whether or not they are in the model.
+        fused: of these in the model.
+        folder: where its files lie; empty: they are not written yet.
+        files: their names.
+    """
+
+    words: str
+    level: str = "unknown"
+    pairs: int = 0
+    fused: int = 0
+    folder: str = ""
+    files: tuple[str, ...] = ()
+
+
+class SurfaceMesh(Protocol):
+    """Triangles with colours, as `phone_host.scan.mesh.Mesh` has them."""
+
+    @property
+    def points_m(self) -> NDArray[np.float32]:
+        """Places, (V, 3), m: x right, y down, z forward of the first left camera."""
+
+    @property
+    def colours(self) -> NDArray[np.uint8]:
+        """Red green blue of each point, (V, 3)."""
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """Numbers of points, (T, 3), anticlockwise as seen from where the camera was."""
+
+
+class SurfacePatch(Protocol):
+    """A part of a growing surface; a newer one of the same place takes its place."""
+
+    @property
+    def number(self) -> int:
+        """Grows with each patch that is made."""
+
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Of its cube, in cubes."""
+
+    @property
+    def side_m(self) -> float:
+        """Of the cube; its points lie at most a tenth of it beyond."""
+
+    @property
+    def mesh(self) -> SurfaceMesh:
+        """The surface in it; fewer than 65 536 points."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """What of a scan's surface is new.
+
+    Attributes:
+        begun: `PageState.begun` of the scan.
+        patches: oldest first; those that are left out come next time.
+    """
+
+    begun: int
+    patches: Sequence[SurfacePatch]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PageState:
     """Everything that the page shows beside images.
 
@@ -96,6 +171,7 @@ class PageState:
         matchers: names that `--matcher` takes.
         run: the run, live or the last one; None: there was none.
         guide: the live calibration, as its guide.json has it; None: there was none.
+        scan: the scan, live or the last one; None: there was none.
         checks: what the last check has looked at, in order.
         trouble: what went wrong last; None: nothing.
         changed: grows with each change of anything but `run` and `guide`.
@@ -112,6 +188,7 @@ class PageState:
     matchers: tuple[str, ...] = ()
     run: RunSnapshot | None = None
     guide: Mapping[str, object] | None = None
+    scan: ScanState | None = None
     checks: tuple[Checked, ...] = ()
     trouble: Trouble | None = None
     changed: int = 0
@@ -128,6 +205,7 @@ class Do(Enum):
     CAPTURE = "capture"
     CALIBRATE = "calibrate"
     RUN = "run"
+    SCAN = "scan"
     STOP = "stop"
     SNAPSHOT = "snapshot"
     RECORD = "record"
@@ -141,7 +219,8 @@ class Command:
     Attributes:
         do: what.
         values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
-            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one. Empty for the others.
+            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel` and `box`, which may be
+            missing. Empty for the others.
     """
 
     do: Do
@@ -276,6 +355,17 @@ class Source(Protocol):
             points_px: x, y of one or two points, px of the full image.
             number: of the result; None: the newest. One that is gone is answered in `words`.
         """
+
+    def surface(self, since: int, most_points: int) -> Surface | None:
+        """Return what of the scan's surface is newer than a patch; None: there is no scan.
+
+        Args:
+            since: number of the newest patch that is known; 0: none is.
+            most_points: of all patches together; one comes in any case.
+        """
+
+    def scanned(self) -> str:
+        """Return the path of the folder with the files of the last scan; empty: there is none."""
 
     def saved(self) -> str:
         """Return the path of the folder with the saved pairs (pair-NNNNNN); empty: nothing is saved."""

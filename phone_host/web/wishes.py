@@ -101,6 +101,14 @@ def read_command(text: str | bytes) -> Command | None:
     return Command(do=Do(said["do"]), values=values)
 
 
+def read_number(text: str) -> int | None:
+    """Read a number of an address; None: it is none, or too large."""
+    if not text.isascii() or not text.isdigit() or len(text) > len(str(MOST_NUMBER)):
+        return None
+    number = int(text)
+    return number if number <= MOST_NUMBER else None
+
+
 def token_in(text: str) -> str:
     """Return the token that a hello carries; empty: none."""
     said = _object(text)

@@ -11,6 +11,7 @@ from common.stamp import HOST_CLOCK, Stamp
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.model import BoardFrame, FramePair, Processed, Result
+from phone_host.scan.patches import Patches
 from phone_host.web.source import (
     Activity,
     Answer,
@@ -23,6 +24,7 @@ from phone_host.web.source import (
     PageState,
     Step,
     StepName,
+    Surface,
 )
 from tests.support.run_snapshots import run
 from tests.support.samples import FRAME, LEDGER
@@ -49,6 +51,8 @@ class PageSource:
         self.blocked = threading.Event()
         self.blocked.set()
         self._saved = saved
+        self.patches: Patches | None = None
+        self.scan_folder = ""
         self._number = -1
         self._lock = threading.Lock()
         self._told: list[Callable[[], None]] = []
@@ -130,6 +134,15 @@ class PageSource:
             distances_m=(2.0,) * count,
             length_m=None if count < 2 else 0.0,
         )
+
+    def surface(self, since: int, most_points: int) -> Surface | None:
+        """See Source."""
+        patches = () if self.patches is None else self.patches.since(since, most_points)
+        return None if self.patches is None else Surface(1, patches)
+
+    def scanned(self) -> str:
+        """See Source."""
+        return self.scan_folder
 
     def saved(self) -> str:
         """Return the folder."""

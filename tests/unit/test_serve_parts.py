@@ -211,7 +211,7 @@ def test_a_failure_is_told_with_its_remedy() -> None:
     assert "the program itself failed" in seen.failures[1].problem
 
 
-def test_the_steps_lead_from_nothing_to_a_run() -> None:
+def test_the_steps_lead_from_nothing_to_a_run_and_a_scan() -> None:
     """Each step says what to do until it is done, then what it has come to; a board that wants its code is not done."""
     nothing = steps(Facts(choices={}))
     assert [step.name for step in nothing] == list(StepName)
@@ -219,10 +219,14 @@ def test_the_steps_lead_from_nothing_to_a_run() -> None:
     both = {"link": "tcp://b:1", "camera": "v4l2:auto"}
     assert "board-agent pair" in steps(Facts(choices=both, stranger="tcp://b:1"))[0].words
     chosen = steps(Facts(choices=both))
-    assert [step.done for step in chosen] == [True, True, False, False, False]
-    all_done = steps(Facts(choices={**both, "calibration": "rig.yaml"}, checked="seen", pairs=2))
-    assert all(step.done for step in all_done)
-    assert all_done[-1].words == "the last run gave 2 pairs"
+    assert [step.done for step in chosen] == [True, True, False, False, False, False]
+    assert "calibrate first" in chosen[5].words
+    ready = steps(Facts(choices={**both, "calibration": "rig.yaml"}, checked="seen", pairs=2))
+    assert [step.done for step in ready] == [True] * 5 + [False]
+    assert ready[4].words == "the last run gave 2 pairs"
+    assert "move the cameras around" in ready[5].words
+    scanned = steps(Facts(choices=both, scan="3 of 3 pairs are in the model", has_scan=True))[5]
+    assert (scanned.done, scanned.words) == (True, "3 of 3 pairs are in the model")
     assert steps(Facts(choices={**both, "rectified": "yes"}, is_running=True))[3].done
     assert steps(Facts(choices=both, is_running=True))[4].words == "it runs"
 

@@ -21,6 +21,7 @@ from phone_host.measure.recording_account import RecordingAccount
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.trust import Concern
 from phone_host.model import Processed, Result
+from phone_host.scan.patches import Patches
 from phone_host.scene.demo_scene import demo_scene, matched_view
 from phone_host.scene.scene_render import Renderer
 from phone_host.scene.truth import Truth, rectified_cameras, truth
@@ -38,8 +39,10 @@ from phone_host.web.source import (
     Measured,
     Newest,
     PageState,
+    ScanState,
     Step,
     StepName,
+    Surface,
 )
 from tests.support.run_snapshots import run as snapshot
 from tests.support.samples import LEDGER
@@ -109,6 +112,8 @@ class Played:
     concerns: tuple[Concern, ...] = ()
     recording: RecordingAccount | None = None
     folder: str = ""
+    scan: ScanState | None = None
+    patches: Patches | None = None
     begun: int = 0
     commands: list[Command] = field(default_factory=list)
     answers: dict[Do, Answer] = field(default_factory=dict)
@@ -154,6 +159,7 @@ class Played:
             StepName.CHECK: "have the machine, the board and both cameras checked",
             StepName.CALIBRATION: "show the printed board to both cameras, or choose a rig.yaml",
             StepName.RUN: "start the run",
+            StepName.SCAN: "start, and move the cameras around the thing",
         }
         steps = tuple(Step(name=name, done=name in self.done, words=words[name]) for name in self.steps)
         options = " ".join(f"--{name} {value}" for name, value in sorted(self.settings.items()))
@@ -168,6 +174,7 @@ class Played:
             matchers=("tandem", "tandem-fast", "sgbm"),
             run=run,
             guide=None if self.guide is None else self.guide.as_json(),
+            scan=self.scan,
             trouble=self.trouble,
             changed=self._changed,
             begun=self.begun,
@@ -193,6 +200,8 @@ class Played:
                     self.change(settings=kept)
             case Do.RUN:
                 self.change(activity=Activity.RUNNING, begun=self.begun + 1)
+            case Do.SCAN:
+                self.change(activity=Activity.SCANNING, begun=self.begun + 1)
             case Do.STOP:
                 self.change(activity=Activity.IDLE)
             case Do.ENROL:
@@ -223,6 +232,14 @@ class Played:
             length_sigma_m=None if length is None else 0.0014,
             words="" if all(known) else "there is no depth at this point",
         )
+
+    def surface(self, since: int, most_points: int) -> Surface | None:
+        """Implement Source."""
+        return None if self.patches is None else Surface(self.begun, self.patches.since(since, most_points))
+
+    def scanned(self) -> str:
+        """Implement Source."""
+        return "" if self.scan is None else self.scan.folder
 
     def saved(self) -> str:
         """Implement Source."""

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from contextlib import suppress
+from pathlib import Path
 
 from common.errors import SettingsError
 from common.orientation import UPRIGHT
@@ -21,9 +22,10 @@ from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.run.stereo_results import require_writable
+from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
-from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
+from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run
 from phone_host.verbs.scan.wanted import resumed_of, scan_wanted
 from phone_host.verbs.serve.choices import run_options
 from phone_host.verbs.stereo_options import output_options
@@ -50,12 +52,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     resumed = resumed_of(options)
     logs.set_up(log_level(found.values.log_level))
     opened = open_run(of_run, found, _tell)
-    camera = opened.camera
-    pacing = camera.pacing if isinstance(camera, Playback) else camera.description.pacing
-    is_stills = pacing is Pacing.DEMAND and not isinstance(camera, Playback)
-    live = LiveScan(
-        wanted, opened.board_side, options.out, resumed, waits=pacing is Pacing.DEMAND, is_timeless=is_stills
-    )
+    live = live_scan(opened, wanted, options.out, resumed)
     signals = StopSignals()
     prepared = opened.prepared(sys.argv, (live.sink,))
 
@@ -79,6 +76,21 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     live.kept.done()
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return last.report, INTERRUPTED if signals.interrupted else 4 if too_few else 0
+
+
+def live_scan(opened: Opened, wanted: ScanWanted, out: Path, resumed: tuple[Submap, ...] = ()) -> LiveScan:
+    """Return what takes the pairs of a run.
+
+    Args:
+        opened: the run.
+        wanted: how the model is made.
+        out: the results folder.
+        resumed: submaps of a scan that was killed, to go on from.
+    """
+    camera = opened.camera
+    pacing = camera.pacing if isinstance(camera, Playback) else camera.description.pacing
+    is_stills = pacing is Pacing.DEMAND and not isinstance(camera, Playback)
+    return LiveScan(wanted, opened.board_side, out, resumed, waits=pacing is Pacing.DEMAND, is_timeless=is_stills)
 
 
 def _followed(prepared: PreparedRun, live: LiveScan, signals: StopSignals) -> EndReason:

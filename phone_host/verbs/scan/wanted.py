@@ -34,7 +34,7 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
     if options.memory < _LEAST_BYTES:
         raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
     return ScanWanted(
-        voxel_m=math.nan if options.voxel is None else _voxel_mm(options.voxel) / 1000,
+        voxel_m=math.nan if options.voxel is None else voxel_of(options.voxel),
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
@@ -61,7 +61,7 @@ def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
             f"--resume {options.resume}: {error.strerror}", "give a folder that can be read"
         ) from error
     voxel_m = submaps[-1].settings.voxel_m
-    if options.voxel is not None and not math.isclose(_voxel_mm(options.voxel) / 1000, voxel_m):
+    if options.voxel is not None and not math.isclose(voxel_of(options.voxel), voxel_m):
         raise SettingsError(
             f"--voxel is {options.voxel}, the scan in {options.resume} has {voxel_m * 1000:g} mm", "leave --voxel out"
         )
@@ -74,11 +74,19 @@ def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
     return submaps
 
 
-def _voxel_mm(text: str) -> float:
+def voxel_of(text: str) -> float:
+    """Read how fine a model is, m.
+
+    Args:
+        text: what the user wrote, mm unless it names a unit.
+
+    Raises:
+        SettingsError: it is none.
+    """
     value = length_mm(text, "--voxel", "2mm")
     if not _LEAST_VOXEL_MM <= value <= _MOST_VOXEL_MM:
         raise SettingsError(f"--voxel is {value:g} mm", f"give {_LEAST_VOXEL_MM:g} to {_MOST_VOXEL_MM:g} mm")
-    return value
+    return value / 1000
 
 
 def box_of(text: str) -> Box:

@@ -27,3 +27,12 @@ def recording_folder(out: Path | None) -> Path:
         out: folder for the results of runs; None: none.
     """
     return (out or data_folder()) / "recordings"
+
+
+def scan_folder(out: Path | None) -> Path:
+    """Return the folder of the scans that are made on the page, each in a folder of its own.
+
+    Args:
+        out: folder for the results of runs; None: none.
+    """
+    return (out or data_folder()) / "scans"

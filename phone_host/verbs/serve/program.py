@@ -46,7 +46,8 @@ from phone_host.verbs.serve.choices import (
     without_depth,
 )
 from phone_host.verbs.serve.kept_choices import is_there, keep, kept
-from phone_host.verbs.serve.places import data_folder, recording_folder, snapshot_folder
+from phone_host.verbs.serve.page_scan import PageScan, page_scan
+from phone_host.verbs.serve.places import data_folder, recording_folder, scan_folder, snapshot_folder
 from phone_host.verbs.stereo_options import refuse_rejected
 
 _TRIAL_S: Final = 2.5
@@ -168,6 +169,12 @@ class Commands:
         asked = asked_of(options)
         require_rig_place(out)
         return Calibration(options, asked, prepare_views(options, asked, self.feed, sinks))
+
+    def scan(self, choices: Choices, values: Choices, sinks_of: SinksOf) -> PageScan:
+        """See Program."""
+        out = choices.get("out", "")
+        folder = scan_folder(Path(out) if out else None)
+        return page_scan(self._options(choices), values, folder, sinks_of, tell=self._tell, feed=self.feed)
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """See Program."""

@@ -14,6 +14,7 @@ _WORDS: Final = {
     Activity.CHECKING: "checking both cameras",
     Activity.CALIBRATING: "calibrating",
     Activity.RUNNING: "running",
+    Activity.SCANNING: "scanning",
     Activity.ENDING: "ending",
 }
 _CLEAR: Final = "\r\x1b[K"

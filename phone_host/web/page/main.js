@@ -8,6 +8,7 @@ import { showFigures } from './figures.js';
 import { seePictures, showGuide } from './guide.js';
 import { Live } from './live.js';
 import { showOwnCamera } from './own_camera.js';
+import { ScanPanel } from './scan.js';
 import { connectSetup, showSetup } from './setup.js';
 import { STEPS, showSteps, stepOf } from './steps.js';
 import { takeToken } from './token.js';
@@ -37,6 +38,7 @@ let asked = '';
 const controls = new Controls(() => state, () => live.pair?.head ?? null);
 /** @type {Live} */
 const live = new Live((from, to, done) => controls.drag(from, to, done));
+const scan = new ScanPanel(() => state);
 const charts = new Charts({ delays: byId('chart-delays'), rate: byId('chart-rate'), skew: byId('chart-skew') });
 
 const connection = new Connection({
@@ -78,6 +80,7 @@ function draw() {
   showOwnCamera(state);
   showFigures(state.live, charts.delay());
   controls.show(state);
+  scan.show(state);
   text(byId('activity'), state.activity);
   data(document.body, 'activity', state.activity);
   want();

@@ -8,9 +8,8 @@ import { opaque, Viewer } from './viewer.js';
  * @typedef {object} Surface
  * @property {[number, number, number]} low - lowest corner, X right Y down Z forward, m
  * @property {number} step - of a coordinate, m
- * @property {number[]} size - along the axes, m
  * @property {Uint16Array} points - three coordinates each, in steps from `low`
- * @property {Uint32Array} triangles - three numbers of points each, anticlockwise from outside
+ * @property {Uint32Array | Uint16Array} triangles - three numbers of points each, anticlockwise from outside
  * @property {Uint8Array} colours - red green blue each
  * @property {Uint8Array} noise - each: 0 exact .. 255 least exact
  */
@@ -27,14 +26,11 @@ const VERTEX = `
 precision highp float;
 in vec3 colour;
 in float noise;
-uniform vec3 low;
-uniform float size;
 out vec3 tint;
 out vec3 at;
 out float share;
 void main() {
-  vec3 place = low + position * size;
-  vec4 seen = modelViewMatrix * vec4(place.x, -place.y, -place.z, 1.0);
+  vec4 seen = modelViewMatrix * vec4(position, 1.0);
   gl_Position = projectionMatrix * seen;
   at = seen.xyz;
   tint = colour;
@@ -65,27 +61,57 @@ export class Model extends Viewer {
     const ramp = new three.DataTexture(opaque(RAMP), RAMP.length / 3, 1);
     ramp.magFilter = ramp.minFilter = three.LinearFilter;
     ramp.needsUpdate = true;
-    const uniforms = { low: { value: [0, 0, 0] }, size: { value: 1 }, paint: { value: 0 }, ramp: { value: ramp } };
+    const uniforms = { paint: { value: 0 }, ramp: { value: ramp } };
     const shaders = { vertexShader: VERTEX, fragmentShader: FRAGMENT, glslVersion: three.GLSL3, uniforms, side: three.DoubleSide };
     this.material = new three.ShaderMaterial(shaders);
-    /** @type {?Surface} */
-    this.surface = null;
+    /** @type {Map<string, three.Mesh>} parts of the surface, by their names */
+    this.parts = new Map();
+    /** @type {Map<string, Surface>} */
+    this.surfaces = new Map();
   }
 
-  /** @param {Surface} surface */
+  /** All of a surface, seen whole. @param {Surface} surface */
   show(surface) {
+    this.put('', surface);
+    this.view('turned');
+  }
+
+  /** A part, in place of that of the same name; one without triangles only takes that away. @param {string} name @param {Surface} surface */
+  put(name, surface) {
+    const old = this.parts.get(name);
+    if (old) {
+      this.scene.remove(old);
+      old.geometry.dispose();
+      this.parts.delete(name);
+      this.surfaces.delete(name);
+    }
+    this.draw();
+    if (!surface.triangles.length) return;
     const geometry = new three.BufferGeometry();
     geometry.setIndex(new three.BufferAttribute(surface.triangles, 1));
     geometry.setAttribute('position', new three.BufferAttribute(surface.points, 3));
     geometry.setAttribute('colour', new three.BufferAttribute(surface.colours, 3, true));
     geometry.setAttribute('noise', new three.BufferAttribute(surface.noise, 1, true));
-    this.material.uniforms.low.value = surface.low;
-    this.material.uniforms.size.value = surface.step;
     const mesh = new three.Mesh(geometry, this.material);
     mesh.frustumCulled = false;
+    const [x, y, z] = surface.low;
+    mesh.position.set(x, -y, -z);
+    mesh.scale.set(surface.step, -surface.step, -surface.step);
     this.scene.add(mesh);
-    this.surface = surface;
-    this.view('turned');
+    this.parts.set(name, mesh);
+    this.surfaces.set(name, surface);
+  }
+
+  /** Take all parts away. */
+  clear() {
+    for (const mesh of this.parts.values()) {
+      this.scene.remove(mesh);
+      mesh.geometry.dispose();
+    }
+    this.parts.clear();
+    this.surfaces.clear();
+    this.renderer.clear();
+    this.draw();
   }
 
   /** @param {Paint} paint */
@@ -96,17 +122,21 @@ export class Model extends Viewer {
 
   /** @returns {boolean} */
   isEmpty() {
-    return !this.surface;
+    return !this.surfaces.size;
   }
 
   /** @returns {?import('./viewer.js').Stand} */
   stand() {
-    if (!this.surface) return null;
-    const { low, step, size, points } = this.surface;
-    const by = 3 * Math.max(1, Math.floor(points.length / 3 / LOOKED_AT));
+    const all = [...this.surfaces.values()];
+    if (!all.length) return null;
+    const count = all.reduce((sum, { points }) => sum + points.length / 3, 0);
+    const by = 3 * Math.max(1, Math.floor(count / LOOKED_AT));
+    /** @type {number[][]} */
     const some = [];
-    for (let at = 0; at < points.length; at += by) some.push(low.map((value, axis) => value + step * points[at + axis]));
-    const middle = low.map((value, axis) => value + size[axis] / 2);
-    return { middle, front: null, points: some, reach: [0.5, 0.5], scale: Math.hypot(...size) };
+    for (const { low, step, points } of all)
+      for (let at = 0; at < points.length; at += by) some.push(low.map((value, axis) => value + step * points[at + axis]));
+    const ends = [0, 1, 2].map((axis) => [Math.min(...some.map((place) => place[axis])), Math.max(...some.map((place) => place[axis]))]);
+    const middle = ends.map(([least, most]) => (least + most) / 2);
+    return { middle, front: null, points: some, reach: [0.5, 0.5], scale: Math.hypot(...ends.map(([least, most]) => most - least)) };
   }
 }

@@ -1,15 +1,17 @@
-// The way from nothing to a run: which step is shown, and what is done. The address's fragment names the step, so that back and reload work.
+// The way from nothing to a run and a scan: which step is shown, and what is done. The address's fragment names the step, so that back and reload work.
 
 import { byId, data, sentence, show, text } from './dom.js';
 
-export const STEPS = /** @type {const} */ (['board', 'camera', 'check', 'calibration', 'run']);
+export const STEPS = /** @type {const} */ (['board', 'camera', 'check', 'calibration', 'run', 'scan']);
 
 /** The step to show: the one asked for, else the run if there is one, else the first that is not done. @param {any} state @param {string} asked */
 export function stepOf(state, asked) {
   if (state.steps.some((/** @type {any} */ step) => step.name === asked)) return asked;
   if (state.activity === 'running' || state.activity === 'ending') return 'run';
   if (state.activity === 'calibrating') return 'calibration';
-  return state.steps.find((/** @type {any} */ step) => !step.done)?.name ?? 'run';
+  if (state.activity === 'scanning') return 'scan';
+  const open = state.steps.find((/** @type {any} */ step) => !step.done)?.name ?? 'run';
+  return open === 'scan' ? 'run' : open; // nobody has to scan
 }
 
 /** @param {any} state @param {string} shown */

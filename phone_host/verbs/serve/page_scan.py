@@ -1,0 +1,152 @@
+"""A scan that the page begins: a run whose pairs become a model, in a folder of its own."""
+
+import argparse
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from common.errors import SettingsError, UnavailableError
+from common.places import make_folder
+from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.live.scan import LiveScan
+from phone_host.output.axes import Axes
+from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
+from phone_host.report.stereo_report import ALWAYS
+from phone_host.run.host import Host
+from phone_host.run.host_settings import EndReason
+from phone_host.run.scan_files import FinishedScan, write_scan
+from phone_host.run.scan_result import require_something
+from phone_host.scan.scan import ScanWanted
+from phone_host.serve.program import Choices, Scanned, SinksOf
+from phone_host.stereo.match_tandem import matching_threads
+from phone_host.verbs.output_folders import unwritable
+from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
+from phone_host.verbs.scan.live import live_scan
+from phone_host.verbs.scan.wanted import box_of, voxel_of
+from phone_host.verbs.stereo_options import output_options
+
+OF_SCAN: Final = ("voxel", "box")
+"""Options of `scan` that the page may give."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PageScan:
+    """A scan that is ready to begin.
+
+    Attributes:
+        prepared: the run beneath.
+        live: takes its pairs.
+        out: folder for its files.
+        matcher: its name.
+        axes: of its files.
+    """
+
+    prepared: PreparedRun
+    live: LiveScan
+    out: Path
+    matcher: str
+    axes: Axes
+
+    @property
+    def host(self) -> Host:
+        """See ReadyScan."""
+        return self.prepared.host
+
+    def finish(self, ended: EndReason) -> Scanned:
+        """See ReadyScan."""
+        over = self.prepared.ended(ended)
+        finished = self._finished()
+        report = finished.report
+        require_something(report)
+        try:
+            write_scan(self.out, finished)
+        except OSError as error:
+            raise unwritable(self.out, error) from error
+        self.live.kept.done()
+        return Scanned(
+            words=_words(report),
+            level="good" if report.is_sound else "warning",
+            folder=self.out,
+            files=(MODEL, TRAJECTORY, *ALWAYS),
+            snapshot=over.snapshot,
+        )
+
+    def save(self) -> None:
+        """See ReadyScan."""
+        if self.live.scan.fused:
+            with suppress(Exception):  # tell what ended the scan, not what followed
+                write_scan(self.out, self._finished())
+
+    def _finished(self) -> FinishedScan:
+        self.live.renew_surface()
+        return self.live.finished(self.host.snapshot(), self.matcher, self.axes)
+
+
+def page_scan(
+    options: argparse.Namespace,
+    values: Choices,
+    folder: Path,
+    sinks_of: SinksOf,
+    *,
+    tell: Callable[[str], None],
+    feed: BrowserFeed,
+) -> PageScan:
+    """Open everything that a scan needs.
+
+    Args:
+        options: of `run`.
+        values: options of `scan` by name, those of OF_SCAN.
+        folder: of all scans; created if missing.
+        sinks_of: makes further sinks.
+        tell: takes a line that the user should know.
+        feed: brings browsers that give their cameras.
+
+    Raises:
+        SettingsError: options contradict each other, or give no depth in metres.
+        UnavailableError: a camera, a link or the folder cannot be had.
+        DataError: the rig cannot be used.
+    """
+    options.out, options.save_every = None, 0
+    found = checked(options)
+    if not found.values.calibration and not (options.rectified and options.focal):
+        raise SettingsError("there is no calibration, so there are no metres", "calibrate, or name a rig.yaml")
+    if unknown := set(values) - set(OF_SCAN):
+        raise SettingsError(f"{min(unknown)!r} is no option of a scan that the page can set", "give voxel and box")
+    voxel, box = (values.get(name, "").strip() for name in OF_SCAN)
+    usual = ScanWanted()
+    wanted = ScanWanted(
+        voxel_m=voxel_of(voxel) if voxel else usual.voxel_m,
+        box=box_of(box) if box else None,
+        threads=matching_threads(),
+    )
+    out = _new_folder(folder)
+    opened = open_run(options, found, tell, feed)
+    live = live_scan(opened, wanted, out)
+    prepared = opened.prepared((), (live.sink, *sinks_of(opened.core)))
+    return PageScan(prepared, live, out, found.values.matcher, output_options(options).axes)
+
+
+def _words(report: ScanReport) -> str:
+    wide, high, deep = (1000 * side for side in report.model.size.extent_m)
+    return f"{report.fused} of {len(report.scanned)} pairs are in the model: {wide:.0f} x {high:.0f} x {deep:.0f} mm"
+
+
+def _new_folder(folder: Path) -> Path:
+    """Return a folder that is free, named by date and time of this place; it is made when something is written.
+
+    Raises:
+        UnavailableError: the folder above cannot be made.
+    """
+    try:
+        make_folder(folder)
+    except OSError as error:
+        cause = error.strerror or str(error)
+        raise UnavailableError(f"{folder} cannot be made ({cause})", "make room, or choose another out") from None
+    stem = time.strftime("%Y-%m-%d-%H%M%S")
+    path, number = folder / stem, 2
+    while path.exists():
+        path, number = folder / f"{stem}-{number}", number + 1
+    return path
