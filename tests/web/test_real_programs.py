@@ -11,6 +11,7 @@ import pytest
 
 from common.recording.opened import open_recorded
 from phone_host.model import CameraModel, Rig
+from phone_host.output.model_file import read_model
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.demo_scene import plane_scene
 from phone_host.scene.scene import render, rig_poses
@@ -64,8 +65,20 @@ def number_at(shown: Any, side: str) -> int:
     return sum(1 << bit for bit, level in enumerate(levels) if level > 128)
 
 
+def _scan(shown: Any) -> None:
+    """Scan the wall until it is on the page, and save it."""
+    shown.evaluate("location.hash = 'scan'")
+    shown.click("#scan-go")
+    shown.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
+    shown.click("#scan-go")
+    shown.wait_for_selector("#scan-saved:not([hidden])")
+    with shown.expect_download() as saved:
+        shown.click("#scan-files a >> text=model.ply")
+    assert Path(saved.value.path()).read_bytes().startswith(b"ply\n")
+
+
 def test_from_nothing_to_true_depth_on_the_page_alone(browser: Any, wall: Path, tmp_path: Path) -> None:
-    """Typed addresses, Start, a tap: 1.2 m. The board dies and comes back: pairs go on without a touch. The host ends: the page says so."""
+    """Typed addresses, Start, a tap: 1.2 m. The board dies and comes back: pairs go on without a touch. A scan is made and saved. The host ends: the page says so."""
     theirs = ["run", "--camera", f"replay:{wall}/left?fps=10&loop=1", "--link", f"ipc://{tmp_path}/link"]
     shown = browser.new_page(viewport=PHONE)
     shown.set_default_timeout(60_000)
@@ -103,10 +116,15 @@ def test_from_nothing_to_true_depth_on_the_page_alone(browser: Any, wall: Path, 
             shown.wait_for_selector("#recording[data-on=yes]")
             shown.click("#go")
             shown.wait_for_function("() => document.querySelector('#go').textContent === 'Start'")
+            _scan(shown)
         assert ours.stop() == 0
         shown.wait_for_selector("body[data-line=ended]")
     assert errors == []
     shown.close()
+    [scan] = (tmp_path / "data" / "tandemscan" / "scans").iterdir()
+    assert {path.name for path in scan.iterdir()} >= {"model.ply", "trajectory.txt", "report.json", "index.html"}
+    points_m = read_model(scan, 1.0).solid.points_mm / 1000
+    assert np.median(points_m[:, 2]) == pytest.approx(DEPTH_M, rel=0.02)
     [recording] = (tmp_path / "data" / "tandemscan" / "recordings").glob("*.mcap")
     recorded = open_recorded(recording)  # the run has ended it
     assert recorded.is_complete

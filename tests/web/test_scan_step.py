@@ -1,0 +1,105 @@
+"""The scan's step: what it tells, the surface as it grows, and what can be saved."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from phone_host.geometry.se3 import SE3
+from phone_host.scan.patches import Patches
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.web.source import Activity, Do, ScanState
+from tests.support.plane_films import CORNER, plane_view, texture
+from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
+from tests.web.played import Played
+
+FILES = ("model.ply", "report.json")
+
+
+class Growing:
+    """A volume that shows more of a corner with each call."""
+
+    def __init__(self) -> None:
+        self.volume = Volume(VolumeSettings(voxel_m=0.01, far_m=3.0))
+        self.patches = Patches(self.volume, 1)
+
+    def show(self, columns: int) -> None:
+        """Fuse the first columns of the view."""
+        view = plane_view(SE3.identity(), texture(), CORNER)
+        view.depth_m[:, columns:] = np.nan
+        self.volume.fuse(view, SE3.identity())
+        self.patches.renew()
+
+
+def _roughness(page: Any) -> float:
+    """By how much neighbours differ in the middle of the surface's picture."""
+    picture = cv2.imdecode(np.frombuffer(page.locator("#scan-model").screenshot(), np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    height, width = picture.shape[:2]
+    middle = picture[3 * height // 8 : 5 * height // 8, 3 * width // 8 : 5 * width // 8]
+    return float(np.abs(np.diff(middle.astype(float), axis=1)).mean())
+
+
+@pytest.mark.parametrize("size", [PHONE, LAPTOP])
+def test_the_surface_grows_until_it_is_saved(
+    program: Played, opened: Opener, complaints: Complaints, size: dict[str, int], tmp_path: Path
+) -> None:
+    """Start asks for a scan with the given fineness; what is new appears by itself; a scan that is over offers its files; the next one begins empty."""
+    growing = Growing()
+    page = opened("scan", size)
+    page.wait_for_selector("#panel-scan:not([hidden])")
+    page.fill("#scan-voxel", "5mm")
+    page.click("#scan-go")
+    page.wait_for_function("() => document.getElementById('scan-go').textContent === 'Stop'")
+    assert (program.commands[-1].do, program.commands[-1].values) == (Do.SCAN, {"voxel": "5mm", "box": ""})
+    assert page.text_content("#scan-none") == "No surface yet"
+    words = "2 pairs in the model: moved too fast: move more slowly, back to where it was"
+    growing.show(60)
+    program.patches = growing.patches
+    program.change(scan=ScanState(words=words, level="bad", pairs=5, fused=2))
+    page.wait_for_selector("#scan-state[data-level=bad]")
+    assert "move more slowly" in page.text_content("#scan-words")
+    assert page.text_content("#scan-pairs") == "2 of 5 pairs are in the model"
+    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
+    few = int(page.get_attribute("#scan-model", "data-parts"))
+    growing.show(240)
+    page.wait_for_function("few => +document.getElementById('scan-model').dataset.parts > few", arg=few)
+    assert page.is_hidden("#scan-none")
+    page.wait_for_function("() => document.getElementById('scan-model').dataset.drawn")
+    for name in FILES:
+        (tmp_path / name).write_bytes(name.encode())
+    over = ScanState(words="5 of 9 pairs are in the model", level="good", pairs=9, fused=5, folder=str(tmp_path), files=FILES)  # fmt: skip
+    program.change(scan=over, activity=Activity.IDLE)
+    page.wait_for_selector("#scan-saved:not([hidden])")
+    assert [link.text_content() for link in page.query_selector_all("#scan-files a")] == list(FILES)
+    with page.expect_download() as saved:
+        page.click("#scan-files a >> nth=0")
+    assert Path(saved.value.path()).read_bytes() == b"model.ply"
+    assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+    program.patches = Patches(Volume(VolumeSettings()), 1)
+    page.click("#scan-go")
+    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts === 0")
+    assert complaints == []
+
+
+def test_a_surface_is_drawn_and_turned_by_keys(program: Played, opened: Opener, complaints: Complaints) -> None:
+    """Something stands in the picture; an arrow key turns it; as shape its texture is gone."""
+    growing = Growing()
+    growing.show(240)
+    program.patches, program.scan = growing.patches, ScanState(words="1 pair in the model: go on", level="good")
+    program.activity = Activity.SCANNING
+    page = opened("scan")
+    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
+    page.wait_for_function("() => document.getElementById('scan-model').dataset.drawn")
+    before = page.get_attribute("#scan-model", "data-drawn")
+    page.focus("#scan-model")
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_function("was => document.getElementById('scan-model').dataset.drawn !== was", arg=before)
+    coloured = _roughness(page)
+    page.check("input[name=scan-paint][value=shape]", force=True)
+    page.wait_for_timeout(300)
+    assert _roughness(page) < coloured / 2
+    assert complaints == []
