@@ -37,6 +37,8 @@ _BODY_S: Final = 10.0
 _SURFACE_POINTS: Final = 200_000
 """In one answer: 4 MB, a second of a phone's Wi-Fi; the rest comes with the next one."""
 
+_SURFACE: Final = {"Content-Type": "application/octet-stream", "Cache-Control": "no-store"}
+
 _KINDS: Final = {
     ".html": "application/octet-stream",
     ".json": "application/octet-stream",
@@ -217,7 +219,7 @@ class Answers:
             if surface is None:
                 return problem(404, _NO_SCAN)
             data = await self._hub.encoder.run(lambda: surface_bytes(surface, since))
-            return await _send(request, len(data), _blocks(data), _file_headers("surface.ply"))
+            return await _send(request, len(data), _blocks(data), _SURFACE)
 
     async def _scan_file(self, request: web.Request) -> web.StreamResponse:
         name, folder = request.match_info["name"], self._hub.source.scanned()

@@ -8,6 +8,7 @@ import ssl
 import sys
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import aiohttp
 import numpy as np
@@ -15,12 +16,17 @@ import pytest
 from multidict import CIMultiDict
 
 from common.errors import TakenError, UnavailableError
+from phone_host.geometry.se3 import SE3
 from phone_host.output.ply import read_ply
+from phone_host.scan.patches import Patches
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.web.secret_files import kept_credentials
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Command, Do
 from tests.support.page_source import PageSource
+from tests.support.plane_films import plane_view, texture
 from tests.support.programs import until
 from tests.support.served_page import Start, next_pair, start, viewer  # noqa: F401 - start is a fixture
 from tests.support.stereo_pages import GEOMETRY
@@ -143,6 +149,34 @@ def test_saved_pairs(start: Start, tmp_path: Path) -> None:
         "99999999999/cloud.ply",
     ):
         assert served.get(f"/api/pairs/{path}")[0] == 404, path
+
+
+def test_a_scan_as_surface_and_files(start: Start, tmp_path: Path) -> None:
+    """Without a scan there is nothing; then its surface comes in patches, each once, and its files by their names alone, never through a link."""
+    source = PageSource()
+    served = start(source)
+    assert served.get("/api/surface")[0] == served.get("/api/scan/model.ply")[0] == 404
+    volume = Volume(VolumeSettings(voxel_m=0.01, far_m=3.0))
+    volume.fuse(plane_view(SE3.identity(), texture()), SE3.identity())
+    source.patches = Patches(volume, 1)
+    source.patches.renew()
+    status, _, body = served.get("/api/surface?since=0")
+    head = json.loads(body[4 : 4 + int.from_bytes(body[:4], "little")])
+    assert status == 200
+    assert head["newest"] == len(head["patches"]) > 1
+    again = served.get(f"/api/surface?since={head['newest']}")[2]
+    assert json.loads(again[4:]) == {"kind": "surface", "begun": 1, "newest": head["newest"], "patches": []}
+    for wrong in ("-1", "1.5", "", "x", "9" * 400, "%00", "\u0663"):
+        assert served.get(f"/api/surface?since={quote(wrong, safe='%')}")[0] == 400, wrong
+    source.scan_folder = str(tmp_path)
+    (tmp_path / "model.ply").write_bytes(b"x" * 1_000_000)
+    (tmp_path / "secret.txt").write_text("secret")
+    (tmp_path / "report.json").symlink_to(tmp_path / "secret.txt")
+    status, headers, body = served.get("/api/scan/model.ply")
+    assert (status, len(body)) == (200, 1_000_000)
+    assert headers["Content-Disposition"] == 'attachment; filename="model.ply"'
+    for path in ("secret.txt", "report.json", "index.html", "..%2fmodel.ply", ""):
+        assert served.get(f"/api/scan/{path}")[0] == 404, path
 
 
 def test_a_viewer_gets_the_newest_pair_once_it_has_shown_the_last(start: Start) -> None:
