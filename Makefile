@@ -7,7 +7,7 @@ SHELL := /bin/sh
 BIN := .venv/bin
 READY := .venv/.ready
 RUN := .venv/.ready-run
-PARTS := unit contract native system hostile web
+PARTS := unit contract native system hostile print web
 # What the native library is made of; .ci/venv knows the same.
 NATIVE := setup.py phone_host/stereo/native/build_library.py $(wildcard phone_host/stereo/native/src/*)
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
@@ -40,7 +40,7 @@ demo: $(RUN) ## run both programs on this machine with a rendered scene; writes 
 native: $(RUN) ## build the native library again, in place (the set-up does this itself; after installing a compiler, or with CC=clang)
 	@$(BIN)/python -m phone_host.stereo.native.build_library
 
-test: $(READY) ## run the unit, contract, native, system, hostile and web tests; prints the minutes of each part
+test: $(READY) ## run the unit, contract, native, system, hostile, print and web tests; prints the minutes of each part
 	@.ci/test $(PARTS)
 
 $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit

@@ -20,6 +20,7 @@ from phone_host.verbs.export import arguments as export
 from phone_host.verbs.keys import arguments as keys
 from phone_host.verbs.measure import arguments as measure
 from phone_host.verbs.pair import arguments as pair
+from phone_host.verbs.print import arguments as print_
 from phone_host.verbs.printcheck import arguments as printcheck
 from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.record import arguments as record
@@ -57,6 +58,7 @@ _VERBS: Final[dict[str, Arguments]] = {
     "export": export,
     "relief": relief,
     "printcheck": printcheck,
+    "print": print_,
     "measure": measure,
     "quality": quality,
     "pair": pair,

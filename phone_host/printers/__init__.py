@@ -1,0 +1,1 @@
+"""Printers: G-code, and how it is brought to one that hangs on a serial line."""

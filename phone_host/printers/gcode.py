@@ -1,0 +1,190 @@
+"""G-code as it is sent: what its lines ask for, how far the nozzle goes where it extrudes, and what a slicer tells of it. Pure.
+
+Rules: lines go one by one, a file of any length takes no memory. Comments and blanks are left away; a line that no firmware takes is refused
+with its number.
+Source: the RepRap wiki, "G-code" (https://reprap.org/wiki/G-code); Marlin's G-code index (https://marlinfw.org/meta/gcode).
+"""
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from common.errors import DataError
+
+_MOST_CHARACTERS: Final = 90
+"""Marlin's lines hold 96 (MAX_CMD_SIZE), number and checksum included."""
+
+_WORD: Final = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+)?)")
+_NAME: Final = re.compile(r"([GMT]\d+)(?!\d)")
+_TIME: Final = re.compile(r";\s*(?:estimated printing time(?: \(normal mode\))?\s*=|TIME:)\s*(.+)", re.IGNORECASE)
+_TIME_PART: Final = re.compile(r"(\d+)\s*([dhms]?)")
+_UNIT_S: Final = {"d": 86400, "h": 3600, "m": 60, "s": 1, "": 1}
+_INCH_MM: Final = 25.4
+_AXES: Final = "XYZ"
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line that goes to the printer.
+
+    Attributes:
+        number: in its file, from 1.
+        text: without comment and blanks around it.
+    """
+
+    number: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class GcodeFacts:
+    """What a file asks of a printer.
+
+    Attributes:
+        lines: that are sent.
+        extruding: of these, those that move and extrude.
+        low_mm: lowest X, Y, Z of these moves, mm; NaN: there are none.
+        high_mm: highest, likewise.
+        seconds: time that the slicer tells, s; NaN: it tells none.
+        heats: whether anything is heated.
+    """
+
+    lines: int
+    extruding: int
+    low_mm: tuple[float, float, float]
+    high_mm: tuple[float, float, float]
+    seconds: float
+    heats: bool
+
+
+def lines_of(file: Iterable[str], name: str) -> Iterator[Line]:
+    """Give the lines that go to the printer.
+
+    Args:
+        file: its lines.
+        name: of the file, for messages.
+
+    Raises:
+        DataError: a line is none of G-code, or too long.
+    """
+    for number, raw in enumerate(file, start=1):
+        text = _without_comment(raw)
+        if not text:
+            continue
+        if not text.isascii() or not text.isprintable() or not text[0].isalpha():
+            raise DataError(f"{name}: line {number} is no G-code", "give the file that a slicer wrote")
+        if len(text) > _MOST_CHARACTERS:
+            raise DataError(
+                f"{name}: line {number} has {len(text)} characters", f"give lines of at most {_MOST_CHARACTERS}"
+            )
+        yield Line(number, text)
+
+
+def _without_comment(raw: str) -> str:
+    text = raw.partition(";")[0]
+    if "(" in text:
+        text = re.sub(r"\([^)]*\)", "", text)
+    return text.strip().removesuffix("*").strip()
+
+
+def name_of(text: str) -> str:
+    """Return a line's command, such as G1 or M104; empty: it has none."""
+    found = _NAME.match(text.upper().replace(" ", ""))
+    return found[1] if found else ""
+
+
+def examine(file: Iterable[str], name: str) -> GcodeFacts:
+    """Read a whole file.
+
+    Args:
+        file: its lines.
+        name: of the file, for messages.
+
+    Raises:
+        DataError: a line is none of G-code, or nothing is sent.
+    """
+    path, seconds, count, heats = _Path(), math.nan, 0, False
+
+    def watched() -> Iterator[str]:
+        nonlocal seconds
+        for raw in file:
+            if raw.startswith(";") and (found := _TIME.match(raw)):
+                seconds = _seconds(found[1])
+            yield raw
+
+    for line in lines_of(watched(), name):
+        count += 1
+        heats = heats or name_of(line.text) in {"M104", "M109", "M140", "M190"}
+        path.take(line.text)
+    if not count:
+        raise DataError(f"{name} has no line that a printer would do", "give the file that a slicer wrote")
+    return GcodeFacts(count, path.extruding, _ends(path.low), _ends(path.high), seconds, heats)
+
+
+def _ends(values: list[float]) -> tuple[float, float, float]:
+    x, y, z = (value if math.isfinite(value) else math.nan for value in values)
+    return x, y, z
+
+
+def _seconds(text: str) -> float:
+    return float(sum(int(amount) * _UNIT_S[unit] for amount, unit in _TIME_PART.findall(text)))
+
+
+class _Path:
+    """Follows the nozzle: absolute or relative, mm or inches; where it extrudes, it notes how far it goes."""
+
+    def __init__(self) -> None:
+        self.low, self.high = [math.inf] * 3, [-math.inf] * 3
+        self.extruding = 0
+        self._at = [0.0, 0.0, 0.0]
+        self._e = 0.0
+        self._is_relative = self._e_is_relative = False
+        self._unit = 1.0
+
+    def take(self, text: str) -> None:
+        """Take a line."""
+        words = {letter: float(value) for letter, value in _WORD.findall(text.upper()) if value not in {"", "+", "-"}}
+        match name_of(text):
+            case "G0" | "G1" | "G2" | "G3":
+                self._move(words)
+            case "G28":
+                asked = [axis for axis, letter in enumerate(_AXES) if letter in text.upper()[3:]]
+                for axis in asked or range(3):
+                    self._at[axis] = 0.0
+            case "G90":
+                self._is_relative = self._e_is_relative = False
+            case "G91":
+                self._is_relative = self._e_is_relative = True
+            case "M82":
+                self._e_is_relative = False
+            case "M83":
+                self._e_is_relative = True
+            case "G92":
+                self._set(words)
+            case "G20":
+                self._unit = _INCH_MM
+            case "G21":
+                self._unit = 1.0
+
+    def _set(self, words: dict[str, float]) -> None:
+        for axis, letter in enumerate(_AXES):
+            self._at[axis] = words.get(letter, self._at[axis] / self._unit) * self._unit
+        self._e = words.get("E", self._e)
+
+    def _move(self, words: dict[str, float]) -> None:
+        before = list(self._at)
+        for axis, letter in enumerate(_AXES):
+            if letter in words:
+                value = words[letter] * self._unit
+                self._at[axis] = self._at[axis] + value if self._is_relative else value
+        amount = words.get("E", 0.0 if self._e_is_relative else self._e)
+        fed = amount if self._e_is_relative else amount - self._e
+        self._e = self._e + amount if self._e_is_relative else amount
+        if fed <= 0 or not {"X", "Y"} & words.keys():
+            return
+        self.extruding += 1
+        for axis in range(3):
+            self.low[axis] = min(self.low[axis], before[axis], self._at[axis])
+            self.high[axis] = max(self.high[axis], before[axis], self._at[axis])

@@ -1,0 +1,1 @@
+"""phone-host print: its options (light), and its command."""

@@ -1,0 +1,1 @@
+"""Tests of printing: a simulated printer, and the command against it."""

@@ -1,0 +1,147 @@
+"""A print over a serial line: every line once, in order, whatever happens to it on the way."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from common.errors import DataError, UnavailableError
+from phone_host.printers.gcode import lines_of
+from phone_host.printers.line import PrinterGoneError, open_line
+from phone_host.printers.marlin import MarlinSender, Phase
+from phone_host.printers.printer_uri import read_uri
+from phone_host.printers.sending import Progress, Wishes, send
+from tests.support.marlin_printer import Faults, MarlinPrinter, cube, printer
+
+S = 1_000_000_000
+
+
+def printed(
+    on: MarlinPrinter, lines: list[str], wishes: Wishes | None = None, tell: Callable[[Progress], None] = lambda _: None
+) -> MarlinSender:
+    """Print over the line; return what has sent it."""
+    line = open_line(read_uri(f"serial:{on.path}?baud=115200"))
+    sender = MarlinSender(lines_of(lines, "cube.gcode"), time.monotonic_ns() - 3 * S)  # it has said start
+    try:
+        send(line, sender, wishes or Wishes(), tell)
+    finally:
+        line.close()
+    return sender
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        Faults(),
+        Faults(corrupted=0.02),
+        Faults(corrupted=0.02, answers_ok_after_resend=False),
+        Faults(silent={"G28": 5.0}),
+    ],
+    ids=["clean", "corrupted", "no ok after resend", "silent homing"],
+)
+def test_every_line_is_done_once_and_in_order(faults: Faults) -> None:
+    """1500 lines arrive as they stand in the file."""
+    lines = cube(1500)
+    with printer(faults) as there:
+        sender = printed(there, lines)
+    assert there.done == lines
+    assert (sender.phase, sender.done) == (Phase.DONE, 1500)
+    assert (sender.resent > 0) == (there.resends > 0) == bool(faults.corrupted)
+
+
+def test_answers_that_are_lost_cost_time_and_nothing_else() -> None:
+    """The line is sent again, the printer has it already and says so; it is not done twice."""
+    lines = cube(400)
+    with printer(Faults(corrupted=0.02, lost=0.004), seed=4) as there:
+        sender = printed(there, lines)
+    assert there.done == lines
+    assert sender.phase is Phase.DONE
+
+
+def test_cancelling_switches_the_heaters_off_within_a_second() -> None:
+    """In the middle of drawing, nothing of the print follows but what was under way."""
+    wishes, cancelled_s = Wishes(), list[float]()
+
+    def watch(progress: Progress) -> None:
+        if progress.done > 100 and not cancelled_s:
+            cancelled_s.append(time.monotonic())
+            wishes.cancel()
+
+    with printer(Faults(delay_s=0.004)) as there:
+        sender = printed(there, cube(1500), wishes, watch)
+        assert (there.nozzle, there.bed) == (0.0, 0.0)
+        assert there.cooled_s - cancelled_s[0] < 1.0
+        assert there.done[-5:] == ["M108", "M104 S0", "M140 S0", "M107", "M84"]
+    assert sender.phase is Phase.CANCELLED
+
+
+def test_a_pause_sends_nothing_until_it_ends() -> None:
+    """The heaters stay on meanwhile, and the print is whole afterwards."""
+    wishes, counts = Wishes(), list[int]()
+
+    def watch(progress: Progress) -> None:
+        if progress.phase is Phase.PAUSED:
+            counts.append(progress.done)
+            if len(counts) == 4:
+                wishes.toggle_pause()
+        elif progress.done > 50 and not counts and not wishes.is_paused:
+            wishes.toggle_pause()
+
+    lines = cube(600)
+    with printer(Faults(delay_s=0.003)) as there:
+        sender = printed(there, lines, wishes, watch)
+    assert len(counts) >= 4
+    assert len(set(counts[1:4])) == 1
+    assert there.done == lines
+    assert sender.phase is Phase.DONE
+
+
+def test_a_printer_that_is_unplugged_cannot_be_cooled_from_here() -> None:
+    """At half of the print its plug is pulled: one line says so."""
+    with printer(Faults(dies_after=200)) as there, pytest.raises(PrinterGoneError, match="cannot be cooled from here"):
+        printed(there, cube(400))
+    assert len(there.done) == 200
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("Error:Thermal Runaway, system stopped! Heater_ID: 0", "Thermal Runaway"),
+        ("Error:Printer halted. kill() called!", "kill"),
+        ("start", "restarted"),
+        ("Resend: 9000", "asks for line 9000"),
+    ],
+)
+def test_a_printer_that_fails_is_told(said: str, words: str) -> None:
+    """What it says ends the print, with what it said."""
+    with printer(Faults(says={50: said})) as there:
+        sender = printed(there, cube(300))
+    assert sender.phase is Phase.FAILED
+    assert words in sender.problem
+    assert sender.remedy
+    assert len(there.done) < 60
+
+
+def test_a_broken_file_cools_the_printer() -> None:
+    """A line that is none of G-code in the middle: the heaters are off, then the line is named."""
+
+    def broken() -> Iterator[str]:
+        yield from cube(200)[:100]
+        yield "\x00\x01"
+
+    with printer() as there:
+        line = open_line(read_uri(f"serial:{there.path}"))
+        with pytest.raises(DataError, match="line 101 is no G-code"):
+            send(line, MarlinSender(lines_of(broken(), "cube.gcode"), time.monotonic_ns()), Wishes(), lambda _: None)
+        line.close()
+        assert there.nozzle == there.bed == 0.0
+
+
+@pytest.mark.parametrize(
+    ("uri", "words"),
+    [("serial:/dev/ttyNOPE9", "there is no printer"), ("socket://127.0.0.1:9", "no printer answers")],
+)
+def test_a_printer_that_is_not_there_is_named(uri: str, words: str) -> None:
+    """With a remedy."""
+    with pytest.raises(UnavailableError, match=words):
+        open_line(read_uri(uri))

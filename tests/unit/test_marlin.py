@@ -1,0 +1,203 @@
+"""Marlin's protocol, and the files and addresses that lead to it: pure, so the test is the printer."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.printers.gcode import GcodeFacts, Line, examine, lines_of, name_of
+from phone_host.printers.journal import Entry, Journal
+from phone_host.printers.line import open_line
+from phone_host.printers.marlin import MarlinSender, Phase, framed
+from phone_host.printers.printer_uri import LineKind, LineUri, read_uri
+
+S = 1_000_000_000
+
+
+class Talk:
+    """A sender whose printer is the test: what it sends, and what it hears."""
+
+    def __init__(self, *texts: str) -> None:
+        self.now_ns = 0
+        self.sender = MarlinSender(iter([Line(n, text) for n, text in enumerate(texts, 1)]), 0)
+        self.sender.heard("start", 0)
+        assert self.sent() == framed(0, "M110 N0")
+        self.hear("ok")
+
+    def sent(self, after_ns: int = 0) -> bytes:
+        """What it sends after a while."""
+        self.now_ns += after_ns
+        return self.sender.to_send(self.now_ns)
+
+    def hear(self, *said: str) -> None:
+        """The printer says something."""
+        for each in said:
+            self.sender.heard(each, self.now_ns)
+
+
+def test_a_frame_is_what_marlin_documents() -> None:
+    """N3 T0*57 is the example of the documentation."""
+    assert framed(3, "T0") == b"N3 T0*57\n"
+
+
+def test_one_line_is_under_way() -> None:
+    """Without an answer nothing follows; busy and temperatures are signs of life, not answers."""
+    talk = Talk("G1 X1", "G1 X2")
+    assert talk.sent() == framed(1, "G1 X1")
+    assert talk.sent(S) == b""
+    for _ in range(5):
+        talk.hear("echo:busy: processing", "T:199.5 /200.0 B:59 /60 @:0")
+        assert talk.sent(3 * S) == b""
+    assert talk.sender.heat.nozzle == (199.5, 200.0)
+    assert talk.sender.heat.bed == (59.0, 60.0)
+    talk.hear("ok")
+    assert talk.sent() == framed(2, "G1 X2")
+    talk.hear("ok P15 B3")
+    assert talk.sent() == b""
+    assert talk.sender.phase is Phase.DONE
+
+
+def test_a_lost_answer_is_told_from_a_lost_line() -> None:
+    """If the line had arrived, the printer asks for the next one; that is the answer, and nothing is sent twice."""
+    talk = Talk("G1 X1", "G1 X2")
+    talk.sent()
+    assert talk.sent(5 * S) == framed(1, "G1 X1")
+    talk.hear("Error:Line Number is not Last Line Number+1, Last Line: 1", "Resend: 2", "ok")
+    assert talk.sent() == framed(2, "G1 X2")
+    assert talk.sender.done == 1
+
+
+def test_a_slow_answer_and_its_ghost_change_nothing() -> None:
+    """The answer comes after the second sending; what the printer says of the second one is swallowed."""
+    talk = Talk("G1 X1", "G1 X2", "G1 X3")
+    talk.sent()
+    assert talk.sent(5 * S) == framed(1, "G1 X1")
+    talk.hear("ok")
+    assert talk.sent() == framed(2, "G1 X2")
+    talk.hear("Error:Line Number is not Last Line Number+1, Last Line: 1", "Resend: 2", "ok")
+    assert talk.sent() == b""
+    talk.hear("ok")
+    assert talk.sent() == framed(3, "G1 X3")
+
+
+def test_an_older_line_is_sent_again_with_all_that_followed() -> None:
+    """The printer may go back some lines; beyond what is kept it cannot be helped."""
+    talk = Talk(*[f"G1 X{n}" for n in range(1, 9)])
+    for number in range(1, 5):
+        assert talk.sent() == framed(number, f"G1 X{number}")
+        talk.hear("ok")
+    talk.sent()
+    talk.hear("rs N3")
+    assert talk.sent() == b""
+    assert talk.sent(S // 5) == framed(3, "G1 X3")
+    for number in (4, 5, 6):
+        talk.hear("ok")
+        assert talk.sent() == framed(number, f"G1 X{number}")
+    assert talk.sender.resent == 1
+    other = Talk(*["G1 X1"] * 300)
+    for _ in range(250):
+        other.sent()
+        other.hear("ok")
+    other.sent()
+    other.hear("Resend: 3")
+    assert "long after" in other.sender.problem
+
+
+def test_silence_ends_it() -> None:
+    """After four sendings without a word the printer is given up; homing may take minutes."""
+    talk = Talk("G28")
+    assert talk.sent()
+    assert talk.sent(500 * S) == b""
+    quiet = Talk("G1 X1")
+    quiet.sent()
+    sent = [quiet.sent(5 * S) for _ in range(5)]
+    assert [bool(each) for each in sent] == [True, True, True, False, False]
+    assert "does not answer" in quiet.sender.problem
+
+
+def test_a_cancelled_line_is_never_sent_again() -> None:
+    """If the printer asks for the line that was under way, it gets one that cools."""
+    talk = Talk("M104 S200", "G1 X2")
+    talk.sent()
+    talk.hear("ok")
+    assert talk.sent() == framed(2, "G1 X2")
+    assert talk.sender.cancel() == b"M108\n"
+    assert talk.sender.cancel() == b""
+    assert talk.sent() == framed(3, "M104 S0")
+    talk.hear("Error:Line Number is not Last Line Number+1, Last Line: 1", "Resend: 2", "ok")
+    assert talk.sent(S // 5) == framed(2, "M104 S0")
+    talk.hear("ok")
+    assert talk.sent() == framed(3, "M104 S0")
+
+
+def test_on_android_only_the_network_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Serial ports and Bluetooth end with the ways that work."""
+    monkeypatch.setattr("sys.platform", "android")
+    for uri in ("serial:/dev/ttyUSB0", "rfcomm://00:11:22:33:44:55"):
+        with pytest.raises(UnavailableError) as refused:
+            open_line(read_uri(uri))
+        assert "socket://HOST:PORT" in refused.value.remedy
+
+
+def facts(*lines: str) -> GcodeFacts:
+    """Of a file with these lines."""
+    return examine([f"{line}\n" for line in lines], "x.gcode")
+
+
+def test_the_range_is_that_of_the_moves_that_extrude() -> None:
+    """Travel, retraction and homing do not count; relative moves, offsets and inches do."""
+    found = facts("G28", "G1 X300 Y300", "G1 X10 Y20 Z0.2", "G1 X50 Y60 E5 ; drawn", "G1 E3", "G1 X-20")
+    assert (found.low_mm, found.high_mm, found.extruding) == ((10.0, 20.0, 0.2), (50.0, 60.0, 0.2), 1)
+    relative = facts("G91", "G1 X5 Y5 Z1 E1", "G1 X5 E1", "G90", "M83", "G1 X2 E.5")
+    assert (relative.low_mm, relative.high_mm) == ((0.0, 0.0, 0.0), (10.0, 5.0, 1.0))
+    assert facts("G20", "G92 X1 Y0", "G1 X2 E1").high_mm[0] == pytest.approx(50.8)
+    assert facts("M82", "G92 E10", "G1 X5 Y1 E9", "G1 X6 E9.5").low_mm[0] == 5.0
+    assert math.isnan(facts("G28", "M104 S0").low_mm[0])
+
+
+def test_a_file_tells_its_time_and_whether_it_heats() -> None:
+    """As PrusaSlicer and Cura write it."""
+    told = facts("; estimated printing time (normal mode) = 1h 2m 3s", "M104 S200", "G1 X1 E1")
+    assert (told.seconds, told.heats, told.lines) == (3723.0, True, 2)
+    assert facts(";TIME:90", "G1 X1 E1").seconds == 90.0
+    assert math.isnan(facts("G1 X1 E1").seconds)
+
+
+def test_lines_are_sent_without_comments() -> None:
+    """Blanks and comments of both kinds go; what is no G-code is named by its number."""
+    read = list(lines_of(["; head\n", "\n", " G1 X1 ; on\n", "G1 (fast) Y2\n"], "x.gcode"))
+    assert [(line.number, line.text) for line in read] == [(3, "G1 X1"), (4, "G1  Y2")]
+    for bad in ("\x00\x01\n", "\ufffd\n", "123\n", "G1 " + "X1 " * 40):
+        with pytest.raises(DataError, match="line 2"):
+            list(lines_of(["G28\n", bad], "x.gcode"))
+    with pytest.raises(DataError, match="no line"):
+        facts("; nothing")
+    assert [name_of(text) for text in ("g1 x1", "G28.1", "M104S200", "T0", "")] == ["G1", "G28", "M104", "T0", ""]
+
+
+def test_addresses_of_printers() -> None:
+    """A device, a Bluetooth address, a host; everything else is refused with the forms."""
+    assert read_uri("serial:/dev/ttyUSB0") == LineUri("serial:/dev/ttyUSB0", LineKind.SERIAL, "/dev/ttyUSB0", 115200)
+    assert read_uri("serial:ttyACM0?baud=250000").baud == 250000
+    assert read_uri("rfcomm://00:11:22:aa:bb:CC?channel=3").port == 3
+    assert (read_uri("socket://[::1]:80").place, read_uri("socket://h:80").port) == ("::1", 80)
+    for bad in ("", "/dev/ttyUSB0", "usb:x", "serial:", "serial:x?baud=7", "serial:x?speed=9600", "rfcomm://x", "socket://h", "socket://h:0", "socket://h:1?x=2", "rfcomm://00:11:22:33:44:55?channel=99"):  # fmt: skip
+        with pytest.raises(SettingsError, match="--printer"):
+            read_uri(bad)
+
+
+def test_the_journal_tells_of_a_print_whose_program_is_gone(tmp_path: Path) -> None:
+    """Not of one that goes on, nor of a file that is none."""
+    journal = Journal(tmp_path / "deep" / "printing.json")
+    assert journal.left() is None
+    entry = Entry("cup.gcode", "serial:x", 50, 100, 2**22 + 1)
+    journal.note(entry)
+    assert journal.left() == entry
+    journal.note(Entry("cup.gcode", "serial:x", 50, 100, 1))
+    assert journal.left() is None
+    for text in ("{}", "[", '{"file": 1, "printer": "", "done": 0, "lines": 0, "pid": 1}'):
+        (tmp_path / "deep" / "printing.json").write_text(text)
+        assert journal.left() is None
+    journal.forget()
+    journal.forget()
