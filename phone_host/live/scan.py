@@ -40,6 +40,7 @@ class LiveScan:
 
     Attributes:
         scan: what has become of them; whole once the run has ended.
+        patches: its surface, for whoever watches; while the run goes on, `surface_since` asks them.
         sink: for the host.
 
     Args:
@@ -69,7 +70,7 @@ class LiveScan:
         self._last: ScannedPair | None = None
         self._first_ns: int | None = None
         self._counts = len(self._earlier), self.scan.fused
-        self._patches: Patches | None = None
+        self.patches = Patches(LEAST_WEIGHT)
         self._watching = threading.Lock()
         self._asked_ns = self._renewed_ns = -_WATCHED_NS
 
@@ -92,7 +93,7 @@ class LiveScan:
         """
         with self._watching:
             self._asked_ns = now.monotonic_ns()
-            return () if self._patches is None else self._patches.since(number, most_points)
+            return self.patches.since(number, most_points)
 
     def renew_surface(self) -> None:
         """Make the surface again. The run has ended, or calls this itself."""
@@ -100,9 +101,7 @@ class LiveScan:
         if tracker is None:
             return
         with self._watching:
-            if self._patches is None:
-                self._patches = Patches(tracker.volume, LEAST_WEIGHT)
-            self._patches.renew()
+            self.patches.renew(tracker.volume)
             self._renewed_ns = now.monotonic_ns()
 
     @property

@@ -43,18 +43,20 @@ class Patches:
     """All patches of a volume, as they were when they were last renewed.
 
     Args:
-        volume: grows; it must not change while `renew` runs.
         least_weight: of a voxel that counts as seen.
     """
 
-    def __init__(self, volume: Volume, least_weight: int) -> None:
-        self._volume, self._least_weight = volume, least_weight
+    def __init__(self, least_weight: int) -> None:
+        self._least_weight = least_weight
         self._made: dict[tuple[int, int, int], Patch] = {}
         self._seen = self._number = 0
 
-    def renew(self) -> None:
-        """Make those again whose blocks have changed."""
-        volume = self._volume
+    def renew(self, volume: Volume) -> None:
+        """Make those again whose blocks have changed.
+
+        Args:
+            volume: always the same; it must not change meanwhile.
+        """
         blocks, changed = volume.blocks, volume.changed_since(self._seen)
         self._seen = volume.fused
         # The cubes of marching reach into the next block along each axis: what lies before a changed block changes with it.
@@ -64,7 +66,7 @@ class Patches:
             return
         cubes = blocks.places[: blocks.count] // SIDE_BLOCKS
         for place in wanted:
-            self._make(place, np.flatnonzero((cubes == place).all(axis=1)))
+            self._make(volume, place, np.flatnonzero((cubes == place).all(axis=1)))
 
     def since(self, number: int, most_points: int) -> tuple[Patch, ...]:
         """Return the patches that are newer than one, oldest first.
@@ -77,9 +79,9 @@ class Patches:
         ends = np.cumsum([len(each.mesh.points_m) for each in newer])
         return tuple(newer[: max(1, int(np.searchsorted(ends, most_points, side="right")))])
 
-    def _make(self, place: NDArray[np.int32], numbers: NDArray[np.int64]) -> None:
-        voxel_m = self._volume.settings.voxel_m
-        mesh = mesh_of(self._volume.blocks, voxel_m, self._least_weight, numbers)
+    def _make(self, volume: Volume, place: NDArray[np.int32], numbers: NDArray[np.int64]) -> None:
+        voxel_m = volume.settings.voxel_m
+        mesh = mesh_of(volume.blocks, voxel_m, self._least_weight, numbers)
         most = len(mesh.triangles)
         while len(mesh.points_m) > _MOST_POINTS:
             most //= 2

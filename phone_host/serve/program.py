@@ -127,8 +127,8 @@ class ReadyScan(Protocol):
     def finish(self, ended: EndReason) -> Scanned:
         """Make the surface, and write the files."""
 
-    def save(self) -> None:
-        """Write what there is after an error. Raises nothing."""
+    def save(self) -> Scanned | None:
+        """Write what there is after an error; None: there was nothing, or it cannot be written. Raises nothing."""
 
 
 class Program(Protocol):

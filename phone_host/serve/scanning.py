@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from phone_host.live.scan import LiveScan
+from phone_host.scan.patches import Patches
 from phone_host.scan.scan import ScannedPair
 from phone_host.scan.tracking_words import Tracking
 from phone_host.serve.program import Scanned
@@ -24,7 +25,8 @@ class Scanning:
     def __init__(self) -> None:
         self._live: LiveScan | None = None
         self._begun = 0
-        self._is_live = False
+        self._patches: Patches | None = None  # of a scan that is over: its volume, which is large, is not kept
+        self._counts = 0, 0
         self._over: Scanned | None = None
 
     @contextmanager
@@ -35,14 +37,14 @@ class Scanning:
             live: the scan.
             begun: number of its activity.
         """
-        self._live, self._begun, self._over, self._is_live = live, begun, None, True
+        self._live, self._begun, self._over, self._patches = live, begun, None, None
         try:
             yield
         finally:
-            self._is_live = False
+            self._patches, self._counts, self._live = live.patches, live.counts, None
 
-    def over(self, scanned: Scanned) -> None:
-        """Take what came of it."""
+    def over(self, scanned: Scanned | None) -> None:
+        """Take what came of it; None: nothing was written."""
         self._over = scanned
 
     @property
@@ -53,23 +55,23 @@ class Scanning:
     @property
     def state(self) -> ScanState | None:
         """How it goes; None: there was none."""
-        live, over = self._live, self._over
-        if live is None:
+        if (live := self._live) is not None:
+            pairs, fused = live.counts
+            return ScanState(words=live.words, level=_level(live.last), pairs=pairs, fused=fused)
+        if self._patches is None:
             return None
-        pairs, fused = live.counts
-        if over is not None:
-            files = over.files
-            return ScanState(
-                words=over.words, level=over.level, pairs=pairs, fused=fused, folder=str(over.folder), files=files
-            )
-        if not self._is_live:
-            return ScanState(words="stopped: nothing of it was written", pairs=pairs, fused=fused)
-        return ScanState(words=live.words, level=_level(live.last), pairs=pairs, fused=fused)
+        (pairs, fused), over = self._counts, self._over
+        if over is None:
+            return ScanState(words="it ended, and nothing of it was written", pairs=pairs, fused=fused)
+        return ScanState(
+            words=over.words, level=over.level, pairs=pairs, fused=fused, folder=str(over.folder), files=over.files
+        )
 
     def surface(self, since: int, most_points: int) -> Surface | None:
         """See Source."""
-        live = self._live
-        return None if live is None else Surface(self._begun, live.surface_since(since, most_points))
+        if (live := self._live) is not None:
+            return Surface(self._begun, live.surface_since(since, most_points))
+        return None if self._patches is None else Surface(self._begun, self._patches.since(since, most_points))
 
 
 def _level(last: ScannedPair | None) -> str:

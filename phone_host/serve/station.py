@@ -296,11 +296,10 @@ class Station:
             host = ready.host
             with task.held(), self._memory.live(host.snapshot), self._scanning.shown(ready.live, self._memory.begun):
                 try:
-                    ended = host.run(task.stopped)
+                    done = ready.finish(host.run(task.stopped))
                 except Exception:
-                    ready.save()
+                    self._scanning.over(ready.save())
                     raise
-                done = ready.finish(ended)
             self._memory.last(done.snapshot)
             self._memory.gave_up(host.has_given_up)
             self._scanning.over(done)

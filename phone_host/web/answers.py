@@ -215,7 +215,7 @@ class Answers:
         if since is None:
             return problem(400, _NO_NUMBER)
         async with self._place(request):
-            surface = self._hub.source.surface(since, _SURFACE_POINTS)
+            surface = await _aside(lambda: self._hub.source.surface(since, _SURFACE_POINTS))
             if surface is None:
                 return problem(404, _NO_SCAN)
             data = await self._hub.encoder.run(lambda: surface_bytes(surface, since))

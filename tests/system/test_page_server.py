@@ -158,8 +158,8 @@ def test_a_scan_as_surface_and_files(start: Start, tmp_path: Path) -> None:
     assert served.get("/api/surface")[0] == served.get("/api/scan/model.ply")[0] == 404
     volume = Volume(VolumeSettings(voxel_m=0.01, far_m=3.0))
     volume.fuse(plane_view(SE3.identity(), texture()), SE3.identity())
-    source.patches = Patches(volume, 1)
-    source.patches.renew()
+    source.patches = Patches(1)
+    source.patches.renew(volume)
     status, _, body = served.get("/api/surface?since=0")
     head = json.loads(body[4 : 4 + int.from_bytes(body[:4], "little")])
     assert status == 200

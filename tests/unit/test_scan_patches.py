@@ -30,8 +30,8 @@ def grown() -> Volume:
 def test_the_patches_are_the_whole_surface() -> None:
     """Each triangle of the surface is in one patch, inside its cube; each patch has a number of its own."""
     volume = grown()
-    patches = Patches(volume, 1)
-    patches.renew()
+    patches = Patches(1)
+    patches.renew(volume)
     found, whole = patches.since(0, MANY), mesh_of(volume.blocks, SETTINGS.voxel_m)
     assert sum(len(each.mesh.triangles) for each in found) == len(whole.triangles) > 1000
     assert [each.number for each in found] == list(range(1, len(found) + 1))
@@ -45,15 +45,15 @@ def test_the_patches_are_the_whole_surface() -> None:
 def test_only_what_changed_is_made_again() -> None:
     """A second view of a part changes the patches that it shows, as a whole new making would; without a view nothing is new."""
     volume = grown()
-    patches = Patches(volume, 1)
-    patches.renew()
+    patches = Patches(1)
+    patches.renew(volume)
     before = patches.since(0, MANY)
-    patches.renew()
+    patches.renew(volume)
     assert patches.since(before[-1].number, MANY) == ()
     part = plane_view(SE3.identity(), PICTURE, CORNER)
     part.depth_m[:, 60:] = np.nan
     volume.fuse(part, SE3.identity())
-    patches.renew()
+    patches.renew(volume)
     newer = patches.since(before[-1].number, MANY)
     assert 0 < len(newer) < len(before)
     whole = mesh_of(volume.blocks, SETTINGS.voxel_m)
@@ -62,8 +62,8 @@ def test_only_what_changed_is_made_again() -> None:
 
 def test_an_answer_is_bounded_and_goes_on() -> None:
     """With a small bound the patches come one by one, in their order, and all of them."""
-    patches = Patches(grown(), 1)
-    patches.renew()
+    patches = Patches(1)
+    patches.renew(grown())
     numbers, newest = [], 0
     while some := patches.since(newest, 10):
         assert len(some) == 1
@@ -76,13 +76,13 @@ def test_a_surface_that_goes_away_is_told() -> None:
     """Where nothing is left the patch comes once more, without triangles."""
     volume = Volume(SETTINGS)
     volume.fuse(plane_view(SE3.identity(), PICTURE, WALL), SE3.identity())
-    patches = Patches(volume, 1)
-    patches.renew()
+    patches = Patches(1)
+    patches.renew(volume)
     newest = patches.since(0, MANY)[-1].number
     gone = volume.changed_blocks(every=True)
     gone.weights[:] = 0
     volume.put(gone)
-    patches.renew()
+    patches.renew(volume)
     newer = patches.since(newest, MANY)
     assert newer
     assert all(len(each.mesh.triangles) == 0 for each in newer)
@@ -91,8 +91,8 @@ def test_a_surface_that_goes_away_is_told() -> None:
 def test_a_patch_never_has_more_points_than_16_bit_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """A patch with too many is thinned."""
     monkeypatch.setattr("phone_host.scan.patches._MOST_POINTS", 300)
-    patches = Patches(grown(), 1)
-    patches.renew()
+    patches = Patches(1)
+    patches.renew(grown())
     sizes = [len(each.mesh.points_m) for each in patches.since(0, MANY)]
     assert max(sizes) <= 300
     assert sum(sizes) > 500
@@ -126,8 +126,8 @@ def test_a_resumed_volume_shows_itself_whole() -> None:
     """What is put into a volume, as a scan does that goes on, is in the patches."""
     volume, other = grown(), Volume(SETTINGS)
     other.put(volume.changed_blocks(every=True))
-    patches = Patches(other, 1)
-    patches.renew()
+    patches = Patches(1)
+    patches.renew(other)
     whole = mesh_of(volume.blocks, SETTINGS.voxel_m)
     assert sum(len(each.mesh.triangles) for each in patches.since(0, MANY)) == len(whole.triangles)
     assert len(other.changed_blocks().places) == 0

@@ -15,15 +15,19 @@ from common.ledger import StageTimes
 from common.peers import Peer
 from phone_host.boards.found import Found
 from phone_host.calibration.capture.words import stored_finding
+from phone_host.live.scan import LiveScan
 from phone_host.measure.trouble import Trouble
-from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result
+from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side
 from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes
+from phone_host.scan.scan import ScanWanted
 from phone_host.serve import check
 from phone_host.serve.activities import Activities, Task
 from phone_host.serve.find import board_choice, stranger
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
+from phone_host.serve.program import Scanned
+from phone_host.serve.scanning import Scanning
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.steps import Facts, steps
@@ -32,7 +36,7 @@ from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.page import address_of, page_settings
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import Status, told
-from phone_host.web.source import Activity, PageState, StepName
+from phone_host.web.source import Activity, PageState, ScanState, StepName, Surface
 from tests.support.run_snapshots import run
 from tests.support.samples import LEDGER
 
@@ -399,3 +403,23 @@ def test_the_terminal_tells_what_goes_on() -> None:
         "phone-host: ready",
     ]
     assert told(replace(ready, trouble=Trouble("no rig", "calibrate"))) == "ready; no rig: calibrate"
+
+
+def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
+    """Nothing before the first; then what helps; then what came of it. Its surface stays, what it was made of does not."""
+    scanning = Scanning()
+    assert scanning.state is None
+    assert scanning.surface(0, 10) is None
+    live = LiveScan(ScanWanted(), Side.LEFT, tmp_path, waits=False, is_timeless=False)
+    with scanning.shown(live, 7):
+        assert scanning.state == ScanState(words="waiting for the first pair")
+        assert scanning.surface(0, 10) == Surface(7, ())
+        state = PageState(activity=Activity.SCANNING, scan=scanning.state)
+        assert told(state) == "scanning: waiting for the first pair"
+    assert scanning.state is not None
+    assert "nothing of it was written" in scanning.state.words
+    over = Scanned(words="3 pairs", level="good", folder=tmp_path, files=("model.ply",), snapshot=run())
+    scanning.over(over)
+    assert scanning.state == ScanState(words="3 pairs", level="good", folder=str(tmp_path), files=("model.ply",))
+    assert scanning.folder == str(tmp_path)
+    assert scanning.surface(0, 10) == Surface(7, ())

@@ -24,14 +24,14 @@ class Growing:
 
     def __init__(self) -> None:
         self.volume = Volume(VolumeSettings(voxel_m=0.01, far_m=3.0))
-        self.patches = Patches(self.volume, 1)
+        self.patches = Patches(1)
 
     def show(self, columns: int) -> None:
         """Fuse the first columns of the view."""
         view = plane_view(SE3.identity(), texture(), CORNER)
         view.depth_m[:, columns:] = np.nan
         self.volume.fuse(view, SE3.identity())
-        self.patches.renew()
+        self.patches.renew(self.volume)
 
 
 def _roughness(page: Any) -> float:
@@ -79,7 +79,7 @@ def test_the_surface_grows_until_it_is_saved(
         page.click("#scan-files a >> nth=0")
     assert Path(saved.value.path()).read_bytes() == b"model.ply"
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
-    program.patches = Patches(Volume(VolumeSettings()), 1)
+    program.patches = Patches(1)
     page.click("#scan-go")
     page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts === 0")
     assert complaints == []

@@ -12,7 +12,7 @@ from phone_host.web.source import Activity, Answer, Do, StepName
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
 from tests.web.played import BOARDS, CAMERAS, Played, guide_snapshot
 
-EXPECTED_STEPS = ["board", "camera", "check", "calibration", "run"]
+EXPECTED_STEPS = ["board", "camera", "check", "calibration", "run", "scan"]
 
 
 def asked(program: Played) -> list[tuple[Do, dict[str, str]]]:
@@ -76,7 +76,7 @@ def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, c
         (Do.CALIBRATE, {"board": "auto", "square": "30mm"}),
         (Do.RUN, {}),
     ]
-    assert [page.get_attribute(f"#step-{name}", "data-done") for name in EXPECTED_STEPS] == ["yes"] * 5
+    assert [page.get_attribute(f"#step-{name}", "data-done") for name in EXPECTED_STEPS] == ["yes"] * 6
     assert complaints == []
 
 

@@ -12,6 +12,7 @@ from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.live.scan import LiveScan
+from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
@@ -66,19 +67,22 @@ class PageScan:
         except OSError as error:
             raise unwritable(self.out, error) from error
         self.live.kept.done()
-        return Scanned(
-            words=_words(report),
-            level="good" if report.is_sound else "warning",
-            folder=self.out,
-            files=(MODEL, TRAJECTORY, *ALWAYS),
-            snapshot=over.snapshot,
-        )
+        return self._scanned(_words(report), is_sound=report.is_sound, snapshot=over.snapshot)
 
-    def save(self) -> None:
+    def save(self) -> Scanned | None:
         """See ReadyScan."""
-        if self.live.scan.fused:
-            with suppress(Exception):  # tell what ended the scan, not what followed
-                write_scan(self.out, self._finished())
+        if not self.live.scan.fused:
+            return None
+        with suppress(Exception):  # tell what ended the scan, not what followed
+            finished = self._finished()
+            write_scan(self.out, finished)
+            words = f"ended early: {_words(finished.report)}"
+            return self._scanned(words, is_sound=False, snapshot=self.host.snapshot())
+        return None
+
+    def _scanned(self, words: str, *, is_sound: bool, snapshot: RunSnapshot) -> Scanned:
+        level, files = "good" if is_sound else "warning", (MODEL, TRAJECTORY, *ALWAYS)
+        return Scanned(words=words, level=level, folder=self.out, files=files, snapshot=snapshot)
 
     def _finished(self) -> FinishedScan:
         self.live.renew_surface()

@@ -27,6 +27,8 @@ def told(state: PageState) -> str:
         run = state.run
         words += f": {run.processed} pairs" if run.processed else ": no pair yet"
         words += f"; {headline(run).sentence}" if run.images.wants_depth and run.images.judged else ""
+    if state.activity is Activity.SCANNING and state.scan is not None:
+        words += f": {state.scan.words}"
     if state.trouble is not None and state.activity is Activity.IDLE:
         words += f"; {state.trouble.problem}: {state.trouble.remedy}"
     return printable(words)
