@@ -408,18 +408,22 @@ def test_the_terminal_tells_what_goes_on() -> None:
 def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
     """Nothing before the first; then what helps; then what came of it. Its surface stays, what it was made of does not."""
     scanning = Scanning()
-    assert scanning.state is None
+
+    def state() -> ScanState | None:
+        return scanning.state
+
+    assert state() is None
     assert scanning.surface(0, 10) is None
     live = LiveScan(ScanWanted(), Side.LEFT, tmp_path, waits=False, is_timeless=False)
     with scanning.shown(live, 7):
-        assert scanning.state == ScanState(words="waiting for the first pair")
+        assert state() == ScanState(words="waiting for the first pair")
         assert scanning.surface(0, 10) == Surface(7, ())
-        state = PageState(activity=Activity.SCANNING, scan=scanning.state)
-        assert told(state) == "scanning: waiting for the first pair"
-    assert scanning.state is not None
-    assert "nothing of it was written" in scanning.state.words
-    over = Scanned(words="3 pairs", level="good", folder=tmp_path, files=("model.ply",), snapshot=run())
+        assert told(PageState(activity=Activity.SCANNING, scan=state())) == "scanning: waiting for the first pair"
+    ended = state()
+    assert ended is not None
+    assert "nothing of it was written" in ended.words
+    over = Scanned(words="3 pairs", level="good", folder=tmp_path, files=("model.ply",), snapshot=run(0))
     scanning.over(over)
-    assert scanning.state == ScanState(words="3 pairs", level="good", folder=str(tmp_path), files=("model.ply",))
+    assert state() == ScanState(words="3 pairs", level="good", folder=str(tmp_path), files=("model.ply",))
     assert scanning.folder == str(tmp_path)
     assert scanning.surface(0, 10) == Surface(7, ())
