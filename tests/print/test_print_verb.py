@@ -2,14 +2,17 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from phone_host.printers.gcode import examine
 from tests.support.marlin_printer import Faults, MarlinPrinter, cube, printer
 from tests.support.programs import until
 
@@ -129,7 +132,7 @@ def test_a_printer_that_stops_is_told(gcode: Path, tmp_path: Path, said: str, wo
         (["cube.gcode", "--printer", "usb0", "--yes"], 2, "names no printer"),
         (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--bed", "50,50,50", "--yes"], 4, "leaves the bed: X"),
         (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--bed", "50"], 2, "--bed"),
-        (["cup.stl", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "slice it first"),
+        (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--up", "y"], 2, "are for models"),
         (["none.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "cannot be read"),
         (["noise.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "line 1 is no G-code"),
         (["empty.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "no line that a printer would do"),
@@ -147,3 +150,60 @@ def test_bad_input_gets_one_line(gcode: Path, tmp_path: Path, arguments: list[st
     assert ended.returncode == code
     assert words in ended.stderr
     assert len(ended.stderr.splitlines()) == 1
+
+
+def _cube_file(path: Path, side_mm: float, *, is_open: bool = False) -> Path:
+    """Write a cube as text STL, its last two triangles left out or not."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float) * side_mm
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [corner for a, b, c, d in squares for corner in ((a, b, c), (a, c, d))]
+    lines = ["solid cube"]
+    for triangle in triangles[: -2 if is_open else None]:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += ["vertex " + " ".join(f"{value:g}" for value in corners[corner]) for corner in triangle]
+        lines += ["endloop", "endfacet"]
+    path.write_text("\n".join([*lines, "endsolid cube"]) + "\n")
+    return path
+
+
+@pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="needs prusa-slicer")
+def test_a_model_is_sliced_and_printed(tmp_path: Path) -> None:
+    """A cube of 6 mm comes out in the middle of the bed, hot, and cold at the end."""
+    stl = _cube_file(tmp_path / "cube.stl", 6)
+    with printer() as there:
+        ended = done(tmp_path, str(stl), "--unit", "mm", "--printer", uri(there), "--bed", "100,120,90", "--yes")
+        assert (there.nozzle, there.bed) == (0.0, 0.0)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert any(text.startswith("M109 S2") for text in there.done)
+    found = examine([f"{text}\n" for text in there.done], "done")
+    middle = [(low + high) / 2 for low, high in zip(found.low_mm, found.high_mm, strict=True)]
+    assert middle[:2] == pytest.approx([50, 60], abs=1.5)
+    assert found.high_mm[2] == pytest.approx(6, abs=0.2)
+
+
+@pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="needs prusa-slicer")
+def test_a_model_that_cannot_be_printed_is_refused(tmp_path: Path) -> None:
+    """Open, larger than the bed, none at all, or with a profile that the slicer refuses: one line each."""
+    there = ["--printer", "serial:/dev/ttyNOPE", "--yes", "--unit", "mm"]
+    (tmp_path / "bad.ini").write_text("layer_height = many\n")
+    cases = [
+        ([str(_cube_file(tmp_path / "open.stl", 20, is_open=True))], "cannot be printed"),
+        ([str(_cube_file(tmp_path / "large.stl", 400))], "cannot be printed"),
+        ([str(_cube_file(tmp_path / "cube.stl", 20)), "--profile", str(tmp_path / "bad.ini")], "the slicer refuses"),
+        ([str(_cube_file(tmp_path / "cube.stl", 20)), "--profile", str(tmp_path / "none.ini")], "the slicer refuses"),
+    ]
+    for arguments, words in cases:
+        ended = done(tmp_path, *arguments, *there)
+        assert ended.returncode == 4, ended.stderr
+        assert words in ended.stderr
+        assert len(ended.stderr.splitlines()) == 1
+
+
+def test_without_a_slicer_it_says_how_to_get_one(tmp_path: Path) -> None:
+    """Exit 3; G-code still prints."""
+    stl = _cube_file(tmp_path / "cube.stl", 20)
+    asked = command(tmp_path, str(stl), "--printer", "serial:/dev/ttyNOPE", "--yes")
+    bare = {**environment(tmp_path), "PATH": str(tmp_path)}
+    ended = subprocess.run(asked, env=bare, capture_output=True, text=True, check=False, timeout=60)
+    assert ended.returncode == 3
+    assert "no slicer is installed" in ended.stderr

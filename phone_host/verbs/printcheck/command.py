@@ -1,7 +1,6 @@
 """phone-host printcheck: whether a scan or mesh can be printed."""
 
 import argparse
-import math
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +12,6 @@ from common.errors import DataError, SettingsError
 from common.places import make_folder
 from common.program.terminal import say
 from phone_host.output.atomic import write_bytes
-from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
 from phone_host.output.meshes.decimated import NoLibraryError
 from phone_host.output.meshes.formats import mesh_bytes
@@ -21,26 +19,22 @@ from phone_host.output.meshes.printable import Flaw, Printer, Problem, problems
 from phone_host.output.meshes.printable_fix import Fixed, NotClosedError, fixed
 from phone_host.output.meshes.printable_view import picture
 from phone_host.output.meshes.solid import Solid
-from phone_host.output.model_file import Model, read_model
+from phone_host.output.model_file import Model
 from phone_host.run.progress_bar import step_bar
 from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
+from phone_host.verbs.printable_model import bed_of, upright_model
 from phone_host.verbs.units import length_mm
 
 _CHECK_FAILED: Final = 4
-_UNITS_M: Final = {"m": 1.0, "mm": 0.001}
-_UP: Final = {"z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}  # fmt: skip
-"""Rows of the rotation that puts this axis up."""
-
-_UP_OF: Final = {Axes.CAMERA: "-y", Axes.Y_UP: "y", None: "z"}
 
 
 def run(options: argparse.Namespace) -> int:
     """Check the model, draw what is wrong, mend it if asked, and check what came of that."""
     printer = _printer(options)
     require_folder(options.out)
-    model = read_model(Path(options.model), _UNITS_M.get(options.unit, math.nan))
-    turn = np.array(_UP[options.up or _UP_OF[model.axes]], np.float64)
-    points, triangles = model.solid.points_m.astype(np.float64) * 1000 @ turn.T, model.solid.triangles
+    upright = upright_model(Path(options.model), options.unit, options.up)
+    model, points = upright.model, upright.points_mm
+    triangles = model.solid.triangles
     with step_bar("edges", None) as watcher:
         found = problems(points, triangles, printer, watcher.say)
         mended = _mended(points, triangles, printer, found) if options.fix else None
@@ -67,14 +61,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _printer(options: argparse.Namespace) -> Printer:
-    words = options.bed.split(",")
-    if len(words) != 3:
-        raise SettingsError(f"--bed is {options.bed!r}", "give three lengths, for example 220,220,250")
-    x, y, z = (length_mm(word, "--bed", "220,220,250") for word in words)
+    bed_mm = bed_of(options)
     if not 0 < options.overhang < 90:
         raise SettingsError(f"--overhang is {options.overhang:g}", "give degrees between 0 and 90, for example 45")
     wall_mm = length_mm(options.wall, "--wall", "0.8mm")
-    return Printer(bed_mm=(x, y, z), least_wall_mm=wall_mm, overhang_deg=options.overhang)
+    return Printer(bed_mm=bed_mm, least_wall_mm=wall_mm, overhang_deg=options.overhang)
 
 
 def _mended(points: NDArray[np.float64], triangles: NDArray[np.int32], printer: Printer, found: list[Problem]) -> Fixed:
