@@ -144,6 +144,7 @@ class Commands:
             out=options.out or data_folder(),
             wait_s=_BOARD_S,
             keys=self.keys,
+            data=data_folder(),
             feed=self.feed,
         )
 
@@ -154,7 +155,7 @@ class Commands:
         question = self.question(choices)
         camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns(), feed=self.feed)
         calibration = Path(question.calibration) if question.calibration else None
-        return check_capture(camera, calibration, _CAPTURE_S, stopped, tell).findings
+        return check_capture(camera, calibration, question.data, _CAPTURE_S, stopped=stopped, tell=tell).findings
 
     def calibration(self, choices: Choices, values: Choices, sinks: Sequence[Sink]) -> "Calibration":
         """See Program."""
