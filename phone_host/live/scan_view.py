@@ -2,6 +2,7 @@
 
 from typing import Final
 
+import numpy as np
 from rich.color import Color
 from rich.console import Console
 from rich.style import Style
@@ -65,7 +66,7 @@ class ScanPicture(Redrawn):
 def _as_text(view: SmallView) -> Text:
     """Write a picture with two pixels a character, its empty lines left out."""
     text = Text(no_wrap=True, end="")
-    rows = view.is_seen.reshape(-1, 2, view.is_seen.shape[1]).any(axis=(1, 2)).nonzero()[0]
+    rows = np.flatnonzero(view.is_seen.reshape(-1, 2, view.is_seen.shape[1]).any(axis=(1, 2)))
     for row in range(rows[0], rows[-1] + 1) if len(rows) else ():
         for column in range(view.is_seen.shape[1]):
             upper, lower = (

@@ -37,7 +37,7 @@ def test_the_nearest_surface_is_seen_and_fills_the_picture() -> None:
     shown = {tuple(colour) for colour in view.colours[view.is_seen]}
     assert shown == {RED, BLUE}
     assert view.is_seen.any(axis=1).mean() > 0.9
-    columns = view.is_seen.any(axis=0).nonzero()[0]
+    columns = np.flatnonzero(view.is_seen.any(axis=0))
     assert abs((columns[0] + columns[-1]) / 2 - 29.5) < 3
     assert abs(np.ptp(columns) - 40) < 10  # a square stays one
 
