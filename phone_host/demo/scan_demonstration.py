@@ -79,8 +79,8 @@ def render_pictures(
             advance()
 
     with ThreadPoolExecutor(len(folders)) as threads, _set_at_end(ended):
-        for each in [threads.submit(render_all, side) for side in folders]:
-            each.result()
+        for camera in [threads.submit(render_all, side) for side in folders]:
+            camera.result()
         if ended.is_set():
             return None
     return Pictures(folders[Side.LEFT], folders[Side.RIGHT])

@@ -42,7 +42,7 @@ class ModelErrors:
         """In words."""
         return (
             f"against the true surface: {self.mean_mm:.2f} mm off on average, 95 % of it within {self.p95_mm:.2f} mm,"
-            f" {self.coverage:.0%} of what does not stand on the mat is there"
+            f" {self.coverage * 100:.0f} % of what does not stand on the mat is there"
         )
 
 

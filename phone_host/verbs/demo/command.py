@@ -58,6 +58,7 @@ def run(options: argparse.Namespace) -> int:
     signals = StopSignals()
     console = Console(stderr=True)
     out: Path = options.out or _OUT
+    options.out = out
     rig, scene = unlike_rig(), demo_scene()
 
     try:

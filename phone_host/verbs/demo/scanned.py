@@ -148,7 +148,7 @@ def _printed(out: Path, console: Console) -> dict[str, Any]:
     Raises:
         OSError: the folder cannot be written to.
     """
-    upright = upright_model(out, None, None)
+    upright = upright_model(out, None, "z")
     solid = upright.model.solid
     points_m = (upright.points_mm / 1000.0).astype(np.float32)
     write_bytes(out / _STL, mesh_bytes(Solid(points_m, solid.triangles, np.zeros((0, 3), np.uint8)), "stl", None))
@@ -160,7 +160,7 @@ def _printed(out: Path, console: Console) -> dict[str, Any]:
     except (UnavailableError, DataError) as error:
         return found | {"problem": str(error)}
     seconds = None if math.isnan(facts.seconds) else round(facts.seconds)
-    return found | {"gcode": str(out / _GCODE), "seconds": seconds, "layers": None}
+    return found | {"gcode": str(out / _GCODE), "seconds": seconds}
 
 
 def _truth_json(errors: ModelErrors) -> dict[str, float | int | None]:
