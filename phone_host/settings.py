@@ -10,7 +10,8 @@ from typing import Final
 from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.program.settings import DEFAULT, Resolved, log_level, resolve
+from common.places import Kind, kind_of
+from common.program.settings import DEFAULT, Resolved, log_level, read_file, resolve
 from phone_host.camera.factory import check_camera
 from phone_host.declared_settings import PRINTERS_TABLE, PhoneHostSettings
 from phone_host.stereo.default_matcher import default_matcher
@@ -22,6 +23,7 @@ ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
 PAGE_TABLE: Final = "page"
 """The table of the settings file in which the page keeps options of `run` that are no settings."""
 
+_NAME: Final = "phone-host.toml"
 _ASIDE: Final = (PAGE_TABLE, PRINTERS_TABLE)
 
 _MOST_BUDGET_MS: Final = 60_000
@@ -70,6 +72,26 @@ def check(settings: PhoneHostSettings) -> None:
         raise SettingsError(
             f"budget is {settings.budget:g} ms", f"give 1 to {_MOST_BUDGET_MS} ms for each pair, for example 30ms"
         )
+
+
+def usual_file() -> Path:
+    """Return the settings file if no option names another."""
+    return default_folder(os.environ, service=False) / _NAME
+
+
+def printer_keys(file: Path | None) -> tuple[object, Path]:
+    """Return the table of printers' keys as the settings file has it, unchecked, and the file. Empty: it has none.
+
+    Args:
+        file: settings file; None: the usual one, if it is there.
+
+    Raises:
+        SettingsError: it cannot be read, or is not TOML.
+    """
+    path = file or usual_file()
+    if file is None and kind_of(path) is Kind.MISSING:
+        return {}, path
+    return read_file(path).get(PRINTERS_TABLE, {}), path
 
 
 def key_folder(keys: str) -> KeyFolder:

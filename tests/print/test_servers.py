@@ -191,13 +191,17 @@ def test_prusalink_that_does_not_cool_is_told(job: Job) -> None:
     """Nothing more can be done from here, and that is said."""
     wishes = Wishes()
     wishes.cancel()
-    path = job.gcode
     with print_server(ServerKind.PRUSALINK, ServerFaults(rate=0.01, cools=False)) as there:
         ended = printed(there, job, wishes=wishes)
         assert (ended.phase, there.files) == (Phase.CANCELLED, [])  # before it was whole
         wishes = Wishes()
+
+        def watch(progress: Progress) -> None:
+            if progress.phase is Phase.PRINTING:
+                wishes.cancel()
+
         with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
-            printed(there, Job(path, path.name, job.facts), wishes=wishes, tell=lambda each: (each.phase is Phase.PRINTING and wishes.cancel()) or None)  # fmt: skip
+            printed(there, job, wishes=wishes, tell=watch)
 
 
 def test_a_file_that_leaves_heaters_on_is_cooled_or_told(tmp_path: Path) -> None:
@@ -222,14 +226,14 @@ def test_a_print_runs_in_a_thread_of_its_own(job: Job) -> None:
         until(lambda: running.progress.phase is Phase.PRINTING, "it prints")
         running.pause()
         until(lambda: running.progress.phase is Phase.PAUSED, "it waits")
-        assert running.outcome is None
         running.cancel()
         assert running.join(30)
-        assert isinstance(running.outcome, Ended)
-        assert running.outcome.phase is Phase.CANCELLED
+        assert running.outcome is outcomes[0]
         wrong = RunningPrint(
             Place(door_to(read_uri(there.uri), "x"), there.uri, "cup.gcode"), job, over=outcomes.append
         )
         wrong.start()
         assert wrong.join(30)
+    assert isinstance(outcomes[0], Ended)
+    assert outcomes[0].phase is Phase.CANCELLED
     assert isinstance(outcomes[1], SettingsError)

@@ -162,14 +162,44 @@ class Klipper:
         match method:
             case "info":
                 home = str(self.path.parent / "klipper")
-                return {"state": "ready", "state_message": "Printer is ready", "hostname": "test", "software_version": "v0.12.0", "cpu_info": "", "klipper_path": home, "python_path": home, "config_file": f"{home}.cfg", "log_file": f"{home}.log", "process_id": 1, "user_id": 0, "group_id": 0}  # fmt: skip
+                return {
+                    "state": "ready",
+                    "state_message": "Printer is ready",
+                    "hostname": "test",
+                    "software_version": "v0.12.0",
+                    "cpu_info": "",
+                    "klipper_path": home,
+                    "python_path": home,
+                    "config_file": f"{home}.cfg",
+                    "log_file": f"{home}.log",
+                    "process_id": 1,
+                    "user_id": 0,
+                    "group_id": 0,
+                }
             case "list_endpoints":
-                return {"endpoints": ["info", "list_endpoints", "objects/list", "objects/query", "objects/subscribe", "gcode/script", "gcode/help", "pause_resume/pause", "pause_resume/resume", "pause_resume/cancel", "emergency_stop"]}  # fmt: skip
+                return {
+                    "endpoints": [
+                        "info",
+                        "list_endpoints",
+                        "objects/list",
+                        "objects/query",
+                        "objects/subscribe",
+                        "gcode/script",
+                        "gcode/help",
+                        "pause_resume/pause",
+                        "pause_resume/resume",
+                        "pause_resume/cancel",
+                        "emergency_stop",
+                    ]
+                }
             case "objects/list":
                 return {"objects": list(self._status())}
             case "objects/query" | "objects/subscribe":
                 names = params.get("objects") or {}
-                return {"eventtime": time.monotonic(), "status": {name: value for name, value in self._status().items() if name in names}}  # fmt: skip
+                return {
+                    "eventtime": time.monotonic(),
+                    "status": {name: value for name, value in self._status().items() if name in names},
+                }
             case "gcode/script":
                 self._do(params["script"])
             case "pause_resume/pause":
@@ -213,14 +243,14 @@ class Klipper:
                 "filament_used": 0.0,
                 "message": "",
                 "info": {"total_layer": None, "current_layer": None},
-            },  # fmt: skip
+            },
             "virtual_sdcard": {
                 "file_path": self.file,
                 "progress": self.share,
                 "is_active": self.state == "printing",
                 "file_position": 0,
                 "file_size": 100,
-            },  # fmt: skip
+            },
             "heaters": {
                 "available_heaters": ["extruder", "heater_bed"],
                 "available_sensors": [],

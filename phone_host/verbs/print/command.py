@@ -7,11 +7,9 @@ from contextlib import ExitStack
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import INTERRUPTED
-from common.program.settings import read_file
 from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
-from phone_host.declared_settings import PRINTERS_TABLE
 from phone_host.output.json_text import json_text
 from phone_host.printers.door import Job, PrinterDoor, Wishes
 from phone_host.printers.doors import door_to, key_of
@@ -22,10 +20,10 @@ from phone_host.printers.printing import Place, printed
 from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import Slicer, SlicingWanted
 from phone_host.run.progress_bar import share_bar, step_bar
+from phone_host.settings import printer_keys
 from phone_host.verbs.print.finding import find
 from phone_host.verbs.print.keypad import keypad
 from phone_host.verbs.printer_bed import bed_of
-from phone_host.verbs.serve.kept_choices import is_there, usual_file
 from phone_host.verbs.serve.places import data_folder
 
 
@@ -59,10 +57,10 @@ def _place(door: PrinterDoor, uri: PrinterUri, options: argparse.Namespace) -> P
 
 def _key(options: argparse.Namespace, uri: PrinterUri) -> str:
     """Return the printer's key; empty: it needs none, or has none in the settings file."""
-    file = options.config or usual_file()
-    if not isinstance(uri, ServerUri) or (options.config is None and not is_there(file)):
+    if not isinstance(uri, ServerUri):
         return ""
-    return key_of(uri, read_file(file).get(PRINTERS_TABLE, {}), file)
+    table, file = printer_keys(options.config)
+    return key_of(uri, table, file)
 
 
 def _sent(place: Place, job: Job, journal: Journal) -> Ended:
