@@ -28,17 +28,19 @@ from phone_host.output.listed import ListedFolder
 from phone_host.output.meshes.formats import mesh_bytes
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.rig_yaml import write_rig
-from phone_host.printers.slicing import SlicingWanted, find_slicer, sliced
+from phone_host.output.upright import upright_model
+from phone_host.printers.preparing import Wanted, job_of
+from phone_host.printers.printer_uri import FileUri
+from phone_host.printers.slicing import SlicingWanted
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
-from phone_host.run.progress_bar import busy_bar, progress_bar
+from phone_host.run.progress_bar import busy_bar, progress_bar, step_bar
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.printable_model import upright_model
 
 _CHECK_FAILED: Final = 4
 _OUT: Final = Path("out/demo-scan")
@@ -48,6 +50,9 @@ _VIEWS: Final = 36
 
 _LEAST_VIEWS, _MOST_VIEWS = 6, 360
 _STL, _GCODE = "model.stl", "model.gcode"
+_UP: Final = "z"
+"""Of a model on the mat."""
+
 _BED_MM: Final = (220.0, 220.0, 250.0)
 
 _WORST_MM: Final = 1.0
@@ -148,18 +153,21 @@ def _printed(out: Path, console: Console) -> dict[str, Any]:
     Raises:
         OSError: the folder cannot be written to.
     """
-    upright = upright_model(out, None, "z")
-    solid = upright.model.solid
+    upright = upright_model(out, None, _UP)
     points_m = (upright.points_mm / 1000.0).astype(np.float32)
-    write_bytes(out / _STL, mesh_bytes(Solid(points_m, solid.triangles, np.zeros((0, 3), np.uint8)), "stl", None))
+    solid = Solid(points_m, upright.model.solid.triangles, np.zeros((0, 3), np.uint8))
+    write_bytes(out / _STL, mesh_bytes(solid, "stl", None))
     found: dict[str, Any] = {"stl": str(out / _STL), "gcode": None, "seconds": None, "problem": None}
+    wanted = Wanted(SlicingWanted(_BED_MM), up=_UP)
     try:
-        find_slicer()
-        with busy_bar("slicing", console):
-            facts = sliced(out / _STL, out / _GCODE, SlicingWanted(_BED_MM))
+        with (
+            step_bar("slicing", None, console) as watcher,
+            job_of(out, wanted, FileUri(f"file:{out / _GCODE}", out / _GCODE), watcher.say) as job,
+        ):
+            write_bytes(out / _GCODE, job.gcode.read_bytes())
     except (UnavailableError, DataError) as error:
-        return found | {"problem": str(error)}
-    seconds = None if math.isnan(facts.seconds) else round(facts.seconds)
+        return found | {"problem": error.problem, "remedy": error.remedy}
+    seconds = None if math.isnan(job.facts.seconds) else round(job.facts.seconds)
     return found | {"gcode": str(out / _GCODE), "seconds": seconds}
 
 
@@ -195,7 +203,7 @@ def _closing(out: Path, printed: dict[str, Any]) -> str:
         )
         lines.append(f"          {out}/{_GCODE}      sliced{minutes}")
     elif printed.get("problem"):
-        lines.append(f"not sliced: {printed['problem']}")
+        lines.append(f"not sliced: {printed['problem']}; {printed['remedy']}")
     lines.append("try next")
     lines += [f"  {one.command}" for one in _by_hand(out)]
     return "\n".join(lines)
