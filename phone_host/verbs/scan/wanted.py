@@ -1,4 +1,4 @@
-"""Reads how a model is to be made: --voxel, --box and --memory."""
+"""Reads how a model is to be made: --mat, --voxel, --box and --memory."""
 
 import argparse
 import math
@@ -12,6 +12,7 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.run.kept_submaps import read_submaps
 from phone_host.scan.box import Box
+from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.units import length_mm
@@ -38,6 +39,7 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
+        mat=None if options.mat is None else parse_mat(options.mat or USUAL_MAT),
     )
 
 
