@@ -1,7 +1,8 @@
 """Where each view was taken, from a printed mat in it. Pure.
 
 Only the mat counts, so it is the same whether the cameras go around it or it is turned before them, and the background may do what it likes. The world's axes
-are the mat's: the model stands upright on its middle. A view that shows too little of the mat is laid against the model from where the last one was.
+are the mat's: the model stands upright on its middle. A view that shows too little of the mat is followed by
+its corners from the last one and laid against the model.
 
 What lies outside the box above the sheet gets no room in the model. It still tells that nothing is before it.
 """
@@ -17,11 +18,11 @@ from phone_host.geometry.se3 import SE3
 from phone_host.scan.box import Box
 from phone_host.scan.mat import Mat, mat_corners
 from phone_host.scan.mat_pose import MatPose, MatScale, fit_mat
-from phone_host.scan.odometry import Moved
+from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
 from phone_host.scan.tracker import Tracked, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
-from phone_host.scan.view import Camera, Depth, View, halved
+from phone_host.scan.view import Camera, Depth, View, halved, reduced
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
@@ -46,6 +47,8 @@ STANDS_M: Final = np.array([0.0, 0.0, 0.05])
 _PARTNER_VOXELS, _FLOOR_VOXELS = 10, 0.3
 _ALIGNED_PX: Final = 320
 _LEAST_OVERLAP, _LEAST_NEAR, _LEAST_DIRECTIONS = 0.35, 0.5, 6
+_ODOMETRY: Final = OdometrySettings(corners=400)
+_LEAST_CORNERS: Final = 15
 _FUSED_OFF_VOXELS: Final = 2.0
 """Mean distance to the model beyond which a view without a mat is not believed."""
 
@@ -104,7 +107,8 @@ class MatTracker:
         self._finder, self._threads = MatFinder(mat), threads
         self._room = room_of(box, settings.truncation_m + 2 * settings.voxel_m)
         self._pose = SE3.identity()
-        self._has_pose = self._was_lost = False
+        self._was_lost = False
+        self._last: View | None = None
 
     def track(self, view: View) -> Tracked:
         """Take the next view; all have one size and one geometry.
@@ -115,13 +119,14 @@ class MatTracker:
         found, most_m = self._finder.find(view), _MOST_SIGMA_VOXELS * self.volume.settings.voxel_m
         if found is not None and found.sigma_at(STANDS_M) <= most_m:
             return replace(self._fused(view, found.camera_mat.inverse(), Weakness.NONE, None), mat=found.said(STANDS_M))
-        if not self._has_pose or self.volume.blocks.count == 0:
+        start = self._followed(view)
+        if start is None:
             return self._lost(None)
-        fit = self._laid(view)
+        fit = self._laid(view, start)
         is_told = fit.told >= _LEAST_DIRECTIONS and fit.overlap >= _LEAST_OVERLAP and fit.near >= _LEAST_NEAR
         if not is_told or not fit.off_m <= _FUSED_OFF_VOXELS * self.volume.settings.voxel_m:
             return self._lost(fit)
-        return self._fused(view, self._pose @ fit.start_now, Weakness.NO_MAT, fit)
+        return self._fused(view, start @ fit.start_now, Weakness.NO_MAT, fit)
 
     def kept(self, places_before: int) -> TrackerState:
         """See `Tracker.kept`: there are no places, the mat is one."""
@@ -130,15 +135,16 @@ class MatTracker:
 
     def go_on(self, state: TrackerState) -> None:
         """See `Tracker.go_on`."""
-        self._pose, self._has_pose, self._was_lost = state.pose, True, True
+        self._pose, self._was_lost = state.pose, True
 
     def _lost(self, fit: Registered | None) -> Tracked:
         self._was_lost = True
         return _told(self._pose, Tracking.LOST, Weakness.NO_MAT, fit)
 
     def _fused(self, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
-        self._pose, self._has_pose = pose, True
+        self._pose = pose
         inside = depths_inside(view, pose, self._room)
+        self._last = reduced(replace(view, depth_m=inside))
         # What is farther than the field reaches is as good as at its end: nothing is before it.
         reach = np.minimum(view.depth_m, np.float32(self.volume.settings.far_m))
         self.volume.fuse(replace(view, depth_m=reach), pose, inside)
@@ -148,12 +154,24 @@ class MatTracker:
         self._was_lost = False
         return _told(pose, state, weakness, fit)
 
-    def _laid(self, view: View) -> Registered:
-        """Lay what a view shows near the model against it, from where the last view was taken."""
-        depth, geometry, step = depths_inside(view, self._pose, self._room), view.geometry, 1
+    def _followed(self, view: View) -> SE3 | None:
+        """Return where a view was taken by the corners that stand on the mat; None: too few are followed from the last view.
+
+        The shape alone does not tell: a ball fits from everywhere.
+        """
+        if self._last is None:
+            return None
+        odometry = Odometry(_ODOMETRY)
+        odometry.step(self._last)
+        moved = odometry.step(reduced(view))
+        return self._pose @ moved.before_now if moved.is_known and moved.inliers >= _LEAST_CORNERS else None
+
+    def _laid(self, view: View, start: SE3) -> Registered:
+        """Lay what a view shows near the model against it."""
+        depth, geometry, step = depths_inside(view, start, self._room), view.geometry, 1
         while depth.shape[1] > _ALIGNED_PX:
             (depth, geometry), step = halved(depth, geometry), 2 * step
-        surface = self.volume.cast(Camera(geometry, depth.shape, self._pose), depth)
+        surface = self.volume.cast(Camera(geometry, depth.shape, start), depth)
         voxel_m = self.volume.settings.voxel_m
         settings = RegistrationSettings(
             most_m=_PARTNER_VOXELS * voxel_m,

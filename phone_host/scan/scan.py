@@ -170,6 +170,11 @@ class Scan:
         self._closed = _Closed()
 
     @property
+    def mat(self) -> Mat | None:
+        """On which the object lies; None: there is none."""
+        return self._wanted.mat
+
+    @property
     def pairs(self) -> tuple[ScannedPair, ...]:
         """What became of each pair, in order."""
         return tuple(self._pairs)

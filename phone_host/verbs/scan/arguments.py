@@ -86,7 +86,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mat",
         nargs="?",
-        const="",
+        const="usual",
         metavar="10x8:25mm:18mm:5x5",
         help="scan what lies on a printed mat, whether it is turned or the cameras go around it: the sheet of `phone-host target mat`, or any ChArUco"
         " sheet by its squares, side of a square, side of a mark and family; the model stands on the sheet's middle, z up",

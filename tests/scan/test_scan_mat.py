@@ -1,27 +1,35 @@
 """The mat: which one, where it lies, and a scan of what stands on it."""
 
+import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from common import now
 from common.errors import SettingsError
+from phone_host.cli import main
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Image, Processed
+from phone_host.output.axes import Axes
+from phone_host.output.rig_yaml import write_rig
+from phone_host.report.mat_figures import mat_figures
 from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
-from phone_host.scan.mat_pose import MatPose, MatScale, fit_mat
+from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
 from phone_host.scan.mat_tracker import ABOVE_M
 from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_rig
 from tests.support.mat_rigs import rig_of
 from tests.support.mats import BALL_M, MAT, MatPainter, looking_at, of_right
 
@@ -141,25 +149,71 @@ def test_what_stands_on_the_mat_becomes_a_model_in_the_mats_axes() -> None:
     assert mesh.points_m.tobytes() == again.points_m.tobytes()
 
 
-def test_a_pair_without_the_mat_is_lost_with_a_reason_or_laid_against_the_model() -> None:
-    """Before the mat was seen nothing is fused; later the same view without its marks fits the model where it was, and another does not."""
-    hidden = without_marks(walked(0))
+def test_a_pair_without_the_mat_is_lost_with_a_reason_or_followed_by_what_stands_on_it() -> None:
+    """Before the mat was seen nothing is fused. Later the ball alone tells where it is when it hardly moved, not when it was turned half around."""
     scan = Scan(WANTED)
-    first = scan.take("first", 0.0, hidden)
+    first = scan.take("first", 0.0, without_marks(0))
     assert (first.state, first.weakness) == (Tracking.LOST, Weakness.NO_MAT)
     seen = scan.take("seen", 1.0, walked(0))
     assert seen.state is Tracking.TRACKING
     assert seen.mat is not None
-    held = scan.take("held", 2.0, hidden)
+    held = scan.take("held", 2.0, without_marks(3))
     assert (held.state, held.weakness, held.mat) == (Tracking.WEAK, Weakness.NO_MAT, None)
-    assert np.linalg.norm(held.world_camera.t_m - seen.world_camera.t_m) < 0.002
-    far = scan.take("far", 3.0, without_marks(walked(180)))
-    assert far.state is Tracking.LOST
+    truth = (SE3(Rectifier(RIG).rectification.R_left, np.zeros(3)) @ from_side(3)).inverse()
+    assert np.linalg.norm(held.world_camera.t_m - truth.t_m) < 0.003
+    turned = scan.take("turned", 3.0, without_marks(180))
+    assert (turned.state, turned.weakness) == (Tracking.LOST, Weakness.NO_MAT)
     assert scan.fused == 2
 
 
-def without_marks(processed: Processed) -> Processed:
-    """The same pair, its images grey: only the depth remains."""
-    grey: Callable[[Image], Image] = np.zeros_like
-    pair = replace(processed.pair, left=grey(processed.pair.left), right=grey(processed.pair.right))
-    return replace(processed, pair=pair)
+def without_marks(degrees: float) -> Processed:
+    """A pair in which only the ball is more than grey; its depth is whole."""
+    whole = walked(degrees)
+    assert whole.cloud is not None
+    points = true_pose(degrees).inverse().apply(whole.cloud.reshape(-1, 3).astype(float))
+    with np.errstate(invalid="ignore"):
+        is_ball = np.linalg.norm(points - [0, 0, BALL_M], axis=1) < BALL_M + 0.004
+    left = np.where(is_ball.reshape(whole.pair.left.shape), whole.pair.left, np.uint8(128))
+    return replace(whole, pair=replace(whole.pair, left=left, right=np.full_like(whole.pair.right, 128)))
+
+
+def test_the_command_scans_pictures_of_an_object_on_a_mat(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four photographs a quarter turn apart become a model that stands upright; the report tells the squares; a mat that is not there is told."""
+    write_rig(tmp_path / "rig.yaml", RIG, rectify_rig(RIG))
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+    for number, degrees in enumerate((0, 60, 180, 240)):
+        for side, image in zip(("left", "right"), pictures(degrees), strict=True):
+            cv2.imwrite(str(tmp_path / side / f"{number}.png"), image)
+    given = ["scan", *(str(tmp_path / each) for each in ("left", "right")), "--calibration", str(tmp_path / "rig.yaml")]
+    wanted = ["--near", "280mm", "--voxel", "2mm"]
+    assert main([*given, *wanted, "--mat", "--out", str(tmp_path / "ball")]) == 0
+    report = json.loads((tmp_path / "ball" / "report.json").read_text())
+    assert report["in_model"] == 4
+    assert report["model"]["axes"] == Axes.MAT.text
+    assert report["mat"]["to_scale"]
+    assert report["mat"]["measured_m"] == pytest.approx(0.025, rel=0.002)
+    assert report["model"]["extent_m"][2] == pytest.approx(2 * BALL_M, abs=0.006)
+    assert "its squares measure 25.0" in capsys.readouterr().out
+    assert "The mat" in (tmp_path / "ball" / "index.html").read_text()
+    assert main([*given, *wanted, "--mat", "8x6:28mm:20mm:4x4", "--out", str(tmp_path / "none")]) == 4
+    assert "the mat 8x6:28mm:20mm:4x4 is not seen in any of 4 pairs" in capsys.readouterr().err
+
+
+def test_a_mat_that_was_printed_too_small_is_told() -> None:
+    """At 97 % the report says how long the squares are and what to do; to scale it says nothing."""
+    seen = MatSaid((30, 31), 0.03, 0.0001, MatScale(0.97, 0.0002))
+    told = mat_figures(MAT, [seen])
+    assert not told.is_to_scale
+    assert "24.25 mm" in told.remarks[0].problem
+    assert mat_figures(MAT, [replace(seen, scale=MatScale(1.004, 0.0002))]).remarks == ()
+
+
+def test_what_a_mat_told_is_kept_in_submaps() -> None:
+    """A submap that is read again tells the same of the mat, and a scan goes on from it with the next pair."""
+    scan, pairs = scanned([0, 60], WANTED)
+    kept = submap_of(submap_bytes(scan.close_submap()), "kept")
+    assert [pair.mat for pair in kept.pairs] == [pair.mat for pair in pairs]
+    later = Scan(WANTED)
+    later.go_on([kept])
+    assert later.take("next", 2.0, walked(180)).is_fused
