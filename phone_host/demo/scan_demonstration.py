@@ -143,7 +143,7 @@ class ScanDemo:
 
     def finished(self) -> tuple[FinishedScan, ModelErrors]:
         """Make the model, and compare it with the thing. The run has ended."""
-        scan = self.live.finished(self._host.snapshot(), self._matcher.value, Axes.CAMERA)
+        scan = self.live.finished(self._host.snapshot(), self._matcher.value, Axes.MAT)
         errors = model_errors(scan.model.mesh, self._scene.solid)
         return scan, errors
 

@@ -50,9 +50,6 @@ _VIEWS: Final = 36
 
 _LEAST_VIEWS, _MOST_VIEWS = 6, 360
 _STL, _GCODE = "model.stl", "model.gcode"
-_UP: Final = "z"
-"""Of a model on the mat."""
-
 _BED_MM: Final = (220.0, 220.0, 250.0)
 
 _WORST_MM: Final = 1.0
@@ -153,16 +150,16 @@ def _printed(out: Path, console: Console) -> dict[str, Any]:
     Raises:
         OSError: the folder cannot be written to.
     """
-    upright = upright_model(out, None, _UP)
+    upright = upright_model(out, None, None)
     points_m = (upright.points_mm / 1000.0).astype(np.float32)
     solid = Solid(points_m, upright.model.solid.triangles, np.zeros((0, 3), np.uint8))
     write_bytes(out / _STL, mesh_bytes(solid, "stl", None))
     found: dict[str, Any] = {"stl": str(out / _STL), "gcode": None, "seconds": None, "problem": None}
-    wanted = Wanted(SlicingWanted(_BED_MM), up=_UP)
+    wanted = Wanted(SlicingWanted(_BED_MM))
     try:
         with (
             step_bar("slicing", None, console) as watcher,
-            job_of(out, wanted, FileUri(f"file:{out / _GCODE}", out / _GCODE), watcher.say) as job,
+            job_of(out, wanted, FileUri(f"file:{out / _GCODE}", str(out / _GCODE)), watcher.say) as job,
         ):
             write_bytes(out / _GCODE, job.gcode.read_bytes())
     except (UnavailableError, DataError) as error:
