@@ -9,7 +9,7 @@ import pytest
 
 from phone_host.output.ply import read_ply
 from phone_host.scene.object_scene import Setting, object_scene
-from tests.support.programs import host, until
+from tests.support.programs import PATIENCE_S, host, until
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,8 @@ def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, o
     """One demo with few views: its folder, what it said as JSON, and what it told the user."""
     folder = tmp_path_factory.mktemp("scan")
     with host(["demo", "--scan", "--views", "9", "--out", str(folder / "demo"), "--json"], folder) as demo:
-        assert demo.wait() == 0, demo.stderr
+        # Twenty seconds of computing, beside whatever else runs.
+        assert demo.process.wait(4 * PATIENCE_S) == 0, demo.stderr
     assert "Traceback" not in demo.stderr
     return folder / "demo", demo.json(), demo.stderr
 
