@@ -36,7 +36,18 @@ from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.workshop import Workshop
 from phone_host.stereo.core import StereoCore
-from phone_host.web.source import Activity, Answer, Checked, Command, Do, Measured, Newest, PageState, ScanState, Surface
+from phone_host.web.source import (
+    Activity,
+    Answer,
+    Checked,
+    Command,
+    Do,
+    Measured,
+    Newest,
+    PageState,
+    ScanState,
+    Surface,
+)
 
 _END_S: Final = 20.0
 """A run that ends writes its report; a slow card takes seconds for that."""

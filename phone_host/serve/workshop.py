@@ -129,7 +129,9 @@ class Workshop:
             if state is None or state.stage is not PrintStage.ASKS or wanted is None or job is None:
                 raise SettingsError("nothing is ready to be printed", "prepare it first")
             if confirmed != state.asks:
-                raise SettingsError(f"that is not what would be printed: {state.asks}", "look at file and printer again")
+                raise SettingsError(
+                    f"that is not what would be printed: {state.asks}", "look at file and printer again"
+                )
             assert wanted.door is not None
             place = Place(wanted.door, wanted.text, str(job.gcode))
             self._running = RunningPrint(place, job, wanted.journal, self._heard, self._over)
@@ -223,9 +225,7 @@ class Workshop:
         """Take how it has ended; called in its thread."""
         assert self._job is not None
         name = self._job.name
-        if isinstance(outcome, TandemError):
-            words, level = f"{outcome.problem}: {outcome.remedy}", "bad"
-        elif outcome.phase is Phase.FAILED:
+        if isinstance(outcome, TandemError) or outcome.phase is Phase.FAILED:
             words, level = f"{outcome.problem}: {outcome.remedy}", "bad"
         elif outcome.phase is Phase.CANCELLED:
             words, level = f"{name}: cancelled; heaters are off", "warning"

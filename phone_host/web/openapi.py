@@ -4,7 +4,7 @@ from typing import Final
 
 from common.versions import PACKAGE_VERSION
 from phone_host.output.pair_files import RUN_FILES
-from phone_host.web.saved_pairs import SCAN_FILES
+from phone_host.web.saved_pairs import SAVED_MODEL, SCAN_FILES
 from phone_host.web.source import Activity, Do, PrintStage, StepName
 from phone_host.web.wishes import MOST_NUMBER, MOST_POINTS, MOST_PX, MOST_TEXT, MOST_VALUES
 
@@ -202,7 +202,12 @@ def _surface() -> _Json:
 
 def _scanned() -> _Json:
     described = _get("A file of the last scan", _bytes("application/octet-stream"), 404, 503)
-    file = {"name": "file", "in": "path", "required": True, "schema": {"enum": list(SCAN_FILES)}}
+    file = {
+        "name": "file",
+        "in": "path",
+        "required": True,
+        "schema": {"anyOf": [{"enum": list(SCAN_FILES)}, {"type": "string", "pattern": f"^{SAVED_MODEL}$"}]},
+    }
     return described | {"parameters": [file]}
 
 
