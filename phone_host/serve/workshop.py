@@ -11,7 +11,7 @@ from pathlib import Path
 from threading import Lock, Thread
 from typing import Final
 
-from common.errors import DataError, SettingsError, TandemError, UnavailableError
+from common.errors import SettingsError, TandemError, UnavailableError
 from common.words import counted
 from phone_host.output.meshes.formats import FORMATS
 from phone_host.output.meshes.printable import Printer
@@ -59,12 +59,12 @@ class Workshop:
 
         Raises:
             SettingsError: there is no scan.
-            DataError: it cannot be printed; the words say all that is wrong.
+            DataError: its model cannot be read.
         """
         found = check_model(_some(folder), Printer(bed_mm=wanted.how.slicing.bed_mm))
         blocking = [problem for problem in found if problem.blocks]
         if blocking:
-            raise DataError("; ".join(problem.sentence for problem in blocking), blocking[0].remedy)
+            return f"it cannot be printed: {'; '.join(problem.sentence for problem in blocking)}: {blocking[0].remedy}"
         notes = "; ".join(f"{problem.sentence}: {problem.remedy}" for problem in found)
         return f"it can be printed, but: {notes}" if notes else "it can be printed"
 
