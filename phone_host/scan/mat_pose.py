@@ -214,7 +214,7 @@ def _fitted(start: SE3, seen: _Seen, camera: _Pair, known: MatScale) -> _Fit:
     lengths = np.linalg.norm(errors.reshape(-1, 2), axis=1) / _SIGMA_PX
     cost = float(np.log1p((lengths / _ROBUST_SIGMAS) ** 2).sum())
     covariance = np.asarray(np.linalg.inv(matrix) * noise, np.float64)
-    return _Fit(pose, scale, covariance, cost, float(np.sqrt(squares)))
+    return _Fit(pose, float(scale), covariance, cost, float(np.sqrt(squares)))
 
 
 def _linearised(pose: SE3, scale: float, seen: _Seen, camera: _Pair) -> tuple[Floats, Floats]:
