@@ -121,6 +121,8 @@ def _scanned(
         picture = ScanPicture(demo.live, console) if console.is_terminal else None
         with picture or nullcontext():
             demo.run(lambda: signals.stop, picture.refresh if picture else None)
+    if signals.stop and not demo.live.counts[1]:
+        return None
     with busy_bar("making the surface, comparing it with the thing", console):
         scan, errors = demo.finished()
     demo.live.kept.done()
