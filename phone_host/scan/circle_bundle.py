@@ -27,6 +27,9 @@ _CONVERGED: Final = 1e-5
 _AXIS_PARAMETERS: Final = 4
 """Two of the direction, two of the point."""
 
+_UNSEEN: Final = 1e-3
+"""1/m^2 of every point, so that one that no view sees stays where it is; a view gives 1e6."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
@@ -117,7 +120,7 @@ class _Problem:
         views, count = len(self.seen), len(state.points_m)
         size = views + _AXIS_PARAMETERS
         shared, right, coupling = np.zeros((size, size)), np.zeros(size), np.zeros((count, size, 3))
-        blocks, blocks_right = np.zeros((count, 3, 3)), np.zeros((count, 3))
+        blocks, blocks_right = np.tile(_UNSEEN * np.eye(3), (count, 1, 1)), np.zeros((count, 3))
         observer, axis_at = self.observer, np.arange(views, size)
         for view, seen in enumerate(self.seen):
             pose = state.axis.camera_world(float(state.angles[view]))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Image, StereoGeometry
-from phone_host.scan.circle_bundle import Circle, Seen
+from phone_host.scan.circle_bundle import Seen
 from phone_host.scan.corners import new_corners
 from phone_host.scan.observation import Observer
 from phone_host.scan.turn_axis import TurnAxis
@@ -125,8 +125,8 @@ def _neighbours(angles: Floats, here: int, *, across_turns: bool) -> list[int]:
 
 
 def _corners(view: View) -> NDArray[np.float32]:
-    inside = np.isfinite(view.depth_m).astype(np.uint8)
-    inside = cv2.erode(inside, np.ones((2 * _BORDER_PX + 1, 2 * _BORDER_PX + 1), np.uint8), borderValue=0)
+    known = np.isfinite(view.depth_m).astype(np.uint8)
+    inside = cv2.erode(known, np.ones((2 * _BORDER_PX + 1, 2 * _BORDER_PX + 1), np.uint8), borderValue=0)
     return new_corners(view.grey, np.zeros((0, 2), np.float32), _CORNERS, _APART_PX, inside > 0)
 
 

@@ -35,6 +35,9 @@ _LEAST_SEEN: Final = 3
 _LEAST_CLOSING: Final = 40
 """Sightings of points of one turn in views of another, that close it."""
 
+_LEAST_SIGHTINGS: Final = 20
+"""Of points where they should be, for a view that tracking has lost."""
+
 _CLOSING_VIEWS: Final = 5
 _BESIDE: Final = 2
 _CLOSED_VOXELS: Final = 3.0
@@ -67,47 +70,56 @@ class FullTurn:
         return float(np.ptp(self.angles[self.used])) if self.used.any() else 0.0
 
 
-def full_turn(
-    views: Sequence[View], world_cameras: Sequence[SE3], settings: VolumeSettings, threads: int
-) -> FullTurn | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class TurnView:
+    """A view of a thing that turns.
+
+    Attributes:
+        view: of the thing alone: what does not belong to it has no depth.
+        world_camera: where it was taken in the thing's axes, as tracking has it.
+        is_sure: whether tracking believes that; if not, the fit decides.
+    """
+
+    view: View
+    world_camera: SE3
+    is_sure: bool
+
+
+def full_turn(given: Sequence[TurnView], settings: VolumeSettings, threads: int) -> FullTurn | None:
     """Fit a turn.
 
     Args:
-        views: of the thing alone: what does not belong to it has no depth; in the order in which they were taken.
-        world_cameras: where each was taken in the thing's axes, as tracking has it.
+        given: views in the order in which they were taken.
         settings: of the model.
         threads: that compute; results do not depend on them.
 
     Returns:
         The turn; None: too few views agree on an axis.
     """
-    cameras_world = [pose.inverse() for pose in world_cameras]
+    cameras_world = [each.world_camera.inverse() for each in given]
+    sure = [pose for pose, each in zip(cameras_world, given, strict=True) if each.is_sure]
     axis = axis_of(
-        [
-            after @ before.inverse()
-            for span in _SPANS
-            for before, after in zip(cameras_world, cameras_world[span:], strict=False)
-        ]
+        [after @ before.inverse() for span in _SPANS for before, after in zip(sure, sure[span:], strict=False)]
     )
     if axis is None:
         return None
     used = _leans_little(cameras_world, axis)
     if np.count_nonzero(used) < LEAST_VIEWS:
         return None
-    chosen = [view for view, fits in zip(views, used, strict=True) if fits]
+    chosen = [each.view for each, fits in zip(given, used, strict=True) if fits]
     start = unwrapped([axis.angle_of(pose) for pose, fits in zip(cameras_world, used, strict=True) if fits])
     shift = start[0]
-    axis, angles, closing = _fitted(chosen, axis, start - shift)
+    fit = _fitted(chosen, axis, start - shift)
     closed_m = float("nan")
-    if closing:
-        closed_m = _closed_m(chosen, axis, angles, settings, threads)
+    if fit.is_closed:
+        closed_m = _closed_m(chosen, fit.axis, fit.angles, settings, threads)
         if not closed_m <= _CLOSED_VOXELS * settings.voxel_m:
-            axis, angles, closing = *_fitted(chosen, axis, start - shift, may_close=False)[:2], False
-            closed_m = float("nan")
-    every = np.full(len(views), np.nan)
-    every[used] = angles
-    gap = float(np.ptp(start) - np.ptp(angles)) if closing else float("nan")
-    return FullTurn(axis=axis, angles=every, used=used, is_closed=closing, gap=gap, closed_m=closed_m)
+            fit, closed_m = _fitted(chosen, axis, start - shift, may_close=False), float("nan")
+    every = np.full(len(given), np.nan)
+    every[used] = fit.angles
+    used[used] = (fit.sightings >= _LEAST_SIGHTINGS) | np.array([each.is_sure for each in given])[used]
+    gap = float(np.ptp(start) - np.ptp(fit.angles)) if fit.is_closed else float("nan")
+    return FullTurn(axis=fit.axis, angles=every, used=used, is_closed=fit.is_closed, gap=gap, closed_m=closed_m)
 
 
 def _leans_little(cameras_world: Sequence[SE3], axis: TurnAxis) -> Flags:
@@ -119,12 +131,20 @@ def _leans_little(cameras_world: Sequence[SE3], axis: TurnAxis) -> Flags:
     return used
 
 
-def _fitted(
-    views: Sequence[View], axis: TurnAxis, angles: Floats, *, may_close: bool = True
-) -> tuple[TurnAxis, Floats, bool]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """A fit: axis, (N,) angles, whether the turn was closed, and (N,) how many points each view sees where they should be."""
+
+    axis: TurnAxis
+    angles: Floats
+    is_closed: bool
+    sightings: NDArray[np.int64]
+
+
+def _fitted(views: Sequence[View], axis: TurnAxis, angles: Floats, *, may_close: bool = True) -> _Fit:
     """Fit twice, the second time with corners that are looked for where the first says; tell whether the turn was closed."""
     observer = Observer(views[0].geometry, views[0].noise_px)
-    closing = False
+    closing, sightings = False, np.zeros(len(views), np.int64)
     for _ in range(2):
         tracks = tracks_of(views, axis, angles, across_turns=may_close)
         if not len(tracks.points_m):
@@ -136,7 +156,8 @@ def _fitted(
         if len(circle.points_m):
             circle = fitted_circle(circle, seen, observer)
         axis, angles = circle.axis, circle.angles
-    return axis, angles, closing
+        sightings = np.array([len(each.points) for each in seen])
+    return _Fit(axis, angles, closing, sightings)
 
 
 def _without_outliers(circle: Circle, seen: Sequence[Seen], observer: Observer) -> tuple[Circle, list[Seen]]:
@@ -150,9 +171,7 @@ def _without_outliers(circle: Circle, seen: Sequence[Seen], observer: Observer) 
     return replace(circle, points_m=circle.points_m[kept]), left
 
 
-def _closed_m(
-    views: Sequence[View], axis: TurnAxis, angles: Floats, settings: VolumeSettings, threads: int
-) -> float:
+def _closed_m(views: Sequence[View], axis: TurnAxis, angles: Floats, settings: VolumeSettings, threads: int) -> float:
     """Lay depths of the end against those of the beginning; return how far they have to be moved, m, at the thing's middle.
 
     Infinite: they do not lie on each other at all.

@@ -37,7 +37,7 @@ def up_of(axis: TurnAxis) -> Floats | None:
     """Return the direction of the axis (3,) that points upwards in the picture; None: it points towards the camera or aside."""
     if abs(axis.direction[1]) < _LEAST_UPRIGHT:
         return None
-    return -axis.direction * np.sign(axis.direction[1])
+    return axis.direction if axis.direction[1] < 0 else -axis.direction
 
 
 def table_height_m(still_m: Floats, thing_m: Floats, axis: TurnAxis, voxel_m: float) -> float:

@@ -1,6 +1,7 @@
 """What the tracker says of a view, and what helps. Pure."""
 
 from enum import Enum
+from typing import Final
 
 
 class Tracking(Enum):
@@ -44,3 +45,7 @@ class Weakness(Enum):
             Weakness.ALL_TURNS: "the background moves, too: the cameras must stand still, or leave --turntable out",
             Weakness.OUTSIDE: "what turns reaches out of the picture: move the cameras back, or the object to the middle",
         }[self]
+
+
+OF_TURNING: Final = (Weakness.NOTHING_TURNS, Weakness.ALL_TURNS, Weakness.OUTSIDE)
+"""Why a pair is of no use where an object is to turn before cameras that stand still."""

@@ -73,6 +73,7 @@ def axis_of(motions: Sequence[SE3]) -> TurnAxis | None:
         return None
     vectors, shifts, turns, angles = vectors[far], shifts[far], turns[far], angles[far]
     weights = np.ones(len(angles))
+    direction, point = np.zeros(3), np.zeros(3)
     for _ in range(_ROUNDS):
         _, directions = np.linalg.eigh((vectors * weights[:, np.newaxis]).T @ vectors)
         direction = directions[:, 2]

@@ -56,9 +56,9 @@ class Background:
         # A mean, because medians of so many NaN are slow; what shows the background by chance is cut by `same`.
         count = known.sum(axis=0)
         total = np.where(known, depths, np.float32(0)).sum(axis=0)
-        self.depth_m = np.where(
-            self._known & (count > 0), total / np.maximum(count, 1), np.float32(np.nan)
-        ).astype(np.float32)
+        self.depth_m = np.where(self._known & (count > 0), total / np.maximum(count, 1), np.float32(np.nan)).astype(
+            np.float32
+        )
 
     def is_seen(self, grey: Image, depth_m: Depth) -> Flags:
         """Return (H, W): which pixels of a view show the background."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Processed
 from phone_host.scan.fineness import fineness_for
-from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, full_turn
+from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted, require_size, view_of
 from phone_host.scan.table_cut import above, points_of, table_height_m
 from phone_host.scan.tracker import PoseGate, Tracker
@@ -43,12 +43,13 @@ _WORDS: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Station:
-    """A view that is kept: the pair's number, the view with the depths of the background, the thing's pixels, and where tracking puts the camera."""
+    """A view that is kept: the pair's number, the view with the depths of the background, the thing's pixels, where tracking puts the camera, and how surely."""
 
     pair: int
     view: View
     mask: NDArray[np.bool_]
     world_camera: SE3
+    is_sure: bool
 
     @property
     def thing(self) -> View:
@@ -65,6 +66,15 @@ class _Finished:
     volume: Volume | None
 
 
+def scan_for(wanted: ScanWanted) -> Scan:
+    """Return what takes the pairs of a scan: of cameras that move, or of an object that turns.
+
+    Args:
+        wanted: what for.
+    """
+    return TurntableScan(wanted) if wanted.turntable else Scan(wanted)
+
+
 class TurntableScan(Scan):
     """Takes pairs of a thing that turns and grows a model of it.
 
@@ -76,6 +86,7 @@ class TurntableScan(Scan):
         super().__init__(wanted)
         self._mask = TurningMask()
         self._waiting: tuple[int, View] | None = None
+        self._last: ScannedPair | None = None
         self._window: tuple[slice, slice] | None = None
         self._stations: list[_Station] = []
         self._least_turn = _LEAST_TURN
@@ -128,6 +139,8 @@ class TurntableScan(Scan):
             self._take_waiting()
         if density < PoseGate().least_depths:
             pair = _lost(name, stamp_s, density, Weakness.NO_DEPTH)
+        elif found.turning is Turning.NOTHING and self._last is not None:
+            pair = replace(self._last, name=name, stamp_s=stamp_s, density=density)  # it pauses, or turns slowly
         elif found.turning is not Turning.THING:
             if not self._stations:
                 self._waiting = len(self._pairs), view
@@ -135,6 +148,8 @@ class TurntableScan(Scan):
         else:
             pair = self._tracked(len(self._pairs), view, found.mask, (name, stamp_s, density))
         self._pairs.append(pair)
+        if pair.is_fused:
+            self._last = pair
         return pair
 
     def final(self, pair: ScannedPair) -> ScannedPair:
@@ -167,8 +182,8 @@ class TurntableScan(Scan):
         # The axis tells what a small or round thing does not.
         weakness = Weakness.NONE if told.weakness is Weakness.FLAT else told.weakness
         state = Tracking.TRACKING if told.state is Tracking.WEAK and weakness is Weakness.NONE else told.state
-        if told.is_fused:
-            self._keep(_Station(number, cropped, own, told.world_camera))
+        if told.is_fused or told.moved.is_known:
+            self._keep(_Station(number, cropped, own, told.world_camera, told.is_fused))
         name, stamp_s, density = told_of
         return ScannedPair(
             name=name,
@@ -220,7 +235,10 @@ class TurntableScan(Scan):
             _masked(each.view, each.mask & ~background.is_seen(each.view.grey, each.view.depth_m))
             for each in self._stations
         ]
-        turn = full_turn(things, [each.world_camera for each in self._stations], settings, self._wanted.threads)
+        given = [
+            TurnView(thing, each.world_camera, each.is_sure) for thing, each in zip(things, self._stations, strict=True)
+        ]
+        turn = full_turn(given, settings, self._wanted.threads)
         if turn is None:
             return _Finished(taken, None, None)
         volume = Volume(settings, self._wanted.threads)
@@ -231,7 +249,10 @@ class TurntableScan(Scan):
             if is_used:
                 pose = turn.axis.camera_world(float(angle)).inverse()
                 volume.fuse(above(thing, turn.axis, height_m, settings.voxel_m), pose)
-                self._pairs[station.pair] = replace(self._pairs[station.pair], world_camera=pose)
+                pair = replace(self._pairs[station.pair], world_camera=pose)
+                if not station.is_sure:  # the others have shown where it belongs
+                    pair = replace(pair, state=Tracking.RELOCALISED, weakness=Weakness.NONE)
+                self._pairs[station.pair] = pair
         return _Finished(taken, turn, volume)
 
 

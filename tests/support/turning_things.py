@@ -1,18 +1,19 @@
 """A speckled thing that turns before a rig that stands still, on a table that does not turn; and how far points lie off its surface."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.ledger import StageTimes
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.model import Image, RectifiedPair, StereoGeometry
+from phone_host.model import Image, Processed, RectifiedPair, StereoGeometry
 from phone_host.scan.view import View
 from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK
-from phone_host.scene.scene_model import Body, Box, Plane, RectifiedView, Scene, Sphere, Texture
+from phone_host.scene.scene_model import Body, Box, Look, Plane, RectifiedView, Scene, Sphere, Texture
 from phone_host.scene.scene_render import render
 from phone_host.scene.truth import rectified_cameras, truth
 from phone_host.stereo.match import MatchSettings, create_matcher
@@ -31,9 +32,15 @@ _ACROSS: Final = np.array([1.0, 0.0, 0.0])
 AXES: Final = np.column_stack([_ACROSS, np.cross(UP, _ACROSS), UP])
 """(3, 3) takes the thing's axes, z up, to the camera's at the beginning."""
 
-_SPECKLES: Final = Texture(seed=3, light_bgr=(0.75, 0.8, 0.85), dark_bgr=(0.1, 0.15, 0.3), contrast=0.9, shortest_m=0.003, longest_m=0.024)
-_BLUE: Final = Texture(seed=4, light_bgr=(0.9, 0.7, 0.4), dark_bgr=(0.3, 0.15, 0.05), contrast=0.9, shortest_m=0.003, longest_m=0.024)
-_RED: Final = Texture(seed=5, light_bgr=(0.4, 0.5, 0.9), dark_bgr=(0.05, 0.08, 0.35), contrast=0.9, shortest_m=0.003, longest_m=0.024)
+_SPECKLES: Final = Texture(
+    seed=3, light_bgr=(0.75, 0.8, 0.85), dark_bgr=(0.1, 0.15, 0.3), contrast=0.9, shortest_m=0.003, longest_m=0.024
+)
+_BLUE: Final = Texture(
+    seed=4, light_bgr=(0.9, 0.7, 0.4), dark_bgr=(0.3, 0.15, 0.05), contrast=0.9, shortest_m=0.003, longest_m=0.024
+)
+_RED: Final = Texture(
+    seed=5, light_bgr=(0.4, 0.5, 0.9), dark_bgr=(0.05, 0.08, 0.35), contrast=0.9, shortest_m=0.003, longest_m=0.024
+)
 _WOOD: Final = Texture(seed=12, light_bgr=(0.24, 0.42, 0.64), dark_bgr=(0.12, 0.24, 0.42), longest_m=0.13)
 _WALL: Final = Texture(seed=11, light_bgr=(0.58, 0.62, 0.63), dark_bgr=(0.50, 0.53, 0.51), shortest_m=0.008)
 
@@ -118,11 +125,15 @@ def photographed(scene: Scene, size: Size, seed: int) -> RectifiedPair:
 
 def matched_view(pair: RectifiedPair, size: Size, disparities: int) -> View:
     """Match a pair with `tandem`."""
-    grey = RectifiedPair(*(np.asarray(cv2.cvtColor(each, cv2.COLOR_BGR2GRAY), np.uint8) for each in (pair.left, pair.right)))
+    grey = RectifiedPair(
+        *(np.asarray(cv2.cvtColor(each, cv2.COLOR_BGR2GRAY), np.uint8) for each in (pair.left, pair.right))
+    )
     disparity = create_matcher(MatchSettings(MatcherName.TANDEM, disparities)).match(grey)
     product = np.float32(size.focal_px * size.baseline_m)
     depth = product / np.where(disparity > 0, disparity, np.float32(np.nan))
-    return View(grey=grey.left, colours=pair.left, depth_m=depth.astype(np.float32), geometry=size.view.geometry, noise_px=0.5)
+    return View(
+        grey=grey.left, colours=pair.left, depth_m=depth.astype(np.float32), geometry=size.view.geometry, noise_px=0.5
+    )
 
 
 def exact_view(scene: Scene, size: Size, seed: int = 0) -> View:
@@ -134,8 +145,7 @@ def exact_view(scene: Scene, size: Size, seed: int = 0) -> View:
     return View(grey=grey, colours=colours, depth_m=depth, geometry=size.view.geometry, noise_px=0.25, patch_px=5)
 
 
-def _seeded(look: object, seed: int):
-    from dataclasses import replace
+def _seeded(look: Look, seed: int) -> Look:
     return replace(look, seed=10 * seed + look.seed, vignetting=0.0)
 
 
@@ -143,3 +153,12 @@ def _through_jpeg(image: Image) -> Image:
     ok, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 92])
     assert ok
     return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.uint8)
+
+
+def processed_of(view: View) -> Processed:
+    """A view as the stereo core gives it."""
+    cloud = np.full((*view.depth_m.shape, 3), np.nan, np.float32)
+    cloud[..., 2] = view.depth_m
+    of = view.geometry
+    disparity = np.float32(of.focal_px * of.baseline_m) / view.depth_m
+    return Processed(RectifiedPair(view.colours, view.colours), disparity, cloud, StageTimes(), geometry=of)
