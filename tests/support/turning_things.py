@@ -125,9 +125,8 @@ def photographed(scene: Scene, size: Size, seed: int) -> RectifiedPair:
 
 def matched_view(pair: RectifiedPair, size: Size, disparities: int) -> View:
     """Match a pair with `tandem`."""
-    grey = RectifiedPair(
-        *(np.asarray(cv2.cvtColor(each, cv2.COLOR_BGR2GRAY), np.uint8) for each in (pair.left, pair.right))
-    )
+    left, right = (np.asarray(cv2.cvtColor(each, cv2.COLOR_BGR2GRAY), np.uint8) for each in (pair.left, pair.right))
+    grey = RectifiedPair(left, right)
     disparity = create_matcher(MatchSettings(MatcherName.TANDEM, disparities)).match(grey)
     product = np.float32(size.focal_px * size.baseline_m)
     depth = product / np.where(disparity > 0, disparity, np.float32(np.nan))
