@@ -6,7 +6,6 @@ The state machines (`board_session`, `host_session`) are sans-I/O: messages and 
 the sockets and clocks. They send each `Outgoing` unchanged, except that `wire.encode_stamped` sets its send time at the last moment.
 """
 
-from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
@@ -44,7 +43,7 @@ class Outgoing:
     message: Message
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Accepted:
     """Host: from now on the board sends its frames over this link.
 
@@ -57,7 +56,7 @@ class Accepted:
     link: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class LinkUp:
     """Host: our board answers on this link, which may now carry frames."""
 
@@ -65,7 +64,7 @@ class LinkUp:
     hello: BoardHello
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class LinkDown:
     """Host: this link is lost or, if `stuck`, leaves a hello for frames unanswered. The session keeps greeting it."""
 
@@ -73,7 +72,7 @@ class LinkDown:
     stuck: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class OtherBoard:
     """Host: this link leads to a different board from the one we talk to. Nothing from it is used."""
 
@@ -103,7 +102,7 @@ class StaleReason(Enum):
     BEYOND_CREDIT = 3
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Stale:
     """Host: a frame that must not be used."""
 
@@ -123,7 +122,7 @@ class Echo:
     link: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Counted:
     """Host: the board's account of the running session.
 
@@ -136,21 +135,21 @@ class Counted:
     last: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Stepped:
     """Host: the board's camera delivers something else from now on."""
 
     rung: Rung
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class LocksTold:
     """Host: the board says how its camera is held."""
 
     state: LockState
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Refused:
     """Host: the board at the other end of a link refuses to talk to us."""
 
@@ -158,19 +157,19 @@ class Refused:
     link: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Unbelievable:
     """Host: the board says something that cannot be true. None of it was used."""
 
     problem: str
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class ClockVoid:
     """Host: the board had forgotten us. One of the two clocks may have stood still, so nothing learnt about them so far may be used."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Vanished:
     """Host: the board fell silent or said goodbye. The fate of frames still under way in that session is unknown."""
 
