@@ -5,12 +5,12 @@ differences on the board's own clock. So the delays add up to end-to-end to the 
 """
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 from common.value import value
 
 
-@value(kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StageTimes:
     """How long each stage of processing took, ns, in the order in which they run. Their sum is at most the processing delay."""
 

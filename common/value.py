@@ -34,7 +34,7 @@ def _values(item: Any) -> tuple[object, ...]:  # noqa: ANN401 - any of these cla
     return tuple(getattr(item, one.name) for one in fields(item) if one.compare)
 
 
-def _equal(item: object, other: object) -> bool:
+def _equal(item: object, other: object) -> object:
     if other.__class__ is not item.__class__:
         return NotImplemented
     return _values(item) == _values(other)
