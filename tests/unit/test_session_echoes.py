@@ -30,7 +30,7 @@ from common.protocol.session import (
     Stepped,
     connection_name,
 )
-from common.protocol.waves import SLOW_ECHO_NS, WAVE_ECHOES_EARLY, YOUNG_NS
+from common.protocol.waves import OLD_NS, SLOW_ECHO_NS, WAVE_ECHOES_EARLY, YOUNG_NS
 from common.protocol.wire import decode, encode_stamped
 from tests.support.session_world import CAMERA, World, frame
 
@@ -78,14 +78,14 @@ def test_send_times_are_set_at_the_last_moment(then_ns: int, now_ns: int) -> Non
     assert stamped(Credit(9), now_ns) == Credit(9)
 
 
-@pytest.mark.parametrize(("round_trip_ns", "echoes"), [(MS // 2, 3), (2 * MS, 8)])
-def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, echoes: int) -> None:
-    """In a young session a wave has eight echoes on a link with slow echoes and three on a fast one; in an old session always three."""
+@pytest.mark.parametrize(("round_trip_ns", "young", "old"), [(MS // 2, 3, 2), (2 * MS, 8, 3)])
+def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, young: int, old: int) -> None:
+    """In a young session a wave has eight echoes on a link with slow echoes and three on a fast one; then always three; after the first minute two on a fast one."""
     world = World()
     world.settle(1500 * MS)
     host = world.hosts[0]
     control = host.names[0, Lane.CONTROL]
-    for begin_ns, expected in ((world.now_ns, echoes), (world.now_ns + YOUNG_NS, 3)):
+    for begin_ns, expected in ((world.now_ns, young), (world.now_ns + YOUNG_NS, 3), (world.now_ns + OLD_NS, old)):
         now_ns, heard = begin_ns, 0
         outputs: list[Output] = []
         while not outputs:
@@ -96,6 +96,35 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, e
             t0_ns, now_ns, heard = now_ns, now_ns + round_trip_ns, heard + 1
             outputs = host.session.receive(control, Pong(wave=pings[0].wave, t0_ns=t0_ns, t1_ns=1, t2_ns=2), now_ns)
         assert heard == expected
+
+
+def test_a_grant_is_repeated_only_once_frames_stay_away() -> None:
+    """While frames come, a wave of echoes repeats no credit. Once they stay away, each one does: the grant may have been lost."""
+    world = World()
+    world.settle(1500 * MS)
+    host, board = world.hosts[0], world.board
+    names, now_ns, index = host.names, world.now_ns, board.next_index
+
+    def wave() -> list[Message]:
+        """Let time pass until a wave begins, and answer nothing; return what was sent with it."""
+        nonlocal now_ns, index
+        while True:
+            now_ns += 20 * MS
+            host.session.receive(names[0, Lane.CONTROL], Status("", BoardCounts(), Rung()), now_ns)  # a sign of life
+            if flows:
+                host.session.grant(1)
+                host.session.receive(names[0, Lane.FRAMES], frame(board.session, index), now_ns)
+                index += 1
+            sent = [output.message for output in host.session.tick(now_ns) if isinstance(output, Outgoing)]
+            if any(isinstance(message, Ping) for message in sent):
+                return sent
+
+    flows = True
+    assert [type(message) for _ in range(3) for message in wave()] == [Ping] * 3
+    flows = False
+    wave()
+    host.session.grant(1)
+    assert wave()[1:] == [Credit(index + 1)]
 
 
 def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
