@@ -31,7 +31,7 @@ from common.protocol.message import (
     RefusalReason,
     Rung,
 )
-from common.protocol.session import Outgoing
+from common.protocol.terms import Outgoing
 from common.protocol.wire import VersionError, decode, encode, encode_for_any_version, encode_frame, encode_stamped
 from common.value import value
 from common.versions import other_protocol

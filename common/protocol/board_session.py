@@ -33,7 +33,7 @@ from common.protocol.message import (
     Status,
     Steer,
 )
-from common.protocol.session import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
+from common.protocol.terms import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
 
 _NEVER = 2**63 - 1
 

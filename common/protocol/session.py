@@ -1,46 +1,50 @@
-"""What both roles of a session share: their outputs, and the times after which they act.
-
-A session may use several links at once. Each connection's name begins with the number of its link, so names are unique across links.
+"""What the host's role of a session tells its shell; with the terms of both roles (`terms`), which are importable from here, too.
 
 The state machines (`board_session`, `host_session`) are sans-I/O: messages and `now_ns` go in, a list of outputs comes out. Shells own
 the sockets and clocks. They send each `Outgoing` unchanged, except that `wire.encode_stamped` sets its send time at the last moment.
 """
 
 from enum import Enum
-from typing import Final
 
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, LockState, Message, RefusalReason, Rung
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, LockState, RefusalReason, Rung
+from common.protocol.terms import (
+    HELLO_RETRY_NS,
+    MS,
+    SILENCE_NS,
+    STATUS_NS,
+    STATUS_SLOW_NS,
+    TAKEOVER_NS,
+    Outgoing,
+    connection_name,
+)
 from common.value import value
 
-MS: Final = 1_000_000
-
-HELLO_RETRY_NS: Final = 200 * MS
-"""Time between two attempts to be heard. A peer that appears is met within this time."""
-
-TAKEOVER_NS: Final = 1000 * MS
-"""After this much silence from its host, a board accepts another host. This is two missed clock waves."""
-
-SILENCE_NS: Final = 3000 * MS
-"""After this much silence a peer is considered gone. No stall seen on Wi-Fi or on a swapping phone lasted longer."""
-
-STATUS_NS: Final = 500 * MS
-"""Time between two accounts of the board's frames."""
-
-STATUS_SLOW_NS: Final = 1000 * MS
-"""The same where frames are further apart than this: one account a second takes 0.5 % of a 115200 baud line."""
-
-
-@value()
-class Outgoing:
-    """Send this message on that connection.
-
-    Attributes:
-        connection: the link's own name for a byte path; opaque here.
-        message: what to send.
-    """
-
-    connection: bytes
-    message: Message
+__all__ = [
+    "HELLO_RETRY_NS",
+    "MS",
+    "SILENCE_NS",
+    "STATUS_NS",
+    "STATUS_SLOW_NS",
+    "TAKEOVER_NS",
+    "Accepted",
+    "Arrived",
+    "ClockVoid",
+    "Counted",
+    "Echo",
+    "LinkDown",
+    "LinkUp",
+    "LocksTold",
+    "OtherBoard",
+    "Outgoing",
+    "Output",
+    "Refused",
+    "Stale",
+    "StaleReason",
+    "Stepped",
+    "Unbelievable",
+    "Vanished",
+    "connection_name",
+]
 
 
 @value(kw_only=True)
@@ -193,13 +197,3 @@ Output = (
     | ClockVoid
     | Vanished
 )
-
-
-def connection_name(link: int, path: bytes) -> bytes:
-    """Make a connection's name unique over all links.
-
-    Args:
-        link: number of the link, below 256.
-        path: the link's own name for the connection.
-    """
-    return bytes((link,)) + path

@@ -93,6 +93,7 @@ class Reception:
         self.due_ns = 0
         self._has_news = True
         self._is_choosing = len(links) > 1
+        self._is_paced = any(link.self_paced for link in links)
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self._border = Border(self.account, sink.void)
@@ -238,16 +239,23 @@ class Reception:
             _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
 
     def _grant(self, now_ns: int) -> None:
-        carrier, hello = self._session.carrier, self._hello
-        if carrier is None or hello is None or not self._border.takes_frames:
-            return  # without a clock, frames could not be paired
-        if (room := self._sink.room()) is not None:
-            self._handle(self._session.grant(room), now_ns)
+        if self._hello is None:
             return
-        round_trip_ns = (self._border.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
-        frames = self._flow.credit(self._session.outstanding, hello.camera.period_ns, round_trip_ns)
-        if frames:
+        if (frames := self._sink.room()) is None:
+            outstanding, round_trip_ns = (
+                self._session.outstanding,
+                self._paced_round_trip_ns() if self._is_paced else None,
+            )
+            frames = self._flow.credit(outstanding, self._hello.camera.period_ns, round_trip_ns)
+        if frames and self._border.takes_frames:  # without a clock, frames could not be paired
             self._handle(self._session.grant(frames), now_ns)
+
+    def _paced_round_trip_ns(self) -> int | None:
+        """Round trip of the carrier if it paces itself, ns; 0 before its first echo."""
+        carrier = self._session.carrier
+        if carrier is None or not self._links[carrier].self_paced:
+            return None
+        return self._border.round_trip_ns(carrier) or 0
 
     def _handle(self, outputs: list[Output], now_ns: int) -> None:  # noqa: C901 - one line for each kind of output
         for output in outputs:
