@@ -61,9 +61,6 @@ from common.protocol.session import (
 _FOREIGN_RETRY_NS: Final = 5000 * MS
 """Retry time for a link that leads to another board, or refuses us while another link is open: someone may move the cable."""
 
-_MISSED_NS: Final = 250 * MS
-"""While frames come more often than this, no grant was lost, so none is repeated: each wakes the board."""
-
 _TOO_MANY: Final = Unbelievable("an account of more frames than were allowed")
 
 
@@ -176,7 +173,7 @@ class HostSession:
             return taken
         if path.hello is None:
             path.lived(now_ns)
-        path.heard_ns = stream.came_ns = now_ns
+        path.heard_ns = now_ns
         return taken
 
     def tick(self, now_ns: int) -> list[Output]:
@@ -360,12 +357,9 @@ class HostSession:
         echoes, ping = path.waves.begin_wave(now_ns, standby=path is not carrier)
         if ping is None:
             return []
-        outputs: list[Output] = [*echoes, Outgoing(control, ping)]
-        stream = self._stream if path is carrier else None
-        if stream is not None and stream.below_index and now_ns - stream.came_ns >= _MISSED_NS:
-            # Credit is granted up to an index. Repeating it is harmless, and replaces a grant that a broken connection swallowed.
-            outputs.append(Outgoing(control, Credit(stream.below_index)))
-        return outputs
+        # Credit is granted up to an index. Repeating it is harmless, and replaces a grant that a broken connection swallowed.
+        below_index = 0 if path is not carrier or self._stream is None else self._stream.below_index
+        return [*echoes, Outgoing(control, ping), *([Outgoing(control, Credit(below_index))] if below_index else [])]
 
     def _attend(  # noqa: PLR0911 - one line for each kind of message
         self, path: HostPath, connection: bytes, message: Pong | Status | End | LockState, now_ns: int

@@ -22,7 +22,6 @@ class Stream:
         below_index: credit granted since frames were last accepted, as the index below which the board may send.
         granted_index: the same over the whole life. No honest frame has this index or a higher one.
         missing: frames recently given up as lost.
-        came_ns: when the newest one came, host's clock, ns.
     """
 
     hello: BoardHello
@@ -31,7 +30,6 @@ class Stream:
     below_index: int = 0
     granted_index: int = 0
     missing: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_MISSING))
-    came_ns: int = 0
 
     def pass_over(self, index: int) -> int:
         """Give up the frames below an index that have not come; return how many."""

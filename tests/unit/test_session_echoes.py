@@ -98,35 +98,6 @@ def test_slow_echoes_are_repeated_while_the_skew_is_learnt(round_trip_ns: int, y
         assert heard == expected
 
 
-def test_a_grant_is_repeated_only_once_frames_stay_away() -> None:
-    """While frames come, a wave of echoes repeats no credit. Once they stay away, each one does: the grant may have been lost."""
-    world = World()
-    world.settle(1500 * MS)
-    host, board = world.hosts[0], world.board
-    names, now_ns, index = host.names, world.now_ns, board.next_index
-
-    def wave() -> list[Message]:
-        """Let time pass until a wave begins, and answer nothing; return what was sent with it."""
-        nonlocal now_ns, index
-        while True:
-            now_ns += 20 * MS
-            host.session.receive(names[0, Lane.CONTROL], Status("", BoardCounts(), Rung()), now_ns)  # a sign of life
-            if flows:
-                host.session.grant(1)
-                host.session.receive(names[0, Lane.FRAMES], frame(board.session, index), now_ns)
-                index += 1
-            sent = [output.message for output in host.session.tick(now_ns) if isinstance(output, Outgoing)]
-            if any(isinstance(message, Ping) for message in sent):
-                return sent
-
-    flows = True
-    assert [type(message) for _ in range(3) for message in wave()] == [Ping] * 3
-    flows = False
-    wave()
-    host.session.grant(1)
-    assert wave()[1:] == [Credit(index + 1)]
-
-
 def test_swift_echoes_are_learnt_from_when_their_wave_has_ended() -> None:
     """A wave's echoes are given with the last answer; a slow one among them gives all at once; a wave that is cut short gives its own when the next one begins. None outlives its connection."""
     world = World()
