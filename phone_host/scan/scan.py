@@ -27,7 +27,7 @@ from phone_host.scan.surface_noise import surface_noise_m
 from phone_host.scan.tracker import PoseGate, Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
-from phone_host.scan.volume import BlockValues
+from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.images import size_px, to_grey
 
@@ -55,6 +55,7 @@ class ScanWanted:
         box: what lies outside does not belong to the model; None: everything belongs.
         threads: that compute; results do not depend on them.
         mat: on which the object lies: it alone tells where each pair was taken; None: there is none.
+        turntable: whether the cameras stand still and an object turns before them.
     """
 
     voxel_m: float = math.nan
@@ -62,6 +63,7 @@ class ScanWanted:
     box: Box | None = None
     threads: int = 1
     mat: Mat | None = None
+    turntable: bool = False
 
     @property
     def model_box(self) -> Box | None:
@@ -185,6 +187,11 @@ class Scan:
         return sum(pair.is_fused for pair in self._pairs)
 
     @property
+    def volume(self) -> Volume | None:
+        """The model; None before the first pair that has depth."""
+        return None if self.tracker is None else self.tracker.volume
+
+    @property
     def settings(self) -> VolumeSettings | None:
         """How the model is made; None before the first pair that has depth."""
         return None if self.tracker is None else self.tracker.volume.settings
@@ -223,9 +230,7 @@ class Scan:
                     "the scan that is gone on with has another calibration, size or crop",
                     "give the same options as then, or begin a new scan",
                 )
-            if size_px(view.grey) != self.size_px:
-                here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
-                raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
+            require_size(name, view, self.size_px)
             told = self.tracker.track(view)
             pair = ScannedPair(
                 name=name,
@@ -254,6 +259,14 @@ class Scan:
                 wanted.threads,
             )
         return Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
+
+    def final(self, pair: ScannedPair) -> ScannedPair:
+        """Return what has become of a pair since it was taken.
+
+        Args:
+            pair: as it was told then.
+        """
+        return pair
 
     @property
     def is_submap_due(self) -> bool:
@@ -322,9 +335,9 @@ class Scan:
 
     def model(self) -> ScanModel:
         """Return the surface so far, without crumbs and what lies outside the box; without triangles before any was seen."""
-        if self.tracker is None:
+        volume = self.volume
+        if volume is None:
             return ScanModel(Mesh.empty(), np.zeros(0, np.float32))
-        volume = self.tracker.volume
         mesh = mesh_of(volume.blocks, volume.settings.voxel_m, LEAST_WEIGHT)
         box = self._wanted.model_box
         if box is not None:
@@ -332,6 +345,22 @@ class Scan:
             mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))
         mesh = without_crumbs(mesh)
         return ScanModel(mesh, surface_noise_m(mesh.points_m, volume.blocks, volume.settings))
+
+
+def require_size(name: str, view: View, size: tuple[int, int]) -> None:
+    """Refuse a view of another size than those before it.
+
+    Args:
+        name: of its pair.
+        view: that was taken.
+        size: width and height of those before it, px.
+
+    Raises:
+        DataError: so it is.
+    """
+    if size_px(view.grey) != size:
+        here, before = (size_text(each) for each in (size_px(view.grey), size))
+        raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
 
 
 def view_of(processed: Processed, mat: Mat | None = None) -> View:

@@ -55,6 +55,7 @@ def run(black: Path, out: Path, *words: str) -> int:
         (["one_left", "one_right", "--calibration", "rig.yaml"], (4, "there is only one pair")),
         (["left", "right", "--calibration", "rig.yaml"], (4, "none of the 3 pairs has depth")),
         (["left", "right", "--calibration", "rejected.yaml"], (4, "was rejected by its own calibration")),
+        (["left", "right", "--calibration", "rig.yaml", "--mat", "--turntable"], (2, "--turntable beside --mat")),
         (["--mat", "left", "right", "--calibration", "rig.yaml"], (2, "--mat is")),
         (["left", "right", "--calibration", "rig.yaml", "--mat", "10x8:25mm"], (2, "--mat is '10x8:25mm'")),
         (["left", "right", "--calibration", "rig.yaml", "--mat", "--axes", "y-up"], (2, "--axes y-up beside --mat")),

@@ -39,12 +39,15 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
     """
     if options.memory < _LEAST_BYTES:
         raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
+    if options.mat is not None and options.turntable:
+        raise SettingsError("--turntable beside --mat", "leave --turntable out: the mat tells how it turns")
     return ScanWanted(
         voxel_m=math.nan if options.voxel is None else voxel_of(options.voxel),
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
         mat=None if options.mat is None else parse_mat(USUAL_MAT if options.mat == _USUAL else options.mat),
+        turntable=options.turntable,
     )
 
 
@@ -61,6 +64,10 @@ def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
     """
     if options.resume is None:
         return ()
+    if options.turntable:
+        raise SettingsError(
+            "--resume beside --turntable: the end needs all of its pairs", "scan the pictures or the recording again"
+        )
     try:
         submaps = read_submaps(options.resume)
     except OSError as error:
