@@ -7,7 +7,7 @@ SHELL := /bin/sh
 BIN := .venv/bin
 READY := .venv/.ready
 RUN := .venv/.ready-run
-PARTS := unit contract native system hostile print web
+PARTS := unit scan contract native system hostile print web
 # What the native library is made of; .ci/venv knows the same.
 NATIVE := setup.py phone_host/stereo/native/build_library.py $(wildcard phone_host/stereo/native/src/*)
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
@@ -19,7 +19,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles lock clean
+.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -40,17 +40,17 @@ demo: $(RUN) ## run both programs on this machine with a rendered scene; writes 
 native: $(RUN) ## build the native library again, in place (the set-up does this itself; after installing a compiler, or with CC=clang)
 	@$(BIN)/python -m phone_host.stereo.native.build_library
 
-test: $(READY) ## run the unit, contract, native, system, hostile, print and web tests; prints the minutes of each part
+test: $(READY) ## run the unit, scan, contract, native, system, hostile, print and web tests; prints the minutes of each part
 	@.ci/test $(PARTS)
 
 $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
 	@.ci/test $*
 
 test-slow: $(READY) ## run the tests with large samples, too slow for every day; the unit tests use small ones
-	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/contract
+	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract
 
-coverage: $(READY) ## run the unit tests; lists branches of the pure modules that no test takes (CI requires 98 %)
-	@COVERAGE=1 .ci/test unit
+coverage: $(READY) ## run the unit and scan tests; lists branches of the pure modules that no test takes (CI requires 98 %)
+	@COVERAGE=1 .ci/test unit scan
 
 test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, and try the phone's stand-in, under qemu-user
 	@$(BIN)/python -m tests.native.arm
@@ -119,6 +119,13 @@ oracles: $(READY) ## install what judges recordings, other programs' readers of 
 	@$(BIN)/python -m venv build/oracles
 	@build/oracles/bin/python -m pip -qq --no-input install "mcap-ros2-support>=0.5" "rosbags>=0.10" "rerun-sdk>=0.41"
 	@build/oracles/bin/rerun analytics disable
+
+printers: ## install what judges prints, other programs' servers and senders, into build/printers (750 MB)
+	@for name in octoprint moonraker printrun meshes; do $(BIN)/python -m venv build/printers/$$name || exit; done
+	@build/printers/octoprint/bin/python -m pip -qq --no-input install "OctoPrint>=1.11.8,<1.12"
+	@build/printers/moonraker/bin/python -m pip -qq --no-input install "moonraker>=0.11"
+	@build/printers/printrun/bin/python -m pip -qq --no-input install --no-deps "Printrun>=2.2" pyserial
+	@build/printers/meshes/bin/python -m pip -qq --no-input install pymeshlab trimesh manifold3d lxml networkx
 
 vendor: ## build the page's libraries and the static pages' scripts again (after changing phone_host/web/page; needs node; FETCH=1: take npm's files, too)
 	@$(if $(FETCH),node .ci/vendor.mjs fetch &&) node .ci/vendor.mjs build

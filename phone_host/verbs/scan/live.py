@@ -15,10 +15,10 @@ from common.program.terminal import say
 from common.protocol.message import Pacing
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.live.scan import LiveScan
+from phone_host.live.scan_view import ScanPicture
 from phone_host.recording.playback import Playback
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.host_settings import EndReason
-from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.run.stereo_results import require_writable
@@ -26,9 +26,8 @@ from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
 from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run
-from phone_host.verbs.scan.wanted import resumed_of, scan_wanted
+from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
 from phone_host.verbs.serve.choices import run_options
-from phone_host.verbs.stereo_options import output_options
 
 
 def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
@@ -46,6 +45,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
         DataError: the rig cannot be used, or no pair has depth.
     """
     wanted, of_run = scan_wanted(options), _run_options(options)
+    axes = axes_of(options, wanted)
     found = checked(of_run)
     _require(options, found.values)
     _require_place(options)
@@ -57,7 +57,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     prepared = opened.prepared(sys.argv, (live.sink,))
 
     def finished() -> FinishedScan:
-        return live.finished(prepared.host.snapshot(), found.values.matcher, output_options(options).axes)
+        return live.finished(prepared.host.snapshot(), found.values.matcher, axes)
 
     try:
         ended = _followed(prepared, live, signals)
@@ -94,19 +94,20 @@ def live_scan(opened: Opened, wanted: ScanWanted, out: Path, resumed: tuple[Subm
 
 
 def _followed(prepared: PreparedRun, live: LiveScan, signals: StopSignals) -> EndReason:
-    """Run, and tell whoever holds the cameras what helps: in a bar on a terminal, else a line when it changes."""
+    """Run, and tell whoever holds the cameras what helps: beside the surface on a terminal, else a line when it changes."""
+    if sys.stderr.isatty():
+        with ScanPicture(live) as picture:
+            return prepared.host.run(lambda: signals.stop, picture.refresh)
     told = ""
 
     def tell() -> None:
         nonlocal told
         advice = live.words.partition(": ")[2]
-        if advice != told and not sys.stderr.isatty():
+        if advice != told:
             _tell(live.words)
         told = advice
-        watcher.say(live.words)
 
-    with step_bar("waiting for the board", None) as watcher:
-        return prepared.host.run(lambda: signals.stop, tell)
+    return prepared.host.run(lambda: signals.stop, tell)
 
 
 def _run_options(options: argparse.Namespace) -> argparse.Namespace:
