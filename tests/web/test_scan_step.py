@@ -9,7 +9,7 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.mesh import Mesh
-from phone_host.scan.patches import Patch, Patches
+from phone_host.scan.patches import Patches
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.web.source import Activity, Do, ScanState
@@ -199,19 +199,16 @@ def test_what_stands_on_a_mat_stands_upright(program: Played, opened: Opener) ->
     post = np.stack([0.01 * np.cos(turn), 0.01 * np.sin(turn), z], axis=-1).reshape(-1, 3)
     x, y = np.meshgrid(np.linspace(-0.08, 0.08, 60), np.linspace(-0.08, 0.08, 60))
     plate = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-    quads = np.array([[[n, n + 1, n + 60], [n + 1, n + 61, n + 60]] for n in range(59 * 60) if n % 60 < 59]).reshape(
-        -1, 3
-    )
-    meshes = [
-        Mesh(points.astype(np.float32), np.full((3600, 3), colour, np.uint8), quads.astype(np.int32))
-        for points, colour in ((post, (255, 0, 0)), (plate, (0, 0, 255)))
-    ]
+    corners = [[n, n + 1, n + 60, n + 1, n + 61, n + 60] for n in range(59 * 60) if n % 60 < 59]
+    quads = np.array(corners, np.int32).reshape(-1, 3)
+    colours = np.repeat(np.array([(255, 0, 0), (0, 0, 255)], np.uint8), 3600, axis=0)
+    mesh = Mesh(np.concatenate([post, plate]).astype(np.float32), colours, np.concatenate([quads, quads + 3600]))
     program.patches = Patches(1)
-    program.patches._made = {(n, 0, 0): Patch(n + 1, (n, 0, 0), 0.5, mesh) for n, mesh in enumerate(meshes)}
+    program.patches.become(mesh, 0.01)
     program.axes = "mat"
     program.scan, program.activity = ScanState(words="go on", level="good"), Activity.SCANNING
     page = opened("scan")
-    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts === 2")
+    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
     page.wait_for_function("() => document.getElementById('scan-model').dataset.drawn")
     page.wait_for_timeout(500)
     picture = cv2.imdecode(np.frombuffer(page.locator("#scan-model").screenshot(), np.uint8), cv2.IMREAD_COLOR)
