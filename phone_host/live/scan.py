@@ -143,6 +143,9 @@ class LiveScan:
             remarks.append(Remark(words, "a greater --voxel is faster", is_note=True))
         remarks.extend(self.kept.remarks)
         model = self.scan.model()
+        if self.scan.settings is not None:
+            with self._watching:
+                self.patches.become(model.mesh, self.scan.settings.voxel_m)
         remarks.extend(turn_remarks(self.scan))
         report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
         return FinishedScan(report, model)

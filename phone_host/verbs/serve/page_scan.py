@@ -85,7 +85,6 @@ class PageScan:
         return Scanned(words=words, level=level, folder=self.out, files=files, snapshot=snapshot)
 
     def _finished(self) -> FinishedScan:
-        self.live.renew_surface()
         return self.live.finished(self.host.snapshot(), self.matcher, self.axes)
 
 
