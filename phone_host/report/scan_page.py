@@ -9,6 +9,7 @@ import numpy as np
 
 from common.imagesize.head import size_text
 from common.words import counted, distance_text
+from phone_host.output.axes import Axes
 from phone_host.report.model_view import ShownModel, model_view
 from phone_host.report.page_frame import document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
@@ -48,8 +49,9 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
         *(f"{pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed),
         *(remark.text for remark in report.remarks),
     ]
+    axes = report.axes.text if report.axes is Axes.MAT else f"{report.axes.text} at the first pair"
     files = (
-        FileLink(MODEL, f"the surface with its colours, metres; {report.axes.text} at the first pair"),
+        FileLink(MODEL, f"the surface with its colours, metres; {axes}"),
         FileLink(TRAJECTORY, "where the camera was, a line a pair: s, m, quaternion x y z w (TUM's format)"),
         FileLink("report.json", "all figures, with those of every pair"),
     )
