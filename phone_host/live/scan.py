@@ -23,7 +23,8 @@ from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import report_of
 from phone_host.run.sinks import FunctionSink
 from phone_host.scan.patches import Patch, Patches
-from phone_host.scan.scan import LEAST_WEIGHT, Scan, ScannedPair, ScanWanted, Submap
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, Submap
+from phone_host.scan.volume_settings import LEAST_WEIGHT
 
 _SINK: Final = "scan"
 _NS: Final = 1e9

@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
+from phone_host.scan.carving import Carved, Carving
+from phone_host.scan.cells import Cells
+from phone_host.scan.closing import Floor
 from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.fineness import fineness_for
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import only, without_crumbs
-from phone_host.scan.surface_noise import surface_noise_m
+from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.tracker import PoseGate, Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
@@ -30,10 +30,6 @@ from phone_host.stereo.images import size_px, to_grey
 
 NOISE_PX: Final = 0.5
 """Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
-
-LEAST_WEIGHT: Final = 8
-"""Of a voxel on the surface: an eighth of a sure depth. One view at a slant gives less, and is off by 5 mm where others are off by 4."""
-
 
 _SUBMAP_PAIRS: Final = 20
 """Fused pairs after which a submap is closed: four seconds at five pairs a second."""
@@ -49,13 +45,15 @@ class ScanWanted:
     Attributes:
         voxel_m: distance of two values of the field, m; NaN: as the depths' noise deserves.
         most_bytes: memory of the model at most.
-        box: what lies outside does not belong to the model; None: everything belongs.
+        box: what lies outside does not belong to the model, and what nobody saw inside is closed; None: everything belongs, and nothing is closed.
+        floor: the lowest side of the box is a plane on which the thing stands; None: it is not.
         threads: that compute; results do not depend on them.
     """
 
     voxel_m: float = math.nan
     most_bytes: int = 300_000_000
     box: Box | None = None
+    floor: Floor | None = None
     threads: int = 1
 
 
@@ -103,6 +101,7 @@ class Submap:
         size_px: width and height of their rectified images.
         blocks: those that got something since then, with all that they hold.
         tracker: where it stood at the end, and the places since then.
+        carved: what all views since the beginning told of the box; None: there is none.
     """
 
     is_whole: bool
@@ -112,6 +111,7 @@ class Submap:
     size_px: tuple[int, int]
     blocks: BlockValues
     tracker: TrackerState
+    carved: Carved | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,19 +122,6 @@ class _Closed:
     fused: int = 0
     places: int = 0
     blocks: int = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ScanModel:
-    """A surface.
-
-    Attributes:
-        mesh: its triangles.
-        noise_m: (V,) float32 standard deviation of its points, m, if the views err independently.
-    """
-
-    mesh: Mesh
-    noise_m: NDArray[np.float32]
 
 
 class Scan:
@@ -152,6 +139,7 @@ class Scan:
     def __init__(self, wanted: ScanWanted) -> None:
         self._wanted = wanted
         self.tracker: Tracker | None = None
+        self._carving: Carving | None = None
         self.geometry: StereoGeometry | None = None
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
@@ -191,7 +179,7 @@ class Scan:
         if self.tracker is None and density >= PoseGate().least_depths:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
             wanted = self._wanted
-            self.tracker = Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
+            self._begin(fineness_for(view, wanted.voxel_m, wanted.most_bytes))
         if self.tracker is None:
             pair = ScannedPair(
                 name=name,
@@ -211,6 +199,8 @@ class Scan:
                 here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
                 raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
             told = self.tracker.track(view)
+            if told.is_fused and self._carving is not None:
+                self._carving.see(view, told.world_camera)
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
@@ -257,6 +247,7 @@ class Scan:
             size_px=self.size_px,
             blocks=blocks,
             tracker=tracker,
+            carved=None if self._carving is None else self._carving.carved,
         )
 
     def go_on(self, submaps: Sequence[Submap]) -> None:
@@ -267,27 +258,39 @@ class Scan:
         """
         first = submaps[0]
         self.geometry, self.size_px = first.geometry, first.size_px
-        self.tracker = Tracker(replace(first.settings, most_bytes=self._wanted.most_bytes), self._wanted.threads)
+        self._begin(replace(first.settings, most_bytes=self._wanted.most_bytes))
+        assert self.tracker is not None
         places = 0
         for each in submaps:
             self._pairs.extend(each.pairs)
             self.tracker.volume.put(each.blocks)
             self.tracker.go_on(each.tracker)
             places += len(each.tracker.places)
+        carved = submaps[-1].carved
+        if self._carving is not None:
+            if carved is None or carved.cells != self._carving.cells:
+                raise SettingsError(
+                    "the scan that is gone on with had another box", "give the same --box as then, or begin a new scan"
+                )
+            self._carving.go_on(carved)
         written = sum(len(each.blocks.places) for each in submaps)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
     def model(self) -> ScanModel:
-        """Return the surface so far, without crumbs and what lies outside the box; without triangles before any was seen."""
+        """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""
         if self.tracker is None:
-            return ScanModel(Mesh.empty(), np.zeros(0, np.float32))
-        volume = self.tracker.volume
-        mesh = mesh_of(volume.blocks, volume.settings.voxel_m, LEAST_WEIGHT)
-        if self._wanted.box is not None:
-            inside = self._wanted.box.holds(mesh.points_m)
-            mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))
-        mesh = without_crumbs(mesh)
-        return ScanModel(mesh, surface_noise_m(mesh.points_m, volume.blocks, volume.settings))
+            return ScanModel.empty()
+        volume, wanted = self.tracker.volume, self._wanted
+        if wanted.box is None or self._carving is None:
+            return open_model(volume)
+        return closed_model(volume, self._carving, wanted.box, wanted.floor)
+
+    def _begin(self, settings: VolumeSettings) -> None:
+        """Begin a model."""
+        wanted = self._wanted
+        self.tracker = Tracker(settings, wanted.threads)
+        if wanted.box is not None:
+            self._carving = Carving(Cells.of(wanted.box, settings.voxel_m), wanted.threads)
 
 
 def view_of(processed: Processed) -> View:

@@ -15,6 +15,8 @@ from common.errors import DataError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.blocks import VOXELS
+from phone_host.scan.carving import Carved
+from phone_host.scan.cells import Cells
 from phone_host.scan.places import Place
 from phone_host.scan.scan import ScannedPair, Submap
 from phone_host.scan.tracker import TrackerState
@@ -68,6 +70,7 @@ def submap_bytes(submap: Submap) -> bytes:
         place_poses=_rows([place.world_camera for place in places]),
         place_sizes=np.array([len(place.points_m) for place in places], np.int64),
         place_points=np.concatenate([np.zeros((0, 3)), *(place.points_m for place in places)]),
+        **_carved_arrays(submap.carved),
         descriptors=np.concatenate([np.zeros((0, 32), np.uint8), *(place.descriptors for place in places)]),
     )
     return _HEAD + zlib.compress(file.getvalue(), _LEVEL)
@@ -132,7 +135,29 @@ def _read(content: bytes) -> Submap:
         size_px=(width_px, height_px),
         blocks=_blocks(held),
         tracker=TrackerState(_poses(held["pose"])[0], float(held["usual_off_m"]), _places(held)),
+        carved=_carved(held) if "carved" in held else None,
     )
+
+
+def _carved_arrays(carved: Carved | None) -> Arrays:
+    if carved is None:
+        return {}
+    cells = carved.cells
+    return {
+        "carved": carved.counts,
+        "cells": np.array([*cells.low, cells.voxels, carved.views], np.int64),
+        "cells_voxel_m": np.array(cells.voxel_m),
+    }
+
+
+def _carved(held: Arrays) -> Carved:
+    x, y, z, voxels, views = held["cells"].tolist()
+    counts = held["carved"].astype(np.uint8)
+    kinds, tall, deep, wide = counts.shape
+    if kinds != 3:
+        raise ValueError("cells")
+    cells = Cells((x, y, z), (wide, deep, tall), voxels, float(held["cells_voxel_m"]))
+    return Carved(cells, counts, views)
 
 
 def _blocks(held: Arrays) -> BlockValues:
