@@ -276,6 +276,14 @@ class Scan:
         written = sum(len(each.blocks.places) for each in submaps)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
+    def crop(self, box: Box | None) -> None:
+        """Keep only what lies in a box: when the model is made, for the field holds it all.
+
+        Args:
+            box: m; None: everything.
+        """
+        self._wanted = replace(self._wanted, box=box)
+
     def model(self) -> ScanModel:
         """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""
         if self.tracker is None:
