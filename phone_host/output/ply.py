@@ -125,7 +125,9 @@ def write_surface(
     faces = np.empty(len(triangles), _TRIANGLE)
     faces["corners"], faces["numbers"] = 3, triangles
     further = "" if seen is None else "property uchar seen\n"
-    header = _header(len(vertices), axes, f"{further}element face {len(faces)}\nproperty list uchar int vertex_indices\n")
+    header = _header(
+        len(vertices), axes, f"{further}element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+    )
     write_parts(path, [header, vertices.tobytes(), faces.tobytes()])
 
 

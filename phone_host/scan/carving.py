@@ -78,8 +78,7 @@ class Carving:
         if self._library is None:
             pose = np.column_stack([world_camera.inverse().R, world_camera.inverse().t_m]).astype(np.float32)
             told = carving_numpy.told(self.cells, replace(view, depth_m=depth), pose, _SIGMAS, clear_m)
-            for counts, more in zip(self.counts, told, strict=True):
-                counts += more & (counts < 255)
+            self.counts += np.array(told) & (self.counts < 255)
             return
         job = CarveJob(
             looked_through=self.counts[0].ctypes.data,

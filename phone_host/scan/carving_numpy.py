@@ -15,7 +15,9 @@ F: Final = np.float32
 Flags = NDArray[np.bool_]
 
 
-def told(cells: Cells, view: View, camera_world: NDArray[np.float32], sigmas: float, clear_m: float) -> tuple[Flags, Flags, Flags]:
+def told(
+    cells: Cells, view: View, camera_world: NDArray[np.float32], sigmas: float, clear_m: float
+) -> tuple[Flags, Flags, Flags]:
     """Return the cells that a view looked through, those that it found hidden, and those where it has no depth, (Z, Y, X) each.
 
     Args:

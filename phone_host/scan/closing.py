@@ -31,12 +31,14 @@ _SOFT: Final = F(4)
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A plane that a thing stands on: the lowest side of its box.
+    """A plane that a thing stands on; z is up.
 
     Attributes:
+        z_m: its height, m.
         skip_m: height above it, m, in which its own surface and that of the thing cannot be told apart; what stands there goes on down to it.
     """
 
+    z_m: float = 0.0
     skip_m: float = 0.0
 
 
@@ -49,13 +51,22 @@ class _Part:
 
 
 class _Closed:
-    """The closed field, block by block."""
+    """The closed field, block by block.
 
-    def __init__(self, blocks: Blocks, settings: VolumeSettings, cells: CellField, box: Box, floor: Floor | None) -> None:
+    Attributes:
+        low_m: lowest corner of what is not outside.
+    """
+
+    def __init__(
+        self, blocks: Blocks, settings: VolumeSettings, cells: CellField, box: Box, floor: Floor | None
+    ) -> None:
         self._blocks, self._cells = blocks, cells
-        self._voxel_m, self._truncation_m, self._box = settings.voxel_m, settings.truncation_m, box
-        foot_m = box.low_m[2] + (floor.skip_m if floor else 0.0)
-        self._foot = int(np.ceil(foot_m / settings.voxel_m)) if floor and floor.skip_m else None
+        self._voxel_m, self._truncation_m = settings.voxel_m, settings.truncation_m
+        x_m, y_m, z_m = box.low_m
+        self.low_m = (x_m, y_m, max(z_m, floor.z_m)) if floor else box.low_m
+        self._high_m, self._foot = box.high_m, None
+        if floor and floor.skip_m:
+            self._foot = int(np.ceil((floor.z_m + floor.skip_m) / settings.voxel_m))
 
     def part(self, places: Places) -> _Part:
         """Return the field of blocks at places (N, 3)."""
@@ -92,10 +103,10 @@ class _Closed:
         far = []
         for axis in range(3):
             at = (first[:, axis, np.newaxis] + np.arange(_SIZE)) * self._voxel_m
-            far.append(np.maximum(self._box.low_m[axis] - at, at - self._box.high_m[axis]) / self._truncation_m)
+            far.append(np.maximum(self.low_m[axis] - at, at - self._high_m[axis]) / self._truncation_m)
         x, y, z = far
         most = np.maximum(np.maximum(x[:, np.newaxis, np.newaxis], y[:, np.newaxis, :, np.newaxis]), z[:, :, np.newaxis, np.newaxis])  # fmt: skip
-        return np.clip(most, -1, 1).astype(F)
+        return np.asarray(np.clip(most, -1, 1), F)
 
 
 def _summed(values: Floats) -> Floats:
@@ -122,7 +133,7 @@ def closed(blocks: Blocks, settings: VolumeSettings, carving: Carving, box: Box,
     """
     cells = cell_field(carving, blocks, LEAST_WEIGHT, has_floor=floor is not None)
     field = _Closed(blocks, settings, cells, box, floor)
-    made, waiting = Blocks(), _begin(blocks, cells, box, settings.voxel_m)
+    made, waiting = Blocks(), _begin(blocks, cells, field.low_m, box)
     steps = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], np.int32)
     while len(waiting):
         active = []
@@ -137,18 +148,20 @@ def closed(blocks: Blocks, settings: VolumeSettings, carving: Carving, box: Box,
     return made
 
 
-def _begin(blocks: Blocks, cells: CellField, box: Box, voxel_m: float) -> Places:
-    """Return the blocks in the box that the volume has, and those where the cells' field changes its sign."""
+def _begin(blocks: Blocks, cells: CellField, low_m: tuple[float, float, float], box: Box) -> Places:
+    """Return the blocks in the box that the volume has, and those where the cells' field changes its sign, or is below 0 on the floor."""
     values, wide = cells.values, cells.cells.voxels
     below, found = values < 0, []
     for axis in range(3):
         changes = np.argwhere(np.diff(below, axis=axis))[:, ::-1]
         found.append((changes - 1 + np.array(cells.cells.low)) * wide // SIDE)
     floor = np.argwhere(below[1])[:, ::-1]
-    found.append((np.column_stack([floor, np.ones(len(floor), np.int64)]) - 1 + np.array(cells.cells.low)) * wide // SIDE)
+    found.append(
+        (np.column_stack([floor, np.ones(len(floor), np.int64)]) - 1 + np.array(cells.cells.low)) * wide // SIDE
+    )
     places = blocks.places[: blocks.count]
-    side_m = SIDE * voxel_m
-    inside = (places * side_m < np.array(box.high_m)) & ((places + 1) * side_m > np.array(box.low_m))
+    side_m = SIDE * cells.cells.voxel_m
+    inside = (places * side_m < np.array(box.high_m)) & ((places + 1) * side_m > np.array(low_m))
     found.append(places[inside.all(axis=1)])
     return np.unique(np.concatenate(found).astype(np.int32), axis=0)
 

@@ -20,6 +20,7 @@ from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor
 from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.fineness import fineness_for
+from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.tracker import PoseGate, Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -46,7 +47,7 @@ class ScanWanted:
         voxel_m: distance of two values of the field, m; NaN: as the depths' noise deserves.
         most_bytes: memory of the model at most.
         box: what lies outside does not belong to the model, and what nobody saw inside is closed; None: everything belongs, and nothing is closed.
-        floor: the lowest side of the box is a plane on which the thing stands; None: it is not.
+        floor: the plane on which the thing in the box stands; None: that is not known.
         threads: that compute; results do not depend on them.
     """
 
@@ -140,6 +141,7 @@ class Scan:
         self._wanted = wanted
         self.tracker: Tracker | None = None
         self._carving: Carving | None = None
+        self._depths = KeptDepths()
         self.geometry: StereoGeometry | None = None
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
@@ -199,8 +201,10 @@ class Scan:
                 here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
                 raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
             told = self.tracker.track(view)
-            if told.is_fused and self._carving is not None:
-                self._carving.see(view, told.world_camera)
+            if told.is_fused:
+                self._depths.remember(view, told.world_camera)
+                if self._carving is not None:
+                    self._carving.see(view, told.world_camera)
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
@@ -277,7 +281,7 @@ class Scan:
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
     def crop(self, box: Box | None) -> None:
-        """Keep only what lies in a box: when the model is made, for the field holds it all.
+        """Keep only what lies in a box, and close it: when the model is made, for the field holds it all.
 
         Args:
             box: m; None: everything.
@@ -289,9 +293,13 @@ class Scan:
         if self.tracker is None:
             return ScanModel.empty()
         volume, wanted = self.tracker.volume, self._wanted
-        if wanted.box is None or self._carving is None:
+        if wanted.box is None:
             return open_model(volume)
-        return closed_model(volume, self._carving, wanted.box, wanted.floor)
+        cells, carving = Cells.of(wanted.box, volume.settings.voxel_m), self._carving
+        if carving is None or carving.cells != cells:  # the box was chosen after some views
+            carving = Carving(cells, wanted.threads)
+            self._depths.carve(carving)
+        return closed_model(volume, carving, wanted.box, wanted.floor)
 
     def _begin(self, settings: VolumeSettings) -> None:
         """Begin a model."""

@@ -34,7 +34,8 @@ class Thing:
         x, y, height = self.half_m
         beside = np.abs(points - [0, 0, height / 2]) - [x, y, height / 2]
         box = np.linalg.norm(np.maximum(beside, 0), axis=1) + np.minimum(beside.max(axis=1), 0)
-        return np.minimum(box, np.linalg.norm(points - self.ball_m, axis=1) - self.radius_m)
+        ball = np.linalg.norm(points - self.ball_m, axis=1) - self.radius_m
+        return np.asarray(np.minimum(box, ball), np.float64)
 
     def volume_m3(self, step_m: float = 0.0005) -> float:
         """Return its content, counted in cells."""
@@ -107,4 +108,4 @@ def _box(thing: Thing, pose: SE3, rays: Floats) -> Floats:
 def _ball(thing: Thing, pose: SE3, rays: Floats) -> Floats:
     away = pose.t_m - thing.ball_m
     a, b, c = (rays * rays).sum(axis=1), rays @ away, float(away @ away) - thing.radius_m**2
-    return (-b - np.sqrt(b * b - a * c)) / a
+    return np.asarray((-b - np.sqrt(b * b - a * c)) / a, np.float64)

@@ -17,6 +17,7 @@ from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor, closed
+from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.scan_model import UNSEEN_RGB, ScanModel, closed_model
 from phone_host.scan.view import View
@@ -58,7 +59,7 @@ def model() -> ScanModel:
     """The thing from twelve sides, with noise."""
     poses = around(12)
     volume, carving = scanned(poses, [thing_view(THING, pose, seed=n) for n, pose in enumerate(poses)])
-    return closed_model(volume, carving, BOX, Floor(0.004))
+    return closed_model(volume, carving, BOX, Floor(skip_m=0.004))
 
 
 def test_a_thing_on_a_floor_becomes_a_closed_body(model: ScanModel) -> None:
@@ -114,10 +115,14 @@ def test_a_patch_without_depth_is_closed_smoothly() -> None:
     for pose in poses:
         view = thing_view(THING, pose)
         rows, columns = np.mgrid[: view.grey.shape[0], : view.grey.shape[1]]
-        slopes = np.stack([(columns - view.geometry.cx_px) / 300, (rows - view.geometry.cy_px) / 300, np.ones_like(rows)], -1)
+        slopes = np.stack(
+            [(columns - view.geometry.cx_px) / 300, (rows - view.geometry.cy_px) / 300, np.ones_like(rows)], -1
+        )
         at = (slopes * view.depth_m[..., np.newaxis]) @ pose.R.T + pose.t_m
         with np.errstate(invalid="ignore"):
-            patch = (np.abs(at[..., 0] - 0.05) < 0.001) & (np.abs(at[..., 1]) < 0.01) & (np.abs(at[..., 2] - 0.03) < 0.01)
+            patch = (
+                (np.abs(at[..., 0] - 0.05) < 0.001) & (np.abs(at[..., 1]) < 0.01) & (np.abs(at[..., 2] - 0.03) < 0.01)
+            )
         views.append(replace(view, depth_m=np.where(patch, np.float32(np.nan), view.depth_m)))
     volume, carving = scanned(poses, views)
     found = closed_model(volume, carving, BOX, Floor())
@@ -158,7 +163,9 @@ def test_the_library_and_numpy_carve_the_same() -> None:
     assert isinstance(library, Library)
     view = thing_view(THING, pose, seed=1)
     view.depth_m[:20], view.depth_m[20:90] = np.inf, np.nan
-    made = [Carving(Cells((-30, -20, 0), (61, 47, 30), 3, 0.0011), 3, library.using(simd)) for simd in library.usable_sets()]
+    made = [
+        Carving(Cells((-30, -20, 0), (61, 47, 30), 3, 0.0011), 3, library.using(simd)) for simd in library.usable_sets()
+    ]
     made.append(Carving(made[0].cells, 1, NONE))
     for carving in made:
         for _ in range(2):
@@ -166,6 +173,25 @@ def test_the_library_and_numpy_carve_the_same() -> None:
     for carving in made:
         assert np.array_equal(carving.counts, made[-1].counts)
     assert made[-1].counts.any(axis=(1, 2, 3)).all()
+
+
+def test_a_box_may_be_chosen_when_the_views_have_passed() -> None:
+    """Small copies of their depths carve nearly the same; of 1200 views at most 512 are kept, from first to last."""
+    poses, kept, carving = around(12), KeptDepths(), Carving(Cells.of(BOX, 0.004))
+    for pose in poses:
+        view = thing_view(THING, pose)
+        kept.remember(view, pose)
+        carving.see(view, pose)
+    later = Carving(carving.cells)
+    kept.carve(later)
+    assert later.views == 12
+    assert (later.empty != carving.empty).mean() < 0.03
+    many, small = KeptDepths(), replace(view, depth_m=view.depth_m[:4, :4])
+    for _ in range(1200):
+        many.remember(small, pose)
+    few = Carving(Cells((0, 0, 0), (1, 1, 1), 1, 0.01))
+    many.carve(few)
+    assert few.views == 300
 
 
 def test_counts_stay_at_their_greatest() -> None:
@@ -196,7 +222,7 @@ def test_whatever_the_field_the_surface_is_closed(seed: int, inside: float, know
     carving = Carving(cells)
     carving.counts[:] = random.integers(0, 3, carving.counts.shape)
     carving.views = 3
-    made = closed(blocks, replace(SETTINGS, voxel_m=0.001), carving, box, Floor(0.002) if seed % 2 else None)
+    made = closed(blocks, replace(SETTINGS, voxel_m=0.001), carving, box, Floor(-0.001, 0.002) if seed % 2 else None)
     mesh = mesh_of(made, 0.001)
     if len(mesh.triangles):
         assert blocking(mesh) <= {Flaw.CRUMBS}
