@@ -186,9 +186,10 @@ def test_a_box_may_be_chosen_when_the_views_have_passed() -> None:
     kept.carve(later)
     assert later.views == 12
     assert (later.empty != carving.empty).mean() < 0.03
-    many, small = KeptDepths(), replace(view, depth_m=view.depth_m[:4, :4])
+    many, whole = KeptDepths(), thing_view(THING, poses[0])
+    small = replace(whole, depth_m=whole.depth_m[:4, :4])
     for _ in range(1200):
-        many.remember(small, pose)
+        many.remember(small, poses[0])
     few = Carving(Cells((0, 0, 0), (1, 1, 1), 1, 0.01))
     many.carve(few)
     assert few.views == 300
