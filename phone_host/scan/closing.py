@@ -63,7 +63,9 @@ class _Closed:
         self._blocks, self._cells = blocks, cells
         self._voxel_m, self._truncation_m = settings.voxel_m, settings.truncation_m
         x_m, y_m, z_m = box.low_m
-        self.low_m = (x_m, y_m, max(z_m, floor.z_m)) if floor else box.low_m
+        if floor and z_m <= floor.z_m + floor.skip_m:
+            z_m = floor.z_m
+        self.low_m = x_m, y_m, z_m
         self._high_m, self._foot = box.high_m, None
         if floor and floor.skip_m:
             self._foot = int(np.ceil((floor.z_m + floor.skip_m) / settings.voxel_m))

@@ -1,6 +1,6 @@
 """Pairs go in one after another, a model comes out. Pure: no files, no clock.
 
-The world's axes are those of the rectified left camera at the first pair that has depth.
+The world's axes are those of the rectified left camera at the first pair that has depth; with a mat, the mat's.
 """
 
 import math
@@ -21,11 +21,14 @@ from phone_host.scan.closing import Floor
 from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
+from phone_host.scan.mat import Mat
+from phone_host.scan.mat_pose import MatSaid
+from phone_host.scan.mat_tracker import ABOVE_M, MatTracker, begun_on_mat, box_of_mat
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.tracker import PoseGate, Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
-from phone_host.scan.volume import BlockValues
+from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.images import size_px, to_grey
 
@@ -47,15 +50,27 @@ class ScanWanted:
         voxel_m: distance of two values of the field, m; NaN: as the depths' noise deserves.
         most_bytes: memory of the model at most.
         box: what lies outside does not belong to the model, and what nobody saw inside is closed; None: everything belongs, and nothing is closed.
-        floor: the plane on which the thing in the box stands; None: that is not known.
         threads: that compute; results do not depend on them.
+        mat: on which the object lies: it alone tells where each pair was taken; None: there is none.
+        turntable: whether the cameras stand still and an object turns before them.
     """
 
     voxel_m: float = math.nan
     most_bytes: int = 300_000_000
     box: Box | None = None
-    floor: Floor | None = None
     threads: int = 1
+    mat: Mat | None = None
+    turntable: bool = False
+
+    @property
+    def model_box(self) -> Box | None:
+        """What lies outside does not belong to the model: the box that was asked for, or the room above the mat; None: everything belongs."""
+        return box_of_mat(self.mat) if self.box is None and self.mat is not None else self.box
+
+    @property
+    def floor(self) -> Floor | None:
+        """The plane on which the thing stands: the mat; None: it is not known."""
+        return None if self.mat is None else Floor(skip_m=ABOVE_M)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -72,6 +87,7 @@ class ScannedPair:
         corners: that agree on the motion since the last pair; 0 for the first.
         overlap: share of its depths that lie on the model, 0..1; NaN: not compared.
         off_m: mean distance of these from the model, m; NaN: not compared.
+        mat: what the mat told; None: it was not seen, or nobody looked for it.
     """
 
     name: str
@@ -83,6 +99,7 @@ class ScannedPair:
     corners: int = 0
     overlap: float = math.nan
     off_m: float = math.nan
+    mat: MatSaid | None = None
 
     @property
     def is_fused(self) -> bool:
@@ -139,13 +156,18 @@ class Scan:
 
     def __init__(self, wanted: ScanWanted) -> None:
         self._wanted = wanted
-        self.tracker: Tracker | None = None
+        self.tracker: Tracker | MatTracker | None = None
         self._carving: Carving | None = None
         self._depths = KeptDepths()
         self.geometry: StereoGeometry | None = None
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
         self._closed = _Closed()
+
+    @property
+    def mat(self) -> Mat | None:
+        """On which the object lies; None: there is none."""
+        return self._wanted.mat
 
     @property
     def pairs(self) -> tuple[ScannedPair, ...]:
@@ -156,6 +178,11 @@ class Scan:
     def fused(self) -> int:
         """Pairs that became part of the model."""
         return sum(pair.is_fused for pair in self._pairs)
+
+    @property
+    def volume(self) -> Volume | None:
+        """The model; None before the first pair that has depth."""
+        return None if self.tracker is None else self.tracker.volume
 
     @property
     def settings(self) -> VolumeSettings | None:
@@ -176,19 +203,19 @@ class Scan:
         Raises:
             DataError: its size is not that of the pairs before it.
         """
-        view = view_of(processed)
+        view = view_of(processed, self._wanted.mat)
         density = float(np.isfinite(view.depth_m).mean())
         if self.tracker is None and density >= PoseGate().least_depths:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
-            wanted = self._wanted
-            self._begin(fineness_for(view, wanted.voxel_m, wanted.most_bytes))
+            self.tracker = self._begun(view)
+            self._carving = self._carving_of(self._wanted.model_box)
         if self.tracker is None:
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
                 world_camera=SE3.identity(),
                 state=Tracking.LOST,
-                weakness=Weakness.NO_DEPTH,
+                weakness=Weakness.NO_DEPTH if density < PoseGate().least_depths else Weakness.NO_MAT,
                 density=density,
             )
         else:
@@ -197,9 +224,7 @@ class Scan:
                     "the scan that is gone on with has another calibration, size or crop",
                     "give the same options as then, or begin a new scan",
                 )
-            if size_px(view.grey) != self.size_px:
-                here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
-                raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
+            require_size(name, view, self.size_px)
             told = self.tracker.track(view)
             if told.is_fused:
                 self._depths.remember(view, told.world_camera)
@@ -215,8 +240,30 @@ class Scan:
                 corners=told.moved.inliers,
                 overlap=math.nan if told.fit is None else told.fit.overlap,
                 off_m=math.nan if told.fit is None else told.fit.off_m,
+                mat=told.mat,
             )
         self._pairs.append(pair)
+        return pair
+
+    def _begun(self, view: View) -> Tracker | MatTracker | None:
+        """Begin with a view that has depth; None: the mat is not seen in it."""
+        wanted = self._wanted
+        if wanted.mat is not None and wanted.model_box is not None:
+            return begun_on_mat(
+                view,
+                wanted.mat,
+                wanted.model_box,
+                lambda inside: fineness_for(inside, wanted.voxel_m, wanted.most_bytes),
+                wanted.threads,
+            )
+        return Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
+
+    def final(self, pair: ScannedPair) -> ScannedPair:
+        """Return what has become of a pair since it was taken.
+
+        Args:
+            pair: as it was told then.
+        """
         return pair
 
     @property
@@ -262,15 +309,19 @@ class Scan:
         """
         first = submaps[0]
         self.geometry, self.size_px = first.geometry, first.size_px
-        self._begin(replace(first.settings, most_bytes=self._wanted.most_bytes))
-        assert self.tracker is not None
+        settings, wanted = replace(first.settings, most_bytes=self._wanted.most_bytes), self._wanted
+        self.tracker = (
+            MatTracker(wanted.mat, wanted.model_box, settings, wanted.threads)
+            if wanted.mat is not None and wanted.model_box is not None
+            else Tracker(settings, wanted.threads)
+        )
         places = 0
         for each in submaps:
             self._pairs.extend(each.pairs)
             self.tracker.volume.put(each.blocks)
             self.tracker.go_on(each.tracker)
             places += len(each.tracker.places)
-        carved = submaps[-1].carved
+        carved, self._carving = submaps[-1].carved, self._carving_of(wanted.model_box)
         if self._carving is not None:
             if carved is None or carved.cells != self._carving.cells:
                 raise SettingsError(
@@ -290,30 +341,48 @@ class Scan:
 
     def model(self) -> ScanModel:
         """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""
-        if self.tracker is None:
+        volume, wanted = self.volume, self._wanted
+        if volume is None:
             return ScanModel.empty()
-        volume, wanted = self.tracker.volume, self._wanted
-        if wanted.box is None:
+        box = wanted.model_box
+        if box is None:
             return open_model(volume)
-        cells, carving = Cells.of(wanted.box, volume.settings.voxel_m), self._carving
-        if carving is None or carving.cells != cells:  # the box was chosen after some views
-            carving = Carving(cells, wanted.threads)
+        carving = self._carving
+        if carving is None or carving.cells != Cells.of(box, volume.settings.voxel_m):  # it was chosen after some views
+            carving = Carving(Cells.of(box, volume.settings.voxel_m), wanted.threads)
             self._depths.carve(carving)
-        return closed_model(volume, carving, wanted.box, wanted.floor)
+        return closed_model(volume, carving, box, wanted.floor)
 
-    def _begin(self, settings: VolumeSettings) -> None:
-        """Begin a model."""
-        wanted = self._wanted
-        self.tracker = Tracker(settings, wanted.threads)
-        if wanted.box is not None:
-            self._carving = Carving(Cells.of(wanted.box, settings.voxel_m), wanted.threads)
+    def _carving_of(self, box: Box | None) -> Carving | None:
+        """Return what a box is carved by; None: there is none, or no model yet."""
+        settings = self.settings
+        return (
+            None if box is None or settings is None else Carving(Cells.of(box, settings.voxel_m), self._wanted.threads)
+        )
 
 
-def view_of(processed: Processed) -> View:
+def require_size(name: str, view: View, size: tuple[int, int]) -> None:
+    """Refuse a view of another size than those before it.
+
+    Args:
+        name: of its pair.
+        view: that was taken.
+        size: width and height of those before it, px.
+
+    Raises:
+        DataError: so it is.
+    """
+    if size_px(view.grey) != size:
+        here, before = (size_text(each) for each in (size_px(view.grey), size))
+        raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
+
+
+def view_of(processed: Processed, mat: Mat | None = None) -> View:
     """Return a pair as the tracker takes it, without the depths beside steps.
 
     Args:
         processed: with disparity and cloud.
+        mat: that is looked for in both images; None: none is.
     """
     assert processed.geometry is not None
     assert processed.cloud is not None
@@ -325,4 +394,6 @@ def view_of(processed: Processed) -> View:
         depth_m=without_edges(processed.cloud[..., 2], processed.geometry),
         geometry=processed.geometry,
         noise_px=NOISE_PX / scale,
+        right=None if mat is None else to_grey(processed.pair.right),
+        epipolar=processed.pair.epipolar,
     )

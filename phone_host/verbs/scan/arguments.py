@@ -18,8 +18,10 @@ SUMMARY = "put pairs from several places together to one model with colours"
 EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup    # folders: photographs on the way around the cup
   phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
   phone-host scan left/ right/ --calibration rig.yaml --box 400x300x400@0,100,900 --out cup    # only what is in this box
+  phone-host scan left/ right/ --calibration rig.yaml --mat --out cup    # on the sheet of `phone-host target mat`, any way around
   phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
   phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --record cup.mcap --out cup    # live
+  phone-host scan left/ right/ --calibration rig.yaml --turntable --out cup    # the cup was turned, the cameras stood still
   phone-host scan left/ right/ --calibration rig.yaml --resume cup --out cup    # go on after it was killed
   phone-host scan --replay session.mcap --calibration rig.yaml --out cup    # every pair of a recording
 """
@@ -40,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_overlay_argument(parser)
     add_image_arguments(parser)
     add_model_arguments(parser)
+    _add_turntable_argument(parser)
     _add_resume_argument(parser)
     parser.add_argument(
         "--out",
@@ -81,7 +84,15 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --voxel, --box and --memory: how the model is made."""
+    """Declare --mat, --voxel, --box and --memory: how the model is made."""
+    parser.add_argument(
+        "--mat",
+        nargs="?",
+        const="usual",
+        metavar="10x8:25mm:18mm:5x5",
+        help="scan what lies on a printed mat, whether it is turned or the cameras go around it: the sheet of `phone-host target mat`, or any ChArUco"
+        " sheet by its squares, side of a square, side of a mark and family; the model stands on the sheet's middle, z up",
+    )
     parser.add_argument(
         "--voxel",
         metavar="MM",
@@ -90,7 +101,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--box",
         metavar="WxHxD@X,Y,Z",
-        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward)",
+        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat",
     )
     parser.add_argument(
         "--memory",
@@ -98,6 +109,15 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         default=300e6,
         metavar="SIZE",
         help="memory of the model at most; what does not fit is left out, and told (default 300MB)",
+    )
+
+
+def _add_turntable_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--turntable",
+        action="store_true",
+        help="the cameras stand still and an object turns before them, on anything or by hand, about one axis and by 3 to 15 degrees between the"
+        " pairs; background and table are left out, and the turn is closed after 360 degrees",
     )
 
 
