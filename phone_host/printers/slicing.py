@@ -103,18 +103,22 @@ def find_slicer(wanted: Slicer | None = None) -> tuple[Slicer, str]:
     )
 
 
-def sliced(stl: Path, gcode: Path, wanted: SlicingWanted) -> None:
+def sliced(stl: Path, gcode: Path, wanted: SlicingWanted, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
     """Slice a model in the middle of the bed.
 
     Args:
         stl: the model, mm.
         gcode: the file to write.
         wanted: how.
+        most_characters: that a line of it may have.
+
+    Returns:
+        What the file asks of the printer.
 
     Raises:
         UnavailableError: no slicer is installed.
         SettingsError: the profile is none of this slicer.
-        DataError: it cannot slice the model.
+        DataError: it cannot slice the model, or what it wrote leaves the bed.
     """
     slicer, program = find_slicer(wanted.slicer)
     environment = dict(os.environ)
@@ -141,6 +145,9 @@ def sliced(stl: Path, gcode: Path, wanted: SlicingWanted) -> None:
             f"the slicer refuses the model ({words[:200] or f'exit code {done.returncode}'})",
             "see what phone-host printcheck says of it",
         )
+    facts = facts_of(gcode, most_characters)
+    require_inside(gcode, facts, wanted.bed_mm)
+    return facts
 
 
 def _prusa(program: str, stl: Path, gcode: Path, wanted: SlicingWanted) -> list[str]:
