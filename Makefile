@@ -125,7 +125,7 @@ printers: ## install what judges prints, other programs' servers and senders, in
 	@build/printers/octoprint/bin/python -m pip -qq --no-input install "OctoPrint>=1.11.8,<1.12"
 	@build/printers/moonraker/bin/python -m pip -qq --no-input install "moonraker>=0.11"
 	@build/printers/printrun/bin/python -m pip -qq --no-input install --no-deps "Printrun>=2.2" pyserial
-	@build/printers/meshes/bin/python -m pip -qq --no-input install pymeshlab trimesh manifold3d lxml networkx
+	@build/printers/meshes/bin/python -m pip -qq --no-input install pymeshlab trimesh manifold3d lib3mf lxml networkx
 	@cd build/printers && if apt-get -qq download cura 2>/dev/null; then dpkg -x cura_*.deb cura && rm cura_*.deb; fi # its definitions, for cura-engine
 
 vendor: ## build the page's libraries and the static pages' scripts again (after changing phone_host/web/page; needs node; FETCH=1: take npm's files, too)

@@ -65,12 +65,12 @@ def test_ctrl_c_and_a_kill(gcode: Path, tmp_path: Path) -> None:
         assert process.returncode == 130
         assert "heaters are off" in said
         assert there.goal == 0.0
-        with subprocess.Popen(asked, env=environment(tmp_path), stdout=subprocess.DEVNULL) as process:
+        with subprocess.Popen(asked, env=environment(tmp_path), stdout=subprocess.DEVNULL) as killed:
             until(
                 lambda: there.condition == "printing" and bool(list(tmp_path.rglob("printing.json"))), "it prints again"
             )
-            process.kill()
-            process.wait(60)
+            killed.kill()
+            killed.wait(60)
         there.condition = "ready"
         again = done(tmp_path, str(gcode), *with_key(tmp_path, there.uri)[:-1])
         assert again.returncode == 2

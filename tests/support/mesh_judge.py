@@ -13,14 +13,14 @@ def by_trimesh(path: Path) -> dict[str, Any]:
     """Read it with trimesh, points at one place made one."""
     import trimesh  # noqa: PLC0415 - each reader may be missing
 
-    scene = trimesh.load(path, force="scene")
+    scene: Any = trimesh.load(path, force="scene")
     mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
-    kind = getattr(mesh.visual, "kind", None)
-    colours = None
+    visual = next(iter(scene.geometry.values())).visual
+    kind, colours = getattr(visual, "kind", None), None
     if kind == "vertex":
-        colours = [int(value) for value in mesh.visual.vertex_colors[:, :3].mean(axis=0)]
+        colours = [int(value) for value in visual.vertex_colors[:, :3].mean(axis=0)]
     elif kind == "face":
-        colours = [int(value) for value in mesh.visual.face_colors[:, :3].mean(axis=0)]
+        colours = [int(value) for value in visual.face_colors[:, :3].mean(axis=0)]
     bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     bare.merge_vertices(merge_norm=True, merge_tex=True)
     return {
@@ -61,13 +61,43 @@ def by_pymeshlab(path: Path) -> dict[str, Any]:
     return found
 
 
+def by_lib3mf(path: Path) -> dict[str, Any]:
+    """Read it with the library of the format's makers, which warns of all that is not as it should be."""
+    import lib3mf  # type: ignore[import-not-found]  # noqa: PLC0415
+
+    model = lib3mf.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.ReadFromFile(str(path))
+    meshes = model.GetMeshObjects()
+    meshes.MoveNext()
+    mesh = meshes.GetCurrentMeshObject()
+    corners = [
+        (each.ResourceID, number)
+        for each in mesh.GetAllTriangleProperties()
+        for number in each.PropertyIDs
+        if each.ResourceID
+    ]
+    groups = {group: model.GetColorGroupByID(group) for group in {group for group, _ in corners}}
+    colours = [
+        (colour.Red, colour.Green, colour.Blue)
+        for colour in (groups[group].GetColor(number) for group, number in corners)
+    ]
+    return {
+        "faces": mesh.GetTriangleCount(),
+        "closed": bool(mesh.IsManifoldAndOriented()),
+        "warnings": reader.GetWarningCount(),
+        "is_mm": int(model.GetUnit()) == 1,
+        "colour": [int(sum(each) / len(colours)) for each in zip(*colours, strict=True)] if colours else None,
+    }
+
+
 def by_manifold(path: Path) -> dict[str, Any]:
     """Ask manifold3d whether it is a closed two-manifold."""
     import manifold3d  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
     import trimesh  # type: ignore[import-untyped,import-not-found,unused-ignore]  # noqa: PLC0415
 
-    mesh = trimesh.load(path, force="mesh")
+    mesh: Any = trimesh.load(path, force="mesh")
     made = manifold3d.Manifold(manifold3d.Mesh(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32)))
     return {"status": made.status().name, "bodies": len(made.decompose()), "volume": made.volume()}
 
@@ -78,7 +108,7 @@ READERS = {"trimesh": by_trimesh, "pymeshlab": by_pymeshlab}
 def main(paths: list[str]) -> None:
     """Judge each file by all who read it."""
     for path in map(Path, paths):
-        said = {"file": path.name}
+        said: dict[str, Any] = {"file": path.name}
         kind = path.suffix.lower()
         for name, reader in READERS.items():
             if (name, kind) in {("trimesh", ".3ds"), ("pymeshlab", ".glb")}:
@@ -87,6 +117,8 @@ def main(paths: list[str]) -> None:
                 said[name] = reader(path)
             except Exception as error:  # noqa: BLE001 - whatever it is, it is the verdict
                 said[name] = {"error": f"{type(error).__name__}: {error}"}
+        if kind == ".3mf":
+            said["lib3mf"] = by_lib3mf(path)
         if kind == ".stl":
             said["manifold"] = by_manifold(path)
         print(json.dumps(said), flush=True)
