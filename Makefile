@@ -47,7 +47,7 @@ $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
 	@.ci/test $*
 
 test-slow: $(READY) ## run the tests with large samples, too slow for every day; the unit tests use small ones
-	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract
+	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract tests/print
 
 coverage: $(READY) ## run the unit and scan tests; lists branches of the pure modules that no test takes (CI requires 98 %)
 	@COVERAGE=1 .ci/test unit scan

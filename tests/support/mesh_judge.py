@@ -11,7 +11,8 @@ from typing import Any
 
 def by_trimesh(path: Path) -> dict[str, Any]:
     """Read it with trimesh, points at one place made one."""
-    import trimesh  # noqa: PLC0415 - each reader may be missing
+    import numpy as np  # noqa: PLC0415 - each reader may be missing
+    import trimesh  # noqa: PLC0415
 
     scene: Any = trimesh.load(path, force="scene")
     mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
@@ -21,6 +22,10 @@ def by_trimesh(path: Path) -> dict[str, Any]:
         colours = [int(value) for value in visual.vertex_colors[:, :3].mean(axis=0)]
     elif kind == "face":
         colours = [int(value) for value in visual.face_colors[:, :3].mean(axis=0)]
+    elif "color" in (held := getattr(visual, "vertex_attributes", {})):  # of a GLB: linear, by its specification
+        linear = held["color"][:, :3] / (65535.0 if held["color"].dtype.kind == "u" else 1.0)
+        shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        colours = [int(value) for value in 255 * shown.mean(axis=0)]
     bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     bare.merge_vertices(merge_norm=True, merge_tex=True)
     return {
