@@ -17,6 +17,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
 from phone_host.scan.depth_edges import without_edges
+from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import only, without_crumbs
@@ -52,6 +53,7 @@ class ScanWanted:
         box: what lies outside does not belong to the model; None: everything belongs.
         threads: that compute; results do not depend on them.
         turntable: whether the cameras stand still and an object turns before them.
+        onto: the field of an earlier pass, to which this one is added; None: this one is alone.
     """
 
     voxel_m: float = math.nan
@@ -59,6 +61,7 @@ class ScanWanted:
     box: Box | None = None
     threads: int = 1
     turntable: bool = False
+    onto: KeptField | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,7 +16,9 @@ from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Processed
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
+from phone_host.scan.merged_field import merged
 from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted, require_size, view_of
+from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, points_of, table_height_m
 from phone_host.scan.tracker import PoseGate, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -59,11 +61,12 @@ class _Station:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Finished:
-    """The end of a scan: how many pairs were taken, the turn, and the volume made again."""
+    """The end of a scan: how many pairs were taken, the turn, the volume made again, and how it lies on that of an earlier pass."""
 
     taken: int
     turn: FullTurn | None
     volume: Volume | None
+    match: SurfaceMatch | None = None
 
 
 def scan_for(wanted: ScanWanted) -> Scan:
@@ -109,6 +112,11 @@ class TurntableScan(Scan):
     def turn(self) -> FullTurn | None:
         """The turn, once the model was asked for; None: too few views agree on an axis."""
         return None if self._finished is None else self._finished.turn
+
+    @property
+    def match(self) -> SurfaceMatch | None:
+        """How this pass lies on the earlier one, once the model was asked for; None: there is none, or no turn."""
+        return None if self._finished is None else self._finished.match
 
     @property
     def views(self) -> int:
@@ -253,7 +261,17 @@ class TurntableScan(Scan):
                 if not station.is_sure:  # the others have shown where it belongs
                     pair = replace(pair, state=Tracking.RELOCALISED, weakness=Weakness.NONE)
                 self._pairs[station.pair] = pair
-        return _Finished(taken, turn, volume)
+        if self._wanted.onto is None:
+            return _Finished(taken, turn, volume)
+        first = self._wanted.onto.volume(self._wanted.threads)
+        match = matched_surfaces(first, volume)
+        if match.match is Match.FOUND:
+            volume = merged(first, volume, match.first_second, self._wanted.threads)
+            self._pairs = [
+                replace(pair, world_camera=match.first_second @ pair.world_camera) if pair.is_fused else pair
+                for pair in self._pairs
+            ]
+        return _Finished(taken, turn, volume, match)
 
 
 def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPair:

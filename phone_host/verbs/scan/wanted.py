@@ -10,8 +10,10 @@ from common.errors import SettingsError, UnavailableError
 from common.program.quantities import decimal_number
 from common.program.terminal import say
 from common.words import counted
+from phone_host.run.kept_field import read_field
 from phone_host.run.kept_submaps import read_submaps
 from phone_host.scan.box import Box
+from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.units import length_mm
@@ -33,13 +35,36 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
     """
     if options.memory < _LEAST_BYTES:
         raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
+    onto = _onto_of(options)
+    usual_m = math.nan if onto is None else onto.settings.voxel_m
     return ScanWanted(
-        voxel_m=math.nan if options.voxel is None else voxel_of(options.voxel),
+        voxel_m=usual_m if options.voxel is None else voxel_of(options.voxel),
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
         turntable=options.turntable,
+        onto=onto,
     )
+
+
+def _onto_of(options: argparse.Namespace) -> KeptField | None:
+    """Read the field that --onto names.
+
+    Raises:
+        DataError: there is none, or it is damaged.
+        SettingsError: it is given without --turntable, or is the folder of the results.
+        UnavailableError: it cannot be read.
+    """
+    if options.onto is None:
+        return None
+    if not options.turntable:
+        raise SettingsError("--onto without --turntable", "scan both passes with --turntable")
+    if options.onto.resolve() == options.out.resolve():
+        raise SettingsError("--onto and --out are the same folder", "give the results another folder")
+    try:
+        return read_field(options.onto)
+    except OSError as error:
+        raise UnavailableError(f"--onto {options.onto}: {error.strerror}", "give a folder that can be read") from error
 
 
 def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
