@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
+from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
 from phone_host.scan.places import Place, Places
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
@@ -69,6 +70,7 @@ class Tracked:
         weakness: why it is not surer.
         moved: what odometry says.
         fit: how the depth lies against the model; None where it was not compared.
+        mat: what a mat told; None: there is none, or it was not seen.
     """
 
     world_camera: SE3
@@ -76,6 +78,7 @@ class Tracked:
     weakness: Weakness
     moved: Moved
     fit: Registered | None
+    mat: MatSaid | None = None
 
     @property
     def is_fused(self) -> bool:
