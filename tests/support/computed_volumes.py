@@ -44,7 +44,7 @@ def volume_of(
     places = np.stack(grid, axis=-1).reshape(-1, 3)
     z, y, x = np.meshgrid(*(np.arange(SIDE),) * 3, indexing="ij")
     inside = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    world = ((SIDE * places[:, np.newaxis] + inside) * voxel_m).reshape(-1, 3)
+    world = ((SIDE * places[:, np.newaxis] + inside) * voxel_m).reshape(-1, 3).astype(np.float64)
     own = moved.inverse().apply(world)
     off = off_m(own)
     rise = sum((off_m(own + _STEP_M * axis) - off)[:, np.newaxis] * axis / _STEP_M for axis in np.eye(3))
