@@ -16,7 +16,7 @@ from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
 from phone_host.run.kept_field import FIELD
-from phone_host.scan.scan import ScanModel
+from phone_host.scan.scan_model import ScanModel
 
 NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html|field\.bin"
 """The names that `scan` writes into its folder."""
@@ -54,7 +54,8 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
     folder = ListedFolder(out, NAMES)
     try:
         folder.add(MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else []))
-        write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes)
+        seen = scan.model.seen if scan.model.is_closed else None
+        write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
         if scan.field:
             write_bytes(out / FIELD, scan.field)
         write_text(out / TRAJECTORY, trajectory_of(report))
