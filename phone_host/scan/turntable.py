@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Processed
+from phone_host.scan.carving import Carving
+from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.merged_field import merged
@@ -173,7 +175,18 @@ class TurntableScan(Scan):
         """Return the surface so far, made from all views together once there are enough of them."""
         if self._finished is None or self._finished.taken != len(self._pairs):
             self._finished = self._end()
+        self._carve()
         return super().model()
+
+    def _carve(self) -> None:
+        """Let the views carve the box, from where they are known to lie in the end."""
+        box, settings = self._wanted.model_box, self.settings
+        if box is None or settings is None:
+            return
+        self._carving = Carving(Cells.of(box, settings.voxel_m), self._wanted.threads)
+        for station in self._stations:
+            if self._pairs[station.pair].is_fused:
+                self._carving.see(station.view, self._pairs[station.pair].world_camera)
 
     def _tracked(
         self, number: int, view: View, mask: NDArray[np.bool_], told_of: tuple[str, float, float]
