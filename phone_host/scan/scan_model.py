@@ -48,7 +48,7 @@ class ScanModel:
     @property
     def seen_mesh(self) -> Mesh:
         """The triangles of which a view saw all corners: what can be compared with the truth."""
-        return only(self.mesh, self.seen[self.mesh.triangles].all(axis=1))
+        return only(self.mesh, np.logical_and.reduce(self.seen[self.mesh.triangles], axis=1))
 
     @staticmethod
     def empty() -> "ScanModel":
