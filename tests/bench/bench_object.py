@@ -109,8 +109,17 @@ def pose_row(size: str, seed: int, places: int) -> PoseRow:
         truth = upright @ seen
         off.append(1e3 * float(np.linalg.norm(found.camera_mat.apply(STANDS_M) - truth.apply(STANDS_M))))
         turned.append(math.degrees(float(np.linalg.norm(vectors_of(found.camera_mat.R.T @ truth.R)))))
-    p95 = [float(np.percentile(each, 95)) for each in (off, turned)]
-    return PoseRow(size, seed, places, lost, float(np.mean(off)), *p95, least, 1e3 * float(np.median(took)))
+    return PoseRow(
+        size=size,
+        seed=seed,
+        places=places,
+        lost=lost,
+        mean_mm=float(np.mean(off)),
+        p95_mm=float(np.percentile(off, 95)),
+        p95_degrees=float(np.percentile(turned, 95)),
+        least_corners=least,
+        cpu_ms=1e3 * float(np.median(took)),
+    )
 
 
 def surface_row(name: str, size: Size, views: int) -> tuple[SurfaceRow, list[Processed]]:
