@@ -84,6 +84,7 @@ def test_what_nobody_saw_is_told_and_has_its_colour(model: ScanModel) -> None:
     assert not (model.mesh.colours[model.seen] == UNSEEN_RGB).all(axis=1).any()
     assert np.isnan(model.noise_m[~model.seen]).all()
     assert 0.12 < model.unseen_share < 0.35
+    assert model.seen[~under].sum() * 0.9 < len(model.seen_mesh.points_m) <= model.seen.sum()
 
 
 def test_fewer_views_leave_more_unseen() -> None:
