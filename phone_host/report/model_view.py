@@ -30,13 +30,13 @@ class ShownModel:
         mesh: its triangles.
         noise_m: (V,) standard deviation of its points, m.
         voxel_m: of the field that it was made of, m.
-        stands_on_mat: whether its axes are the mat's, z up, and not the left camera's.
+        is_on_mat: whether its axes are a mat's, z up; else they are a camera's.
     """
 
     mesh: Mesh
     noise_m: NDArray[np.float32]
     voxel_m: float
-    stands_on_mat: bool = False
+    is_on_mat: bool = False
 
 
 def model_view(shown: ShownModel, file: str) -> str:
@@ -59,12 +59,7 @@ def model_view(shown: ShownModel, file: str) -> str:
     low = mesh.points_m.min(axis=0)
     size = mesh.points_m.max(axis=0) - low
     step = float(size.max()) / _STEPS
-    view = {
-        "low": low.tolist(),
-        "size": size.tolist(),
-        "step": step,
-        "axes": "mat" if shown.stands_on_mat else "camera",
-    }
+    view = {"low": low.tolist(), "size": size.tolist(), "step": step, "axes": "mat" if shown.is_on_mat else "camera"}
     points = np.rint((mesh.points_m - low) / step).astype(np.uint16)
     levels = np.clip((noise_m - best) / (worst - best), 0, 1) * 255
     data = {
@@ -85,8 +80,8 @@ def model_view(shown: ShownModel, file: str) -> str:
     )
 
 
-def _buttons(shown: ShownModel) -> str:
-    front = "front" if shown.stands_on_mat else "as the camera began"
+def _buttons(model: ShownModel) -> str:
+    front = "front" if model.is_on_mat else "as the camera began"
     views = (("turned", "turned"), ("front", front), ("side", "side"), ("above", "above"))
     return "".join(f'<button type="button" data-to="{name}">{words}</button>' for name, words in views)
 
@@ -100,14 +95,10 @@ def _paints(best_m: float, worst_m: float) -> str:
     )
 
 
-def _words(drawn: int, total: int, shown: ShownModel) -> str:
-    number = f"{drawn:,} triangles stand for {total:,}" if drawn < total else f"{total:,} triangles"
-    axes = (
-        "mat's: X along its rows, Y away from the last row, Z up"
-        if shown.stands_on_mat
-        else "left camera's at the first pair: X right, Y down, Z forward"
-    )
+def _words(shown: int, total: int, model: ShownModel) -> str:
+    number = f"{shown:,} triangles stand for {total:,}" if shown < total else f"{total:,} triangles"
+    axes = "the mat's: Z up" if model.is_on_mat else "the left camera's at the first pair: X right, Y down, Z forward"
     return (
-        f"{number.replace(',', THIN)}; the axes are the {axes}. Drag turns, two fingers"
+        f"{number.replace(',', THIN)}; the axes are {axes}. Drag turns, two fingers"
         " or the wheel (after a click) zoom, shift and drag move, a double click goes back. Dark is the surface seen from behind."
     )

@@ -57,9 +57,8 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
         *(f"{pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed),
         *(remark.text for remark in report.remarks),
     ]
-    axes = report.axes.text if report.axes is Axes.MAT else f"{report.axes.text} at the first pair"
     files = (
-        FileLink(MODEL, f"the surface with its colours, metres; {axes}"),
+        FileLink(MODEL, f"the surface with its colours, metres; {_axes_words(report.axes)}"),
         FileLink(TRAJECTORY, "where the camera was, a line a pair: s, m, quaternion x y z w (TUM's format)"),
         FileLink("report.json", "all figures, with those of every pair"),
     )
@@ -81,6 +80,10 @@ def _subtitle(report: ScanReport) -> str:
     names = [pair.name for pair in report.pairs]
     which = f"{counted(len(names), 'pair')}, {names[0]} to {names[-1]}" if names else "no pairs"
     return f"{which}; {size_text(report.rectified_px)} px, matcher {report.matcher}"
+
+
+def _axes_words(axes: Axes) -> str:
+    return axes.text if axes is Axes.MAT else f"{axes.text} at the first pair"
 
 
 def _figures(report: ScanReport) -> tuple[Figure, ...]:
