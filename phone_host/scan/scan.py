@@ -20,8 +20,10 @@ from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import only, without_crumbs
+from phone_host.scan.piece import PoseGate
+from phone_host.scan.pieces import Joined
 from phone_host.scan.surface_noise import surface_noise_m
-from phone_host.scan.tracker import PoseGate, Tracker, TrackerState
+from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume import BlockValues
@@ -156,6 +158,8 @@ class Scan:
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
         self._closed = _Closed()
+        self._untracked = 0  # pairs before the first that this tracker took
+        self._is_changed = False  # whether submaps that are closed do not hold any more
 
     @property
     def pairs(self) -> tuple[ScannedPair, ...]:
@@ -192,6 +196,7 @@ class Scan:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
             wanted = self._wanted
             self.tracker = Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
+            self._untracked = len(self._pairs)
         if self.tracker is None:
             pair = ScannedPair(
                 name=name,
@@ -211,6 +216,7 @@ class Scan:
                 here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
                 raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
             told = self.tracker.track(view)
+            self._joined(told.joined)
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
@@ -224,6 +230,15 @@ class Scan:
             )
         self._pairs.append(pair)
         return pair
+
+    def _joined(self, views: Sequence[Joined]) -> None:
+        """Note that pairs that were lost have become part of the model."""
+        for view in views:
+            at = self._untracked + view.number - 1
+            self._pairs[at] = replace(
+                self._pairs[at], world_camera=view.world_camera, state=view.state, weakness=view.weakness
+            )
+            self._is_changed = self._is_changed or at < self._closed.pairs
 
     @property
     def is_submap_due(self) -> bool:
@@ -242,9 +257,10 @@ class Scan:
         assert self.geometry is not None
         before, volume = self._closed, self.tracker.volume
         blocks = volume.changed_blocks()
-        is_whole = whole or before.blocks + len(blocks.places) > _MOST_COPIES * volume.blocks.count
+        is_whole = whole or self._is_changed or before.blocks + len(blocks.places) > _MOST_COPIES * volume.blocks.count
         if is_whole:
             before, blocks = _Closed(), volume.changed_blocks(every=True)
+        self._is_changed = False
         tracker = self.tracker.kept(before.places)
         self._closed = _Closed(
             len(self._pairs), self.fused, before.places + len(tracker.places), before.blocks + len(blocks.places)
@@ -274,7 +290,7 @@ class Scan:
             self.tracker.volume.put(each.blocks)
             self.tracker.go_on(each.tracker)
             places += len(each.tracker.places)
-        written = sum(len(each.blocks.places) for each in submaps)
+        written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
     def model(self) -> ScanModel:

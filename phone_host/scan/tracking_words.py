@@ -25,6 +25,7 @@ class Weakness(Enum):
     LITTLE_OVERLAP = "little overlap"
     POOR_FIT = "poor fit"
     FLAT = "flat"
+    APART = "apart"
 
     @property
     def advice(self) -> str:
@@ -36,5 +37,6 @@ class Weakness(Enum):
             Weakness.TOO_FAST: "moved too fast: move more slowly, back to where it was",
             Weakness.LITTLE_OVERLAP: "too little of the model is in view: move back to where it was",
             Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
+            Weakness.APART: "followed again, but apart from the model: move back to where it was",
             Weakness.FLAT: "only a plane is in view: show something with depth beside it",
         }[self]
