@@ -106,15 +106,18 @@ class CheckedCapture:
 def check_capture(
     camera: Camera,
     calibration: Path | None,
+    elsewhere: Path,
     whole_s: float,
+    *,
     stopped: Callable[[], bool],
     tell: Callable[[Progress], None],
 ) -> CheckedCapture:
-    """Film, check, and keep the report beside the calibration.
+    """Film, check, and keep the report beside the calibration; without one, in another folder.
 
     Args:
         camera: the open camera; this function closes it.
-        calibration: rig.yaml; None: there is none, and nothing is kept.
+        calibration: rig.yaml; None: there is none.
+        elsewhere: folder for the report of a check without a calibration; made if need be.
         whole_s: how long it takes, s.
         stopped: asked often; True ends it early, and nothing is kept.
         tell: called with each frame.
@@ -131,15 +134,13 @@ def check_capture(
     report = film_capture(camera, rig, plan, stopped, tell)
     findings = findings_of(report)
     if not stopped():
-        findings.append(_kept(report, calibration))
+        findings.append(_kept(report, capture_path(calibration, elsewhere)))
     return CheckedCapture(report, findings)
 
 
-def _kept(report: CaptureReport, calibration: Path | None) -> Finding:
-    if calibration is None:
-        return ok("capture", "not kept, for there is no calibration yet: check again after it")
-    path = capture_path(calibration)
+def _kept(report: CaptureReport, path: Path) -> Finding:
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, capture_text(report))
     except OSError as error:
         problem = f"{path} cannot be written ({error.strerror or error})"

@@ -67,6 +67,7 @@ class Question:
         out: folder of the results.
         wait_s: how long to wait for the board, s.
         keys: folder of this host's key and the boards that it knows.
+        data: folder of this user's data, where a check of the camera's images is kept if there is no calibration.
         feed: brings browsers that give their cameras; None: there is no page.
     """
 
@@ -76,6 +77,7 @@ class Question:
     out: Path
     wait_s: float
     keys: KeyFolder
+    data: Path
     feed: BrowserFeed | None = None
 
 
@@ -113,12 +115,15 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
         yield ok("board", "not asked: give --link")
     for uri in question.links:
         yield from _examine_board(uri, question.wait_s, question.keys, works=works)
-    if question.calibration and works:
+    if works and (question.calibration or question.camera):
         from phone_host.doctor import vision_checks  # noqa: PLC0415 - numpy and OpenCV, seen to work
 
-        yield check_rig(vision_checks.read_rig_readings(question.calibration, question.camera))
+        if question.calibration:
+            yield check_rig(vision_checks.read_rig_readings(question.calibration, question.camera))
         if keeps and question.camera:
-            yield from vision_checks.check_kept_capture(question.calibration, question.camera, question.feed)
+            yield from vision_checks.check_kept_capture(
+                question.calibration, question.camera, question.data, question.feed
+            )
     yield from check_clocks(machine.read_clocks(Path(__file__).parent))
     yield from examine_out(question.out)
     if not is_android():  # which shows the kernel's log to nobody

@@ -16,7 +16,7 @@ from common.errors import AbsentBoardError, BusyBoardError, DataError, OtherVers
 from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.calibration.capture.words import stored_finding
+from phone_host.calibration.capture.words import holds_for, stored_finding
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import camera_orientation, open_camera
@@ -111,19 +111,22 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
     )
 
 
-def check_kept_capture(calibration: str, camera: str, feed: BrowserFeed | None) -> list[Finding]:
-    """Look for the check of a camera's images that is kept beside a calibration, and whether it holds for this camera.
+def check_kept_capture(calibration: str, camera: str, data: Path, feed: BrowserFeed | None) -> list[Finding]:
+    """Look for the check of a camera's images that is kept beside a calibration, else the one from before it, and whether it holds for this camera.
 
     Phones stabilise their images, other cameras hardly: of a camera of this machine nothing is said if it was never checked.
 
     Args:
-        calibration: rig.yaml.
+        calibration: rig.yaml; empty: there is none.
         camera: URI of the host camera.
+        data: folder where a check without a calibration is kept.
         feed: brings browsers that give their cameras; None: there is no page.
     """
+    may_warp = is_http(camera) or is_browser(camera)
     try:
-        kept = read_capture(capture_path(Path(calibration)))
-        if kept is None and not is_http(camera) and not is_browser(camera):
+        beside = read_capture(capture_path(Path(calibration), data)) if calibration else None
+        kept = beside or read_capture(capture_path(None, data))
+        if kept is None and not may_warp:
             return []
         opened = open_camera(camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
     except DataError as error:
@@ -131,4 +134,7 @@ def check_kept_capture(calibration: str, camera: str, feed: BrowserFeed | None) 
     except TandemError:
         return []  # the camera's own finding says so
     opened.close()
-    return [stored_finding(kept, source_of(opened))]
+    source = source_of(opened)
+    if beside is None and kept is not None and not may_warp and not holds_for(kept.source, source):
+        return []
+    return [stored_finding(kept, source, has_lens=bool(calibration))]

@@ -22,6 +22,7 @@ from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import report_of
 from phone_host.run.sinks import FunctionSink
+from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan import LEAST_WEIGHT, Scan, ScannedPair, ScanWanted, Submap
 
@@ -103,6 +104,14 @@ class LiveScan:
         with self._watching:
             self.patches.renew(tracker.volume)
             self._renewed_ns = now.monotonic_ns()
+
+    def crop(self, box: Box | None) -> None:
+        """Keep only what lies in a box, from now on until the model is written. Safe from any thread.
+
+        Args:
+            box: in the model's axes; None: everything.
+        """
+        self.scan.crop(box)
 
     @property
     def words(self) -> str:

@@ -1,4 +1,6 @@
-"""capture.json: what the check of the host's camera found. It lies beside the rig.yaml whose lens it was checked with.
+"""capture.json: what the check of the host's camera found.
+
+It lies beside the rig.yaml whose lens it was checked with, or among this user's own data as long as there is none.
 
 Keys: format_version; camera: driver, name, serial (empty: unknown); software; width_px, height_px; pace and rigidity, with the
 names and units of `model.capture`; null: not measured.
@@ -24,9 +26,14 @@ _REMEDY: Final = "delete the file, and check the camera again"
 _Kind = TypeVar("_Kind", Pace, Rigidity)
 
 
-def capture_path(calibration: Path) -> Path:
-    """Return where the check that belongs to a rig.yaml is kept."""
-    return calibration.parent / _NAME
+def capture_path(calibration: Path | None, elsewhere: Path) -> Path:
+    """Return where a check is kept.
+
+    Args:
+        calibration: rig.yaml that it belongs to; None: there is none yet.
+        elsewhere: folder for a check without one.
+    """
+    return (elsewhere if calibration is None else calibration.parent) / _NAME
 
 
 def capture_values(report: CaptureReport) -> dict[str, Any]:

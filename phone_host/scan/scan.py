@@ -293,6 +293,14 @@ class Scan:
         written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
+    def crop(self, box: Box | None) -> None:
+        """Keep only what lies in a box: when the model is made, for the field holds it all.
+
+        Args:
+            box: m; None: everything.
+        """
+        self._wanted = replace(self._wanted, box=box)
+
     def model(self) -> ScanModel:
         """Return the surface so far, without crumbs and what lies outside the box; without triangles before any was seen."""
         if self.tracker is None:

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from phone_host.geometry import lens
 from phone_host.model import CameraModel, Lens
-from phone_host.scene.scene_model import Body, Box, Floats, Plane, Pose, Shape, Sphere, Vector
+from phone_host.scene.round_shapes import dot, frustum_faces, frustum_normals, meet_frustum, meet_torus, torus_normals
+from phone_host.scene.scene_model import Body, Box, Floats, Frustum, Plane, Pose, Shape, Sphere, Torus, Vector
 
 FACES = 8
-"""Surface numbers per body: surface = body index * FACES + face. A box has six faces, every other body has one."""
+"""Surface numbers per body: surface = body index * FACES + face. A box has six faces, a frustum three, every other body has one."""
 
 NOTHING = -1
 """Surface number of a ray that hits nothing."""
@@ -119,6 +120,12 @@ def intersect(shape: Shape, origin: Floats, rays: Floats) -> Floats:
                 root = half * half - square * (origin @ origin - radius_m * radius_m)
                 depth = (-half - np.sqrt(root)) / square
                 hit = (root >= 0.0) & (depth > 0.0)
+            case Frustum():
+                depth = meet_frustum(shape, origin, rays)
+                hit = np.isfinite(depth)
+            case Torus():
+                depth = meet_torus(shape, origin, rays)
+                hit = np.isfinite(depth)
             case _:
                 assert_never(shape)
         return np.where(hit, depth, rays.dtype.type(np.inf))
@@ -182,14 +189,13 @@ def faces_and_normals(shape: Shape, points: Floats) -> tuple[NDArray[np.int16], 
             normals = np.zeros_like(points)
             normals[axis, each] = side
             return (2 * axis + (side > 0)).astype(np.int16), normals
+        case Frustum():
+            faces = frustum_faces(shape, points)
+            return faces, frustum_normals(shape, points, faces)
+        case Torus():
+            return np.zeros(count, dtype=np.int16), torus_normals(shape, points)
         case _:
             assert_never(shape)
-
-
-def dot(a: Floats, b: Floats) -> Floats:
-    """Return the inner products (N,) of vectors (3, N); written out, this is three times as fast as einsum."""
-    product: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return product
 
 
 def column(vector: Vector | NDArray[np.float64], like: Floats) -> Floats:

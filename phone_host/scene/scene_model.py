@@ -58,7 +58,27 @@ class Sphere:
     radius_m: float
 
 
-Shape = Plane | Box | Sphere
+@dataclass(frozen=True, slots=True)
+class Frustum:
+    """A capped cone, cut parallel to its base, around the body's z axis, half of its height on either side of the origin.
+
+    Equal radii make a cylinder, a radius of zero a whole cone.
+    """
+
+    bottom_radius_m: float
+    top_radius_m: float
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Torus:
+    """A ring around the body's z axis: a tube whose middle runs around the origin."""
+
+    ring_radius_m: float
+    tube_radius_m: float
+
+
+Shape = Plane | Box | Sphere | Frustum | Torus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +93,8 @@ class Texture:
         shortest_m: wavelength of the finest octave.
         longest_m: wavelengths double from `shortest_m` up to this.
         stretch: at least 1 per axis of the body; 6 along an axis gives a grain along it.
+        gloss: brightness of the lamp's reflection, as a share of the lamp; 0 is matt.
+        sharpness: how narrow that reflection is, the exponent of Blinn and Phong.
     """
 
     seed: int = 0
@@ -82,6 +104,25 @@ class Texture:
     shortest_m: float = 0.004
     longest_m: float = 0.26
     stretch: Vector = (1.0, 1.0, 1.0)
+    gloss: float = 0.0
+    sharpness: float = 60.0
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Print:
+    """Black ink on white paper, on a plane: x to the right, y up, z towards who reads it; its middle is the origin.
+
+    Attributes:
+        ink: (H + 1, W + 1) float64; how many texels of ink lie above and to the left of each texel corner.
+        texels_per_m: how fine it is.
+        paper_bgr: reflectance (0..1, linear) of the paper.
+        ink_bgr: reflectance of the ink.
+    """
+
+    ink: NDArray[np.float64]
+    texels_per_m: float
+    paper_bgr: Vector = (0.76, 0.80, 0.80)
+    ink_bgr: Vector = (0.035, 0.035, 0.035)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,14 +166,14 @@ class Body:
         shape: its shape.
         position_m: its origin in the scene's axes.
         R_scene_body: (3, 3) float64, takes body coordinates to the scene's axes.
-        texture: its surface.
+        texture: its surface; only a plane can be printed on.
         path: how it moves.
     """
 
     name: str
     shape: Shape
     position_m: Vector
-    texture: Texture = field(default_factory=Texture)
+    texture: Texture | Print = field(default_factory=Texture)
     R_scene_body: Rotation = field(default_factory=lambda: np.eye(3))
     path: Path = STILL
 
@@ -146,6 +187,10 @@ class Body:
                 return math.hypot(*size_m) / 2.0
             case Sphere(radius_m):
                 return radius_m
+            case Frustum(bottom_radius_m, top_radius_m, height_m):
+                return math.hypot(max(bottom_radius_m, top_radius_m), height_m / 2.0)
+            case Torus(ring_radius_m, tube_radius_m):
+                return ring_radius_m + tube_radius_m
             case _:
                 assert_never(self.shape)
 
@@ -219,6 +264,7 @@ class Look:
         offset: black level, grey levels.
         gamma: exponent of the transfer curve.
         vignetting: fraction of the light lost in the corners, 0..1.
+        blur_px: standard deviation of the lens's blur, px.
         noise_sigma: standard deviation of the sensor's noise, grey levels.
         seed: selects that noise.
     """
@@ -227,6 +273,7 @@ class Look:
     offset: float = 0.0
     gamma: float = 2.0
     vignetting: float = 0.0
+    blur_px: float = 0.0
     noise_sigma: float = 0.0
     seed: int = 0
 

@@ -14,9 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import CameraModel, Image
-from phone_host.scene.cast import BATCH, FACES, NOTHING, Hits, cast, cast_one, dot, pixel_rays, to_body
+from phone_host.scene.cast import BATCH, FACES, NOTHING, Hits, cast, cast_one, pixel_rays, to_body
+from phone_host.scene.round_shapes import dot
 from phone_host.scene.scene_model import Body, Floats, Look, Plane, Pose, Scene
-from phone_host.scene.shade import albedo, may_darken, shadow_balls, surface_light, surface_normals
+from phone_host.scene.shade import (
+    SeenPoints,
+    albedo,
+    lamp_reflection,
+    may_darken,
+    shadow_balls,
+    surface_light,
+    surface_normals,
+)
 
 _BLOCK_PX = 16
 _SUB_PIXELS = (-1.0 / 3.0, 0.0, 1.0 / 3.0)
@@ -85,6 +94,8 @@ class Renderer:
             self._cast_moving(bodies, hits, touched)
             self._mark_shadows(bodies, hits, touched)
             self._paint(bodies, hits, touched, levels)
+        if self._look.blur_px > 0.0:
+            levels = self._blurred(levels)
         if self._noise is not None:
             levels += self._noise_at(t_s)
         return np.clip(np.rint(levels, out=levels), 0.0, 255.0, out=levels).astype(np.uint8).reshape(*self._size, 3)
@@ -107,7 +118,8 @@ class Renderer:
             points = self._centre[:, None] + depth * rays
             normals = surface_normals(bodies[index], points, -rays)
             reflectance[:, at] = self._reflectance(bodies[index], depth=depth, rays=rays, normals=normals, pixels=at)
-            levels[at] = self._develop(reflectance[:, at] * self._light(bodies[index], still, points, normals), at)
+            light = self._light_from(bodies[index], still, SeenPoints(points, normals, rays), reflectance[:, at])
+            levels[at] = self._develop(light, at)
         self._smooth_edges(still, hits.surface, None, levels)
         return _Still(hits, reflectance, levels)
 
@@ -151,16 +163,19 @@ class Renderer:
                 reflectance = self._reflectance(bodies[index], depth=depth, rays=rays, normals=normals, pixels=at)
             else:
                 reflectance = self._still.reflectance[:, at]
-            levels[at] = self._develop(reflectance * self._light(bodies[index], bodies, points, normals), at)
+            light = self._light_from(bodies[index], bodies, SeenPoints(points, normals, rays), reflectance)
+            levels[at] = self._develop(light, at)
         self._smooth_edges(bodies, hits.surface, touched, levels)
 
-    def _light(self, body: Body, bodies: tuple[Body, ...], points: Floats, normals: Floats) -> Floats:
-        """Compute the light (3, N) on points of a body."""
+    def _light_from(self, body: Body, bodies: tuple[Body, ...], seen: SeenPoints, reflectance: Floats) -> Floats:
+        """Compute the light (3, N) that leaves points of a body towards the camera."""
         solid = (other for other in bodies if other is not body and not isinstance(other.shape, Plane))
         casters = tuple(
             other for other in solid if isinstance(body.shape, Plane) or may_darken(self._scene.light, other, body)
         )
-        return surface_light(self._scene.light, casters, points, normals)
+        scattered: Floats = reflectance * surface_light(self._scene.light, casters, seen.points, seen.normals)
+        reflected = lamp_reflection(self._scene.light, body, casters, seen)
+        return scattered if reflected is None else scattered + reflected
 
     def _reflectance(self, body: Body, *, depth: Floats, rays: Floats, normals: Floats, pixels: Flat) -> Floats:
         """Compute the reflectance (3, N) as a pixel averages it.
@@ -234,7 +249,7 @@ class Renderer:
             across, along = self._footprint_m(depth, ray, normals)
             local = to_body(bodies[index], points)
             reflectance = albedo(bodies[index], local, np.maximum(across, along / np.float32(len(_SUB_PIXELS))))
-            colour[:, part] = reflectance * self._light(bodies[index], bodies, points, normals)
+            colour[:, part] = self._light_from(bodies[index], bodies, SeenPoints(points, normals, ray), reflectance)
         levels[at] = self._develop(colour.reshape(3, -1, at.size).mean(axis=1), at)
 
     def _develop(self, colour: Floats, at: Flat) -> Floats:
@@ -244,6 +259,17 @@ class Renderer:
         curve = np.sqrt(lit) if look.gamma == 2.0 else np.power(lit, np.float32(1.0 / look.gamma))
         gain = 255.0 * np.asarray(look.gain_bgr, dtype=np.float32)[:, None]
         return (gain * curve + np.float32(look.offset)).T
+
+    def _blurred(self, levels: Floats) -> Floats:
+        """Return grey levels (N, 3) as a lens blurs them: the light is blurred, not its levels."""
+        look = self._look
+        gain = 255.0 * np.asarray(look.gain_bgr, dtype=np.float32)
+        light = np.maximum((levels - np.float32(look.offset)) / gain, 0.0) ** np.float32(look.gamma)
+        picture = light.reshape(*self._size, 3)
+        soft = np.asarray(cv2.GaussianBlur(picture, (0, 0), look.blur_px, borderType=cv2.BORDER_REPLICATE))
+        curve = np.power(soft.reshape(-1, 3), np.float32(1.0 / look.gamma))
+        blurred: Floats = gain * curve + np.float32(look.offset)
+        return blurred
 
     def _inside(self, centre: NDArray[np.float64], radius: float) -> Flat:
         """Return flat indices of pixels that may see a ball: all 16 x 16 blocks whose cone of rays meets the ball's cone."""

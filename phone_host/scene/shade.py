@@ -1,7 +1,7 @@
 """Computes the light that leaves a surface point: solid band-limited texture, one lamp with soft shadows, a sky.
 
-All of it depends only on the point on the surface (no highlights), so two cameras see the same thing, each within
-the detail that its own pixels can hold.
+All of it depends only on the point on the surface, so two cameras see the same thing, each within the detail that its
+own pixels can hold. The exception is the lamp's reflection in a glossy surface, which lies elsewhere for each camera.
 
 The texture is a sum of octaves. Each octave reads one periodic tile of noise whose spectrum is a ring of one octave's
 width. It reaches the tile through a projection of the body's three coordinates to two: along the normal of flat faces;
@@ -11,14 +11,17 @@ out before its wavelength gets near two pixels, so nothing aliases.
 
 import functools
 import math
+from dataclasses import dataclass
 from typing import assert_never
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.scene.cast import box_interval, column, dot, faces_and_normals, to_body
-from phone_host.scene.scene_model import Body, Box, Floats, Light, Plane, Sphere, Texture
+from phone_host.scene.cast import box_interval, column, faces_and_normals, to_body
+from phone_host.scene.printed import printed_albedo
+from phone_host.scene.round_shapes import dot
+from phone_host.scene.scene_model import Body, Box, Floats, Frustum, Light, Plane, Print, Sphere, Texture, Torus
 
 _TILE = 512
 _WAVE_TEXELS = 16
@@ -36,6 +39,9 @@ _UP_WEIGHT = 0.3
 
 _LEAST_SKY = 0.04
 """This share is subtracted from the sky that a body hides, so that its influence ends somewhere and frames stay cheap."""
+
+_SQUARE_OF_CIRCLE = math.sqrt(math.pi)
+"""Side of a square with the area of a circle of radius 1."""
 
 _WRAP = 0.15
 """The lamp reaches this far around a ball, like the terminator of a lamp of finite size."""
@@ -69,16 +75,16 @@ def _projections(seed: int, count: int, *, flat: bool) -> tuple[Floats, Floats]:
     return planes.astype(np.float32), rng.uniform(0.0, _TILE / _WAVE_TEXELS, (count, 2)).astype(np.float32)
 
 
-def _texture_places(body: Body, points: Floats) -> tuple[Floats, bool]:
+def _texture_places(body: Body, texture: Texture, points: Floats) -> tuple[Floats, bool]:
     """Return points (3, N) as the texture takes them, and whether their third coordinate is the surface's normal.
 
     Each face of a box is textured separately (coordinates swapped), so that none is seen along a slanted projection.
     """
-    places = points / column(body.texture.stretch, points)
+    places = points / column(texture.stretch, points)
     match body.shape:
         case Plane():
             return places, True
-        case Sphere():
+        case Sphere() | Frustum() | Torus():
             return places, False
         case Box():
             faces = faces_and_normals(body.shape, points)[0]
@@ -128,7 +134,9 @@ def albedo(body: Body, points: Floats, footprint_m: Floats) -> Floats:
         (3, N) float32 BGR, 0..1.
     """
     texture = body.texture
-    places, flat = _texture_places(body, points)
+    if isinstance(texture, Print):
+        return printed_albedo(texture, points, footprint_m)
+    places, flat = _texture_places(body, texture, points)
     waves = wavelengths_m(texture)
     planes, offsets = _projections(texture.seed, len(waves), flat=flat)
     total = np.zeros(points.shape[1], dtype=np.float32)
@@ -170,7 +178,14 @@ def lamp_reaching(body: Body, points: Floats, towards: Floats) -> Floats:
             edge = 0.4 * min(size_m)
             through = _smooth(-edge, edge, near - far)
             return np.where(far > 0.0, through, np.float32(1.0))
-        case Plane():
+        case Frustum(bottom_radius_m, top_radius_m, height_m):
+            # Its shadow is that of a box as wide as its middle; the soft edge hides the difference.
+            side = _SQUARE_OF_CIRCLE * (bottom_radius_m + top_radius_m) / 2.0
+            near, far = box_interval((side, side, height_m), local, ray[:, None])
+            edge = 0.4 * min(side, height_m)
+            return np.where(far > 0.0, _smooth(-edge, edge, near - far), np.float32(1.0))
+        case Plane() | Torus():
+            # A ring's shadow is too narrow to matter.
             return np.ones(points.shape[1], dtype=np.float32)
         case _:
             assert_never(body.shape)
@@ -183,7 +198,9 @@ def _ball_radius_m(body: Body) -> float:
             return radius_m
         case Box(size_m):
             return sum(size_m) / 6.0
-        case Plane():
+        case Frustum(bottom_radius_m, top_radius_m, height_m):
+            return (bottom_radius_m + top_radius_m + height_m / 2.0) / 3.0
+        case Plane() | Torus():
             return 0.0
         case _:
             assert_never(body.shape)
@@ -260,6 +277,46 @@ def surface_light(light: Light, casters: tuple[Body, ...], points: Floats, norma
         sky = sky * (np.float32(1.0) - sky_blocked(body, points, normals))
     total: Floats = column(light.lamp_bgr, points) * lamp + column(light.sky_bgr, points) * sky
     return total
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenPoints:
+    """Surface points as one camera sees them.
+
+    Attributes:
+        points: (3, N) float32, scene axes, m.
+        normals: (3, N) float32 outward.
+        rays: (3, N) float32 directions from the camera, of any length.
+    """
+
+    points: Floats
+    normals: Floats
+    rays: Floats
+
+
+def lamp_reflection(light: Light, body: Body, casters: tuple[Body, ...], seen: SeenPoints) -> Floats | None:
+    """Compute the lamp's reflection in a glossy surface (Blinn 1977).
+
+    Args:
+        light: gives the lamp.
+        body: the body whose surface it is.
+        casters: bodies that may keep the lamp from it.
+        seen: N points of that surface.
+
+    Returns:
+        (3, N) float32 BGR, to be added to the light that the surface scatters; None: it is matt.
+    """
+    texture = body.texture
+    if isinstance(texture, Print) or texture.gloss == 0.0:
+        return None
+    towards = (np.asarray(light.towards) / np.linalg.norm(light.towards)).astype(np.float32)
+    between = towards[:, None] - seen.rays / np.sqrt(dot(seen.rays, seen.rays))
+    facing = np.maximum(dot(between, seen.normals), 0.0) / np.sqrt(np.maximum(dot(between, between), np.float32(1e-12)))
+    share = np.where(towards @ seen.normals > 0.0, facing ** np.float32(texture.sharpness), np.float32(0.0))
+    for caster in casters:
+        share = share * lamp_reaching(caster, seen.points, towards)
+    reflected: Floats = column(light.lamp_bgr, seen.points) * np.float32(texture.gloss) * share
+    return reflected
 
 
 def surface_normals(body: Body, points: Floats, towards_eye: Floats) -> Floats:

@@ -20,6 +20,7 @@ from phone_host.output.axes import Axes
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
 from phone_host.run.sinks import Sink
+from phone_host.scan.box import Box
 from phone_host.stereo.core import StereoCore
 
 Choices = Mapping[str, str]
@@ -191,6 +192,13 @@ class Program(Protocol):
             choices: of a run, with a calibration.
             values: options of `scan` by name: voxel, box.
             sinks_of: makes further sinks.
+        """
+
+    def box(self, values: Choices) -> Box | None:
+        """Return the `box` of these options of `scan`; None: there is none.
+
+        Raises:
+            SettingsError: it is no box.
         """
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:

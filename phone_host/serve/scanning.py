@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from common.errors import SettingsError
 from phone_host.live.scan import LiveScan
+from phone_host.scan.box import Box
 from phone_host.scan.patches import Patches
 from phone_host.scan.scan import ScannedPair
 from phone_host.scan.tracking_words import Tracking
@@ -46,6 +48,20 @@ class Scanning:
     def over(self, scanned: Scanned | None) -> None:
         """Take what came of it; None: nothing was written."""
         self._over = scanned
+
+    def crop(self, box: Box | None) -> str:
+        """Keep only what lies in a box; return what to say.
+
+        Args:
+            box: None: everything.
+
+        Raises:
+            SettingsError: no scan goes on.
+        """
+        if (live := self._live) is None:
+            raise SettingsError("no scan goes on", "begin one: the box is set at its start, too")
+        live.crop(box)
+        return "everything is kept" if box is None else "only what lies in the box is kept"
 
     @property
     def folder(self) -> str:

@@ -70,6 +70,7 @@ class Station:
             Do.CALIBRATE: self._calibrate,
             Do.RUN: self._run,
             Do.SCAN: self._scan,
+            Do.CROP: lambda values: Answer(words=self._scanning.crop(self._program.box(values))),
             Do.STOP: self._stop,
             Do.SNAPSHOT: self._snapshot,
             Do.RECORD: self._record,

@@ -206,6 +206,7 @@ class Do(Enum):
     CALIBRATE = "calibrate"
     RUN = "run"
     SCAN = "scan"
+    CROP = "crop"
     STOP = "stop"
     SNAPSHOT = "snapshot"
     RECORD = "record"
@@ -220,7 +221,7 @@ class Command:
         do: what.
         values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
             `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel` and `box`, which may be
-            missing. Empty for the others.
+            missing; for CROP, while a scan goes on, `box`. Empty for the others.
     """
 
     do: Do

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import CameraModel
-from phone_host.scene.cast import FACES, cast, dot, pixel_rays, to_body
+from phone_host.scene.cast import FACES, cast, pixel_rays, to_body
+from phone_host.scene.round_shapes import dot
 from phone_host.scene.scene import Body, Pose, Scene, Texture
 from phone_host.scene.scene_model import Floats, Vector
 from phone_host.scene.shade import albedo, surface_normals

@@ -34,8 +34,8 @@ _HARDWARE: Final = (
     "host.toml",
     "wall",
     "session.mcap",
-    "walk/",  # pictures on the way around a thing: tests/system/test_scan_command.py
-    "--resume cup",  # after a scan that was killed: tests/system/test_scan_resume.py
+    "walk/",  # pictures on the way around a thing: tests/scan/test_scan_command.py
+    "--resume cup",  # after a scan that was killed: tests/scan/test_scan_resume.py
     "host.mcap",
     "opencv-bm",
     "phone-host serve",  # until it is stopped; tests/system/test_serve.py

@@ -1,6 +1,8 @@
 """A camera's film is checked by `doctor --capture` and on the page, with a film of a camera that is turned by hand."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from phone_host.calibration.capture.words import CHECK_AGAIN
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import write_rig
@@ -41,10 +44,11 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def doctor(film: Path, *arguments: str) -> tuple[dict[str, Any], str]:
-    """Run the doctor with the film; return its JSON and what it told on the way."""
+    """Run the doctor with the film; return its JSON and what it told on the way. The user's data lie beside the film."""
     camera = f"replay:{film}/film?fps={_FPS}&loop=1&pace=clock"
     command = [sys.executable, "-P", "-m", "phone_host.cli", "doctor", "--json", "--camera", camera, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    own = {**os.environ, "XDG_DATA_HOME": str(film / "data")}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, env=own)
     assert "Traceback" not in done.stderr
     return json.loads(done.stdout) if done.stdout else {}, done.stderr
 
@@ -62,6 +66,19 @@ def test_a_film_is_checked_and_kept_beside_the_rig(film: Path) -> None:
     again, _ = doctor(film, "--calibration", str(film / "rig.yaml"))
     (kept,) = (check["finding"] for check in again["checks"] if check["what"] == "capture")
     assert kept.startswith("checked: none seen")
+
+
+def test_a_film_is_checked_before_the_calibration_and_kept_among_the_users_data(film: Path, tmp_path: Path) -> None:
+    """Without a calibration the next doctor knows of the check, too; with one that has none beside it, another is asked for."""
+    found, _ = doctor(film, "--capture", "10")
+    assert found["capture"] == json.loads((film / "data" / "tandemscan" / "capture.json").read_text(encoding="utf-8"))
+    assert found["capture"]["rigidity"]["knows_lens"] is False
+    again, _ = doctor(film)
+    assert [each["verdict"] for each in again["checks"] if each["what"] == "capture"] == ["ok"]
+    rig = shutil.copy(film / "rig.yaml", tmp_path)
+    late, _ = doctor(film, "--calibration", str(rig))
+    (kept,) = (each for each in late["checks"] if each["what"] == "capture")
+    assert (kept["verdict"], kept["remedy"]) == ("warn", CHECK_AGAIN)
 
 
 def test_a_check_needs_a_camera_with_a_clock(film: Path, tmp_path: Path) -> None:

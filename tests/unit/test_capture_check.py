@@ -14,7 +14,14 @@ from common.errors import DataError
 from phone_host.calibration.capture.check import ENOUGH, CaptureCheck, Plan, Stage, rigidity_of
 from phone_host.calibration.capture.look import FRAMES, Reading, Window, guessed_lens, look
 from phone_host.calibration.capture.pace import Shot, pace_of
-from phone_host.calibration.capture.words import findings_of, holds_for, stage_words, stored_finding, warp_finding
+from phone_host.calibration.capture.words import (
+    CHECK_AGAIN,
+    findings_of,
+    holds_for,
+    stage_words,
+    stored_finding,
+    warp_finding,
+)
 from phone_host.model import Image
 from phone_host.model.capture import CaptureReport, CaptureSource, Pace, Rigidity, Unseen, Warping
 from phone_host.output.capture_json import capture_path, capture_text, read_capture
@@ -231,7 +238,7 @@ def test_a_missing_calibration_and_a_global_shutter_are_named() -> None:
 def test_a_report_survives_its_file_and_belongs_to_one_camera(tmp_path: Path) -> None:
     """What was written is read again; it holds for the same phone, browser and size alone; without a file there is none."""
     report = CaptureReport(source=PHONE, pace=pace_of(shots(even(30)), math.nan), rigidity=rigidity_of([WARPED] * 3))
-    path = capture_path(tmp_path / "rig.yaml")
+    path = capture_path(tmp_path / "rig.yaml", tmp_path / "data")
     assert read_capture(path) is None
     path.write_text(capture_text(report))
     kept = read_capture(path)
@@ -246,10 +253,26 @@ def test_a_report_survives_its_file_and_belongs_to_one_camera(tmp_path: Path) ->
         replace(PHONE, camera=CameraIdentity("browser", "front")),
     ]
     assert not any(holds_for(kept.source, each) for each in others)
-    assert [stored_finding(each, PHONE).verdict for each in (None, kept)] == [Grade.WARN, Grade.WARN]
-    assert "never" in stored_finding(None, PHONE).text
-    assert "Firefox" in stored_finding(kept, others[0]).text
-    assert stored_finding(replace(kept, rigidity=rigidity_of([RIGID] * 3)), PHONE).verdict is Grade.OK
+    verdicts = [stored_finding(each, PHONE, has_lens=True).verdict for each in (None, kept)]
+    assert verdicts == [Grade.WARN, Grade.WARN]
+    assert "never" in stored_finding(None, PHONE, has_lens=True).text
+    assert "Firefox" in stored_finding(kept, others[0], has_lens=True).text
+
+
+def test_a_check_before_the_calibration_is_kept_elsewhere_and_made_again_after_it(tmp_path: Path) -> None:
+    """Without a lens a rigid film is good until there is a calibration, which would show a crop; a warped one is warped before and after."""
+    assert capture_path(None, tmp_path / "data").parent == tmp_path / "data"
+    early = CaptureReport(source=PHONE, pace=pace_of(shots(even(30)), math.nan), rigidity=rigidity_of([RIGID] * 3))
+    assert stored_finding(early, PHONE, has_lens=False).verdict is Grade.OK
+    now = stored_finding(early, PHONE, has_lens=True)
+    assert (now.verdict, now.remedy) == (Grade.WARN, CHECK_AGAIN)
+    assert "before it was calibrated" in now.text
+    late = replace(early, rigidity=replace(early.rigidity, knows_lens=True))
+    assert stored_finding(late, PHONE, has_lens=True).verdict is Grade.OK
+    warped = replace(early, rigidity=rigidity_of([WARPED] * 3))
+    said = [stored_finding(warped, PHONE, has_lens=has_lens) for has_lens in (False, True)]
+    assert said[0] == said[1]
+    assert "warped or cropped" in said[0].text
 
 
 @pytest.mark.parametrize(

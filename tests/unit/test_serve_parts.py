@@ -346,7 +346,8 @@ def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
     """Pairs, rate and skew; or which camera sent nothing; or the finding that stops everything."""
     assert check.obstacle([ok("python", "there")]) is None
     assert check.obstacle([ok("a", "b"), fail("camera", "gone", "plug it in")]) == Trouble("camera: gone", "plug it in")
-    never = stored_finding(None, CaptureSource(camera=CameraIdentity("browser", "back"), width_px=640, height_px=480))
+    phone = CaptureSource(camera=CameraIdentity("browser", "back"), width_px=640, height_px=480)
+    never = stored_finding(None, phone, has_lens=True)
     assert [each.remedy for each in check.checked([never, ok("a", "b")])] == ["press \u201cCheck the film\u201d", ""]
     assert check.seen(run(21)) == "both cameras are seen: 21 pairs, 20 a second, time skew 0.0 ms"
     assert check.seen(run(0)) == ""

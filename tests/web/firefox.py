@@ -1,11 +1,16 @@
-"""A Firefox with a camera of its own making, driven by WebDriver BiDi (https://w3c.github.io/webdriver-bidi), which it speaks without help."""
+"""A Firefox with a camera of its own making, driven by WebDriver BiDi (https://w3c.github.io/webdriver-bidi), which it speaks without help.
+
+The driver has a thread of its own: while Playwright holds a Chromium for other tests, an event loop runs in theirs, and two loops in one thread
+are refused.
+"""
 
 import asyncio
 import re
 import shutil
 import subprocess
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -39,25 +44,24 @@ class Firefox:
 
     Args:
         url: where it listens for BiDi.
-        loop: does the waiting.
+        loop: does the waiting, in another thread.
     """
 
     def __init__(self, url: str, loop: asyncio.AbstractEventLoop) -> None:
         self._loop, self._url, self._number = loop, url, 0
         self._context = ""
 
-    async def open(self) -> None:
+    def open(self) -> None:
         """Begin to drive it."""
-        self._session = aiohttp.ClientSession()
-        self._socket = await self._session.ws_connect(f"{self._url}/session", max_msg_size=0)
-        await self._ask("session.new", {"capabilities": {}})
-        await self._ask("script.addPreloadScript", {"functionDeclaration": _BUILT_IN})
-        tree = await self._ask("browsingContext.getTree", {})
+        self._wait_for(self._connect())
+        self._run("session.new", {"capabilities": {}})
+        self._run("script.addPreloadScript", {"functionDeclaration": _BUILT_IN})
+        tree = self._run("browsingContext.getTree", {})
         self._context = tree["contexts"][0]["context"]
 
-    async def close(self) -> None:
+    def close(self) -> None:
         """Drive it no more."""
-        await self._session.close()
+        self._wait_for(self._session.close())
 
     def goto(self, url: str) -> None:
         """Open a page and wait until it is loaded."""
@@ -98,7 +102,15 @@ class Firefox:
         return str(self._run("browsingContext.captureScreenshot", {"context": self._context})["data"])
 
     def _run(self, method: str, parameters: dict[str, Any]) -> dict[str, Any]:
-        return self._loop.run_until_complete(self._ask(method, parameters))
+        answer: dict[str, Any] = self._wait_for(self._ask(method, parameters))
+        return answer
+
+    def _wait_for(self, work: Coroutine[Any, Any, Any]) -> Any:
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+
+    async def _connect(self) -> None:
+        self._session = aiohttp.ClientSession()
+        self._socket = await self._session.ws_connect(f"{self._url}/session", max_msg_size=0)
 
     async def _ask(self, method: str, parameters: dict[str, Any]) -> dict[str, Any]:
         self._number += 1
@@ -119,23 +131,51 @@ def firefox(folder: Path, camera: int) -> Iterator[Firefox]:
     Args:
         folder: for its profile.
         camera: whether pages may use it, ALLOWED or DENIED.
+
+    Raises:
+        TimeoutError: it does not listen, or does not answer.
+        RuntimeError: it ended, or refused something. These and whatever else fails in the block carry what Firefox said.
     """
     wanted = _PREFERENCES | {"permissions.default.camera": camera}
     text = {value: str(value).lower() for value in wanted.values()}
     (folder / "user.js").write_text("".join(f'user_pref("{key}", {text[value]});\n' for key, value in wanted.items()))
     command = [str(FIREFOX), "--headless", "--no-remote", "--profile", str(folder), "--remote-debugging-port", "0"]
-    loop = asyncio.new_event_loop()
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+    said = folder / "said.txt"  # no pipe: a Firefox that fills one stands still
+    with said.open("w") as out, subprocess.Popen(command, stdout=out, stderr=out) as process, _own_loop() as loop:
         try:
-            assert process.stderr is not None
-            found = next(match for line in process.stderr if (match := _LISTENS.search(line)))
-            page = Firefox(found[1], loop)
-            loop.run_until_complete(page.open())
+            page = Firefox(_listens_at(process, said), loop)
             try:
+                page.open()
                 yield page
             finally:
-                loop.run_until_complete(page.close())
+                page.close()
+        except BaseException as error:  # a test's time limit, too
+            error.add_note(f"Firefox said:\n{said.read_text(errors='replace')}")
+            raise
         finally:
             process.terminate()
-            process.communicate()
-            loop.close()
+
+
+def _listens_at(process: "subprocess.Popen[bytes]", said: Path) -> str:
+    end_s = time.monotonic() + _ANSWER_S
+    while (found := _LISTENS.search(said.read_text(errors="replace"))) is None:
+        if process.poll() is not None:
+            raise RuntimeError(f"Firefox ended with {process.returncode}")
+        if time.monotonic() > end_s:
+            raise TimeoutError("Firefox does not listen")
+        time.sleep(0.05)
+    return found[1]
+
+
+@contextmanager
+def _own_loop() -> Iterator[asyncio.AbstractEventLoop]:
+    """Run an event loop in a thread."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever, name="firefox", daemon=True)
+    thread.start()
+    try:
+        yield loop
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()

@@ -13,6 +13,7 @@ from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.web.source import Activity, Do, ScanState
 from tests.support.plane_films import CORNER, plane_view, texture
+from tests.support.programs import until
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
 from tests.web.played import Played
 
@@ -102,4 +103,64 @@ def test_a_surface_is_drawn_and_turned_by_keys(program: Played, opened: Opener, 
     page.check("input[name=scan-paint][value=shape]", force=True)
     page.wait_for_timeout(300)
     assert _roughness(page) < coloured / 2
+    assert complaints == []
+
+
+def _box(page: Any) -> list[float]:
+    """The sides and the middle of the box in the field, mm."""
+    sides, middle = page.input_value("#scan-box").split("@")
+    return [float(value) for value in [*sides.split("x"), *middle.split(",")]]
+
+
+@pytest.mark.parametrize("size", [PHONE, LAPTOP])
+def test_a_box_is_drawn_pulled_typed_and_taken_away(
+    program: Played, opened: Opener, complaints: Complaints, size: dict[str, int]
+) -> None:
+    """A box begins around most of the surface; a pulled dot moves one face only; each change reaches the scan; what is no box is said."""
+    growing = Growing()
+    growing.show(240)
+    program.patches, program.scan = growing.patches, ScanState(words="1 pair in the model: go on", level="good")
+    program.activity = Activity.SCANNING
+    page = opened("scan", size)
+    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
+    page.wait_for_function("() => document.getElementById('scan-model').dataset.drawn")
+    page.click("#scan-draw")
+    page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Keep everything'")
+    assert program.commands[-1].do is Do.CROP
+    assert program.commands[-1].values == {"box": page.input_value("#scan-box")}
+    begun, before = page.input_value("#scan-box"), _box(page)
+    assert all(side >= 1 for side in before[:3])
+    page.wait_for_function("() => document.getElementById('scan-model').dataset.handles")
+    page.locator("#scan-model").scroll_into_view_if_needed()
+    dots = [
+        [float(value) for value in dot.split(",")]
+        for dot in page.get_attribute("#scan-model", "data-handles").split(" ")
+    ]
+    frame = page.locator("#scan-model").bounding_box()
+    assert frame is not None
+    x, y, way_x, way_y = dots[0]
+    length = float(np.hypot(way_x, way_y))
+    page.mouse.move(frame["x"] + x, frame["y"] + y)
+    page.mouse.down()
+    page.mouse.move(frame["x"] + x + 30 * way_x / length, frame["y"] + y + 30 * way_y / length, steps=4)
+    page.mouse.up()
+    page.wait_for_function("was => document.getElementById('scan-box').value !== was", arg=begun)
+    after = _box(page)
+    changed = [axis for axis in range(3) if abs(after[axis] - before[axis]) > 1]
+    assert len(changed) == 1
+    others = [axis for axis in range(3) if axis not in changed]
+    assert [after[3 + axis] for axis in others] == [before[3 + axis] for axis in others]
+    pulled = page.input_value("#scan-box")
+    until(lambda: program.commands[-1].values == {"box": pulled}, "the pulled box reaches the scan")
+    page.fill("#scan-box", "300x300")
+    page.dispatch_event("#scan-box", "change")
+    page.wait_for_function("() => document.getElementById('scan-answer').textContent.includes('no box')")
+    page.fill("#scan-box", "300x200x100@0,10,600")
+    page.dispatch_event("#scan-box", "change")
+    page.wait_for_function("() => !document.getElementById('scan-answer').textContent")
+    page.click("#scan-draw")
+    page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Draw the box'")
+    assert page.input_value("#scan-box") == ""
+    assert program.commands[-1].values == {"box": ""}
+    assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
     assert complaints == []

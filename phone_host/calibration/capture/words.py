@@ -167,18 +167,23 @@ def stage_words(progress: Progress) -> str:
     return f"{': '.join(_REASONS[progress.last])}{go_on}"
 
 
-def stored_finding(kept: CaptureReport | None, source: CaptureSource) -> Finding:
+def stored_finding(kept: CaptureReport | None, source: CaptureSource, *, has_lens: bool) -> Finding:
     """Judge the report of an earlier check: does it hold for this camera?
 
     Args:
-        kept: the report beside the calibration; None: there is none.
+        kept: the report beside the calibration, or from before it; None: there is none.
         source: the camera as it is now.
+        has_lens: whether its lens is calibrated by now.
     """
     if kept is None:
         return warn("capture", "this camera's images were never checked for stabilisation", CHECK_AGAIN)
     if not holds_for(kept.source, source):
         return warn("capture", f"the check was of {_named(kept.source)}, this is {_named(source)}", CHECK_AGAIN)
     found = warp_finding(kept.rigidity)
+    if has_lens and not kept.rigidity.knows_lens and kept.rigidity.warping is Warping.GOOD:
+        return warn(
+            "capture", "this camera's images were checked before it was calibrated: a crop was not seen", CHECK_AGAIN
+        )
     return Finding(what="capture", verdict=found.verdict, text=f"checked: {found.text}", remedy=found.remedy)
 
 

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=60.0,
         metavar="S",
         help="film with --camera for S seconds (default 60) and judge rate, stamps, shutter, and whether its software warps the"
-        " images; kept beside --calibration as capture.json",
+        " images; kept as capture.json beside --calibration, or among your data until there is one",
     )
     parser.add_argument(
         "--out",

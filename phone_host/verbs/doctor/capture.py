@@ -15,7 +15,7 @@ from phone_host.verbs.run.page_beside import camera_page
 
 
 def guided_capture(question: Question, whole_s: float) -> CheckedCapture:
-    """Film, check, and keep the report beside the calibration.
+    """Film, check, and keep the report.
 
     Args:
         question: camera and calibration.
@@ -27,7 +27,7 @@ def guided_capture(question: Question, whole_s: float) -> CheckedCapture:
     calibration = Path(question.calibration) if question.calibration else None
     with camera_page(question.camera, question.keys.path) as feed, share_bar("checking the camera") as bar:
         camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
-        return check_capture(camera, calibration, whole_s, lambda: False, _Guide(bar).tell)
+        return check_capture(camera, calibration, question.data, whole_s, stopped=lambda: False, tell=_Guide(bar).tell)
 
 
 class _Guide:

@@ -11,6 +11,7 @@ from phone_host.declared_settings import PhoneHostSettings
 from phone_host.doctor.host_doctor import Question, examine
 from phone_host.output.json_text import json_text
 from phone_host.settings import check, key_folder, resolve_settings
+from phone_host.verbs.serve.places import data_folder
 
 
 def run(options: argparse.Namespace) -> int:
@@ -31,6 +32,7 @@ def run(options: argparse.Namespace) -> int:
         out=options.out,
         wait_s=options.wait,
         keys=key_folder(settings.keys),
+        data=data_folder(),
     )
     if options.capture is not None:
         _require_capture(options.capture, question)

@@ -15,10 +15,10 @@ from common.program.terminal import say
 from common.protocol.message import Pacing
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.live.scan import LiveScan
+from phone_host.live.scan_view import ScanPicture
 from phone_host.recording.playback import Playback
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.host_settings import EndReason
-from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.run.stereo_results import require_writable
@@ -94,19 +94,20 @@ def live_scan(opened: Opened, wanted: ScanWanted, out: Path, resumed: tuple[Subm
 
 
 def _followed(prepared: PreparedRun, live: LiveScan, signals: StopSignals) -> EndReason:
-    """Run, and tell whoever holds the cameras what helps: in a bar on a terminal, else a line when it changes."""
+    """Run, and tell whoever holds the cameras what helps: beside the surface on a terminal, else a line when it changes."""
+    if sys.stderr.isatty():
+        with ScanPicture(live) as picture:
+            return prepared.host.run(lambda: signals.stop, picture.refresh)
     told = ""
 
     def tell() -> None:
         nonlocal told
         advice = live.words.partition(": ")[2]
-        if advice != told and not sys.stderr.isatty():
+        if advice != told:
             _tell(live.words)
         told = advice
-        watcher.say(live.words)
 
-    with step_bar("waiting for the board", None) as watcher:
-        return prepared.host.run(lambda: signals.stop, tell)
+    return prepared.host.run(lambda: signals.stop, tell)
 
 
 def _run_options(options: argparse.Namespace) -> argparse.Namespace:

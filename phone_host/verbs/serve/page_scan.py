@@ -20,6 +20,7 @@ from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
 from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
+from phone_host.scan.box import Box
 from phone_host.scan.scan import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
 from phone_host.stereo.match_tandem import matching_threads
@@ -119,11 +120,11 @@ def page_scan(
         raise SettingsError("there is no calibration, so there are no metres", "calibrate, or name a rig.yaml")
     if unknown := set(values) - set(OF_SCAN):
         raise SettingsError(f"{min(unknown)!r} is no option of a scan that the page can set", "give voxel and box")
-    voxel, box = (values.get(name, "").strip() for name in OF_SCAN)
+    voxel = values.get("voxel", "").strip()
     usual = ScanWanted()
     wanted = ScanWanted(
         voxel_m=voxel_of(voxel) if voxel else usual.voxel_m,
-        box=box_of(box) if box else None,
+        box=asked_box(values),
         threads=matching_threads(),
     )
     out = _new_folder(folder)
@@ -131,6 +132,19 @@ def page_scan(
     live = live_scan(opened, wanted, out)
     prepared = opened.prepared((), (live.sink, *sinks_of(opened.core)))
     return PageScan(prepared, live, out, found.values.matcher, output_options(options).axes)
+
+
+def asked_box(values: Choices) -> Box | None:
+    """Return the box that the page asks for; None: it asks for none.
+
+    Args:
+        values: options of `scan` by name.
+
+    Raises:
+        SettingsError: it is no box.
+    """
+    text = values.get("box", "").strip()
+    return box_of(text) if text else None
 
 
 def _words(report: ScanReport) -> str:

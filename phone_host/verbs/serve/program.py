@@ -29,6 +29,7 @@ from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.run.pair_budget import usable_matchers
 from phone_host.run.sinks import Sink
+from phone_host.scan.box import Box
 from phone_host.serve.program import Calibrated, Choices, SinksOf
 from phone_host.settings import chosen_keys
 from phone_host.stereo.matcher_names import MATCHERS
@@ -46,7 +47,7 @@ from phone_host.verbs.serve.choices import (
     without_depth,
 )
 from phone_host.verbs.serve.kept_choices import is_there, keep, kept
-from phone_host.verbs.serve.page_scan import PageScan, page_scan
+from phone_host.verbs.serve.page_scan import PageScan, asked_box, page_scan
 from phone_host.verbs.serve.places import data_folder, recording_folder, scan_folder, snapshot_folder
 from phone_host.verbs.stereo_options import refuse_rejected
 
@@ -144,6 +145,7 @@ class Commands:
             out=options.out or data_folder(),
             wait_s=_BOARD_S,
             keys=self.keys,
+            data=data_folder(),
             feed=self.feed,
         )
 
@@ -154,7 +156,7 @@ class Commands:
         question = self.question(choices)
         camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns(), feed=self.feed)
         calibration = Path(question.calibration) if question.calibration else None
-        return check_capture(camera, calibration, _CAPTURE_S, stopped, tell).findings
+        return check_capture(camera, calibration, question.data, _CAPTURE_S, stopped=stopped, tell=tell).findings
 
     def calibration(self, choices: Choices, values: Choices, sinks: Sequence[Sink]) -> "Calibration":
         """See Program."""
@@ -175,6 +177,10 @@ class Commands:
         out = choices.get("out", "")
         folder = scan_folder(Path(out) if out else None)
         return page_scan(self._options(choices), values, folder, sinks_of, tell=self._tell, feed=self.feed)
+
+    def box(self, values: Choices) -> Box | None:
+        """See Program."""
+        return asked_box(values)
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """See Program."""

@@ -82,6 +82,18 @@ export class CloudLegend {
     }
   }
 
+  /** @param {number} x @param {number} y @param {number} radius - px @param {string} hue */
+  dot(x, y, radius, hue) {
+    const { pen } = this;
+    pen.beginPath();
+    pen.arc(x, y, radius, 0, 2 * Math.PI);
+    pen.fillStyle = hue;
+    pen.fill();
+    pen.strokeStyle = /** @type {string} */ (this.edge);
+    pen.lineWidth = 2;
+    pen.stroke();
+  }
+
   /** @param {string} text @param {number} x @param {number} y @param {string} hue */
   words(text, x, y, hue) {
     const { pen } = this;

@@ -19,6 +19,9 @@ import { opaque, Viewer } from './viewer.js';
 /** What lights it: the order is that of the shader's cases. @type {Paint[]} */
 const PAINTS = ['colour', 'shape', 'noise'];
 
+/** Nothing lies outside of it. */
+const NOWHERE = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
+
 /** Points that decide from where all fits in. */
 const LOOKED_AT = 3000;
 
@@ -28,9 +31,11 @@ in vec3 colour;
 in float noise;
 out vec3 tint;
 out vec3 at;
+out vec3 place;
 out float share;
 void main() {
   vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  place = (modelMatrix * vec4(position, 1.0)).xyz;
   gl_Position = projectionMatrix * seen;
   at = seen.xyz;
   tint = colour;
@@ -41,8 +46,11 @@ const FRAGMENT = `
 precision highp float;
 uniform sampler2D ramp;
 uniform int paint;
+uniform vec3 low;
+uniform vec3 high;
 in vec3 tint;
 in vec3 at;
+in vec3 place;
 in float share;
 out vec4 shown;
 void main() {
@@ -50,7 +58,8 @@ void main() {
   float facing = abs(dot(normal, normalize(at)));
   float light = paint == 0 ? 0.72 + 0.28 * facing : 0.25 + 0.75 * facing;
   vec3 own = paint == 0 ? tint : paint == 1 ? vec3(0.78) : texture(ramp, vec2(1.0 - share, 0.5)).rgb;
-  shown = vec4(own * light * (gl_FrontFacing ? 1.0 : 0.45), 1.0);
+  bool isOutside = any(lessThan(place, low)) || any(greaterThan(place, high));
+  shown = vec4(own * light * (gl_FrontFacing ? 1.0 : 0.45) * (isOutside ? 0.3 : 1.0), 1.0);
 }`;
 
 /** A scan that can be turned. */
@@ -61,7 +70,8 @@ export class Model extends Viewer {
     const ramp = new three.DataTexture(opaque(RAMP), RAMP.length / 3, 1);
     ramp.magFilter = ramp.minFilter = three.LinearFilter;
     ramp.needsUpdate = true;
-    const uniforms = { paint: { value: 0 }, ramp: { value: ramp } };
+    const ends = { low: { value: new three.Vector3(...NOWHERE.low) }, high: { value: new three.Vector3(...NOWHERE.high) } };
+    const uniforms = { paint: { value: 0 }, ramp: { value: ramp }, ...ends };
     const shaders = { vertexShader: VERTEX, fragmentShader: FRAGMENT, glslVersion: three.GLSL3, uniforms, side: three.DoubleSide };
     this.material = new three.ShaderMaterial(shaders);
     /** @type {Map<string, three.Mesh>} parts of the surface, by their names */
@@ -120,23 +130,47 @@ export class Model extends Viewer {
     this.draw();
   }
 
+  /** Show what lies outside a box darker. @param {?import('./crop_box.js').Box} box - null: there is none */
+  within(box) {
+    const { low, high } = box ?? NOWHERE;
+    const { uniforms } = this.material;
+    uniforms.low.value.set(low[0], -high[1], -high[2]);
+    uniforms.high.value.set(high[0], -low[1], -low[2]);
+    this.draw();
+  }
+
   /** @returns {boolean} */
   isEmpty() {
     return !this.surfaces.size;
   }
 
-  /** @returns {?import('./viewer.js').Stand} */
-  stand() {
+  /** Some of its points, over all of it. @returns {number[][]} */
+  some() {
     const all = [...this.surfaces.values()];
-    if (!all.length) return null;
     const count = all.reduce((sum, { points }) => sum + points.length / 3, 0);
     const by = 3 * Math.max(1, Math.floor(count / LOOKED_AT));
     /** @type {number[][]} */
     const some = [];
     for (const { low, step, points } of all)
       for (let at = 0; at < points.length; at += by) some.push(low.map((value, axis) => value + step * points[at + axis]));
-    const ends = [0, 1, 2].map((axis) => [Math.min(...some.map((place) => place[axis])), Math.max(...some.map((place) => place[axis]))]);
+    return some;
+  }
+
+  /** The box in which most of it lies, for somebody to begin with. @returns {?import('./crop_box.js').Box} null: there is nothing */
+  middle() {
+    const some = this.some();
+    if (!some.length) return null;
+    const sorted = [0, 1, 2].map((axis) => some.map((place) => place[axis]).sort((a, b) => a - b));
+    const at = (/** @type {number[]} */ values, /** @type {number} */ share) => values[Math.round(share * (values.length - 1))];
+    return { low: sorted.map((values) => at(values, 0.1)), high: sorted.map((values) => at(values, 0.9)) };
+  }
+
+  /** @returns {?import('./viewer.js').Stand} */
+  stand() {
+    const points = this.some();
+    if (!points.length) return null;
+    const ends = [0, 1, 2].map((axis) => [Math.min(...points.map((place) => place[axis])), Math.max(...points.map((place) => place[axis]))]);
     const middle = ends.map(([least, most]) => (least + most) / 2);
-    return { middle, front: null, points: some, reach: [0.5, 0.5], scale: Math.hypot(...ends.map(([least, most]) => most - least)) };
+    return { middle, front: null, points, reach: [0.5, 0.5], scale: Math.hypot(...ends.map(([least, most]) => most - least)) };
   }
 }

@@ -1,11 +1,14 @@
-// The scan: start and stop, how it goes, the surface as it grows, and what to save of it.
+// The scan: start and stop, how it goes, the surface as it grows, the box that is kept, and what to save of it.
 
 import { begin, command } from './connection.js';
-import { byId, data, keep, make, onPress, sentence, show, text } from './dom.js';
+import { byId, data, keep, make, onPress, sentence, show, tell, text } from './dom.js';
 import { GrowingSurface } from './surface.js';
+
+/** @typedef {import('./crop_box.js').Box} Box */
 
 const ASK_MS = 1000;
 const NO_WEBGL = 'This browser cannot draw the surface (no WebGL 2). Everything else works; the model can be saved.';
+const NO_BOX = { problem: 'that is no box', remedy: 'give its sides and its middle in mm, such as 300x300x200@0,0,600' };
 const EMPTY = { words: '', level: 'unknown', pairs: 0, fused: 0, folder: '', files: [] };
 
 export class ScanPanel {
@@ -14,11 +17,20 @@ export class ScanPanel {
     this.state = state;
     /** @type {?import('./model.js').Model} */
     this.model = null;
+    /** @type {?import('./crop_box.js').CropBox} */
+    this.crop = null;
+    /** @type {(text: string) => ?Box} */
+    this.boxOf = () => null;
+    /** @type {(box: Box) => string} */
+    this.boxText = () => '';
     this.hasAskedForModel = false;
     /** Whether the person looks at it in a way of his own. */
     this.isHeld = false;
+    this.field = /** @type {HTMLInputElement} */ (byId('scan-box'));
     this.surface = new GrowingSurface((name, part) => this.model?.put(name, part), () => this.model?.clear());
     onPress(byId('scan-go'), () => this.go(), byId('scan-answer'));
+    onPress(byId('scan-draw'), () => this.drawBox(), byId('scan-answer'));
+    this.field.addEventListener('change', () => this.typed());
     setInterval(() => this.ask(), ASK_MS);
   }
 
@@ -31,6 +43,36 @@ export class ScanPanel {
     const value = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (byId(id)).value.trim();
     this.isHeld = false;
     return begin('scan', { voxel: value('scan-voxel'), box: value('scan-box') });
+  }
+
+  /** Begin with a box around most of the surface, or keep everything again. */
+  async drawBox() {
+    const box = this.crop?.box ? null : (this.boxOf(this.field.value) ?? this.model?.middle() ?? null);
+    if (!box && !this.crop?.box) return { problem: 'there is no surface yet', remedy: 'begin the scan first' };
+    return this.boxed(box);
+  }
+
+  /** Somebody has typed a box. */
+  async typed() {
+    const isEmpty = !this.field.value.trim();
+    const box = this.boxOf(this.field.value);
+    const answer = isEmpty || box ? await this.boxed(box, false) : NO_BOX;
+    tell(byId('scan-answer'), answer);
+  }
+
+  /** Show a box, and have it kept. @param {?Box} box @param {boolean} writes - into the field, too @returns {Promise<{problem?: string, remedy?: string}>} */
+  async boxed(box, writes = true) {
+    this.outline(box);
+    if (writes) this.field.value = box ? this.boxText(box) : '';
+    return this.isScanning() ? begin('crop', { box: this.field.value.trim() }) : {};
+  }
+
+  /** @param {?Box} box */
+  outline(box) {
+    this.crop?.show(box);
+    this.model?.within(box);
+    byId('scan-draw').setAttribute('aria-pressed', String(!!box));
+    text(byId('scan-draw'), box ? 'Keep everything' : 'Draw the box');
   }
 
   /** @param {any} state */
@@ -52,9 +94,14 @@ export class ScanPanel {
   async startModel() {
     this.hasAskedForModel = true;
     try {
-      const [{ canShowClouds }, { Model }] = await Promise.all([import('./viewer.js'), import('./model.js')]);
+      const [{ canShowClouds }, { Model }, { CropBox, boxOf, boxText }] = await Promise.all([
+        import('./viewer.js'), import('./model.js'), import('./crop_box.js'),
+      ]);
       if (!canShowClouds()) throw new Error(NO_WEBGL);
       this.model = new Model(/** @type {HTMLCanvasElement} */ (byId('scan-model')), /** @type {HTMLCanvasElement} */ (byId('scan-over')));
+      this.boxOf = boxOf;
+      this.boxText = boxText;
+      this.crop = new CropBox(this.model, (box, done) => this.pulled(box, done));
     } catch {
       text(byId('scan-none'), NO_WEBGL);
       return;
@@ -62,7 +109,18 @@ export class ScanPanel {
     for (const kind of ['pointerdown', 'wheel', 'keydown']) byId('scan-model').addEventListener(kind, () => (this.isHeld = true));
     for (const input of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll('input[name=scan-paint]')))
       input.addEventListener('change', () => this.model?.paint(/** @type {any} */ (input.value)));
+    this.outline(this.boxOf(this.field.value));
     this.ask();
+  }
+
+  /** A face of the box is pulled. @param {Box} box @param {boolean} done */
+  async pulled(box, done) {
+    this.isHeld = true;
+    this.model?.within(box);
+    this.field.value = this.boxText(box);
+    if (!done) return;
+    const answer = await this.boxed(box, false);
+    tell(byId('scan-answer'), answer);
   }
 
   /** Ask for what is new while it is looked at. */

@@ -44,6 +44,8 @@ export class Viewer {
     this.scene = new three.Scene();
     /** @type {?number[]} */
     this.pivot = null;
+    /** Draws over each picture, in the legend's canvas. @type {() => void} */
+    this.over = () => undefined;
     this.asked = 0;
     this.controls = orbit(this.camera, canvas, () => this.moved());
     listen(this, canvas);
@@ -132,6 +134,7 @@ export class Viewer {
     this.ready(zoom * ratio);
     this.renderer.render(this.scene, this.camera);
     this.legend.draw(this.camera, controls.target, zoom, ratio);
+    this.over();
     this.canvas.dataset.drawn = [controls.getAzimuthalAngle(), controls.getPolarAngle(), controls.getDistance()].map((v) => v.toFixed(3)).join(' ');
   }
 }

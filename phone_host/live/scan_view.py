@@ -1,0 +1,83 @@
+"""Shows a live scan on a terminal: what helps now, and the surface as it grows."""
+
+from typing import Final
+
+import numpy as np
+from rich.color import Color
+from rich.console import Console
+from rich.style import Style
+from rich.text import Text
+
+from common import now
+from phone_host.live.scan import LiveScan
+from phone_host.run.redrawn import Part, Redrawn
+from phone_host.scan.patches import Patch
+from phone_host.scan.small_view import SmallView, small_view
+
+_EVERY_NS: Final = 250_000_000
+_SURFACE_NS: Final = 1_000_000_000
+_MOST_POINTS: Final = 2_000_000
+_WORDS_LINES: Final = 3
+_MOST_COLUMNS: Final = 100
+_UPPER_HALF: Final = "\u2580"
+
+
+class ScanPicture(Redrawn):
+    """Redraws words and surface in their place; a context manager.
+
+    Args:
+        live: the scan.
+        console: where to draw; stderr by default.
+    """
+
+    def __init__(self, live: LiveScan, console: Console | None = None) -> None:
+        super().__init__(console)
+        self._scan = live
+        self._patches: dict[tuple[int, int, int], Patch] = {}
+        self._newest, self._words = 0, ""
+        self._drawn_ns = self._asked_ns = -_SURFACE_NS
+        self._picture = Text()
+
+    def refresh(self) -> None:
+        """Show the present state, at most four times a second."""
+        now_ns = now.monotonic_ns()
+        if now_ns - self._drawn_ns < _EVERY_NS:
+            return
+        self._drawn_ns, words, picture = now_ns, self._scan.words, self._picture
+        if now_ns - self._asked_ns >= _SURFACE_NS:
+            self._asked_ns = now_ns
+            self._renew()
+        if words != self._words or picture is not self._picture:
+            self._words = words
+            self.draw([Part(0, Text(words, style="bold")), Part(1, self._picture)])
+
+    def _renew(self) -> None:
+        """Take what is new of the surface, and draw it as large as the terminal allows."""
+        newer = self._scan.surface_since(self._newest, _MOST_POINTS)
+        if not newer:
+            return
+        self._patches |= {patch.place: patch for patch in newer}
+        self._newest = max(patch.number for patch in newer)
+        columns = max(1, min(self.console.width - 1, _MOST_COLUMNS))
+        lines = max(1, self.console.height - _WORDS_LINES)
+        self._picture = _as_text(small_view((each.mesh for each in self._patches.values()), columns, 2 * lines))
+
+
+def _as_text(view: SmallView) -> Text:
+    """Write a picture with two pixels a character, its empty lines left out."""
+    text = Text(no_wrap=True, end="")
+    rows = np.flatnonzero(view.is_seen.reshape(-1, 2, view.is_seen.shape[1]).any(axis=(1, 2)))
+    for row in range(rows[0], rows[-1] + 1) if len(rows) else ():
+        for column in range(view.is_seen.shape[1]):
+            upper, lower = (
+                Color.from_rgb(*view.colours[line, column].tolist()) if view.is_seen[line, column] else None
+                for line in (2 * row, 2 * row + 1)
+            )
+            if upper is None and lower is None:
+                text.append(" ")
+            elif upper is None:
+                text.append("\u2584", Style(color=lower))
+            else:
+                text.append(_UPPER_HALF, Style(color=upper, bgcolor=lower))
+        text.append("\n")
+    return text
