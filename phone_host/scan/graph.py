@@ -104,7 +104,7 @@ class _Problem:
         size, errors = 6 * len(state), self._errors(state)
         matrix, right = np.zeros((size, size)), np.zeros(size)
         weights = 1 / (1 + (errors**2).sum(axis=1) / _CAUCHY_SIGMAS**2)
-        for number, loop in enumerate(self.loops):
+        for number in range(len(self.loops)):
             # error = log(measured^-1 here^-1 there); by the other's motion I, by the one's -Ad(there^-1 here), to first order.
             seen = state[self.there[number]].inverse() @ state[self.here[number]]
             slopes = np.concatenate([-_adjoint(seen), np.eye(6)], axis=1) * self.roots[number][:, np.newaxis]

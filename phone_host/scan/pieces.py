@@ -10,14 +10,13 @@ from typing import Final
 import numpy as np
 
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
-from phone_host.scan.absorbed import absorb
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.graph import Loop, connected, settled
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.registration import Registered
 from phone_host.scan.tracking_words import Tracking, Weakness
-from phone_host.scan.view import View
+from phone_host.scan.view import Camera, View, half_view
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing
 
@@ -27,6 +26,16 @@ _MOST_APART: Final = 4
 
 _LEAST_SHARE: Final = 0.05
 """Of the model's memory that must be left for a piece."""
+
+_ALSO: Final = 8
+"""Views of a piece that are laid against the model before it is joined."""
+
+_SMALL_PX: Final = 320
+_BY_PLACE: Final = 2.0
+"""Times as much as odometry, a place's pose may be corrected: of a room's places, 88 mm and 2.3 degrees."""
+
+_STANDING: Final = Moved(world_camera=SE3.identity(), before_now=SE3.identity(), is_known=True, followed=0, inliers=0)
+"""What odometry says of a view that is compared with a place: nothing that lets it pass more easily."""
 
 _LOOP_SHIFT_M: Final = 0.01
 _LOOP_TURN: Final = 0.006
@@ -169,20 +178,26 @@ class Pieces:
                 self._loops.append(self._loop(number, other.pose @ pose.inverse()))
         return found
 
-    def join(self, pose: SE3, met: Found) -> tuple[Joined, ...]:
+    def join(self, view: View, pose: SE3, met: Found) -> tuple[Joined, ...]:
         """Take the piece that is tracked, and those connected with it, into the model; that is tracked from now on.
 
         Args:
-            pose: of a view, in the piece's axes.
-            met: the same view in the model.
+            view: that belongs to both.
+            pose: where it was taken, in the piece's axes.
+            met: the same in the model's.
 
         Returns:
-            Their views.
+            Their views; none: the piece contradicts the model, and stays apart.
         """
         loop = self._loop(_MODEL, met.pose @ pose.inverse())
-        self._loops.append(loop)
+        others = self._also(view, loop)
+        if others is None:
+            return ()
+        self._loops += [loop, *others]
         self._start(loop)
-        poses = settled({_MODEL: SE3.identity()} | {at: of.world_piece for at, of in self._apart.items()}, self._loops, _MODEL)
+        poses = settled(
+            {_MODEL: SE3.identity()} | {at: of.world_piece for at, of in self._apart.items()}, self._loops, _MODEL
+        )
         joined: list[Joined] = []
         for number in sorted(connected(self._loops, _MODEL) - {_MODEL}):
             joined += self._taken_in(self._apart[number], poses[number])
@@ -190,10 +205,29 @@ class Pieces:
         self._active = _MODEL
         return tuple(sorted(joined, key=lambda each: each.number))
 
+    def _also(self, view: View, loop: Loop) -> list[Loop] | None:
+        """Lay the piece's own surface, as its views saw it, against the model; None: most of what lies on the model does not fit."""
+        of = self._apart[self._active]
+        while view.grey.shape[1] > _SMALL_PX:
+            view = half_view(view)
+        loops, refused = [], 0
+        for seen in of.views[:: max(len(of.views) // _ALSO, 1)]:
+            camera = Camera(view.geometry, view.grey.shape, seen.pose)
+            shown = replace(view, depth_m=np.ascontiguousarray(of.piece.volume.cast(camera).points_m[..., 2]))
+            if not np.isfinite(shown.depth_m).mean() >= self._gate.least_depths:
+                continue
+            start = loop.here_there @ seen.pose
+            fit = self.model.laid(shown, start, 0)
+            if fit.overlap < self._gate.least_overlap:
+                continue
+            if self.model.doubt(_STANDING, fit) is Weakness.NONE:
+                loops.append(self._loop(_MODEL, start @ fit.start_now @ seen.pose.inverse()))
+            else:
+                refused += 1
+        return None if refused > len(loops) else loops
+
     def _loop(self, here: int, here_active: SE3) -> Loop:
-        return Loop(
-            here=here, there=self._active, here_there=here_active, turn=_LOOP_TURN, shift_m=_LOOP_SHIFT_M
-        )
+        return Loop(here=here, there=self._active, here_there=here_active, turn=_LOOP_TURN, shift_m=_LOOP_SHIFT_M)
 
     def _start(self, first: Loop) -> None:
         """Put the pieces where the loops, one after another, put them: the graph goes on from there."""
@@ -212,7 +246,7 @@ class Pieces:
                 waiting.append(other)
 
     def _taken_in(self, of: _Apart, world_piece: SE3) -> list[Joined]:
-        absorb(self.model.volume, of.piece.volume, world_piece)
+        self.model.volume.take_in(of.piece.volume, world_piece)
         self.model.places.add(of.piece.places.moved(world_piece))
         result = []
         for view in of.views:
@@ -232,10 +266,11 @@ class Pieces:
         if not np.isfinite(start.pose()).all():
             return None
         fit = piece.laid(view, start, 0)
-        by_place = Moved(
-            world_camera=start, before_now=SE3.identity(), is_known=True, followed=place.inliers, inliers=0
-        )
-        if piece.doubt(by_place, fit) is not Weakness.NONE:
+        whole = (first.start_now @ fit.start_now).pose()
+        most_shift_m, most_turn = (_BY_PLACE * most for most in (self._gate.most_shift_m, self._gate.most_turn))
+        if np.linalg.norm(whole[3:]) > most_shift_m or np.linalg.norm(whole[:3]) > most_turn:
+            return None
+        if piece.doubt(_STANDING, fit) is not Weakness.NONE:
             return None
         pose = start @ fit.start_now
         return Found(piece, SE3(rotations_of(vectors_of(pose.R)), pose.t_m), fit)

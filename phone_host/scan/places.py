@@ -148,7 +148,9 @@ class Places:
         voted = [place.descriptors[:_VOTED] for place in self._places]
         whose = np.repeat(np.arange(len(voted)), [len(each) for each in voted])
         found = cv2.BFMatcher(cv2.NORM_HAMMING).match(descriptors[:_VOTERS], np.concatenate(voted))
-        votes = np.bincount([whose[each.trainIdx] for each in found if each.distance <= _ALIKE_BITS], minlength=len(voted))
+        votes = np.bincount(
+            [whose[each.trainIdx] for each in found if each.distance <= _ALIKE_BITS], minlength=len(voted)
+        )
         return [self._places[at] for at in sorted(np.argsort(-votes, kind="stable")[:_SHORT].tolist())]
 
 

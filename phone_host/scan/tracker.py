@@ -76,7 +76,7 @@ class Tracker:
     Args:
         settings: of the model.
         threads: that compute, >= 1; results do not depend on them.
-        gate: what is believed.
+        gate: what is believed; None: what usually is.
         library: computes; None: that of this installation.
     """
 
@@ -84,11 +84,12 @@ class Tracker:
         self,
         settings: VolumeSettings,
         threads: int = 1,
-        gate: PoseGate = PoseGate(),
+        gate: PoseGate | None = None,
         library: Library | Missing | None = None,
     ) -> None:
         found = native() if library is None else library
-        self._gate, self._pieces = gate, Pieces(settings, threads, gate, found)
+        self._gate = PoseGate() if gate is None else gate
+        self._pieces = Pieces(settings, threads, self._gate, found)
         self._odometry = Odometry(_ODOMETRY)
         self._pose = SE3.identity()  # in the axes of the piece that is tracked
         self._was_lost = False
@@ -163,7 +164,10 @@ class Tracker:
         if met is None:
             self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
             return self._lost(pose, moved, Weakness.APART, fit)
-        joined = self._pieces.join(pose, met)
+        joined = self._pieces.join(view, pose, met)
+        if not joined:
+            self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
+            return self._lost(pose, moved, Weakness.APART, fit)
         self._was_lost = True
         told = self._fused(view, met.pose, moved, weakness, met.fit)
         return Tracked(

@@ -91,6 +91,11 @@ def reduced(view: View) -> View:
     """Return a view of half the size, its grey averaged over 2 x 2 pixels; one that is small already as it is."""
     if view.grey.shape[1] < _LEAST_WIDTH_PX:
         return view
+    return half_view(view)
+
+
+def half_view(view: View) -> View:
+    """Return a view of half the size, its grey averaged over 2 x 2 pixels."""
     depth, half = halved(view.depth_m, view.geometry)
     small = (depth.shape[1], depth.shape[0])
     return View(

@@ -54,6 +54,7 @@ ONCE: Final = (
     "fuse.c",
     "cast.c",
     "register.c",
+    "absorb.c",
 )
 """Compiled once, for the plainest processor of the architecture."""
 

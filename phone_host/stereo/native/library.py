@@ -15,12 +15,12 @@ from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
 from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
-from phone_host.stereo.native.volume_jobs import CastJob, FuseJob, RegisterJob, TouchJob, declare
+from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
 
-_ABI: Final = 4  # TANDEM_ABI of tandem.h
+_ABI: Final = 5  # TANDEM_ABI of tandem.h
 _HERE: Final = Path(__file__).resolve().parent
 _INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
 _REINSTALL: Final = "reinstall"
@@ -228,6 +228,10 @@ class Library:
     def cast(self, job: CastJob) -> None:
         """Show a volume's surface as a camera sees it; see cast_kernel.c."""
         _require_done(self.handle.tandem_cast(self.isa, ctypes.byref(job)))
+
+    def absorb(self, job: AbsorbJob) -> None:
+        """Take a field into another; see absorb.c."""
+        _require_done(self.handle.tandem_absorb(ctypes.byref(job)))
 
     def register(self, job: RegisterJob) -> None:
         """Compare a depth image with such a surface; see register.c."""

@@ -105,11 +105,31 @@ class RegisterJob(ctypes.Structure):
     )
 
 
+class AbsorbJob(ctypes.Structure):
+    """`struct tandem_absorb_job`."""
+
+    _fields_ = (
+        ("into", ctypes.POINTER(VolumeArrays)),
+        ("of", ctypes.POINTER(VolumeArrays)),
+        ("chosen", _POINTER),
+        ("of_into", ctypes.c_double * 12),
+        ("most_weight", _INT),
+        ("threads", _INT),
+    )
+
+
 def declare(handle: ctypes.CDLL) -> None:
     """State the arguments and results of these functions."""
     handle.tandem_fuse.argtypes = [_INT, ctypes.POINTER(FuseJob)]
     handle.tandem_cast.argtypes = [_INT, ctypes.POINTER(CastJob)]
     handle.tandem_touch.argtypes = [ctypes.POINTER(TouchJob)]
     handle.tandem_register.argtypes = [ctypes.POINTER(RegisterJob)]
-    for function in (handle.tandem_fuse, handle.tandem_cast, handle.tandem_touch, handle.tandem_register):
+    handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
+    for function in (
+        handle.tandem_fuse,
+        handle.tandem_cast,
+        handle.tandem_touch,
+        handle.tandem_register,
+        handle.tandem_absorb,
+    ):
         function.restype = _INT
