@@ -19,7 +19,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles lock clean
+.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -119,6 +119,13 @@ oracles: $(READY) ## install what judges recordings, other programs' readers of 
 	@$(BIN)/python -m venv build/oracles
 	@build/oracles/bin/python -m pip -qq --no-input install "mcap-ros2-support>=0.5" "rosbags>=0.10" "rerun-sdk>=0.41"
 	@build/oracles/bin/rerun analytics disable
+
+printers: ## install what judges prints, other programs' servers and senders, into build/printers (750 MB)
+	@for name in octoprint moonraker printrun meshes; do $(BIN)/python -m venv build/printers/$$name || exit; done
+	@build/printers/octoprint/bin/python -m pip -qq --no-input install "OctoPrint>=1.11.8,<1.12"
+	@build/printers/moonraker/bin/python -m pip -qq --no-input install "moonraker>=0.11"
+	@build/printers/printrun/bin/python -m pip -qq --no-input install --no-deps "Printrun>=2.2" pyserial
+	@build/printers/meshes/bin/python -m pip -qq --no-input install pymeshlab trimesh manifold3d lxml networkx
 
 vendor: ## build the page's libraries and the static pages' scripts again (after changing phone_host/web/page; needs node; FETCH=1: take npm's files, too)
 	@$(if $(FETCH),node .ci/vendor.mjs fetch &&) node .ci/vendor.mjs build

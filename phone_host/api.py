@@ -40,11 +40,15 @@ from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import trouble_of
 from phone_host.model import Result, Rig, Side, StereoGeometry, TimeOffset
+from phone_host.output.meshes.printable import Printer, Problem
 from phone_host.output.ply import PointCloud, write_surface
 from phone_host.output.rig_files.imported import Imported, import_rig, read_own_rig
+from phone_host.printers.door import Wishes
+from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.report.run_json import build
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
+from phone_host.run.model_job import check_model, export_model, print_model
 from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
@@ -58,8 +62,13 @@ from phone_host.sync.fifo import FifoSettings
 
 __all__ = [
     "SE3",
+    "Ended",
     "Imported",
     "Intersections",
+    "Phase",
+    "Printer",
+    "Problem",
+    "Progress",
     "Result",
     "RunSnapshot",
     "Scan",
@@ -68,8 +77,12 @@ __all__ = [
     "ScannedPair",
     "Scanner",
     "StereoGeometry",
+    "Wishes",
+    "check_model",
+    "export_model",
     "import_rig",
     "open_scanner",
+    "print_model",
     "triangulate",
     "write_model",
 ]

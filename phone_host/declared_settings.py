@@ -14,6 +14,9 @@ _USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL
 MAX_MEGAPIXELS_HELP: Final = f"refuse larger images before decoding them, in megapixels (default {_USUAL_MEGAPIXELS})"
 
 
+PRINTERS_TABLE: Final = "printers"
+"""The table of the settings file with the keys of printers' servers, by address. No option gives them: a command line is seen by all."""
+
 NEAR_M: Final = 0.3
 """Default nearest depth to search for, m."""
 

@@ -10,9 +10,10 @@ from typing import Final
 from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.program.settings import DEFAULT, Resolved, log_level, resolve
+from common.places import Kind, kind_of
+from common.program.settings import DEFAULT, Resolved, log_level, read_file, resolve
 from phone_host.camera.factory import check_camera
-from phone_host.declared_settings import PhoneHostSettings
+from phone_host.declared_settings import PRINTERS_TABLE, PhoneHostSettings
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.sync.fifo import FifoSettings
@@ -21,6 +22,9 @@ ENVIRONMENT_PREFIX: Final = "PHONE_HOST"
 
 PAGE_TABLE: Final = "page"
 """The table of the settings file in which the page keeps options of `run` that are no settings."""
+
+_NAME: Final = "phone-host.toml"
+_ASIDE: Final = (PAGE_TABLE, PRINTERS_TABLE)
 
 _MOST_BUDGET_MS: Final = 60_000
 """The largest photographs take half a minute (docs/depth.md)."""
@@ -33,7 +37,7 @@ def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]
     """Resolve the settings from file, environment and a verb's options. Options named like a setting are used."""
     given = {item.name: getattr(options, item.name, None) for item in fields(PhoneHostSettings)}
     given["link"] = tuple(given["link"]) if given["link"] else None
-    resolved = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given, aside=PAGE_TABLE)
+    resolved = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given, aside=_ASIDE)
     if matcher_is_given(resolved):
         return resolved
     return replace(resolved, values=replace(resolved.values, matcher=default_matcher().value))
@@ -70,6 +74,26 @@ def check(settings: PhoneHostSettings) -> None:
         )
 
 
+def usual_file() -> Path:
+    """Return the settings file if no option names another."""
+    return default_folder(os.environ, service=False) / _NAME
+
+
+def printer_keys(file: Path | None) -> tuple[object, Path]:
+    """Return the table of printers' keys as the settings file has it, unchecked, and the file. Empty: it has none.
+
+    Args:
+        file: settings file; None: the usual one, if it is there.
+
+    Raises:
+        SettingsError: it cannot be read, or is not TOML.
+    """
+    path = file or usual_file()
+    if file is None and kind_of(path) is Kind.MISSING:
+        return {}, path
+    return read_file(path).get(PRINTERS_TABLE, {}), path
+
+
 def key_folder(keys: str) -> KeyFolder:
     """Return the folder of keys for the setting `keys`.
 
@@ -89,7 +113,7 @@ def chosen_keys(file: Path | None, option: str | None) -> KeyFolder:
     Raises:
         SettingsError: the file or the environment is invalid.
     """
-    found = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"keys": option}, aside=PAGE_TABLE)
+    found = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, {"keys": option}, aside=_ASIDE)
     return key_folder(found.values.keys)
 
 
@@ -104,7 +128,7 @@ def most_pixels(file: Path | None, option: int | None) -> int:
         SettingsError: a setting is invalid.
     """
     given = {"max_megapixels": option}
-    values = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, given, aside=PAGE_TABLE).values
+    values = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, file, given, aside=_ASIDE).values
     _check_megapixels(values)
     return values.most_pixels
 

@@ -39,7 +39,7 @@ class Resolved(Generic[T]):
 
 
 def resolve(
-    kind: type[T], prefix: str, file: Path | None, options: Mapping[str, object], *, aside: str = ""
+    kind: type[T], prefix: str, file: Path | None, options: Mapping[str, object], *, aside: Sequence[str] = ()
 ) -> Resolved[T]:
     """Work out the settings.
 
@@ -48,7 +48,7 @@ def resolve(
         prefix: prefix of the environment variables, for example `BOARD_AGENT`.
         file: a TOML file, or None.
         options: options from the command line, by field name; None means not given.
-        aside: name of a table in the file that others read.
+        aside: names of tables in the file that others read.
 
     Returns:
         The settings with their origins.
@@ -177,9 +177,10 @@ def read_file(file: Path) -> dict[str, Any]:
     return content
 
 
-def _read(file: Path, known: set[str], aside: str) -> dict[str, Any]:
+def _read(file: Path, known: set[str], aside: Sequence[str]) -> dict[str, Any]:
     content = read_file(file)
-    content.pop(aside, None)
+    for table in aside:
+        content.pop(table, None)
     if unknown := set(content) - known:
         raise SettingsError(f"unknown key {min(unknown)!r} in {file}", f"the keys are {', '.join(sorted(known))}")
     return content
@@ -196,13 +197,14 @@ def _require_few_dots(text: str, file: Path) -> None:
 def _place(problem: str, text: str) -> tuple[str, str]:
     """Return where in the text a TOML error lies, with the line itself, and what the error is.
 
-    A password in an address is not shown.
+    A password in an address is not shown, nor what belongs to an address: that is a key.
     """
     found = re.fullmatch(r"(.*) \(at line (\d+), column \d+\)", problem)
     if found is None:  # at its end
         return "", problem
     line = text.splitlines()[int(found[2]) - 1 : int(found[2])]
-    shown = re.sub(r"//[^/@]*@", "//...@", "".join(line).strip())[:_MOST_SHOWN]
+    shown = re.sub(r"//[^/@]*@", "//...@", "".join(line).strip())
+    shown = re.sub(r"""^(['"]?[\w-]+:[^=]*=).*""", r"\1 ...", shown)[:_MOST_SHOWN]
     return f" in line {found[2]}, {shown!r}", found[1]
 
 

@@ -1,4 +1,4 @@
-"""What `discovery` and `announced` share: the service that boards announce, and the type of a found board."""
+"""What `discovery` and `announced` share: the service that boards announce, and the types of what is found."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -21,3 +21,20 @@ class Found:
 
     name: str
     link: str
+
+
+@dataclass(frozen=True, slots=True)
+class Announcement:
+    """A service that announces itself on the network.
+
+    Attributes:
+        service: its type.
+        name: its own, for people.
+        host: its address, in brackets where it is one of IPv6.
+        port: of TCP.
+    """
+
+    service: str
+    name: str
+    host: str
+    port: int

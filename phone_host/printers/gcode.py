@@ -13,14 +13,25 @@ from typing import Final
 
 from common.errors import DataError
 
-_MOST_CHARACTERS: Final = 90
+MOST_FOR_LINES: Final = 90
 """Marlin's lines hold 96 (MAX_CMD_SIZE), number and checksum included."""
+
+MOST_FOR_SERVERS: Final = 4096
+"""Klipper has commands as long as the outline of a thing (EXCLUDE_OBJECT_DEFINE)."""
 
 _WORD: Final = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+)?)")
 _NAME: Final = re.compile(r"([GMT]\d+)(?!\d)")
 _TIME: Final = re.compile(r";\s*(?:estimated printing time(?: \(normal mode\))?\s*=|TIME:)\s*(.+)", re.IGNORECASE)
 _TIME_PART: Final = re.compile(r"(\d+)\s*([dhms]?)")
 _UNIT_S: Final = {"d": 86400, "h": 3600, "m": 60, "s": 1, "": 1}
+_HEATING: Final = {
+    "M104": "nozzle",
+    "M109": "nozzle",
+    "M140": "bed",
+    "M190": "bed",
+    "M141": "chamber",
+    "M191": "chamber",
+}
 _INCH_MM: Final = 25.4
 _AXES: Final = "XYZ"
 
@@ -49,6 +60,7 @@ class GcodeFacts:
         high_mm: highest, likewise.
         seconds: time that the slicer tells, s; NaN: it tells none.
         heats: whether anything is heated.
+        leaves_hot: whether a heater is still on at its end.
     """
 
     lines: int
@@ -57,14 +69,16 @@ class GcodeFacts:
     high_mm: tuple[float, float, float]
     seconds: float
     heats: bool
+    leaves_hot: bool
 
 
-def lines_of(file: Iterable[str], name: str) -> Iterator[Line]:
+def lines_of(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINES) -> Iterator[Line]:
     """Give the lines that go to the printer.
 
     Args:
         file: its lines.
         name: of the file, for messages.
+        most_characters: that a line may have.
 
     Raises:
         DataError: a line is none of G-code, or too long.
@@ -75,9 +89,9 @@ def lines_of(file: Iterable[str], name: str) -> Iterator[Line]:
             continue
         if not text.isascii() or not text.isprintable() or not text[0].isalpha():
             raise DataError(f"{name}: line {number} is no G-code", "give the file that a slicer wrote")
-        if len(text) > _MOST_CHARACTERS:
+        if len(text) > most_characters:
             raise DataError(
-                f"{name}: line {number} has {len(text)} characters", f"give lines of at most {_MOST_CHARACTERS}"
+                f"{name}: line {number} has {len(text)} characters", f"give lines of at most {most_characters}"
             )
         yield Line(number, text)
 
@@ -95,17 +109,18 @@ def name_of(text: str) -> str:
     return found[1] if found else ""
 
 
-def examine(file: Iterable[str], name: str) -> GcodeFacts:
+def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
     """Read a whole file.
 
     Args:
         file: its lines.
         name: of the file, for messages.
+        most_characters: that a line may have.
 
     Raises:
         DataError: a line is none of G-code, or nothing is sent.
     """
-    path, seconds, count, heats = _Path(), math.nan, 0, False
+    path, heaters, seconds, count = _Path(), _Heaters(), math.nan, 0
 
     def watched() -> Iterator[str]:
         nonlocal seconds
@@ -114,13 +129,14 @@ def examine(file: Iterable[str], name: str) -> GcodeFacts:
                 seconds = _seconds(found[1])
             yield raw
 
-    for line in lines_of(watched(), name):
+    for line in lines_of(watched(), name, most_characters):
         count += 1
-        heats = heats or name_of(line.text) in {"M104", "M109", "M140", "M190"}
+        heaters.take(line.text)
         path.take(line.text)
     if not count:
         raise DataError(f"{name} has no line that a printer would do", "give the file that a slicer wrote")
-    return GcodeFacts(count, path.extruding, _ends(path.low), _ends(path.high), seconds, heats)
+    ends = _ends(path.low), _ends(path.high)
+    return GcodeFacts(count, path.extruding, *ends, seconds, heaters.heats, heaters.are_on)
 
 
 def _ends(values: list[float]) -> tuple[float, float, float]:
@@ -130,6 +146,39 @@ def _ends(values: list[float]) -> tuple[float, float, float]:
 
 def _seconds(text: str) -> float:
     return float(sum(int(amount) * _UNIT_S[unit] for amount, unit in _TIME_PART.findall(text)))
+
+
+class _Heaters:
+    """Follows what is heated. A command of one firmware alone (a macro) may cool: after one, nothing is said to be on."""
+
+    def __init__(self) -> None:
+        self.heats = False
+        self._tool = 0.0
+        self._on: set[tuple[str, float]] = set()
+
+    @property
+    def are_on(self) -> bool:
+        """Whether one is on."""
+        return bool(self._on)
+
+    def take(self, text: str) -> None:
+        """Take a line."""
+        name = name_of(text)
+        if not name:
+            self._on.clear()
+        elif name[0] == "T":
+            self._tool = float(name[1:])
+        elif name in _HEATING:
+            self.heats = True
+            words = _words(text)
+            goal = words.get("S", words.get("R"))
+            heater = (_HEATING[name], words.get("T", self._tool) if _HEATING[name] == "nozzle" else 0.0)
+            if goal is not None:
+                (self._on.add if goal > 0 else self._on.discard)(heater)
+
+
+def _words(text: str) -> dict[str, float]:
+    return {letter: float(value) for letter, value in _WORD.findall(text.upper()) if value not in {"", "+", "-"}}
 
 
 class _Path:
@@ -145,7 +194,7 @@ class _Path:
 
     def take(self, text: str) -> None:
         """Take a line."""
-        words = {letter: float(value) for letter, value in _WORD.findall(text.upper()) if value not in {"", "+", "-"}}
+        words = _words(text)
         match name_of(text):
             case "G0" | "G1" | "G2" | "G3":
                 self._move(words)

@@ -52,14 +52,24 @@ def open_line(uri: LineUri) -> Line:
     Raises:
         UnavailableError: it cannot be had.
     """
-    if uri.kind is not LineKind.SOCKET and is_android():
-        raise UnavailableError(
-            f"{uri.text}: Android lets no program in Termux use this",
-            "take a printer in the network (octoprint://, moonraker://), or socket://HOST:PORT of an app or of ser2net that has the port",
-        )
+    require_allowed(uri)
     if uri.kind is LineKind.SERIAL:
         return _SerialLine(uri)
     return _SocketLine(uri)
+
+
+def require_allowed(uri: LineUri) -> None:
+    """Refuse a line that this machine never gives to a program.
+
+    Raises:
+        UnavailableError: it does not.
+    """
+    if uri.kind is not LineKind.SOCKET and is_android():
+        raise UnavailableError(
+            f"{uri.text}: Android lets no program in Termux use USB or Bluetooth",
+            "take a printer in the network (octoprint://, moonraker://, prusalink://), or socket://HOST:PORT of an app or of ser2net"
+            " that has the port",
+        )
 
 
 class _SerialLine:

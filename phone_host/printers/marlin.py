@@ -11,10 +11,10 @@ against OctoPrint's and Printrun's senders).
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
 from typing import Final
 
 from phone_host.printers.gcode import Line, name_of
+from phone_host.printers.progress import Heat, Phase
 
 SECOND_NS: Final = 1_000_000_000
 
@@ -61,36 +61,6 @@ _FATAL: Final = re.compile(r"halted|kill\(\)|thermal|heating failed|maxtemp|mint
 _ASKED: Final = re.compile(r"(?:resend|rs)[: ]+N?(\d+)", re.IGNORECASE)
 _ORDER: Final = re.compile(r"line number is not|expected line", re.IGNORECASE)
 _HEAT: Final = re.compile(r"\b(T|B)\d?:\s*(-?[\d.]+)\s*/\s*(-?[\d.]+)")
-
-
-class Phase(Enum):
-    """How far a print is."""
-
-    OPENING = "opening"
-    PRINTING = "printing"
-    PAUSED = "paused"
-    CANCELLING = "cancelling"
-    DONE = "done"
-    CANCELLED = "cancelled"
-    FAILED = "failed"
-
-    @property
-    def is_over(self) -> bool:
-        """Whether nothing more is sent."""
-        return self in {Phase.DONE, Phase.CANCELLED, Phase.FAILED}
-
-
-@dataclass(frozen=True, slots=True)
-class Heat:
-    """What the printer tells of its temperatures, degrees C; NaN is never told, 0 is a heater that is off.
-
-    Attributes:
-        nozzle: of the nozzle, and where it shall go.
-        bed: of the bed, likewise.
-    """
-
-    nozzle: tuple[float, float] = (0.0, 0.0)
-    bed: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(slots=True)

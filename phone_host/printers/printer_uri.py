@@ -1,4 +1,4 @@
-"""Where a printer is, as the user writes it: serial:DEVICE?baud=115200, rfcomm://ADDRESS?channel=1, socket://HOST:PORT. Pure."""
+"""Where a printer is, as the user writes it: a line (serial:DEVICE), a server (octoprint://HOST:PORT), or a file (file:OUT.gcode). Pure."""
 
 import re
 from dataclasses import dataclass
@@ -7,20 +7,43 @@ from typing import Final
 
 from common.errors import SettingsError
 
-_REMEDY: Final = "give serial:/dev/ttyUSB0?baud=115200, rfcomm://00:11:22:33:44:55 or socket://HOST:PORT"
+_REMEDY: Final = (
+    "give octoprint://HOST, moonraker://HOST, prusalink://HOST, serial:/dev/ttyUSB0?baud=115200, rfcomm://00:11:22:33:44:55,"
+    " socket://HOST:PORT or file:OUT.gcode"
+)
 _BLUETOOTH: Final = re.compile(r"(?:[0-9A-F]{2}:){5}[0-9A-F]{2}", re.IGNORECASE)
+_HOST: Final = re.compile(r"[A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]")
 _BAUDS: Final = (9600, 19200, 38400, 57600, 115200, 230400, 250000, 460800, 500000, 921600, 1000000)
 _USUAL_BAUD: Final = 115200
 _MOST_CHANNEL: Final = 30
 _MOST_PORT: Final = 65535
+_TLS_PORT: Final = 443
 
 
 class LineKind(Enum):
-    """How a printer is reached."""
+    """How a printer on a line is reached."""
 
     SERIAL = "serial"
     RFCOMM = "rfcomm"
     SOCKET = "socket"
+
+
+class ServerKind(Enum):
+    """Which server stands before the printer."""
+
+    OCTOPRINT = "octoprint"
+    MOONRAKER = "moonraker"
+    PRUSALINK = "prusalink"
+
+    @property
+    def title(self) -> str:
+        """Its name for people."""
+        return {"octoprint": "OctoPrint", "moonraker": "Moonraker", "prusalink": "PrusaLink"}[self.value]
+
+    @property
+    def port(self) -> int:
+        """Its usual port: OctoPi and PrusaLink serve at that of the web, Moonraker at its own."""
+        return 7125 if self is ServerKind.MOONRAKER else 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +65,42 @@ class LineUri:
     port: int = 0
 
 
-def read_uri(text: str) -> LineUri:
+@dataclass(frozen=True, slots=True)
+class ServerUri:
+    """A printer behind a server that takes whole files.
+
+    Attributes:
+        text: as the user wrote it.
+        kind: which server.
+        host: its name or address, without brackets.
+        port: of TCP.
+        is_secure: whether it speaks https.
+    """
+
+    text: str
+    kind: ServerKind
+    host: str
+    port: int
+    is_secure: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FileUri:
+    """No printer, but a file for one.
+
+    Attributes:
+        text: as the user wrote it.
+        path: of the file.
+    """
+
+    text: str
+    path: str
+
+
+PrinterUri = LineUri | ServerUri | FileUri
+
+
+def read_uri(text: str) -> PrinterUri:
     """Read where a printer is.
 
     Args:
@@ -53,8 +111,14 @@ def read_uri(text: str) -> LineUri:
     """
     scheme, colon, rest = text.strip().partition(":")
     place, _, query = rest.removeprefix("//").partition("?")
+    if not colon or not place:
+        raise SettingsError(f"--printer {text!r} names no printer", _REMEDY)
+    if scheme.lower() == "file":
+        return FileUri(text, rest.removeprefix("//"))
+    if server := next((each for each in ServerKind if each.value == scheme.lower()), None):
+        return _server(text, server, place, query)
     kind = next((each for each in LineKind if each.value == scheme.lower()), None)
-    if not colon or kind is None or not place:
+    if kind is None:
         raise SettingsError(f"--printer {text!r} names no printer", _REMEDY)
     match kind:
         case LineKind.SERIAL:
@@ -71,15 +135,35 @@ def read_uri(text: str) -> LineUri:
             return LineUri(text, kind, place.upper(), port=channel)
         case LineKind.SOCKET:
             host, _, port = place.rpartition(":")
-            if not host or not port.isdecimal() or not 0 < int(port) <= _MOST_PORT or query:
+            if not host or not _is_port(port) or query:
                 raise SettingsError(f"--printer {text!r} has no host and port", "give socket://HOST:PORT")
             return LineUri(text, kind, host.strip("[]"), port=int(port))
+
+
+def _server(text: str, kind: ServerKind, place: str, query: str) -> ServerUri:
+    example = f"{kind.value}://HOST:{kind.port}"
+    if "@" in place:
+        shown = f"{kind.value}://…@{place.rpartition('@')[2]}"
+        raise SettingsError(
+            f"--printer {shown} holds a name or key", "write the key into the settings file, table [printers]"
+        )
+    place = place.rstrip("/")
+    is_secure = bool(_number(text, query, "tls", 0))
+    host, colon, port = place.rpartition(":") if not place.endswith("]") and ":" in place else (place, "", "")
+    if not _HOST.fullmatch(host) or (colon and not _is_port(port)):
+        raise SettingsError(f"--printer {text!r} has no host", f"give {example}; ?tls=1 if it speaks https")
+    usual = _TLS_PORT if is_secure else kind.port
+    return ServerUri(text, kind, host.strip("[]"), int(port) if colon else usual, is_secure)
+
+
+def _is_port(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) <= 5 and 0 < int(text) <= _MOST_PORT
 
 
 def _number(text: str, query: str, name: str, usual: int) -> int:
     if not query:
         return usual
     key, _, value = query.partition("=")
-    if key != name or not value.isdecimal() or len(value) > 9:
+    if key != name or not (value.isascii() and value.isdecimal()) or len(value) > 9:
         raise SettingsError(f"--printer {text!r}: {query!r} is no option", f"give ?{name}={usual}")
     return int(value)

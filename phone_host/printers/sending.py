@@ -1,14 +1,19 @@
-"""Brings a print to a printer: the protocol says what and when, the line carries it."""
+"""Brings a print to a printer on a line: the protocol says what and when, the line carries it."""
 
-import threading
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from itertools import chain
 from typing import Final
 
 from common import now
 from common.errors import DataError
-from phone_host.printers.line import Line, PrinterGoneError
-from phone_host.printers.marlin import SECOND_NS, Heat, MarlinSender, Phase
+from phone_host.printers.door import Job, Wishes
+from phone_host.printers.gcode import GcodeFacts, lines_of
+from phone_host.printers.gcode import Line as GcodeLine
+from phone_host.printers.line import Line, PrinterGoneError, open_line, require_allowed
+from phone_host.printers.marlin import SECOND_NS, MarlinSender
+from phone_host.printers.printer_uri import LineUri
+from phone_host.printers.progress import Ended, Phase, Progress
 
 _TELL_NS: Final = SECOND_NS // 4
 _LEAST_WAIT_S, _MOST_WAIT_S = 0.01, 0.1
@@ -18,53 +23,65 @@ _MOST_LINE: Final = 4096
 _CANCEL_NS: Final = 5 * SECOND_NS
 """Heaters are switched off within a second; a printer that is deaf for so long will not hear it."""
 
+_COLD: Final = ("M104 S0", "M140 S0")
 
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a print is.
 
-    Attributes:
-        phase: of it.
-        done: lines that were taken.
-        resent: lines that were sent again.
-        heat: temperatures.
+class LineDoor:
+    """A printer that takes G-code line by line.
+
+    Args:
+        uri: where it is.
     """
 
-    phase: Phase
-    done: int
-    resent: int
-    heat: Heat
+    def __init__(self, uri: LineUri) -> None:
+        self._uri = uri
+
+    def require_ready(self) -> None:
+        """See PrinterDoor. The port is not opened: that restarts many boards."""
+        require_allowed(self._uri)
+
+    def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
+        """See PrinterDoor."""
+        line = open_line(self._uri)
+        try:
+            with job.gcode.open(encoding="utf-8", errors="replace") as file:
+                cooling = _COLD if job.facts.leaves_hot else ()
+                lines = chain(lines_of(file, str(job.gcode)), (GcodeLine(0, text) for text in cooling))
+                sender = MarlinSender(lines, now.monotonic_ns())
+                send(line, sender, wishes, _telling(sender, job.facts, tell))
+        finally:
+            line.close()
+        done = min(sender.done, job.facts.lines)
+        left = f"; {done} of {job.facts.lines} lines were done"
+        return Ended(
+            phase=sender.phase,
+            share=done / job.facts.lines,
+            resent=sender.resent,
+            problem=sender.problem,
+            remedy=sender.remedy + left if sender.phase is Phase.FAILED else "",
+            notes=_notes(job.facts) if sender.phase is Phase.DONE else (),
+        )
 
 
-class Wishes:
-    """What the user wants of a print. Any thread may use it."""
-
-    def __init__(self) -> None:
-        self._cancelled, self._paused = threading.Event(), threading.Event()
-
-    def cancel(self) -> None:
-        """End it, and switch the heaters off."""
-        self._cancelled.set()
-
-    def toggle_pause(self) -> None:
-        """Pause it, or go on."""
-        if self._paused.is_set():
-            self._paused.clear()
-        else:
-            self._paused.set()
-
-    @property
-    def is_cancelled(self) -> bool:
-        """Whether it shall end."""
-        return self._cancelled.is_set()
-
-    @property
-    def is_paused(self) -> bool:
-        """Whether it shall wait."""
-        return self._paused.is_set()
+def _notes(facts: GcodeFacts) -> tuple[str, ...]:
+    return ("its G-code leaves heaters on: they were switched off",) if facts.leaves_hot else ()
 
 
-def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[Progress], None]) -> Phase:
+def _telling(sender: MarlinSender, facts: GcodeFacts, tell: Callable[[Progress], None]) -> Callable[[], None]:
+    began_ns: list[int] = []
+
+    def told() -> None:
+        share, now_ns = min(sender.done / facts.lines, 1.0), now.monotonic_ns()
+        if share > 0 and not began_ns:
+            began_ns.append(now_ns)
+        passed_s = (now_ns - began_ns[0]) / SECOND_NS if began_ns else math.nan
+        left_s = passed_s * (1 - share) / share if share > 0 else math.nan
+        tell(Progress(phase=sender.phase, share=share, seconds_left=left_s, heat=sender.heat, resent=sender.resent))
+
+    return told
+
+
+def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], None]) -> Phase:
     """Send a print until it is done, cancelled or has failed.
 
     Args:
@@ -104,7 +121,7 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[Progr
             line.write(data)
         if now_ns - told_ns >= _TELL_NS:
             told_ns = now_ns
-            tell(Progress(sender.phase, sender.done, sender.resent, sender.heat))
+            tell()
         wait_s = min(max((sender.due_ns - now_ns) / SECOND_NS, 0.0 if data else _LEAST_WAIT_S), _MOST_WAIT_S)
         *lines, rest = (rest + line.read(wait_s)).split(b"\n")
         for each in lines:
@@ -112,5 +129,5 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[Progr
         rest = rest[-_MOST_LINE:]
     if failure is not None:
         raise failure
-    tell(Progress(sender.phase, sender.done, sender.resent, sender.heat))
+    tell()
     return sender.phase

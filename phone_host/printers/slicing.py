@@ -1,16 +1,32 @@
-"""Slicing, by the PrusaSlicer that the user has installed: a program of its own, which is run and not believed."""
+"""Slicing, by a slicer that the user has installed: a program of its own, which is run and not believed.
+
+PrusaSlicer, SuperSlicer (its sister, with the same options) and CuraEngine are known; the first that is installed is taken.
+"""
 
 import math
+import os
 import shutil
 import subprocess
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
-from typing import Final
+from typing import Final, assert_never
 
-from common.errors import DataError, UnavailableError
-from phone_host.printers.gcode import GcodeFacts, examine
+from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.printers.gcode import MOST_FOR_LINES, GcodeFacts, examine
 
-_NAMES: Final = ("prusa-slicer", "PrusaSlicer", "prusa-slicer-console")
+
+class Slicer(Enum):
+    """The slicers that are known, in the order in which they are looked for."""
+
+    PRUSA = "prusa"
+    CURA = "cura"
+
+
+_NAMES: Final = {
+    Slicer.PRUSA: ("prusa-slicer", "PrusaSlicer", "prusa-slicer-console", "superslicer", "SuperSlicer"),
+    Slicer.CURA: ("CuraEngine", "curaengine", "cura-engine"),
+}
 _USUAL: Final = (
     "--nozzle-diameter=0.4",
     "--filament-diameter=1.75",
@@ -24,6 +40,30 @@ _USUAL: Final = (
 )
 """PLA in a printer with a nozzle of 0.4 mm: what nearly everybody begins with. Without the last one, the bed would stay hot."""
 
+_USUAL_CURA: Final = {
+    "machine_nozzle_size": "0.4",
+    "material_diameter": "1.75",
+    "layer_height": "0.2",
+    "layer_height_0": "0.2",
+    "infill_sparse_density": "15",
+    "infill_line_distance": "5.33",
+    "material_print_temperature": "205",
+    "material_print_temperature_layer_0": "210",
+    "material_initial_print_temperature": "205",
+    "material_final_print_temperature": "205",
+    "material_bed_temperature": "60",
+    "material_bed_temperature_layer_0": "60",
+    "roofing_layer_count": "0",
+    "machine_start_gcode": "G28",
+    "machine_end_gcode": "M104 S0\nM140 S0\nM107\nG91\nG1 Z5 F600\nG90\nM84",
+}
+"""The same for CuraEngine, whose own defaults are a filament of 2.85 mm. It computes no setting from another one (5.33 mm between lines of
+0.4 mm in two directions are 15 %)."""
+
+_CURA_RESOURCES: Final = (Path("/usr/share/cura/resources"), Path("/usr/local/share/cura/resources"))
+_CURA_PATH: Final = "CURA_ENGINE_SEARCH_PATH"
+_CURA_MACHINE: Final = "fdmprinter.def.json"
+
 _PATIENCE_S: Final = 1800
 _AXES: Final = "XYZ"
 _SLACK_MM: Final = 0.01
@@ -35,28 +75,35 @@ class SlicingWanted:
 
     Attributes:
         bed_mm: of the printer.
-        profile: settings that the slicer itself has exported (.ini); None: PLA, 0.2 mm layers.
+        profile: settings for the slicer: an .ini that PrusaSlicer has exported, or a machine's .def.json of Cura; None: PLA, 0.2 mm layers.
+        slicer: which one; None: the first that is installed.
     """
 
     bed_mm: tuple[float, float, float]
     profile: Path | None = None
+    slicer: Slicer | None = None
 
 
-def find_slicer() -> str:
-    """Return the path of the slicer.
+def find_slicer(wanted: Slicer | None = None) -> tuple[Slicer, str]:
+    """Return a slicer, and the path of its program.
+
+    Args:
+        wanted: which one; None: the first that is installed.
 
     Raises:
         UnavailableError: none is installed.
     """
-    found = next((path for name in _NAMES if (path := shutil.which(name))), None)
-    if found is None:
-        raise UnavailableError(
-            "no slicer is installed", "sudo apt install prusa-slicer, or slice elsewhere and print the G-code"
-        )
-    return found
+    for slicer in Slicer if wanted is None else (wanted,):
+        if found := next((path for name in _NAMES[slicer] if (path := shutil.which(name))), None):
+            return slicer, found
+    which = "no slicer" if wanted is None else f"the slicer {wanted.value}"
+    raise UnavailableError(
+        f"{which} is not installed" if wanted else "no slicer is installed",
+        "sudo apt install prusa-slicer, or slice elsewhere and print the G-code",
+    )
 
 
-def sliced(stl: Path, gcode: Path, wanted: SlicingWanted) -> GcodeFacts:
+def sliced(stl: Path, gcode: Path, wanted: SlicingWanted) -> None:
     """Slice a model in the middle of the bed.
 
     Args:
@@ -64,44 +111,88 @@ def sliced(stl: Path, gcode: Path, wanted: SlicingWanted) -> GcodeFacts:
         gcode: the file to write.
         wanted: how.
 
-    Returns:
-        What the file asks of the printer.
-
     Raises:
         UnavailableError: no slicer is installed.
-        DataError: it cannot slice the model, or what it wrote leaves the bed.
+        SettingsError: the profile is none of this slicer.
+        DataError: it cannot slice the model.
     """
-    slicer = find_slicer()
+    slicer, program = find_slicer(wanted.slicer)
+    environment = dict(os.environ)
+    match slicer:
+        case Slicer.PRUSA:
+            asked = _prusa(program, stl, gcode, wanted)
+        case Slicer.CURA:
+            asked = _cura(program, stl, gcode, wanted)
+            environment.setdefault(_CURA_PATH, os.pathsep.join(map(str, _cura_folders())))
+        case _:
+            assert_never(slicer)
+    try:
+        done = subprocess.run(
+            asked, capture_output=True, text=True, check=False, timeout=_PATIENCE_S, errors="replace", env=environment
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise UnavailableError(
+            f"{program} does not end in order ({error})", "slice elsewhere and print the G-code"
+        ) from None
+    if done.returncode or not gcode.exists():
+        said = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        words = next((line for line in said if "error" in line.lower()), said[-1] if said else "")
+        raise DataError(
+            f"the slicer refuses the model ({words[:200] or f'exit code {done.returncode}'})",
+            "see what phone-host printcheck says of it",
+        )
+
+
+def _prusa(program: str, stl: Path, gcode: Path, wanted: SlicingWanted) -> list[str]:
     x, y, _ = wanted.bed_mm
     given = (f"--load={wanted.profile}",) if wanted.profile else _USUAL
     bed = f"--bed-shape=0x0,{x:g}x0,{x:g}x{y:g},0x{y:g}"
-    asked = [slicer, "--export-gcode", *given, bed, f"--center={x / 2:g},{y / 2:g}", f"--output={gcode}", str(stl)]
-    try:
-        done = subprocess.run(asked, capture_output=True, text=True, check=False, timeout=_PATIENCE_S, errors="replace")
-    except (OSError, subprocess.TimeoutExpired) as error:
+    return [program, "--export-gcode", *given, bed, f"--center={x / 2:g},{y / 2:g}", f"--output={gcode}", str(stl)]
+
+
+def _cura(program: str, stl: Path, gcode: Path, wanted: SlicingWanted) -> list[str]:
+    if wanted.profile and not wanted.profile.name.endswith(".def.json"):
+        raise SettingsError(f"{wanted.profile} is no profile for CuraEngine", "give a machine's .def.json")
+    machine = wanted.profile or _cura_machine()
+    x, y, z = (f"{length:g}" for length in wanted.bed_mm)
+    bed = {"machine_width": x, "machine_depth": y, "machine_height": z, "machine_center_is_zero": "false"}
+    values = {**({} if wanted.profile else _USUAL_CURA), **bed, "center_object": "true"}
+    told = [word for name, value in values.items() for word in ("-s", f"{name}={value}")]
+    return [program, "slice", "-j", str(machine), *told, "-l", str(stl), "-o", str(gcode)]
+
+
+def _cura_folders() -> list[Path]:
+    return [root / part for root in _CURA_RESOURCES for part in ("definitions", "extruders") if (root / part).is_dir()]
+
+
+def _cura_machine() -> Path:
+    """Return Cura's description of any printer, which its program needs and does not bring along.
+
+    Raises:
+        UnavailableError: it is not there.
+    """
+    named = [Path(each) for each in os.environ.get(_CURA_PATH, "").split(os.pathsep) if each]
+    found = next((path for each in (*named, *_cura_folders()) if (path := each / _CURA_MACHINE).is_file()), None)
+    if found is None:
         raise UnavailableError(
-            f"{slicer} does not end in order ({error})", "slice elsewhere and print the G-code"
-        ) from None
-    if done.returncode or not gcode.exists():
-        said = [line.strip() for line in (done.stderr + done.stdout).splitlines() if line.strip()]
-        raise DataError(
-            f"the slicer refuses the model ({said[-1] if said else f'exit code {done.returncode}'})",
-            "see what phone-host printcheck says of it",
+            f"CuraEngine has no {_CURA_MACHINE}", f"sudo apt install cura, or set {_CURA_PATH} to the folder with it"
         )
-    facts = facts_of(gcode)
-    require_inside(gcode, facts, wanted.bed_mm)
-    return facts
+    return found
 
 
-def facts_of(gcode: Path) -> GcodeFacts:
+def facts_of(gcode: Path, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
     """Read a file of G-code.
+
+    Args:
+        gcode: the file.
+        most_characters: that its lines may have.
 
     Raises:
         DataError: it is none, or cannot be read.
     """
     try:
         with gcode.open(encoding="utf-8", errors="replace") as file:
-            return examine(file, str(gcode))
+            return examine(file, str(gcode), most_characters)
     except OSError as error:
         raise DataError(f"{gcode} cannot be read ({error.strerror})", "give the file that a slicer wrote") from None
 

@@ -11,7 +11,7 @@ from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.serve.program import Calibrated, Choices
 from phone_host.serve.steps import Facts, steps
-from phone_host.web.source import Activity, Checked, Choice, PageState, ScanState
+from phone_host.web.source import Activity, Checked, Choice, PageState, PrintState, ScanState
 
 _FRESH_NS: Final = 150_000_000
 """A snapshot of a run serves so long: however often the state is asked for, the run is read a few times a second."""
@@ -158,6 +158,7 @@ class Memory:
         stranger: str = "",
         browser: Choice | None = None,
         scan: ScanState | None = None,
+        printing: PrintState | None = None,
     ) -> PageState:
         """Return everything.
 
@@ -169,6 +170,7 @@ class Memory:
             stranger: the chosen board that has to be enrolled first.
             browser: the camera of whichever browser gives one; None: no browser can.
             scan: the newest scan; None: there was none.
+            printing: the newest print; None: there was none.
         """
         with self._lock:
             run = self._fresh()
@@ -195,6 +197,7 @@ class Memory:
                 self._checks,
                 self._trouble,
                 scan,
+                printing,
             )
             if here != self._was:
                 self._was, self._changed = here, self._changed + 1
@@ -210,6 +213,7 @@ class Memory:
                 run=run,
                 guide=self._guide,
                 scan=scan,
+                printing=printing,
                 checks=self._checks,
                 trouble=self._trouble,
                 changed=self._changed,

@@ -17,6 +17,10 @@ from phone_host.live.scan import LiveScan
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.output.axes import Axes
+from phone_host.printers.door import PrinterDoor
+from phone_host.printers.journal import Journal
+from phone_host.printers.preparing import Wanted
+from phone_host.printers.printer_uri import PrinterUri
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
 from phone_host.run.sinks import Sink
@@ -132,6 +136,25 @@ class ReadyScan(Protocol):
         """Write what there is after an error; None: there was nothing, or it cannot be written. Raises nothing."""
 
 
+@dataclass(frozen=True, slots=True)
+class PrintWanted:
+    """Where and how a scan is printed.
+
+    Attributes:
+        text: the printer's address, as the user wrote it; empty: none.
+        uri: the same; None: none.
+        door: to it; None likewise.
+        how: the bed, and how the model is sliced.
+        journal: keeps how far it is.
+    """
+
+    text: str
+    uri: PrinterUri | None
+    door: PrinterDoor | None
+    how: Wanted
+    journal: Journal
+
+
 class Program(Protocol):
     """What the commands do, for the page."""
 
@@ -199,6 +222,13 @@ class Program(Protocol):
 
         Raises:
             SettingsError: it is no box.
+        """
+
+    def print_wanted(self, values: Choices) -> PrintWanted:
+        """Return how these options of `print`, printer and bed, want a scan printed. Nothing is opened.
+
+        Raises:
+            SettingsError: they make no sense.
         """
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:

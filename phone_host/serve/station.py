@@ -7,8 +7,9 @@ page ── Source ── Station ─┬ Activities: enrol | check | calibrate |
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from threading import Lock
-from typing import Final
+from typing import Final, TypeVar
 
 from common.errors import SettingsError, TandemError
 from common.link.enrolment_door import pairing_address
@@ -33,8 +34,20 @@ from phone_host.serve.recordings import Recordings
 from phone_host.serve.scanning import Scanning
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
+from phone_host.serve.workshop import Workshop
 from phone_host.stereo.core import StereoCore
-from phone_host.web.source import Activity, Answer, Checked, Command, Do, Measured, Newest, PageState, Surface
+from phone_host.web.source import (
+    Activity,
+    Answer,
+    Checked,
+    Command,
+    Do,
+    Measured,
+    Newest,
+    PageState,
+    ScanState,
+    Surface,
+)
 
 _END_S: Final = 20.0
 """A run that ends writes its report; a slow card takes seconds for that."""
@@ -44,6 +57,9 @@ _DOOR_S: Final = 3.0
 
 _ANSWER_S: Final = 12.0
 """The door's own patience, and a little more."""
+
+
+_Asked = TypeVar("_Asked")
 
 
 class Station:
@@ -60,6 +76,7 @@ class Station:
         self._memory = Memory(kept)
         self._choosing = Lock()
         self._recordings, self._scanning = Recordings(), Scanning()
+        self._workshop = Workshop(self._changed)
         self._activities = Activities(self._begins, self._shelf.tell, self._memory.fail)
         self._do: dict[Do, Callable[[Choices], Answer]] = {
             Do.FIND: self._find,
@@ -75,6 +92,12 @@ class Station:
             Do.SNAPSHOT: self._snapshot,
             Do.RECORD: self._record,
             Do.END_RECORDING: self._end_recording,
+            Do.CHECK_MODEL: lambda values: self._made(self._workshop.check, self._program.print_wanted(values)),
+            Do.SAVE_MODEL: lambda values: self._made(self._workshop.save, values.get("format", "")),
+            Do.PREPARE_PRINT: lambda values: self._made(self._workshop.prepare, self._program.print_wanted(values)),
+            Do.PRINT: lambda values: Answer(words=self._workshop.start(values.get("confirm", ""))),
+            Do.PAUSE_PRINT: lambda _: Answer(words=self._workshop.pause()),
+            Do.CANCEL_PRINT: lambda _: Answer(words=self._workshop.cancel()),
         }
         try:
             program.changed(kept, kept)
@@ -96,7 +119,8 @@ class Station:
             matchers=self._program.matchers,
             stranger=self._stranger(choices.get("link", "")),
             browser=find.browser_choice(self.feed.words),
-            scan=self._scanning.state,
+            scan=self._scanned_state(),
+            printing=self._workshop.state,
         )
 
     def newest(self) -> Newest | None:
@@ -107,6 +131,11 @@ class Station:
     def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
         """See Source."""
         return self._shelf.subscribe(told)
+
+    def _scanned_state(self) -> ScanState | None:
+        """Return how the scan goes; with the files that were saved of it since."""
+        state = self._scanning.state
+        return state and replace(state, files=(*state.files, *self._workshop.saved(state.folder)))
 
     def command(self, command: Command) -> Answer:
         """See Source."""
@@ -138,11 +167,20 @@ class Station:
     def close(self) -> None:
         """End what goes on, in order."""
         self._activities.close(_END_S)
+        self._workshop.close()
 
     @property
     def has_given_up(self) -> bool:
         """Whether native code still computes a pair that nobody waits for. The process may have to end without it."""
         return self._memory.has_given_up
+
+    def _changed(self) -> None:
+        self._memory.outdate()
+        self._shelf.tell()
+
+    def _made(self, does: Callable[[str, _Asked], str], asked: _Asked) -> Answer:
+        """Do something with the last scan."""
+        return Answer(words=does(self._scanning.folder, asked))
 
     def _begins(self) -> None:
         self._memory.begin()

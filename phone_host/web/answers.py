@@ -18,7 +18,7 @@ from phone_host.web.encoder import FILES, has_data
 from phone_host.web.gate import Gate, is_loopback
 from phone_host.web.hub import Hub
 from phone_host.web.openapi import description
-from phone_host.web.saved_pairs import SCAN_FILES, open_plain, open_saved, saved_pairs
+from phone_host.web.saved_pairs import is_scan_file, open_plain, open_saved, saved_pairs
 from phone_host.web.settings import Limits
 from phone_host.web.source import Answer, Command, Do
 from phone_host.web.state_json import answer_values, measured_values, whole_text
@@ -223,7 +223,7 @@ class Answers:
 
     async def _scan_file(self, request: web.Request) -> web.StreamResponse:
         name, folder = request.match_info["name"], self._hub.source.scanned()
-        if not folder or name not in SCAN_FILES:
+        if not folder or not is_scan_file(name):
             return problem(404, _NO_SCAN)
         try:
             async with self._place(request):

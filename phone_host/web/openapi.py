@@ -4,8 +4,8 @@ from typing import Final
 
 from common.versions import PACKAGE_VERSION
 from phone_host.output.pair_files import RUN_FILES
-from phone_host.web.saved_pairs import SCAN_FILES
-from phone_host.web.source import Activity, Do, StepName
+from phone_host.web.saved_pairs import SAVED_MODEL, SCAN_FILES
+from phone_host.web.source import Activity, Do, PrintStage, StepName
 from phone_host.web.wishes import MOST_NUMBER, MOST_POINTS, MOST_PX, MOST_TEXT, MOST_VALUES
 
 _Json = dict[str, object]
@@ -27,7 +27,8 @@ _REFUSED: Final = (401, 403, 421, 429)
 _DO: Final = (
     "`record` begins a recording (MCAP) beside the run that goes on, in a new file of the folder `recordings`; `end_recording` ends it."
     " How it goes stands in the state: `live.recording`. `snapshot` saves the newest pair. `set` takes options of `phone-host run` as"
-    " values, `enrol` link and code, `calibrate` board and square, `scan` voxel and box, which may be missing, `crop` box; the others take none."
+    " values, `enrol` link and code, `calibrate` board and square, `scan` voxel and box, which may be missing, `crop` box, `check_model` bed,"
+    " `save_model` format, `prepare_print` printer and bed, `print` confirm: what `printing.asks` says; the others take none."
 )
 
 
@@ -89,6 +90,13 @@ def _schemas() -> _Json:
         folder=_TEXT,
         files={"type": "array", "items": _TEXT},
     )
+    printing = _object(
+        stage={"enum": [each.value for each in PrintStage]},
+        words=_TEXT,
+        level={"enum": ["good", "warning", "bad", "unknown"]},
+        share=_NUMBER,
+        asks=_TEXT,
+    )
     state = _object(
         kind={"const": "state"},
         activity={"enum": [each.value for each in Activity]},
@@ -101,6 +109,7 @@ def _schemas() -> _Json:
         matchers={"type": "array", "items": _TEXT},
         guide={"type": ["object", "null"]},
         scan={"anyOf": [scan, {"type": "null"}]},
+        printing={"anyOf": [printing, {"type": "null"}]},
         trouble={"anyOf": [_ref("Problem"), {"type": "null"}]},
         changed=_WHOLE,
         begun=_WHOLE,
@@ -193,7 +202,12 @@ def _surface() -> _Json:
 
 def _scanned() -> _Json:
     described = _get("A file of the last scan", _bytes("application/octet-stream"), 404, 503)
-    file = {"name": "file", "in": "path", "required": True, "schema": {"enum": list(SCAN_FILES)}}
+    file = {
+        "name": "file",
+        "in": "path",
+        "required": True,
+        "schema": {"anyOf": [{"enum": list(SCAN_FILES)}, {"type": "string", "pattern": f"^{SAVED_MODEL}$"}]},
+    }
     return described | {"parameters": [file]}
 
 

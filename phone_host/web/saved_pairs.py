@@ -20,6 +20,9 @@ SAVED_FILES: Final = frozenset(file.value for file in RUN_FILES)
 SCAN_FILES: Final = ("model.ply", "trajectory.txt", "report.json", "index.html")
 """Names of a scan's files. They are saved, not shown: the page among them has scripts of its own."""
 
+SAVED_MODEL: Final = r"[0-9A-Za-z][0-9A-Za-z_.-]{0,99}\.(stl|obj|3ds|ply|3mf|glb)"
+"""Names of what was saved of a scan for other programs."""
+
 
 @dataclass(frozen=True, slots=True)
 class SavedPair:
@@ -58,6 +61,11 @@ def open_saved(folder: str, number: int, name: str) -> BinaryIO:
     if not folder or name not in SAVED_FILES:
         raise FileNotFoundError(name)
     return open_plain(Path(folder) / _name(number), name)
+
+
+def is_scan_file(name: str) -> bool:
+    """Return whether a name is one that a scan's folder may hold for whoever asks."""
+    return name in SCAN_FILES or re.fullmatch(SAVED_MODEL, name) is not None
 
 
 def open_plain(folder: Path, name: str) -> BinaryIO:

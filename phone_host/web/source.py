@@ -107,6 +107,35 @@ class ScanState:
     files: tuple[str, ...] = ()
 
 
+class PrintStage(Enum):
+    """How far a print of the page is."""
+
+    PREPARING = "preparing"
+    ASKS = "asks"
+    PRINTING = "printing"
+    PAUSED = "paused"
+    OVER = "over"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintState:
+    """How a print of the page goes, or went.
+
+    Attributes:
+        stage: how far it is.
+        words: what goes on, what is asked, or what came of it; one sentence.
+        level: good, warning, bad or unknown.
+        share: of the print that is done, 0..1.
+        asks: file and printer that a person has to agree to, before anything is heated or moved; empty: nothing is asked.
+    """
+
+    stage: PrintStage
+    words: str
+    level: str = "unknown"
+    share: float = 0.0
+    asks: str = ""
+
+
 class SurfaceMesh(Protocol):
     """Triangles with colours, as `phone_host.scan.mesh.Mesh` has them."""
 
@@ -172,6 +201,7 @@ class PageState:
         run: the run, live or the last one; None: there was none.
         guide: the live calibration, as its guide.json has it; None: there was none.
         scan: the scan, live or the last one; None: there was none.
+        printing: the print, live or the last one; None: there was none.
         checks: what the last check has looked at, in order.
         trouble: what went wrong last; None: nothing.
         changed: grows with each change of anything but `run` and `guide`.
@@ -189,6 +219,7 @@ class PageState:
     run: RunSnapshot | None = None
     guide: Mapping[str, object] | None = None
     scan: ScanState | None = None
+    printing: PrintState | None = None
     checks: tuple[Checked, ...] = ()
     trouble: Trouble | None = None
     changed: int = 0
@@ -211,6 +242,12 @@ class Do(Enum):
     SNAPSHOT = "snapshot"
     RECORD = "record"
     END_RECORDING = "end_recording"
+    CHECK_MODEL = "check_model"
+    SAVE_MODEL = "save_model"
+    PREPARE_PRINT = "prepare_print"
+    PRINT = "print"
+    PAUSE_PRINT = "pause_print"
+    CANCEL_PRINT = "cancel_print"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,7 +258,8 @@ class Command:
         do: what.
         values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
             `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel` and `box`, which may be
-            missing; for CROP, while a scan goes on, `box`. Empty for the others.
+            missing; for CROP, while a scan goes on, `box`; for CHECK_MODEL `bed`; for SAVE_MODEL `format`; for
+            PREPARE_PRINT `printer` and `bed`; for PRINT `confirm`, the state's `printing.asks`. Empty for the others.
     """
 
     do: Do

@@ -110,6 +110,7 @@ def state_text(state: PageState, samples: Sequence[Sample], now_ns: int) -> Stat
         "matchers": list(state.matchers),
         "guide": None if state.guide is None else dict(state.guide),
         "scan": None if state.scan is None else asdict(state.scan),
+        "printing": None if state.printing is None else asdict(state.printing) | {"stage": state.printing.stage.value},
         "trouble": None if state.trouble is None else trouble_values(state.trouble),
         "changed": state.changed,
         "begun": state.begun,

@@ -6,24 +6,36 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from common.errors import DataError, UnavailableError
+from phone_host.printers.door import Wishes
 from phone_host.printers.gcode import lines_of
 from phone_host.printers.line import PrinterGoneError, open_line
-from phone_host.printers.marlin import MarlinSender, Phase
-from phone_host.printers.printer_uri import read_uri
-from phone_host.printers.sending import Progress, Wishes, send
+from phone_host.printers.marlin import MarlinSender
+from phone_host.printers.printer_uri import LineUri, read_uri
+from phone_host.printers.progress import Phase
+from phone_host.printers.sending import send
 from tests.support.marlin_printer import Faults, MarlinPrinter, cube, printer
 
 S = 1_000_000_000
 
 
+def line_uri(text: str) -> LineUri:
+    """The address of a printer on a line."""
+    uri = read_uri(text)
+    assert isinstance(uri, LineUri)
+    return uri
+
+
 def printed(
-    on: MarlinPrinter, lines: list[str], wishes: Wishes | None = None, tell: Callable[[Progress], None] = lambda _: None
+    on: MarlinPrinter,
+    lines: list[str],
+    wishes: Wishes | None = None,
+    tell: Callable[[MarlinSender], None] = lambda _: None,
 ) -> MarlinSender:
     """Print over the line; return what has sent it."""
-    line = open_line(read_uri(f"serial:{on.path}?baud=115200"))
+    line = open_line(line_uri(f"serial:{on.path}?baud=115200"))
     sender = MarlinSender(lines_of(lines, "cube.gcode"), time.monotonic_ns() - 3 * S)  # it has said start
     try:
-        send(line, sender, wishes or Wishes(), tell)
+        send(line, sender, wishes or Wishes(), lambda: tell(sender))
     finally:
         line.close()
     return sender
@@ -62,7 +74,7 @@ def test_cancelling_switches_the_heaters_off_within_a_second() -> None:
     """In the middle of drawing, nothing of the print follows but what was under way."""
     wishes, cancelled_s = Wishes(), list[float]()
 
-    def watch(progress: Progress) -> None:
+    def watch(progress: MarlinSender) -> None:
         if progress.done > 100 and not cancelled_s:
             cancelled_s.append(time.monotonic())
             wishes.cancel()
@@ -79,7 +91,7 @@ def test_a_pause_sends_nothing_until_it_ends() -> None:
     """The heaters stay on meanwhile, and the print is whole afterwards."""
     wishes, counts = Wishes(), list[int]()
 
-    def watch(progress: Progress) -> None:
+    def watch(progress: MarlinSender) -> None:
         if progress.phase is Phase.PAUSED:
             counts.append(progress.done)
             if len(counts) == 4:
@@ -130,9 +142,9 @@ def test_a_broken_file_cools_the_printer() -> None:
         yield "\x00\x01"
 
     with printer() as there:
-        line = open_line(read_uri(f"serial:{there.path}"))
+        line = open_line(line_uri(f"serial:{there.path}"))
         with pytest.raises(DataError, match="line 101 is no G-code"):
-            send(line, MarlinSender(lines_of(broken(), "cube.gcode"), time.monotonic_ns()), Wishes(), lambda _: None)
+            send(line, MarlinSender(lines_of(broken(), "cube.gcode"), time.monotonic_ns()), Wishes(), lambda: None)
         line.close()
         assert there.nozzle == there.bed == 0.0
 
@@ -144,4 +156,4 @@ def test_a_broken_file_cools_the_printer() -> None:
 def test_a_printer_that_is_not_there_is_named(uri: str, words: str) -> None:
     """With a remedy."""
     with pytest.raises(UnavailableError, match=words):
-        open_line(read_uri(uri))
+        open_line(line_uri(uri))

@@ -9,8 +9,9 @@ from common.errors import DataError, SettingsError, UnavailableError
 from phone_host.printers.gcode import GcodeFacts, Line, examine, lines_of, name_of
 from phone_host.printers.journal import Entry, Journal
 from phone_host.printers.line import open_line
-from phone_host.printers.marlin import MarlinSender, Phase, framed
-from phone_host.printers.printer_uri import LineKind, LineUri, read_uri
+from phone_host.printers.marlin import MarlinSender, framed
+from phone_host.printers.printer_uri import FileUri, LineKind, LineUri, ServerKind, ServerUri, read_uri
+from phone_host.printers.progress import Phase
 
 S = 1_000_000_000
 
@@ -136,7 +137,7 @@ def test_on_android_only_the_network_works(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("sys.platform", "android")
     for uri in ("serial:/dev/ttyUSB0", "rfcomm://00:11:22:33:44:55"):
         with pytest.raises(UnavailableError) as refused:
-            open_line(read_uri(uri))
+            open_line(line_uri(uri))
         assert "socket://HOST:PORT" in refused.value.remedy
 
 
@@ -176,15 +177,54 @@ def test_lines_are_sent_without_comments() -> None:
     assert [name_of(text) for text in ("g1 x1", "G28.1", "M104S200", "T0", "")] == ["G1", "G28", "M104", "T0", ""]
 
 
+def line_uri(text: str) -> LineUri:
+    """The address of a printer on a line."""
+    uri = read_uri(text)
+    assert isinstance(uri, LineUri)
+    return uri
+
+
 def test_addresses_of_printers() -> None:
     """A device, a Bluetooth address, a host; everything else is refused with the forms."""
     assert read_uri("serial:/dev/ttyUSB0") == LineUri("serial:/dev/ttyUSB0", LineKind.SERIAL, "/dev/ttyUSB0", 115200)
-    assert read_uri("serial:ttyACM0?baud=250000").baud == 250000
-    assert read_uri("rfcomm://00:11:22:aa:bb:CC?channel=3").port == 3
-    assert (read_uri("socket://[::1]:80").place, read_uri("socket://h:80").port) == ("::1", 80)
+    assert line_uri("serial:ttyACM0?baud=250000").baud == 250000
+    assert line_uri("rfcomm://00:11:22:aa:bb:CC?channel=3").port == 3
+    assert (line_uri("socket://[::1]:80").place, line_uri("socket://h:80").port) == ("::1", 80)
     for bad in ("", "/dev/ttyUSB0", "usb:x", "serial:", "serial:x?baud=7", "serial:x?speed=9600", "rfcomm://x", "socket://h", "socket://h:0", "socket://h:1?x=2", "rfcomm://00:11:22:33:44:55?channel=99"):  # fmt: skip
         with pytest.raises(SettingsError, match="--printer"):
             read_uri(bad)
+
+
+def test_addresses_of_servers_and_files() -> None:
+    """A server has a usual port, and https where it is asked for; a key in an address is refused and not shown."""
+
+    def server(text: str) -> tuple[ServerKind, str, int, bool]:
+        uri = read_uri(text)
+        assert isinstance(uri, ServerUri)
+        return uri.kind, uri.host, uri.port, uri.is_secure
+
+    assert server("octoprint://octopi.local") == (ServerKind.OCTOPRINT, "octopi.local", 80, False)
+    assert server("octoprint://octopi.local?tls=1") == (ServerKind.OCTOPRINT, "octopi.local", 443, True)
+    assert server("Moonraker://10.0.0.2/") == (ServerKind.MOONRAKER, "10.0.0.2", 7125, False)
+    assert server("prusalink://[fe80::1]:8080") == (ServerKind.PRUSALINK, "fe80::1", 8080, False)
+    assert server("moonraker://[::1]") == (ServerKind.MOONRAKER, "::1", 7125, False)
+    assert read_uri("file:out/cup.gcode") == FileUri("file:out/cup.gcode", "out/cup.gcode")
+    for bad in ("octoprint:", "octoprint://", "octoprint://h:0", "octoprint://h:99999", "octoprint://a b", "octoprint://h?key=1", "octoprint://h/x/y"):  # fmt: skip
+        with pytest.raises(SettingsError, match="--printer"):
+            read_uri(bad)
+    with pytest.raises(SettingsError, match=r"table \[printers\]") as refused:
+        read_uri("octoprint://SECRET@h")
+    assert "SECRET" not in str(refused.value)
+
+
+def test_a_file_tells_whether_it_leaves_heaters_on() -> None:
+    """By tool, and by what waits; a macro of one firmware may have cooled."""
+    assert facts("M104 S200", "M140 S60", "G1 X1 E1", "M104 S0").leaves_hot
+    assert not facts("M104 S200", "M140 S60", "G1 X1 E1", "M104 S0", "M140 S0").leaves_hot
+    assert facts("T1", "M104 S200", "T0", "M104 S200", "G1 X1 E1", "M104 S0").leaves_hot
+    assert not facts("M104 T1 S200", "G1 X1 E1", "M104 T1 S0").leaves_hot
+    assert not facts("M109 S200", "G1 X1 E1", "END_PRINT").leaves_hot
+    assert facts("M190 R60", "G1 X1 E1").leaves_hot
 
 
 def test_the_journal_tells_of_a_print_whose_program_is_gone(tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ from phone_host.web.source import (
     Measured,
     Newest,
     PageState,
+    PrintState,
     ScanState,
     Step,
     StepName,
@@ -113,6 +114,7 @@ class Played:
     recording: RecordingAccount | None = None
     folder: str = ""
     scan: ScanState | None = None
+    printing: PrintState | None = None
     patches: Patches | None = None
     begun: int = 0
     commands: list[Command] = field(default_factory=list)
@@ -175,6 +177,7 @@ class Played:
             run=run,
             guide=None if self.guide is None else self.guide.as_json(),
             scan=self.scan,
+            printing=self.printing,
             trouble=self.trouble,
             changed=self._changed,
             begun=self.begun,

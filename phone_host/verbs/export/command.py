@@ -10,15 +10,12 @@ from common.places import make_folder
 from common.program.terminal import say
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
-from phone_host.output.meshes.decimated import NoLibraryError, decimated
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
+from phone_host.run.model_job import fewer_triangles, usual_tolerance_m
 from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
 from phone_host.verbs.units import length_mm
-
-_SHARE_OF_VOXEL: Final = 0.1
-"""How far the surface may move when triangles are left out; with twice that it intersects itself in places (decision 0070)."""
 
 _UNITS_M: Final = {"m": 1.0, "mm": 0.001}
 _LARGE_MM: Final = 2000.0
@@ -31,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
     require_folder(options.out)
     model = read_model(Path(options.model), _UNITS_M.get(options.unit, math.nan))
     tolerance_m = _tolerance_m(options.tolerance, model)
-    solid, notes = _decimated(model, tolerance_m)
+    solid, notes = fewer_triangles(model.solid, tolerance_m)
     files = {f"{model.stem}.{kind}": kind for kind in kinds}
     try:
         make_folder(options.out)
@@ -63,22 +60,8 @@ def _kinds(text: str) -> list[str]:
 def _tolerance_m(text: str | None, model: Model) -> float:
     """Return how far the surface may move, m; 0: not at all."""
     if text is None:
-        return 0.0 if math.isnan(model.voxel_m) else _SHARE_OF_VOXEL * model.voxel_m
+        return usual_tolerance_m(model)
     return 0.0 if text.strip() in {"0", "0mm"} else length_mm(text, "--tolerance", "0.1mm") / 1000
-
-
-def _decimated(model: Model, tolerance_m: float) -> tuple[Solid, list[str]]:
-    """Return the mesh to write, and what is to be said of it."""
-    if not tolerance_m:
-        return model.solid, []
-    try:
-        fewer = decimated(model.solid, tolerance_m)
-    except NoLibraryError:
-        note = "every triangle is written: manifold3d is not installed (pip install 'tandemscan[print]')"
-        return model.solid, [note]
-    if not fewer.is_closed:
-        return model.solid, ["the mesh is not closed, so every triangle is written, and printers may refuse it"]
-    return fewer.solid, []
 
 
 def _told(out: Path, solid: Solid, model: Model, sizes: dict[str, int], notes: list[str]) -> dict[str, Any]:

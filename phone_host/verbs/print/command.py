@@ -2,108 +2,72 @@
 
 import argparse
 import math
-import os
 import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Final
+from contextlib import ExitStack
 
-import numpy as np
-
-from common import now
 from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import INTERRUPTED
 from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
-from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
-from phone_host.output.meshes.formats import mesh_bytes
-from phone_host.output.meshes.printable import Printer, problems
-from phone_host.output.meshes.solid import Solid
-from phone_host.printers.gcode import GcodeFacts, lines_of
-from phone_host.printers.journal import Entry, Journal
-from phone_host.printers.line import Line, open_line
-from phone_host.printers.marlin import SECOND_NS, MarlinSender, Phase
-from phone_host.printers.printer_uri import read_uri
-from phone_host.printers.sending import Progress, Wishes, send
-from phone_host.printers.slicing import SlicingWanted, facts_of, find_slicer, require_inside, sliced
-from phone_host.run.progress_bar import busy_bar, share_bar, step_bar
-from phone_host.verbs.output_folders import unwritable
+from phone_host.printers.door import Job, PrinterDoor, Wishes
+from phone_host.printers.doors import door_to, key_of
+from phone_host.printers.journal import Journal
+from phone_host.printers.preparing import Wanted, is_gcode, job_of
+from phone_host.printers.printer_uri import FileUri, PrinterUri, ServerUri, read_uri
+from phone_host.printers.printing import Place, printed
+from phone_host.printers.progress import Ended, Phase, Progress
+from phone_host.printers.slicing import Slicer, SlicingWanted
+from phone_host.run.progress_bar import share_bar, step_bar
+from phone_host.settings import printer_keys
+from phone_host.verbs.print.finding import find
 from phone_host.verbs.print.keypad import keypad
-from phone_host.verbs.printable_model import Upright, bed_of, upright_model
+from phone_host.verbs.printer_bed import bed_of
 from phone_host.verbs.serve.places import data_folder
-
-_NOTE_NS: Final = 5 * SECOND_NS
-_SUFFIXES: Final = frozenset({".gcode", ".gco", ".g"})
 
 
 def run(options: argparse.Namespace) -> int:
     """Slice a model, check the G-code, ask, send it, and say how it ended."""
-    uri, bed_mm = read_uri(options.printer), bed_of(options)
-    with _gcode(options, bed_mm) as path:
-        facts = facts_of(path)
-        require_inside(path, facts, bed_mm)
-        journal = Journal(data_folder() / "printing.json")
+    if options.find:
+        return find(options)
+    if options.what is None or not options.printer:
+        raise SettingsError("print needs a model or G-code, and --printer", "phone-host print --find lists printers")
+    uri = read_uri(options.printer)
+    slicer = None if options.slicer is None else Slicer(options.slicer)
+    if slicer is not None and is_gcode(options.what):
+        raise SettingsError("--slicer is for models", f"leave it out, or give a model, not {options.what}")
+    wanted = Wanted(SlicingWanted(bed_of(options), options.profile, slicer), options.unit, options.up)
+    door = door_to(uri, _key(options, uri))
+    door.require_ready()
+    journal = Journal(data_folder() / "printing.json")
+    with ExitStack() as kept:
+        with step_bar("reading", None) as watcher:
+            job = kept.enter_context(job_of(options.what, wanted, uri, watcher.say))
+        if isinstance(uri, FileUri):
+            return _told(printed(_place(door, uri, options), job, Wishes(), lambda _: None), options, uri, job)
         _tell_left(journal)
-        _ask(options, facts)
-        line = open_line(uri)
-        try:
-            with path.open(encoding="utf-8", errors="replace") as file:
-                sender = MarlinSender(lines_of(file, str(path)), now.monotonic_ns())
-                _sent(sender, options, facts, journal, line)
-        finally:
-            line.close()
-    return _told(sender, options, facts)
+        _ask(options, job)
+        return _told(_sent(_place(door, uri, options), job, journal), options, uri, job)
 
 
-@contextmanager
-def _gcode(options: argparse.Namespace, bed_mm: tuple[float, float, float]) -> Iterator[Path]:
-    """Give the file to print: the user's own, or that of his model, sliced, for as long as the block runs."""
-    given = options.what
-    if given.suffix.lower() in _SUFFIXES:
-        if options.profile or options.unit or options.up:
-            raise SettingsError(
-                "--profile, --unit and --up are for models", f"leave them out, or give a model, not {given}"
-            )
-        yield given
-        return
-    find_slicer()
-    upright = upright_model(given, options.unit, options.up)
-    _require_printable(upright, bed_mm)
-    with tempfile.TemporaryDirectory() as folder:
-        stl, gcode = Path(folder) / f"{upright.model.stem}.stl", Path(folder) / f"{upright.model.stem}.gcode"
-        points_m = (upright.points_mm / 1000).astype(np.float32)
-        solid = Solid(points_m, upright.model.solid.triangles, np.zeros((0, 3), np.uint8))
-        try:
-            write_bytes(stl, mesh_bytes(solid, "stl", None))
-            with busy_bar(f"slicing {given}"):
-                sliced(stl, gcode, SlicingWanted(bed_mm, options.profile))
-        except OSError as error:
-            raise unwritable(Path(folder), error) from error
-        yield gcode
+def _place(door: PrinterDoor, uri: PrinterUri, options: argparse.Namespace) -> Place:
+    return Place(door, uri.text, str(options.what.absolute()))
 
 
-def _require_printable(upright: Upright, bed_mm: tuple[float, float, float]) -> None:
-    with step_bar("edges", None) as watcher:
-        found = problems(upright.points_mm, upright.model.solid.triangles, Printer(bed_mm=bed_mm), watcher.say)
-    blocking = [problem for problem in found if problem.blocks]
-    if blocking:
-        raise DataError(
-            f"{upright.model.path} cannot be printed: {'; '.join(problem.sentence for problem in blocking)}",
-            f"{blocking[0].remedy}; phone-host printcheck shows where",
-        )
+def _key(options: argparse.Namespace, uri: PrinterUri) -> str:
+    """Return the printer's key; empty: it needs none, or has none in the settings file."""
+    if not isinstance(uri, ServerUri):
+        return ""
+    table, file = printer_keys(options.config)
+    return key_of(uri, table, file)
 
 
-def _sent(sender: MarlinSender, options: argparse.Namespace, facts: GcodeFacts, journal: Journal, line: Line) -> None:
-    """Send the print; keep in the journal how far it is."""
-    signals, wishes, noted_ns = StopSignals(), Wishes(), -_NOTE_NS
-    name = options.what.name
+def _sent(place: Place, job: Job, journal: Journal) -> Ended:
+    """Send the print; show how far it is, and take keys and signals."""
+    signals, wishes = StopSignals(), Wishes()
 
     def tell(progress: Progress) -> None:
-        nonlocal noted_ns
         if signals.stop:
             wishes.cancel()
         match pressed():
@@ -111,60 +75,74 @@ def _sent(sender: MarlinSender, options: argparse.Namespace, facts: GcodeFacts, 
                 wishes.toggle_pause()
             case "c":
                 wishes.cancel()
-        bar(progress.done / facts.lines)
-        bar.say(_words(name, progress))
-        if now.monotonic_ns() - noted_ns >= _NOTE_NS:
-            noted_ns = now.monotonic_ns()
-            journal.note(Entry(str(options.what.absolute()), options.printer, progress.done, facts.lines, os.getpid()))
+        bar(progress.share)
+        bar.say(_words(job.name, progress))
 
-    with keypad() as pressed, share_bar(f"{name}: waiting for the printer") as bar:
-        send(line, sender, wishes, tell)
-    journal.forget()
+    with keypad() as pressed, share_bar(f"{job.name}: waiting for the printer") as bar:
+        return printed(place, job, wishes, tell, journal)
 
 
 def _words(name: str, progress: Progress) -> str:
+    if progress.phase is Phase.SENDING:
+        return f"{name}: sending"
     heat = progress.heat
-    words = f"{name}: {progress.phase.value}, nozzle {heat.nozzle[0]:.0f}/{heat.nozzle[1]:.0f}, bed {heat.bed[0]:.0f}/{heat.bed[1]:.0f} C"
+    left = "" if math.isnan(progress.seconds_left) else f", {progress.seconds_left / 60:.0f} min left"
+    words = f"{name}: {progress.phase.value}, nozzle {heat.nozzle[0]:.0f}/{heat.nozzle[1]:.0f}, bed {heat.bed[0]:.0f}/{heat.bed[1]:.0f} C{left}"
     return f"{words}; p goes on" if progress.phase is Phase.PAUSED else f"{words}; p pauses, c cancels"
 
 
-def _told(sender: MarlinSender, options: argparse.Namespace, facts: GcodeFacts) -> int:
+def _told(ended: Ended, options: argparse.Namespace, uri: PrinterUri, job: Job) -> int:
     """Say how it ended; return the exit code."""
+    lines, done = job.facts.lines, round(ended.share * job.facts.lines)
     if options.json:
         told = {
             "command": "print",
             "file": str(options.what),
             "printer": options.printer,
-            "ended": sender.phase.value,
-            "lines": facts.lines,
-            "done": sender.done,
-            "resent": sender.resent,
+            "ended": ended.phase.value,
+            "share": round(ended.share, 4),
+            "lines": lines,
+            "done": done,
+            "resent": ended.resent,
+            "notes": list(ended.notes),
         }
         print(json_text(told))
-    if sender.phase is Phase.FAILED:
-        raise UnavailableError(sender.problem, f"{sender.remedy}; {sender.done} of {facts.lines} lines were done")
+    if ended.phase is Phase.FAILED:
+        raise UnavailableError(ended.problem, ended.remedy)
     if not options.json:
-        again = f"; {counted(sender.resent, 'line')} had to be sent again" if sender.resent else ""
-        if sender.phase is Phase.DONE:
-            say(f"printed: {counted(facts.lines, 'line')}{again}")
-        else:
-            say(f"cancelled after {sender.done} of {counted(facts.lines, 'line')}: heaters, fan and motors are off")
-    return 0 if sender.phase is Phase.DONE else INTERRUPTED
+        say([_sentence(ended, uri, done, lines), *(f"note: {note}" for note in ended.notes)])
+    return 0 if ended.phase is Phase.DONE else INTERRUPTED
+
+
+def _sentence(ended: Ended, uri: PrinterUri, done: int, lines: int) -> str:
+    again = f"; {counted(ended.resent, 'line')} had to be sent again" if ended.resent else ""
+    if ended.phase is Phase.DONE:
+        return f"written to {uri.path}" if isinstance(uri, FileUri) else f"printed: {counted(lines, 'line')}{again}"
+    if isinstance(uri, ServerUri):
+        return f"cancelled at {ended.share:.0%}: heaters are off"
+    return f"cancelled after {done} of {counted(lines, 'line')}: heaters, fan and motors are off"
 
 
 def _tell_left(journal: Journal) -> None:
     left = journal.left()
     if left is None:
         return
-    lines = [
-        f"phone-host: the last print was not finished: {left.file} on {left.printer} ended near line {left.done} of {left.lines}",
-        "phone-host: nothing was sent since, and its heaters may be on; it does not go on by itself",
-    ]
+    what = f"{left.file} on {left.printer}"
+    if isinstance(read_uri(left.printer), ServerUri):
+        lines = [
+            f"phone-host: nobody watches the last print any more: {what}, near {left.done / max(left.lines, 1):.0%} when last seen",
+            "phone-host: its server may still be printing it: look there",
+        ]
+    else:
+        lines = [
+            f"phone-host: the last print was not finished: {what} ended near line {left.done} of {left.lines}",
+            "phone-host: nothing was sent since, and its heaters may be on; it does not go on by itself",
+        ]
     say(lines, sys.stderr)
     journal.forget()
 
 
-def _ask(options: argparse.Namespace, facts: GcodeFacts) -> None:
+def _ask(options: argparse.Namespace, job: Job) -> None:
     """Ask before anything is heated or moved.
 
     Raises:
@@ -175,9 +153,10 @@ def _ask(options: argparse.Namespace, facts: GcodeFacts) -> None:
         return
     if not sys.stdin.isatty():
         raise SettingsError("nobody can be asked whether to start", "give --yes")
-    minutes = "" if math.isnan(facts.seconds) else f", {facts.seconds / 60:.0f} min"
+    seconds = job.facts.seconds
+    minutes = "" if math.isnan(seconds) else f", {seconds / 60:.0f} min"
     say(
-        f"print {options.what} ({counted(facts.lines, 'line')}{minutes}) on {options.printer}? Is the bed empty? [y/N] ",
+        f"print {options.what} ({counted(job.facts.lines, 'line')}{minutes}) on {options.printer}? Is the bed empty? [y/N] ",
         sys.stderr,
     )
     if sys.stdin.readline().strip().lower() not in {"y", "yes"}:

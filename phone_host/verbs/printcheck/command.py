@@ -20,9 +20,10 @@ from phone_host.output.meshes.printable_fix import Fixed, NotClosedError, fixed
 from phone_host.output.meshes.printable_view import picture
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model
+from phone_host.output.upright import upright_model
 from phone_host.run.progress_bar import step_bar
 from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
-from phone_host.verbs.printable_model import bed_of, upright_model
+from phone_host.verbs.printer_bed import bed_of
 from phone_host.verbs.units import length_mm
 
 _CHECK_FAILED: Final = 4

@@ -15,7 +15,7 @@ from common.program.signals import StopSignals
 from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.serve.station import Station
-from phone_host.verbs.serve.kept_choices import usual_file
+from phone_host.settings import usual_file
 from phone_host.verbs.serve.page import first_url, open_browser, page_settings, served, tell_page
 from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import stderr_status

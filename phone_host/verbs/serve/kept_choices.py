@@ -1,6 +1,5 @@
 """The page's choices in the settings file: settings as its keys, other options of `run` in the table [page]."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -8,22 +7,15 @@ from typing import Any, Final
 
 from common.errors import SettingsError
 from common.files import opened_folder, replacing_in
-from common.keys import default_folder
 from common.program.settings import read_file
 from common.program.settings_file import Value, changed
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.settings import PAGE_TABLE
 from phone_host.verbs.serve.choices import run_options, run_words, with_changes
 
-NAME: Final = "phone-host.toml"
 _NAMES: Final = {item.name.replace("_", "-"): item.name for item in fields(PhoneHostSettings)}
 _OF_PROGRAM: Final = ("keys", "log-level")
 """Settings that concern the program and not the page's choices. They stay as they are."""
-
-
-def usual_file() -> Path:
-    """Return the settings file if no option names another."""
-    return default_folder(os.environ, service=False) / NAME
 
 
 def is_there(file: Path) -> bool:

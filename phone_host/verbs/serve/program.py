@@ -30,7 +30,7 @@ from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.run.pair_budget import usable_matchers
 from phone_host.run.sinks import Sink
 from phone_host.scan.box import Box
-from phone_host.serve.program import Calibrated, Choices, SinksOf
+from phone_host.serve.program import Calibrated, Choices, PrintWanted, SinksOf
 from phone_host.settings import chosen_keys
 from phone_host.stereo.matcher_names import MATCHERS
 from phone_host.verbs.calibrate.earlier import Asked, asked_of
@@ -47,6 +47,7 @@ from phone_host.verbs.serve.choices import (
     without_depth,
 )
 from phone_host.verbs.serve.kept_choices import is_there, keep, kept
+from phone_host.verbs.serve.page_print import asked_print
 from phone_host.verbs.serve.page_scan import PageScan, asked_box, page_scan
 from phone_host.verbs.serve.places import data_folder, recording_folder, scan_folder, snapshot_folder
 from phone_host.verbs.stereo_options import refuse_rejected
@@ -181,6 +182,10 @@ class Commands:
     def box(self, values: Choices) -> Box | None:
         """See Program."""
         return asked_box(values)
+
+    def print_wanted(self, values: Choices) -> PrintWanted:
+        """See Program."""
+        return asked_print(values, self._file if is_there(self._file) else None)
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """See Program."""

@@ -9,6 +9,7 @@ import { seePictures, showGuide } from './guide.js';
 import { Live } from './live.js';
 import { showOwnCamera } from './own_camera.js';
 import { ScanPanel } from './scan.js';
+import { Workshop } from './workshop.js';
 import { connectSetup, showSetup } from './setup.js';
 import { STEPS, showSteps, stepOf } from './steps.js';
 import { takeToken } from './token.js';
@@ -39,6 +40,7 @@ const controls = new Controls(() => state, () => live.pair?.head ?? null);
 /** @type {Live} */
 const live = new Live((from, to, done) => controls.drag(from, to, done));
 const scan = new ScanPanel(() => state);
+const workshop = new Workshop(() => state);
 const charts = new Charts({ delays: byId('chart-delays'), rate: byId('chart-rate'), skew: byId('chart-skew') });
 
 const connection = new Connection({
@@ -81,6 +83,7 @@ function draw() {
   showFigures(state.live, charts.delay());
   controls.show(state);
   scan.show(state);
+  workshop.show(state);
   text(byId('activity'), state.activity);
   data(document.body, 'activity', state.activity);
   want();

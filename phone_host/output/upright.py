@@ -1,6 +1,5 @@
-"""A model as a printer wants it: in millimetres, z up; and the bed that it has to fit on. For the verbs that print."""
+"""A model as a printer wants it: in millimetres, z up."""
 
-import argparse
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from common.errors import SettingsError
 from phone_host.output.axes import Axes
 from phone_host.output.model_file import Model, read_model
-from phone_host.verbs.units import length_mm
 
 _UNITS_M: Final = {"m": 1.0, "mm": 0.001}
 _UP: Final = {"z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}  # fmt: skip
@@ -49,16 +46,3 @@ def upright_model(path: Path, unit: str | None, up: str | None) -> Upright:
     model = read_model(path, _UNITS_M.get(unit or "", math.nan))
     turn = np.array(_UP[up or _UP_OF[model.axes]], np.float64)
     return Upright(model, model.solid.points_m.astype(np.float64) * 1000 @ turn.T)
-
-
-def bed_of(options: argparse.Namespace) -> tuple[float, float, float]:
-    """Read --bed, mm.
-
-    Raises:
-        SettingsError: it is none.
-    """
-    words = options.bed.split(",")
-    if len(words) != 3:
-        raise SettingsError(f"--bed is {options.bed!r}", "give three lengths, for example 220,220,250")
-    x, y, z = (length_mm(word, "--bed", "220,220,250") for word in words)
-    return x, y, z

@@ -1,0 +1,88 @@
+"""The door to a printer: the one way in which a print goes to any of them, whether line by line, to a server, or into a file."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from phone_host.printers.gcode import GcodeFacts
+from phone_host.printers.progress import Ended, Progress
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is to be printed.
+
+    Attributes:
+        gcode: its file.
+        name: for people, and for the file on a server.
+        facts: what it asks of the printer.
+    """
+
+    gcode: Path
+    name: str
+    facts: GcodeFacts
+
+
+class Wishes:
+    """What the user wants of a print. Any thread may use it."""
+
+    def __init__(self) -> None:
+        self._cancelled, self._paused = threading.Event(), threading.Event()
+
+    def cancel(self) -> None:
+        """End it, and switch the heaters off."""
+        self._cancelled.set()
+
+    def pause(self) -> None:
+        """Pause it."""
+        self._paused.set()
+
+    def go_on(self) -> None:
+        """Go on after a pause."""
+        self._paused.clear()
+
+    def toggle_pause(self) -> None:
+        """Pause it, or go on."""
+        if self._paused.is_set():
+            self._paused.clear()
+        else:
+            self._paused.set()
+
+    def wait_cancelled(self, wait_s: float) -> bool:
+        """Wait some time, or until it shall end; return whether it shall."""
+        return self._cancelled.wait(wait_s)
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether it shall end."""
+        return self._cancelled.is_set()
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether it shall wait."""
+        return self._paused.is_set()
+
+
+class PrinterDoor(Protocol):
+    """A printer, however it is reached."""
+
+    def require_ready(self) -> None:
+        """See whether it would take a print now, as far as that is known without starting anything.
+
+        Raises:
+            TandemError: it would not; the words say why, and what helps.
+        """
+
+    def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
+        """Print something. It returns when that has ended.
+
+        Args:
+            job: what.
+            wishes: of the user.
+            tell: called several times a second.
+
+        Raises:
+            TandemError: it cannot be printed, or the printer is gone.
+        """

@@ -1,0 +1,120 @@
+"""From what the user names to G-code that is safe to print: a model is checked and sliced, and G-code is read whole."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.output.atomic import write_bytes
+from phone_host.output.meshes.formats import mesh_bytes
+from phone_host.output.meshes.printable import Printer, problems
+from phone_host.output.meshes.solid import Solid
+from phone_host.output.upright import Upright, upright_model
+from phone_host.printers.door import Job
+from phone_host.printers.gcode import MOST_FOR_LINES, MOST_FOR_SERVERS
+from phone_host.printers.printer_uri import LineUri, PrinterUri
+from phone_host.printers.slicing import SlicingWanted, facts_of, find_slicer, require_inside, sliced
+
+_SUFFIXES: Final = frozenset({".gcode", ".gco", ".g"})
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """How something is printed.
+
+    Attributes:
+        slicing: the bed, and how a model is sliced.
+        unit: of a mesh file of another program, m or mm; None: as the file says, else m.
+        up: axis of a model that points up: z, y or -y; None: as its axes say, else z.
+    """
+
+    slicing: SlicingWanted
+    unit: str | None = None
+    up: str | None = None
+
+
+def is_gcode(what: Path) -> bool:
+    """Return whether a name is one of G-code."""
+    return what.suffix.lower() in _SUFFIXES
+
+
+@contextmanager
+def job_of(what: Path, wanted: Wanted, uri: PrinterUri, tell: Callable[[str], None]) -> Iterator[Job]:
+    """Give what is to be printed, for as long as the block runs.
+
+    Args:
+        what: G-code, a scan's folder or a mesh file.
+        wanted: how.
+        uri: of the printer.
+        tell: is told what is done next.
+
+    Raises:
+        SettingsError: G-code is given, and what only a model has.
+        DataError: it cannot be printed, or leaves the bed.
+        UnavailableError: it cannot be read, or there is no slicer.
+    """
+    most = MOST_FOR_LINES if isinstance(uri, LineUri) else MOST_FOR_SERVERS
+    bed_mm = wanted.slicing.bed_mm
+    if is_gcode(what):
+        if wanted.slicing.profile or wanted.unit or wanted.up:
+            raise SettingsError(
+                "--profile, --unit and --up are for models", f"leave them out, or give a model, not {what}"
+            )
+        tell("reading")
+        facts = facts_of(what, most)
+        require_inside(what, facts, bed_mm)
+        yield Job(what, what.name, facts)
+        return
+    find_slicer(wanted.slicing.slicer)
+    tell("reading")
+    upright = upright_model(what, wanted.unit, wanted.up)
+    _require_printable(upright, bed_mm, tell)
+    with _folder() as folder:
+        gcode = folder / f"{upright.model.stem}.gcode"
+        _slice(upright, folder / f"{upright.model.stem}.stl", gcode, wanted.slicing, tell)
+        facts = facts_of(gcode, most)
+        require_inside(gcode, facts, bed_mm)
+        yield Job(gcode, gcode.name, facts)
+
+
+@contextmanager
+def _folder() -> Iterator[Path]:
+    try:
+        made = tempfile.TemporaryDirectory(prefix="tandemscan-")
+    except OSError as error:
+        raise _full(error) from None
+    with made as name:
+        yield Path(name)
+
+
+def _slice(upright: Upright, stl: Path, gcode: Path, wanted: SlicingWanted, tell: Callable[[str], None]) -> None:
+    points_m = (upright.points_mm / 1000).astype(np.float32)
+    solid = Solid(points_m, upright.model.solid.triangles, np.zeros((0, 3), np.uint8))
+    try:
+        write_bytes(stl, mesh_bytes(solid, "stl", None))
+    except OSError as error:
+        raise _full(error) from None
+    tell("slicing")
+    sliced(stl, gcode, wanted)
+
+
+def _full(error: OSError) -> UnavailableError:
+    return UnavailableError(
+        f"the sliced model cannot be written ({error.strerror})",
+        "make room on the disk, or set TMPDIR to another folder",
+    )
+
+
+def _require_printable(upright: Upright, bed_mm: tuple[float, float, float], tell: Callable[[str], None]) -> None:
+    found = problems(upright.points_mm, upright.model.solid.triangles, Printer(bed_mm=bed_mm), tell)
+    blocking = [problem for problem in found if problem.blocks]
+    if blocking:
+        raise DataError(
+            f"{upright.model.path} cannot be printed: {'; '.join(problem.sentence for problem in blocking)}",
+            f"{blocking[0].remedy}; phone-host printcheck shows where",
+        )

@@ -1,0 +1,136 @@
+"""Runs a print and keeps on disk how far it is; in the caller's thread, or in one of its own."""
+
+import os
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from common import now
+from common.errors import TandemError, UnavailableError
+from phone_host.printers.door import Job, PrinterDoor, Wishes
+from phone_host.printers.journal import Entry, Journal
+from phone_host.printers.progress import Ended, Phase, Progress
+
+_NOTE_NS: Final = 5_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where something is printed.
+
+    Attributes:
+        door: to the printer.
+        text: its address, as the user wrote it.
+        source: what is printed, as the user named it.
+    """
+
+    door: PrinterDoor
+    text: str
+    source: str
+
+
+def printed(
+    place: Place, job: Job, wishes: Wishes, tell: Callable[[Progress], None], journal: Journal | None = None
+) -> Ended:
+    """Print something; return when that has ended.
+
+    Args:
+        place: where.
+        job: what.
+        wishes: of the user; any thread may change them.
+        tell: called several times a second, in this thread.
+        journal: keeps how far it is, so that a later start can say what became of a killed print; None: nobody does.
+
+    Raises:
+        TandemError: it cannot be printed, or the printer is gone.
+    """
+    noted_ns = -_NOTE_NS
+
+    def watched(progress: Progress) -> None:
+        nonlocal noted_ns
+        tell(progress)
+        if journal is not None and now.monotonic_ns() - noted_ns >= _NOTE_NS:
+            noted_ns = now.monotonic_ns()
+            done = 0 if progress.phase is Phase.SENDING else round(progress.share * job.facts.lines)
+            journal.note(Entry(place.source, place.text, done, job.facts.lines, os.getpid()))
+
+    try:
+        return place.door.send(job, wishes, watched)
+    finally:
+        if journal is not None:
+            journal.forget()
+
+
+class RunningPrint:
+    """A print in a thread of its own. Every method may be called from any thread, and returns at once.
+
+    Args:
+        place: where.
+        job: what; its file stays until the print has ended.
+        journal: see `printed`.
+        tell: called several times a second, in the print's thread; None: nobody listens.
+        over: called once, in the print's thread, with how it ended or with the error that ended it; None: nobody listens.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        job: Job,
+        journal: Journal | None = None,
+        tell: Callable[[Progress], None] | None = None,
+        over: Callable[[Ended | TandemError], None] | None = None,
+    ) -> None:
+        self._place, self._job, self._journal = place, job, journal
+        self._tell, self._told_over = tell, over
+        self._wishes = Wishes()
+        self._progress = Progress(phase=Phase.OPENING)
+        self._outcome: Ended | TandemError | None = None
+        self._thread = threading.Thread(target=self._run, name="print", daemon=False)
+
+    def start(self) -> None:
+        """Begin. The user has been asked before."""
+        self._thread.start()
+
+    @property
+    def progress(self) -> Progress:
+        """How far it is."""
+        return self._progress
+
+    @property
+    def outcome(self) -> Ended | TandemError | None:
+        """How it ended, or the error that ended it; None: it goes on."""
+        return self._outcome
+
+    def pause(self) -> None:
+        """Pause it; heaters stay on."""
+        self._wishes.pause()
+
+    def go_on(self) -> None:
+        """Go on after a pause."""
+        self._wishes.go_on()
+
+    def cancel(self) -> None:
+        """End it, and switch the heaters off."""
+        self._wishes.cancel()
+
+    def join(self, wait_s: float | None = None) -> bool:
+        """Wait until it has ended; return whether it has. The only method that waits."""
+        self._thread.join(wait_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            outcome: Ended | TandemError = printed(self._place, self._job, self._wishes, self._heard, self._journal)
+        except TandemError as error:
+            outcome = error
+        except Exception as error:  # noqa: BLE001 - a thread's root: whoever started it is told
+            outcome = UnavailableError(f"the print broke off ({type(error).__name__}: {error})", "go and look")
+        self._outcome = outcome
+        if self._told_over is not None:
+            self._told_over(outcome)
+
+    def _heard(self, progress: Progress) -> None:
+        self._progress = progress
+        if self._tell is not None:
+            self._tell(progress)

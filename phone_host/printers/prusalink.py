@@ -1,0 +1,134 @@
+"""PrusaLink, the server of Prusa's printers, by its HTTP API. Never tried on a printer: written from its description, against a stand-in.
+
+Source: Prusa-Link-Web, spec/openapi.yaml (https://github.com/prusa3d/Prusa-Link-Web); how other programs speak to it.
+"""
+
+import math
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from phone_host.printers.digest import digest_header
+from phone_host.printers.printer_uri import ServerUri
+from phone_host.printers.progress import Heat
+from phone_host.printers.server import Condition, ServerState, note_refusal, pieces, require_good, require_key
+from phone_host.printers.server_answer import Answer, or_zero
+from phone_host.printers.server_talk import ServerTalk
+
+_WHERE: Final = "the printer shows it under Settings, Network, PrusaLink"
+_OF_STATE: Final = {
+    "IDLE": Condition.READY,
+    "READY": Condition.READY,
+    "PRINTING": Condition.PRINTING,
+    "PAUSED": Condition.PAUSED,
+    "FINISHED": Condition.DONE,
+    "STOPPED": Condition.CANCELLED,
+    "BUSY": Condition.BUSY,
+    "ATTENTION": Condition.PAUSED,
+    "ERROR": Condition.ERROR,
+}
+_UNAUTHORIZED: Final = 401
+_ATTENTION: Final = "it waits for somebody at the printer"
+_USUAL_STORE: Final = "/usb"
+
+
+class PrusaLink:
+    """See PrintServer.
+
+    Args:
+        uri: where it is.
+        key: of its API, or USER:PASSWORD; empty: none.
+    """
+
+    def __init__(self, uri: ServerUri, key: str) -> None:
+        self._talk, self._key, self._example = ServerTalk(uri), key, f'"{uri.text}" = "KEY"'
+        self._user, _, self._password = key.partition(":") if ":" in key else ("", "", "")
+        self._job = self._challenge = ""
+        self.title = self._talk.server
+
+    def state(self) -> ServerState:
+        """See PrintServer."""
+        answer = self._ask("GET", "/api/v1/status")
+        require_good(answer, "to tell how its printer is")
+        said = answer.json()
+        printer, job = said["printer"], said["job"]
+        self._job = "" if math.isnan(job["id"].number) else f"{job['id'].number:.0f}"
+        name = printer["state"].text
+        condition = _OF_STATE.get(name, Condition.BUSY)
+        share = min(max(or_zero(job["progress"].number) / 100, 0.0), 1.0)
+        if condition is Condition.DONE:
+            share = 1.0
+        heat = Heat(
+            (or_zero(printer["temp_nozzle"].number), or_zero(printer["target_nozzle"].number)),
+            (or_zero(printer["temp_bed"].number), or_zero(printer["target_bed"].number)),
+        )
+        words = printer["status_printer"]["message"].text or (_ATTENTION if name == "ATTENTION" else "")
+        return ServerState(
+            condition=condition,
+            share=share,
+            seconds_left=job["time_remaining"].number,
+            heat=heat,
+            is_hot=heat.nozzle[1] > 0 or heat.bed[1] > 0,
+            words=words,
+        )
+
+    def start(self, gcode: Path, name: str, sent: Callable[[float], None]) -> None:
+        """See PrintServer."""
+        target = f"/api/v1/files{self._store()}/{name}"
+        headers = {"Content-Type": "text/x.gcode", "Print-After-Upload": "?1", "Overwrite": "?1"}
+        headers |= self._headers("PUT", target, self._challenge)
+        size = gcode.stat().st_size
+        answer = self._talk.hand_over("PUT", target, headers, pieces(gcode, sent), size)
+        require_key(answer, self._key, self._example, _WHERE)
+        require_good(answer, "the file")
+
+    def pause(self) -> None:
+        """See PrintServer."""
+        note_refusal(self._ask("PUT", f"/api/v1/job/{self._job}/pause"), "pause")
+
+    def go_on(self) -> None:
+        """See PrintServer."""
+        note_refusal(self._ask("PUT", f"/api/v1/job/{self._job}/resume"), "resume")
+
+    def cancel(self) -> None:
+        """See PrintServer. The firmware switches the heaters off when a print is stopped."""
+        if not self._job:
+            self.state()
+        if self._job:
+            note_refusal(self._ask("DELETE", f"/api/v1/job/{self._job}"), "cancel")
+
+    def cool(self) -> bool:
+        """See PrintServer."""
+        return False
+
+    def halt(self) -> str:
+        """See PrintServer."""
+        return ""
+
+    def _store(self) -> str:
+        """Return where files go: the first store that is there and takes them."""
+        answer = self._ask("GET", "/api/v1/storage")
+        require_good(answer, "to tell where files go")
+        for store in answer.json()["storage_list"].parts:
+            path = store["path"].text
+            if path.strip("/").isalnum() and store["available"].is_true and not store["read_only"].is_true:
+                return f"/{path.strip('/')}"
+        return _USUAL_STORE
+
+    def _headers(self, method: str, target: str, challenge: str) -> dict[str, str]:
+        if not self._user:
+            return {"X-Api-Key": self._key} if self._key else {}
+        if not challenge:
+            return {}
+        said = digest_header(challenge, self._user, self._password, (method, target), secrets.token_hex(8))
+        return {"Authorization": said} if said else {}
+
+    def _ask(self, method: str, target: str) -> Answer:
+        """Ask; where a user's password is given and asked for, ask again with its proof."""
+        answer = self._talk.ask(method, target, self._headers(method, target, self._challenge))
+        if answer.status == _UNAUTHORIZED and self._user and answer.challenge:
+            self._challenge = answer.challenge
+            answer = self._talk.ask(method, target, self._headers(method, target, self._challenge))
+        require_key(answer, self._key, self._example, _WHERE)
+        return answer

@@ -1,0 +1,205 @@
+"""What every printer's server can be asked, in one way; each kind has a module of its own."""
+
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Final, Protocol
+
+from common.errors import DataError, SettingsError, UnavailableError
+from phone_host.printers.progress import Heat
+from phone_host.printers.server_answer import Answer
+
+_PIECE: Final = 1 << 16
+_BOUNDARY: Final = "tandemscan-7d1f4c0b9e"
+_log = logging.getLogger(__name__)
+
+
+class Condition(Enum):
+    """What a server says of its printer."""
+
+    READY = "ready"
+    PRINTING = "printing"
+    PAUSED = "paused"
+    BUSY = "busy"
+    DONE = "done"
+    CANCELLED = "cancelled"
+    ERROR = "error"
+    OFFLINE = "offline"
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether it would take a print."""
+        return self in {Condition.READY, Condition.DONE, Condition.CANCELLED}
+
+    @property
+    def is_active(self) -> bool:
+        """Whether a print goes on."""
+        return self in {Condition.PRINTING, Condition.PAUSED, Condition.BUSY}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServerState:
+    """What a server says.
+
+    Attributes:
+        condition: of the printer.
+        share: of its print that is done, 0..1.
+        seconds_left: of it, s; NaN: it does not know.
+        heat: temperatures.
+        is_hot: whether any heater shall be warm.
+        words: its own, of errors; empty: none.
+    """
+
+    condition: Condition
+    share: float
+    seconds_left: float
+    heat: Heat
+    is_hot: bool
+    words: str = ""
+
+
+class PrintServer(Protocol):
+    """A server before a printer.
+
+    Every method raises ServerLostError when it does not answer, SettingsError when it wants another key.
+    """
+
+    title: str
+    """Its name for messages."""
+
+    def state(self) -> ServerState:
+        """Return what it says of the printer now."""
+
+    def start(self, gcode: Path, name: str, sent: Callable[[float], None]) -> None:
+        """Hand a file over and start it.
+
+        Args:
+            gcode: the file.
+            name: for it there.
+            sent: called with the share that was sent; what it raises ends the transfer.
+
+        Raises:
+            UnavailableError: the server refuses it.
+        """
+
+    def pause(self) -> None:
+        """Pause the print. A refusal is logged."""
+
+    def go_on(self) -> None:
+        """Go on with it. A refusal is logged."""
+
+    def cancel(self) -> None:
+        """End the print. A refusal is logged: it may be over already."""
+
+    def cool(self) -> bool:
+        """Switch the heaters off; return whether the server can do that at all."""
+
+    def halt(self) -> str:
+        """Stop everything at once; return what has to be done before the next print. Empty: the server cannot do that."""
+
+
+def pieces(gcode: Path, sent: Callable[[float], None]) -> Iterator[bytes]:
+    """Yield a file in pieces, telling the share that was sent before each: so what `sent` raises ends the transfer before it is whole.
+
+    Raises:
+        DataError: it cannot be read.
+    """
+    try:
+        size = max(gcode.stat().st_size, 1)
+        with gcode.open("rb") as file:
+            done = 0
+            while piece := file.read(_PIECE):
+                sent(min(done / size, 1.0))
+                yield piece
+                done += len(piece)
+    except OSError as error:
+        raise DataError(f"{gcode} cannot be read ({error.strerror})", "give the file that a slicer wrote") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A form with one file, as browsers send it (RFC 7578).
+
+    Attributes:
+        head: before the file.
+        tail: after it.
+    """
+
+    head: bytes
+    tail: bytes
+
+    @property
+    def content_type(self) -> str:
+        """Its header."""
+        return f"multipart/form-data; boundary={_BOUNDARY}"
+
+    def size(self, gcode: Path) -> int:
+        """Return its length with the file in it, bytes."""
+        return len(self.head) + gcode.stat().st_size + len(self.tail)
+
+    def body(self, gcode: Path, sent: Callable[[float], None]) -> Iterator[bytes]:
+        """Yield it with the file in it."""
+        yield self.head
+        yield from pieces(gcode, sent)
+        yield self.tail
+
+
+def form_of(name: str, fields: dict[str, str]) -> Form:
+    """Make a form.
+
+    Args:
+        name: of the file: plain characters alone.
+        fields: beside the file.
+    """
+    head = "".join(
+        f'--{_BOUNDARY}\r\nContent-Disposition: form-data; name="{key}"\r\n\r\n{value}\r\n'
+        for key, value in fields.items()
+    )
+    head += (
+        f'--{_BOUNDARY}\r\nContent-Disposition: form-data; name="file"; filename="{name}"\r\n'
+        "Content-Type: application/octet-stream\r\n\r\n"
+    )
+    return Form(head.encode(), f"\r\n--{_BOUNDARY}--\r\n".encode())
+
+
+def require_key(answer: Answer, key: str, example: str, where: str) -> None:
+    """Refuse an answer that wants another key.
+
+    Args:
+        answer: of the server.
+        key: that was given; empty: none.
+        example: of the line in the settings file.
+        where: the server shows its key.
+
+    Raises:
+        SettingsError: it does.
+    """
+    if answer.status not in {401, 403}:
+        return
+    if key:
+        raise SettingsError(f"{answer.server} does not take the key of the settings file", f"copy it again: {where}")
+    raise SettingsError(
+        f"{answer.server} wants a key", f"write {example} into the table [printers] of the settings file; {where}"
+    )
+
+
+def require_good(answer: Answer, what: str) -> None:
+    """Refuse an answer that is an error.
+
+    Args:
+        answer: of the server.
+        what: was asked of it.
+
+    Raises:
+        UnavailableError: it is.
+    """
+    if not answer.is_good:
+        raise UnavailableError(f"{answer.server} refuses {what}: {answer.words}", "look at its own page")
+
+
+def note_refusal(answer: Answer, what: str) -> None:
+    """Log an answer that is an error."""
+    if not answer.is_good:
+        _log.warning("print refused=%s status=%d words=%r", what, answer.status, answer.words)

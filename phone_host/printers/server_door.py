@@ -1,0 +1,234 @@
+"""Prints by a server: hands the file over, watches it, and on cancelling sees that the heaters are off.
+
+The server prints by itself: when this program ends, the print goes on. When the server is silent, it is asked again for a minute.
+"""
+
+import math
+import re
+import threading
+from collections.abc import Callable
+from typing import Final
+
+from common import now
+from common.errors import TandemError, UnavailableError
+from phone_host.printers.door import Job, Wishes
+from phone_host.printers.line import PrinterGoneError
+from phone_host.printers.progress import Ended, Heat, Phase, Progress
+from phone_host.printers.server import Condition, PrintServer, ServerState
+from phone_host.printers.server_talk import ServerLostError
+
+_SECOND_NS: Final = 1_000_000_000
+_ASK_S: Final = 1.0
+_TELL_S: Final = 0.25
+_SOON_S: Final = 0.2
+"""Between questions while it cancels."""
+
+_LOST_NS: Final = 60 * _SECOND_NS
+_BEGIN_NS: Final = 20 * _SECOND_NS
+_OBEY_NS: Final = 10 * _SECOND_NS
+"""Klipper cancels only when it has heated, which may take minutes: after this, what can be halted is halted."""
+
+_HALTED_NS: Final = 5 * _SECOND_NS
+_AGAIN_NS: Final = 2 * _SECOND_NS
+_MOST_NAME: Final = 60
+_PHASE_OF: Final = {Condition.PAUSED: Phase.PAUSED, Condition.PRINTING: Phase.PRINTING, Condition.BUSY: Phase.PRINTING}
+
+
+class _StoppedError(Exception):
+    """Raised inside a transfer that shall end. Nobody's fault."""
+
+
+class ServerDoor:
+    """A printer behind a server.
+
+    Args:
+        server: it.
+    """
+
+    def __init__(self, server: PrintServer) -> None:
+        self._server = server
+
+    def require_ready(self) -> None:
+        """See PrinterDoor."""
+        self._require_idle(self._server.state())
+
+    def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
+        """See PrinterDoor."""
+        self.require_ready()
+
+        def sent(share: float) -> None:
+            tell(Progress(phase=Phase.SENDING, share=share))
+            if wishes.is_cancelled:
+                raise _StoppedError
+
+        try:
+            self._server.start(job.gcode, name_there(job.name), sent)
+        except _StoppedError:
+            return Ended(phase=Phase.CANCELLED, share=0.0)
+        except ServerLostError as error:
+            raise ServerLostError(
+                f"{error.problem} while it gets the file: nobody knows whether it prints", "look at its own page"
+            ) from None
+        return _Watch(self._server, job, wishes, tell).until_over()
+
+    def _require_idle(self, state: ServerState) -> None:
+        title = self._server.title
+        if state.condition.is_active:
+            share = f", {state.share:.0%} done" if state.share else ""
+            raise UnavailableError(f"the printer of {title} is busy{share}", "wait until it is done, or end it there")
+        if state.condition is Condition.OFFLINE:
+            raise UnavailableError(
+                f"{title} has no printer ({state.words or 'not connected'})",
+                "switch the printer on, and connect it there",
+            )
+        if state.condition is Condition.ERROR:
+            raise UnavailableError(f"{title} reports an error: {state.words or 'no words'}", "mend it on its own page")
+
+
+def name_there(name: str) -> str:
+    """Return a name for a file on a server: plain characters, and one that takes no other program's file away.
+
+    Args:
+        name: of the print.
+    """
+    stem = re.sub(r"\.(gcode|gco|g)$", "", name, flags=re.IGNORECASE)
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._")[:_MOST_NAME] or "print"
+    return f"tandemscan-{plain}.gcode"
+
+
+def _pause(wait_s: float) -> None:
+    threading.Event().wait(wait_s)
+
+
+class _Watch:
+    """Watches one print."""
+
+    def __init__(self, server: PrintServer, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> None:
+        self._server, self._job, self._wishes, self._tell_user = server, job, wishes, tell
+        self._began_ns = self._heard_ns = now.monotonic_ns()
+        self._was_active = self._is_paused = False
+        self._last = ServerState(condition=Condition.READY, share=0.0, seconds_left=math.nan, heat=Heat(), is_hot=False)
+
+    def until_over(self) -> Ended:
+        """Return how it ended."""
+        while True:
+            if self._wishes.is_cancelled:
+                return self._cancelled()
+            self._ask()
+            if (ended := self._over()) is not None:
+                return ended
+            self._tell(_PHASE_OF.get(self._last.condition, Phase.OPENING))
+            self._wait(_ASK_S if self._was_active else _SOON_S)
+
+    def _ask(self) -> None:
+        """Ask how it is, and pass a pause on.
+
+        Raises:
+            UnavailableError: the server is silent for long.
+        """
+        try:
+            if self._wishes.is_paused != self._is_paused:
+                self._is_paused = not self._is_paused
+                (self._server.pause if self._is_paused else self._server.go_on)()
+            self._last = self._server.state()
+        except ServerLostError as error:
+            if now.monotonic_ns() - self._heard_ns > _LOST_NS:
+                raise PrinterGoneError(
+                    f"{error.problem} any more: the print goes on there, and cannot be cooled from here",
+                    "go and look",
+                ) from None
+            return
+        self._heard_ns = now.monotonic_ns()
+
+    def _over(self) -> Ended | None:
+        """Return how it ended; None: it has not."""
+        state, title = self._last, self._server.title
+        if state.condition.is_active:
+            self._was_active = True
+            return None
+        if state.condition in {Condition.ERROR, Condition.OFFLINE}:
+            return self._failed(
+                f"{title} says: {state.words or state.condition.value}",
+                "see what the printer's display says: it cannot be cooled from here",
+            )
+        has_begun = self._was_active or now.monotonic_ns() - self._began_ns > _BEGIN_NS
+        if not has_begun:
+            return None
+        if state.condition is Condition.DONE:
+            return Ended(phase=Phase.DONE, share=1.0, notes=self._cold_at_end())
+        if not self._was_active:
+            return self._failed(f"{title} has the file, but does not print it", "look at its own page")
+        words = f" ({state.words})" if state.condition is Condition.CANCELLED and state.words else ""
+        return self._failed(f"the print was ended at the printer or on the page of {title}{words}", "start it again")
+
+    def _failed(self, problem: str, remedy: str) -> Ended:
+        done = f"; {self._last.share:.0%} of it was done" if self._last.share else ""
+        return Ended(phase=Phase.FAILED, share=self._last.share, problem=problem, remedy=f"{remedy}{done}")
+
+    def _cold_at_end(self) -> tuple[str, ...]:
+        if not self._job.facts.leaves_hot:
+            return ()
+        try:
+            if self._server.cool():
+                return ("its G-code leaves heaters on: they were switched off",)
+        except TandemError as error:
+            return (f"its G-code leaves heaters on, and they could not be switched off ({error.problem}): go and look",)
+        return (f"its G-code leaves heaters on, and {self._server.title} cannot switch them off: go and look",)
+
+    def _cancelled(self) -> Ended:
+        """End the print; return when the heaters are off.
+
+        Raises:
+            PrinterGoneError: nobody knows whether they are.
+        """
+        share, notes = self._last.share, tuple[str, ...]()
+        began_ns, asked_ns = now.monotonic_ns(), 0
+        while (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS:
+            if now_ns - asked_ns > _AGAIN_NS:
+                asked_ns = now_ns
+                self._end_and_cool()
+            if self._is_cold():
+                return Ended(phase=Phase.CANCELLED, share=share, notes=notes)
+            self._tell(Phase.CANCELLING)
+            _pause(_SOON_S)
+        while (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS + _HALTED_NS and (remedy := self._halted()):
+            if self._is_cold():
+                said = f"the printer did not obey within {_OBEY_NS // _SECOND_NS} s and was stopped at once: {remedy}"
+                return Ended(phase=Phase.CANCELLED, share=share, notes=(said,))
+            _pause(_SOON_S)
+        raise PrinterGoneError(
+            f"{self._server.title} does not say that the print has ended and its heaters are off",
+            "go and look; switch the printer off if its display does not say that they are cold",
+        )
+
+    def _end_and_cool(self) -> None:
+        for ask in (self._server.cancel, self._server.cool):
+            try:
+                ask()
+            except ServerLostError:
+                continue
+
+    def _halted(self) -> str:
+        try:
+            return self._server.halt()
+        except ServerLostError:
+            return ""
+
+    def _is_cold(self) -> bool:
+        try:
+            self._last = self._server.state()
+        except ServerLostError:
+            return False
+        return not self._last.condition.is_active and not self._last.is_hot
+
+    def _tell(self, phase: Phase) -> None:
+        last = self._last
+        self._tell_user(Progress(phase=phase, share=last.share, seconds_left=last.seconds_left, heat=last.heat))
+
+    def _wait(self, wait_s: float) -> None:
+        """Wait, but not longer than until the user wishes something."""
+        end_ns = now.monotonic_ns() + round(wait_s * _SECOND_NS)
+        while now.monotonic_ns() < end_ns and self._wishes.is_paused == self._is_paused:
+            if self._wishes.wait_cancelled(min(_TELL_S, wait_s)):
+                return
+            self._tell(_PHASE_OF.get(self._last.condition, Phase.OPENING))
