@@ -64,8 +64,8 @@ def test_the_model_is_as_it_was_until_then() -> None:
 def test_the_same_views_give_the_same_bits() -> None:
     """Poses and field, twice, with one thread and with three."""
     one, three = Tracker(SETTINGS), Tracker(SETTINGS, 3)
-    poses = [[each.world_camera.pose() for each in run(tracker)] for tracker in (one, three)]
-    assert np.array_equal(*poses)
+    here, there = (np.array([each.world_camera.pose() for each in run(tracker)]) for tracker in (one, three))
+    assert np.array_equal(here, there)
     assert np.array_equal(one.volume.blocks.field, three.volume.blocks.field)
 
 
