@@ -3,7 +3,6 @@
 import logging
 import socket
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from board_agent.camera_watch import CameraWatch
@@ -22,16 +21,19 @@ from common.program.logs import event
 from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     BoardCounts,
+    Credit,
     DropReason,
     Locks,
     Pacing,
+    Ping,
     Pong,
     Refusal,
     RefusalReason,
     Rung,
 )
-from common.protocol.session import Outgoing
+from common.protocol.terms import Outgoing
 from common.protocol.wire import VersionError, decode, encode, encode_for_any_version, encode_frame, encode_stamped
+from common.value import value
 from common.versions import other_protocol
 
 _LOG = logging.getLogger(__name__)
@@ -52,7 +54,7 @@ _LONGEST_WAIT_MS: Final = 1000
 _NEVER_NS: Final = 2**63 - 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Summary:
     """One life of the agent.
 
@@ -71,7 +73,7 @@ class Summary:
     camera: CameraHealth
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Service:
     """Tells the service manager that the loop is running, and how the board is doing.
 
@@ -157,12 +159,14 @@ class Agent:
         now_ns = now.monotonic_ns()
         while not self._stopping and not (self._camera_ended and self._outbox.waiting is None):
             session_due_ns = self._session.due_ns
-            camera_ready = self._poll(min(session_due_ns, self._camera_due_ns(now_ns)), now_ns)
+            camera_due_ns = self._demand_due_ns(now_ns) if self._on_demand else self._camera.due_ns(now_ns)
+            camera_ready = self._poll(min(session_due_ns, camera_due_ns), now_ns)
             now_ns = now.monotonic_ns()
-            if camera_ready or self._on_demand or now_ns >= self._camera.due_ns(now_ns):
+            if camera_ready or self._on_demand or now_ns >= camera_due_ns:
                 self._grab(now_ns)
             if self._outbox.waiting is not None:
-                self._watch_clock()
+                if slept_ns := self._sleep.slept_ns():
+                    self._note_sleep(slept_ns)
                 if self._flush():
                     session_due_ns -= _AHEAD_NS
             if self._control is not None and self._control.is_due(now_ns):
@@ -208,10 +212,8 @@ class Agent:
             self._held = held
             self._session.hold(held)
 
-    def _camera_due_ns(self, now_ns: int) -> int:
-        """When the camera is to be read next without its descriptor's asking."""
-        if not self._on_demand:
-            return self._camera.due_ns(now_ns)
+    def _demand_due_ns(self, now_ns: int) -> int:
+        """When a camera that shows images on demand is to be read next."""
         return max(now_ns, self._retry_ns) if self._session.has_credit and not self._held_back else _NEVER_NS
 
     def _poll(self, due_ns: int, now_ns: int) -> bool:
@@ -221,7 +223,9 @@ class Agent:
             Whether the camera's descriptor is readable.
         """
         camera_fd = self._camera_watch.look()
-        links_due_ns = min([link.due_ns for link in self._links])
+        links_due_ns = _NEVER_NS
+        for link in self._links:
+            links_due_ns = min(links_due_ns, link.due_ns)
         wait_ns = min(due_ns, links_due_ns) - now_ns
         ready = self._waiter.wait(min(_LONGEST_WAIT_MS, -(-wait_ns // 1_000_000)) if wait_ns > 0 else 0)
         if self._wake_fd in ready:
@@ -238,12 +242,7 @@ class Agent:
     def _take(self, index: int, incoming: Packet | Broken | Garbage) -> None:
         arrived_ns = now.monotonic_ns()
         connection = _address(index, incoming.connection)
-        self._heard = True
         match incoming:
-            case Broken():
-                self._send_all(self._session.unreachable(connection))
-            case Garbage():
-                self._refuse_garbage(connection, "not a packet")
             case Packet(_, header, payload):
                 try:
                     message = decode(header, payload)
@@ -252,7 +251,14 @@ class Agent:
                 except ProtocolError as error:
                     self._refuse_garbage(connection, error.problem)
                 else:
+                    # Credit and questions for the time come all the time and make nothing due.
+                    self._heard |= not isinstance(message, Credit | Ping)
                     self._send_all(self._session.receive(connection, message, arrived_ns, self._outbox.counts))
+            case Broken():
+                self._heard = True
+                self._send_all(self._session.unreachable(connection))
+            case Garbage():
+                self._refuse_garbage(connection, "not a packet")
 
     def _refuse_version(self, index: int, connection: bytes, theirs: int) -> None:
         """Refuse a host of another version, in two envelopes: ours, which tells it our version, and its own, which it can read."""
@@ -284,11 +290,8 @@ class Agent:
                 case Ended():
                     self._camera_ended = True
 
-    def _watch_clock(self) -> None:
-        """Notice that the machine has slept. Drop a frame from before: the clock stood still between its exposure and its sending."""
-        slept_ns = self._sleep.slept_ns()
-        if not slept_ns:
-            return
+    def _note_sleep(self, slept_ns: int) -> None:
+        """Handle that the machine has slept. Drop a frame from before: the clock stood still between its exposure and its sending."""
         self._outbox.discard(DropReason.NO_HOST)
         self._session.begin_clock(now.random_id())
         _LOG.info(event("slept", session=self._session.session, seconds=round(slept_ns / 1e9, 1)))
@@ -304,7 +307,7 @@ class Agent:
         if frame is None or lane is None:
             return False
         link, connection = self._links[lane[0]], lane[1:]
-        if not link.ready(connection):
+        if link.self_paced and not link.ready(connection):
             self._held_back = True  # the previous frame is still leaving; this one waits, or a newer one
             return False
         session = self._session

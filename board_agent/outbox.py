@@ -5,18 +5,17 @@ from common.protocol.message import BoardCounts, DropReason
 
 
 class Outbox:
-    """Keeps the newest frame, never a backlog; counts what becomes of each."""
+    """Keeps the newest frame, never a backlog; counts what becomes of each.
+
+    Attributes:
+        waiting: the frame that could be sent now; None if there is none.
+    """
 
     def __init__(self) -> None:
-        self._waiting: Frame | None = None
+        self.waiting: Frame | None = None
         self._grabbed = 0
         self._sent = 0
         self._dropped: dict[DropReason, int] = {}
-
-    @property
-    def waiting(self) -> Frame | None:
-        """The frame that could be sent now."""
-        return self._waiting
 
     @property
     def counts(self) -> BoardCounts:
@@ -26,9 +25,9 @@ class Outbox:
     def put(self, frame: Frame, *, has_host: bool) -> None:
         """Put in a fresh frame. If one was still waiting, it was not wanted in time and is dropped."""
         self._grabbed += 1
-        if self._waiting is not None:
+        if self.waiting is not None:
             self._drop(DropReason.REPLACED)
-        self._waiting = frame
+        self.waiting = frame
         if not has_host:
             self.discard(DropReason.NO_HOST)
 
@@ -44,14 +43,14 @@ class Outbox:
 
     def sent(self) -> None:
         """Record that the link took the waiting frame."""
-        assert self._waiting is not None
-        self._waiting = None
+        assert self.waiting is not None
+        self.waiting = None
         self._sent += 1
 
     def discard(self, reason: DropReason) -> None:
         """Drop the waiting frame, if there is one."""
-        if self._waiting is not None:
-            self._waiting = None
+        if self.waiting is not None:
+            self.waiting = None
             self._drop(reason)
 
     def _drop(self, reason: DropReason, frames: int = 1) -> None:

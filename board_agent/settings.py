@@ -2,7 +2,6 @@
 
 import argparse
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +13,7 @@ from common.link.factory import parse_link
 from common.program.declaration import setting
 from common.program.quantities import frames_per_second, seconds
 from common.program.settings import Resolved, log_level, resolve
+from common.value import value
 
 ENVIRONMENT_PREFIX = "BOARD_AGENT"
 
@@ -27,7 +27,7 @@ SERVICE_SETTINGS: Final = Path("/etc/tandemscan/board-agent.toml")
 """The settings file of the package's service."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class BoardSettings:
     """Settings of board-agent, from /etc/tandemscan/board-agent.toml or another file, the environment and options."""
 

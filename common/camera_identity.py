@@ -1,11 +1,11 @@
 """Which camera it is and how it is set: what a rig remembers of its two cameras. Values only."""
 
 import re
-from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 from common.orientation import UPRIGHT, Orientation
+from common.value import value
 
 
 class Lock(Enum):
@@ -40,7 +40,7 @@ LARGEST_LOCK: Final = 2**31 - 1
 """A control's value has 32 bits with its sign, on V4L2 as in a rig.yaml."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class CameraIdentity:
     """Tells one camera from another. Empty texts are unknown and differ from nothing.
 
@@ -86,7 +86,7 @@ def identity_of(driver: str, name: str, serial: str) -> CameraIdentity:
     return CameraIdentity(*(text.encode("utf-8", "replace").decode()[:MOST_LETTERS] for text in (driver, name, serial)))
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class RememberedCamera:
     """A camera as it was when its images were taken.
 

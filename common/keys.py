@@ -12,7 +12,7 @@ import stat
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +20,7 @@ from common import now
 from common.errors import DataError, SettingsError, TakenError, UnavailableError
 from common.files import become_owner, opened_folder, read_file, replacing_in
 from common.peers import Peer, clean_name, is_key
+from common.value import value
 
 SERVICE_FOLDER: Final = Path("/var/lib/tandemscan")
 """Where the board's service keeps its state (StateDirectory= of its unit)."""
@@ -37,7 +38,7 @@ _LOCK_STEP_S: Final = 0.05
 """Processes that change the folder hold its lock for some ms. A service that was taken over may hold it for ever."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class OwnKey:
     """This machine's key pair, Z85."""
 

@@ -36,7 +36,7 @@ class BoardMarks:
         return BoardMarks(exposed_ns=self.exposed_ns + shift, grabbed_ns=self.grabbed_ns + shift, sent_ns=sent_ns)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class HostMarks:
     """The marks of the host's own frame, on its own clock: exposure mid-point and dequeue from the driver (ns)."""
 
@@ -44,7 +44,7 @@ class HostMarks:
     grabbed_ns: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class PairLedger:
     """Everything measured about one pair. All marks in ns on the host's clock; the delays are defined in DESIGN, section 4.
 

@@ -33,7 +33,7 @@ class SleepWatch:
 
     def slept_ns(self) -> int:
         """Nanoseconds of sleep not yet reported; 0: none."""
-        slept_ns = asleep_ns() - self._asleep_ns
+        slept_ns = time.clock_gettime_ns(_RUNS_ON) - time.monotonic_ns() - self._asleep_ns  # asleep_ns, once per frame
         if slept_ns < _LEAST_SLEEP_NS:
             return 0
         self._asleep_ns += slept_ns

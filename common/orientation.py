@@ -1,11 +1,11 @@
 """How a camera is mounted: by which turn and mirroring its images become upright. Values only; the host turns the pixels."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
 from common.errors import SettingsError
+from common.value import value
 
 
 class Flip(Enum):
@@ -16,7 +16,7 @@ class Flip(Enum):
     V = "v"
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Orientation:
     """A turn, then a mirroring, that make a camera's images upright.
 

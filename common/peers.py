@@ -4,9 +4,10 @@ Keys are Curve25519 in Z85, as in CurveZMQ (RFC 26, RFC 32).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import reduce
 from typing import Final
+
+from common.value import value
 
 MAX_NAME: Final = 64
 """Longest host name on Linux (HOST_NAME_MAX)."""
@@ -16,7 +17,7 @@ _Z85_ALPHABET: Final = b"0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRS
 """RFC 32. A text of 40 such letters may still not be 256 bits (each five must stand for less than 2^32): see is_key."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Peer:
     """A machine that this one trusts.
 

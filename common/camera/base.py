@@ -3,16 +3,16 @@
 A camera never blocks: it says what to wait for (`pollable`, `due_ns`) and then returns what has come since.
 """
 
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Protocol, cast
 
 from common.frame import Frame, FrameFault
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import CameraDescription, Locks
+from common.value import value
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Spoiled:
     """A grab whose bytes are not a whole image. It has a sequence number like any other.
 
@@ -25,7 +25,7 @@ class Spoiled:
     fault: FrameFault
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Skipped:
     """A grab that was skipped unread because a newer one was already there. It has a sequence number like any other.
 
@@ -38,7 +38,7 @@ class Skipped:
     frames: int = 1
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Ended:
     """No frame will follow."""
 
@@ -46,7 +46,7 @@ class Ended:
 Grab = Frame | Spoiled | Skipped | Ended
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Mode:
     """What a camera can be told to deliver while it runs.
 
@@ -61,7 +61,7 @@ class Mode:
     size_px: tuple[int, int] = (0, 0)
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Offers:
     """The values that a camera's mode can take, the current ones first. Empty tuples where nothing can be changed while it runs.
 
@@ -84,7 +84,7 @@ class CameraState(Enum):
     GONE = "gone"
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class StampOrigin:
     """How a camera's stamps came onto this machine's clock, where they had to be taken over from another one.
 
@@ -107,7 +107,7 @@ def origin_words(origin: StampOrigin) -> str:
     return f"its stamps count on {origin.epoch}{known}"
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class CameraHealth:
     """How a camera has performed since it was opened.
 

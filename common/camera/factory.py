@@ -7,7 +7,6 @@ a callable that takes one CameraRequest, opens the camera and returns a `common.
 option, and an UnavailableError for a device that cannot be had.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl
@@ -18,11 +17,12 @@ from common.camera.turned import turned
 from common.errors import SettingsError
 from common.orientation import ORIENTING, Orientation, orientation_of
 from common.program.extensions import make_registered, named, registered_names
+from common.value import value
 
 _CAMERAS: Final = "tandemscan.cameras"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class CameraRequest:
     """A request to open another package's camera.
 
@@ -41,7 +41,7 @@ class CameraRequest:
     now_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class _Kind:
     """Where a kind of camera is implemented.
 

@@ -14,6 +14,7 @@ from enum import Enum
 from typing import Final
 
 from common.camera.base import CameraState
+from common.value import value
 
 NEVER_NS: Final = 2**63 - 1
 
@@ -63,7 +64,7 @@ class Loss(Enum):
     UNPLUGGED = "unplugged"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class LifeSettings:
     """How patient to be with a kind of camera.
 

@@ -205,11 +205,11 @@ class ReplayCamera:
         if self._settings.pacing is Pacing.DEMAND:
             if self._first_ns is None:
                 self.anchor(self._time_of(0) if self.images.are_times else now_ns, 0)
-            return [self._grab(now_ns)]
+            return [self._grab(now_ns, self._time_of(self._next))]
         if now_ns < self._due_ns:
             return []
         if now_ns < (next_ns := self._time_of(self._next + self._stride)):  # the usual case: one image
-            grabs = [self._grab(now_ns)]
+            grabs = [self._grab(now_ns, self._due_ns)]
             self._due_ns = next_ns
             return grabs
         newest = self._index_at(now_ns) // self._stride * self._stride
@@ -219,7 +219,7 @@ class ReplayCamera:
         self._sequence += passed
         self._next += passed * self._stride
         while self._next <= newest and not (grabs and isinstance(grabs[-1], Ended)):
-            grabs.append(self._grab(now_ns))
+            grabs.append(self._grab(now_ns, self._time_of(self._next)))
         self._due_ns = self._time_of(self._next)
         return grabs
 
@@ -233,7 +233,7 @@ class ReplayCamera:
         """Forget the files."""
         self._cache = [None] * len(self._paths)
 
-    def _grab(self, now_ns: int) -> Grab:
+    def _grab(self, now_ns: int, exposed_ns: int) -> Grab:
         index = self._next
         shown = index - self._first_shown
         if not self._settings.loop and shown >= len(self._paths):
@@ -242,11 +242,11 @@ class ReplayCamera:
         sequence = self._sequence
         self._sequence += 1
         # On the clock the time alone determines the image, so that two replays agree; without loop, the first image comes first.
-        position = index if self._settings.loop else shown
-        image, fault = self._load(position % len(self._paths))
+        position = (index if self._settings.loop else shown) % len(self._paths)
+        image, fault = self._cache[position] or self._load(position)
         if fault is not None:
             return Spoiled(sequence, fault)
-        exposed = Stamp(self._time_of(index), self._settings.clock)
+        exposed = Stamp(exposed_ns, self._settings.clock)
         grabbed = Stamp(now_ns, self._settings.clock)
         return Frame(
             sequence=sequence,
@@ -275,13 +275,11 @@ class ReplayCamera:
         return index if self._time_of(index) <= now_ns else index - 1
 
     def _load(self, position: int) -> tuple[ImageFile, FrameFault | None]:
-        known = self._cache[position]
-        if known is None:
-            image = load(self._paths[position])
-            known = image, find_fault(image.pixel_format, image.payload)
-            if self._cached_bytes + len(image.payload) <= _CACHE_BYTES:
-                self._cache[position] = known
-                self._cached_bytes += len(image.payload)
+        image = load(self._paths[position])
+        known = image, find_fault(image.pixel_format, image.payload)
+        if self._cached_bytes + len(image.payload) <= _CACHE_BYTES:
+            self._cache[position] = known
+            self._cached_bytes += len(image.payload)
         return known
 
     def _check_alike(self) -> ImageFile:

@@ -7,8 +7,9 @@ Debian 12 uses the 32-bit one; a kernel without it answers ENOTTY.
 
 import ctypes
 from ctypes import c_char, c_int32, c_int64, c_uint8, c_uint32, c_uint64
-from dataclasses import dataclass
 from typing import Final
+
+from common.value import value
 
 _WRITE, _READ = 1, 2
 _DIR_SHIFT, _SIZE_SHIFT, _TYPE_SHIFT = 30, 16, 8  # asm-generic/ioctl.h: dir 2 bits, size 14, type 8, number 8
@@ -174,7 +175,7 @@ class EventSubscription(ctypes.Structure):
     _fields_ = [("type", c_uint32), ("id", c_uint32), ("flags", c_uint32), ("reserved", c_uint32 * 5)]
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Layout:
     """The structures whose size depends on the machine, with the ioctl numbers that contain their size.
 

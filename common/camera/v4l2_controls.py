@@ -4,12 +4,13 @@ A control governed by an automatic mode is refused (EACCES) while that mode runs
 not set is left automatic until it has settled, then read and held at that value: the two cameras of a rig must not readjust mid-scan.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from typing import Final
 
 from common.camera import v4l2_abi as abi
 from common.camera_identity import LARGEST_LOCK, Lock
+from common.value import value
 
 
 class PowerLine(Enum):
@@ -54,7 +55,7 @@ def to_locks(held: tuple[tuple["Axis", int], ...]) -> tuple[tuple[Lock, int], ..
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Control:
     """One control of a camera, as its driver describes it.
 
@@ -104,7 +105,7 @@ class Control:
         return any(at == index for at, _ in self.menu)
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class ControlWishes:
     """The user's wishes for the controls.
 
@@ -133,7 +134,7 @@ class ControlWishes:
         return replace(self, held=tuple({**dict(found), **dict(self.held)}.items()))
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Step:
     """Set one control.
 
@@ -146,7 +147,7 @@ class Step:
     value: int
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class _AxisControls:
     """The controls of an axis: the automatic mode, the values that switch it off (the best first), and the value itself."""
 

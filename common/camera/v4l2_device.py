@@ -8,7 +8,6 @@ import errno
 import fcntl
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Final, Self
@@ -17,6 +16,7 @@ from common.camera import v4l2_abi as abi
 from common.camera.v4l2_controls import Control
 from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange
 from common.errors import TakenError, UnavailableError
+from common.value import value
 
 _BY_ID: Final = Path("/dev/v4l/by-id")
 _BY_PATH: Final = Path("/dev/v4l/by-path")
@@ -24,7 +24,7 @@ _MOST_ITEMS: Final = 256
 """An enumeration that continues beyond this is a driver's endless loop."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Identity:
     """What a node says about itself.
 
@@ -47,7 +47,7 @@ class Identity:
         return self.capabilities & wanted == wanted
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class PixelFormatSet:
     """The format that the driver actually set.
 

@@ -1,12 +1,12 @@
 """What a V4L2 camera offers, and the choice among it. Values only: no device is touched here."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
 from common.errors import SettingsError, UnavailableError
 from common.frame import PixelFormat
+from common.value import value
 
 PREFERENCE: Final = (
     ("MJPG", PixelFormat.MJPEG),
@@ -27,7 +27,7 @@ _PARTS: Final = (2, 3, 4, 6, 8, 12, 16, 24, 32)
 """Rates of a camera that takes any rate, as fractions of the requested one. The host's camera at that rate stays in step with them."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class SizeRange:
     """Sizes that a scaling camera offers: minimum, maximum and step of width and height, px."""
 
@@ -50,7 +50,7 @@ class SizeRange:
         return width, height
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Rates:
     """Frame rates of one size: named ones, or everything between two. Both are empty if the driver does not say.
 
@@ -75,7 +75,7 @@ class Rates:
         return " to ".join(rate_text(rate) for rate in self.between_hz) if self.between_hz else "unknown"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class FormatOffer:
     """One encoding of a camera.
 
@@ -106,7 +106,7 @@ class FormatOffer:
         return ", ".join(f"{width}x{height}" for width, height in self.sizes_px) or "any"
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Wanted:
     """The user's wishes for the encoding; None: whatever is best.
 
@@ -121,7 +121,7 @@ class Wanted:
     pixel_format: PixelFormat | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Choice:
     """An encoding and size that the camera offers.
 

@@ -1,11 +1,11 @@
 """What leaves a buffer, in one copy: compressed images unchanged, raw ones without row padding, whole or only their luma."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
 
 from common.camera.v4l2_device import PixelFormatSet
 from common.frame import PixelFormat
+from common.value import value
 
 
 class SendPart(Enum):
@@ -15,7 +15,7 @@ class SendPart(Enum):
     LUMA = "luma"
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Packing:
     """How a camera's buffers become payloads.
 

@@ -3,17 +3,17 @@
 import ctypes
 import errno
 import mmap
-from dataclasses import dataclass
 from typing import Final
 
 from common.camera import v4l2_abi as abi
 from common.camera.v4l2_device import Device, ioctl, taken
+from common.value import value
 
 RING_BUFFERS: Final = 4
 """Fewest that never starve a driver: one being filled, one next, one being read here, one spare for a late reader. DESIGN asks for 4."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Filled:
     """A buffer filled by the driver; it must be given back.
 

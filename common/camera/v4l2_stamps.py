@@ -5,11 +5,11 @@ stamps the arrival of the frame's first packet, which comes after the sensor has
 """
 
 from collections import deque
-from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
 from common.camera import v4l2_abi as abi
+from common.value import value
 
 _PLAUSIBLE_AGE_NS: Final = 2_000_000_000
 """A stamp of an unnamed clock is taken for CLOCK_MONOTONIC if its frame was dequeued at most this much later. A full ring at 5 fps is
@@ -36,7 +36,7 @@ class StampSource(Enum):
     FIRST_PACKET = auto()
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Timing:
     """What is known about a camera besides each stamp.
 

@@ -3,7 +3,7 @@
 import contextlib
 import errno
 import logging
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from pathlib import Path
 from typing import Final
@@ -42,6 +42,7 @@ from common.errors import UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault
 from common.program.logs import event
 from common.stamp import Stamp
+from common.value import value
 
 _LOG = logging.getLogger(__name__)
 
@@ -49,7 +50,7 @@ _SEQUENCE_MASK: Final = 0xFFFFFFFF
 _BACKWARDS: Final = 0x80000000
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class V4l2Settings:
     """What is requested of a V4L2 camera.
 

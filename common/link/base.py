@@ -9,7 +9,6 @@ else that must be heard is repeated until it is answered.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Protocol, runtime_checkable
 
@@ -34,7 +33,7 @@ class Packet:
     payload: Buffer
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Broken:
     """A connection that this side had dialled broke. The link redials by itself.
 
@@ -45,7 +44,7 @@ class Broken:
     connection: bytes
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Garbage:
     """Something arrived that is not a packet, and was thrown away."""
 

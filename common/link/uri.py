@@ -1,13 +1,13 @@
 """Link URIs as the user gives them, parsed and checked without opening anything."""
 
 import ipaddress
-from dataclasses import dataclass
 from typing import Final
 from urllib.parse import parse_qsl, urlsplit
 
 from common.errors import SettingsError
 from common.keys import KeyFolder
 from common.program.extensions import registered_names
+from common.value import value
 
 LINKS: Final = "tandemscan.links"
 """Entry point group of other packages' links; see `factory`."""
@@ -30,7 +30,7 @@ _MORE_OPTIONS = {
 _EXAMPLES = "give tcp://HOST:PORT, ipc://PATH, serial:DEVICE or rfcomm://DEVICE"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class LinkUri:
     """A link as the user named it.
 
@@ -55,7 +55,7 @@ class LinkUri:
     options: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class LinkRequest:
     """A request to open a link: everything that a transport is told.
 

@@ -31,16 +31,18 @@ class Inbox:
     Attributes:
         socket: the socket.
         may_have: whether `has_news` may say yes.
+        is_told: whether its descriptor was readable since it was last asked: hardly ever for nothing.
 
     Args:
         sock: the socket.
     """
 
-    __slots__ = ("_asked", "_fd", "may_have", "socket")
+    __slots__ = ("_asked", "_fd", "is_told", "may_have", "socket")
 
     def __init__(self, sock: "zmq.Socket[bytes]") -> None:
         self.socket = sock
         self.may_have = True
+        self.is_told = False
         self._fd = sock.fileno()
         self._asked = [
             (sock, _READABLE)
@@ -52,6 +54,15 @@ class Inbox:
 
     def has_news(self) -> bool:
         """Ask the socket whether there is something to receive."""
+        self.is_told = False
+        self.may_have = bool(zmq.zmq_poll(self._asked, 0))
+        return self.may_have
+
+    def invites(self) -> bool:
+        """Whether to try to receive now. Right after its descriptor was readable this asks nothing, and the try may find nothing (zmq.Again)."""
+        if self.is_told:
+            self.is_told = False
+            return True
         self.may_have = bool(zmq.zmq_poll(self._asked, 0))
         return self.may_have
 
@@ -113,8 +124,8 @@ class Waiter:
                 ready.append(fd)
         found = self._found_awake() if wait_ms and not ready and self._awake_until_ns else []
         for fd, _ in found or self._poll.poll(0 if ready else wait_ms):
-            if fd in self._inboxes:
-                self._inboxes[fd].may_have = True
+            if (readable := self._inboxes.get(fd)) is not None:
+                readable.may_have = readable.is_told = True
             ready.append(fd)
         return ready
 

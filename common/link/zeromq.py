@@ -46,6 +46,8 @@ _RECONNECT_MS: Final = 50
 _RECONNECT_MAX_MS: Final = 400
 """A peer that comes back is met within this time, well below the second allowed for recovery."""
 
+_NEVER: Final = 2**63 - 1
+
 _COPY_BELOW_BYTES: Final = 256 * 1024
 """Below this, one memcpy into ZeroMQ's message is cheaper than pyzmq's bookkeeping for a borrowed buffer (bench_link shows it)."""
 
@@ -105,19 +107,6 @@ def _send(inbox: Inbox, connection: bytes, header: bytes, payload: Buffer) -> Se
     return SendResult.SENT
 
 
-def _receive_known(sock: zmq.Socket[bytes], connection: bytes, guard: "Guard") -> Iterator[Incoming]:
-    """Take one packet off a socket that has one. Discard it if its peer was forgotten in the meantime."""
-    header = sock.recv(_NOW, copy=False)
-    packet = _complete(sock, connection, header)
-    if guard.knows(header):
-        yield packet
-
-
-def _receive(sock: zmq.Socket[bytes], connection: bytes) -> Incoming:
-    """Take one packet off a socket that has one."""
-    return _complete(sock, connection, sock.recv(_NOW, copy=False))
-
-
 def _complete(sock: zmq.Socket[bytes], connection: bytes, header: zmq.Frame) -> Incoming:
     if not header.more:
         return Packet(connection, header.bytes, b"")
@@ -134,11 +123,6 @@ class _AlwaysReady:
 
     self_paced: Final = False
 
-    @property
-    def due_ns(self) -> int:
-        """When `receive` must be called even if nothing is readable: never."""
-        return 2**63 - 1
-
     def ready(self, connection: bytes) -> bool:  # noqa: ARG002 - the contract of `Link`
         """Whether a frame would be accepted now, as far as can be known without trying."""
         return True
@@ -146,6 +130,9 @@ class _AlwaysReady:
 
 class ZeroMqListener(_AlwaysReady):
     """The side that binds.
+
+    Attributes:
+        due_ns: when `receive` must be called even if nothing is readable.
 
     Args:
         address: `tcp://HOST:PORT` (`*` for every interface) or `ipc://PATH`.
@@ -188,6 +175,7 @@ class ZeroMqListener(_AlwaysReady):
         self.endpoint = plain_endpoint(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
         self._inbox = Inbox(self._socket)
         self._door: Door | None = None
+        self.due_ns = _NEVER
 
     def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
         """Let in new hosts by a code, for all secured links of this board.
@@ -205,6 +193,7 @@ class ZeroMqListener(_AlwaysReady):
 
         assert self._guard is not None, "an open link has no door"
         self._door = Door(self._context, links, keys, self._guard)
+        self._note_due()
 
     @property
     def pollables(self) -> Sequence[Any]:
@@ -213,11 +202,9 @@ class ZeroMqListener(_AlwaysReady):
         guard = (self._guard.inbox,) if self._guard else ()
         return (self._inbox, *gates, *guard, *(self._door.pollables if self._door else ()))
 
-    @property
-    def due_ns(self) -> int:
-        """When `receive` must be called even if nothing is readable."""
-        gate_ns = self._gate.due_ns if self._gate else super().due_ns
-        return min(gate_ns, self._door.due_ns) if self._door else gate_ns
+    def _note_due(self) -> None:
+        gate_ns = self._gate.due_ns if self._gate else _NEVER
+        self.due_ns = min(gate_ns, self._door.due_ns) if self._door else gate_ns
 
     def receive(self) -> Iterator[Incoming]:
         """Return all packets that have arrived; let in peers whose keys are known."""
@@ -227,12 +214,17 @@ class ZeroMqListener(_AlwaysReady):
             self._guard.answer()
         if self._door:
             self._door.answer()
-        while self._inbox.may_have and self._inbox.has_news():
-            connection = self._socket.recv(_NOW)
-            if self._guard:
-                yield from _receive_known(self._socket, connection, self._guard)
-            else:
-                yield _receive(self._socket, connection)
+        self._note_due()
+        inbox, sock = self._inbox, self._socket
+        while inbox.may_have and inbox.invites():
+            try:
+                connection = sock.recv(_NOW)
+            except zmq.Again:
+                continue  # its descriptor was readable for something else
+            header = sock.recv(_NOW, copy=False)
+            packet = _complete(sock, connection, header)
+            if self._guard is None or self._guard.knows(header):  # its peer may have been forgotten in the meantime
+                yield packet
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Send a packet over one connection."""
@@ -249,6 +241,9 @@ class ZeroMqListener(_AlwaysReady):
 
 class ZeroMqDialer(_AlwaysReady):
     """The side that connects, with one socket per lane. ZeroMQ redials by itself whenever a connection breaks.
+
+    Attributes:
+        due_ns: when `receive` must be called even if nothing is readable: to redial.
 
     Args:
         address: `tcp://HOST:PORT` or `ipc://PATH`.
@@ -280,6 +275,7 @@ class ZeroMqDialer(_AlwaysReady):
         self.dialled = {lane: lane.name.encode() for lane in Lane}
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._connections: dict[bytes, Dialled] = {}
+        self.due_ns = _NEVER
         for lane in (Lane.FRAMES, Lane.CONTROL):
             sock = self._context.socket(zmq.DEALER)
             _configure(sock, _most_bytes(board=board))
@@ -293,16 +289,12 @@ class ZeroMqDialer(_AlwaysReady):
                 self._context.destroy(linger=0)
                 raise explained(address, error, "give --link tcp://HOST:PORT or ipc://PATH") from None
             self._connections[self.dialled[lane]] = connection
+        self._lanes = tuple(self._connections.items())
 
     @property
     def pollables(self) -> Sequence[Any]:
         """Both sockets and their monitors' descriptors. Only `receive` calls a monitor, so no other call consumes its news."""
         return tuple(item for known in self._connections.values() for item in (known.inbox, known.news))
-
-    @property
-    def due_ns(self) -> int:
-        """When `receive` must be called even if nothing is readable: to redial."""
-        return min([known.due_ns for known in self._connections.values()])
 
     def receive(self) -> Iterator[Incoming]:
         """Return all packets that have arrived, frames first, then the broken connections: a peer's last words precede its end.
@@ -310,43 +302,64 @@ class ZeroMqDialer(_AlwaysReady):
         Raises:
             UnavailableError: the peer refuses us, requires keys, or belongs to another user; it will be redialled later.
         """
-        now_ns = now.monotonic_ns()
-        broken, refused = [], None
-        for known in self._connections.values():
-            if now_ns >= known.due_ns:
-                known.redial()
+        if self.due_ns != _NEVER:
+            self._redial()
+        broken: list[Broken] = []
+        refused: list[UnavailableError] = []
         going_on = True
         while going_on:
             going_on = False
-            for connection, known in self._connections.items():  # one packet of each in turn
-                if known.inbox.may_have and known.inbox.has_news():
+            for connection, known in self._lanes:  # one packet of each in turn
+                inbox = known.inbox
+                if inbox.may_have and inbox.invites():
                     going_on = True
-                    yield self._received(known, connection, now_ns)
-            if going_on:
-                continue
-            for connection, known in self._connections.items():
-                if known.news.may_have and known.news.has_news():
-                    going_on = known.inbox.may_have = True  # its last words may have come since it was asked
                     try:
-                        if known.broke(now_ns):
-                            broken.append(Broken(connection))
-                    except UnavailableError as error:
-                        refused = error  # raised once no news is left, because a monitor does not wake anyone twice
-        if refused is not None:
-            raise refused
+                        header = inbox.socket.recv(_NOW, copy=False)
+                    except zmq.Again:
+                        continue  # its descriptor was readable for something else
+                    packet = _complete(inbox.socket, connection, header)
+                    if self._trusted:
+                        self._check(known, header)
+                    yield packet
+            if not going_on:
+                going_on = self._hear_news(broken, refused)
+        if refused:  # raised once no news is left, because a monitor does not wake anyone twice
+            self._note_due()
+            raise refused[-1]
         yield from broken
 
-    def _received(self, known: Dialled, connection: bytes, now_ns: int) -> Incoming:
-        sock = known.inbox.socket
-        header = sock.recv(_NOW, copy=False)
-        packet = _complete(sock, connection, header)
-        if self._trusted:
-            try:
-                check_peer(self._path, header, self._trusted)
-            except UnavailableError:
-                known.hang_up(now_ns)
-                raise
-        return packet
+    def _hear_news(self, broken: list[Broken], refused: list[UnavailableError]) -> bool:
+        """Note what the monitors say, one event of each; return whether there was any."""
+        heard = False
+        for connection, known in self._lanes:
+            if known.news.may_have and known.news.has_news():
+                heard = known.inbox.may_have = True  # its last words may have come since it was asked
+                try:
+                    if known.broke(now.monotonic_ns()):
+                        broken.append(Broken(connection))
+                except UnavailableError as error:
+                    refused.append(error)
+        return heard
+
+    def _check(self, known: Dialled, header: zmq.Frame) -> None:
+        """Hang up on a peer that belongs to a user who is not trusted."""
+        try:
+            check_peer(self._path, header, self._trusted)
+        except UnavailableError:
+            known.hang_up(now.monotonic_ns())
+            self._note_due()
+            raise
+
+    def _redial(self) -> None:
+        """Dial again what is due."""
+        now_ns = now.monotonic_ns()
+        for _, known in self._lanes:
+            if now_ns >= known.due_ns:
+                known.redial()
+        self._note_due()
+
+    def _note_due(self) -> None:
+        self.due_ns = min(known.due_ns for _, known in self._lanes)
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Send a packet. Before the peer is there, the result is FULL (ZMQ_IMMEDIATE)."""

@@ -10,7 +10,7 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final, Generic, TypeVar, get_args, get_origin, get_type_hints
 
@@ -18,6 +18,7 @@ from common.errors import DataError, SettingsError
 from common.files import read_whole
 from common.plain_text import printable_lines
 from common.program.quantities import decimal_number, whole_number
+from common.value import value
 
 T = TypeVar("T")
 
@@ -25,7 +26,7 @@ DEFAULT: Final = "default"
 """The origin of a setting that nobody gave."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Resolved(Generic[T]):
     """Settings, and where each came from.
 

@@ -33,7 +33,7 @@ from common.protocol.message import (
     Status,
     Steer,
 )
-from common.protocol.session import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
+from common.protocol.terms import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
 
 _NEVER = 2**63 - 1
 
@@ -113,6 +113,10 @@ class _Host:
 class BoardSession:
     """One life of a board process.
 
+    Attributes:
+        session: its id.
+        next_index: the next frame's number among those sent. `sent` spends the credit.
+
     Args:
         session: random id of this process's life.
         boot_id: identifies this life of the machine's clock.
@@ -130,7 +134,7 @@ class BoardSession:
         self._dialled = dialled
         self._knock_due_ns = 0
         self._host: _Host | None = None
-        self._sent = 0
+        self.next_index = 0
         self._sent_ns = 0
         self._status_ns = STATUS_NS
         self._ended = False
@@ -200,12 +204,7 @@ class BoardSession:
     def frames_lane(self) -> bytes | None:
         """The connection to which the next frame may be sent now; None without credit."""
         host = self._host
-        return None if host is None or self._sent >= host.below_index else host.frames
-
-    @property
-    def next_index(self) -> int:
-        """The next frame's number among those sent. `sent` spends the credit."""
-        return self._sent
+        return None if host is None or self.next_index >= host.below_index else host.frames
 
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int, counts: BoardCounts
@@ -306,9 +305,9 @@ class BoardSession:
 
     def sent(self, now_ns: int) -> None:
         """Record that the link took the frame. Where frames are far apart, accounts become rarer too."""
-        apart_ns = now_ns - self._sent_ns if self._sent else 0
+        apart_ns = now_ns - self._sent_ns if self.next_index else 0
         self._status_ns = STATUS_NS if apart_ns < STATUS_SLOW_NS else STATUS_SLOW_NS
-        self._sent, self._sent_ns = self._sent + 1, now_ns
+        self.next_index, self._sent_ns = self.next_index + 1, now_ns
 
     def unreachable(self, connection: bytes) -> list[Outgoing]:
         """Record that a connection is gone. A host still heard on other links, but without a frames lane, is asked to say hello again."""
@@ -387,7 +386,7 @@ class BoardSession:
         host.heard(connection, now_ns)
         host.reads_long, host.knows_locks = hello.reads_long, False
         if hello.lane is Lane.FRAMES:
-            host.below_index = self._sent  # credit from an earlier connection is void
+            host.below_index = self.next_index  # credit from an earlier connection is void
             host.frames = connection
         else:
             host.controls[connection[0]] = connection

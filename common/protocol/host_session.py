@@ -98,7 +98,9 @@ class HostSession:
     def outstanding(self) -> int:
         """Frames that the board may still send against credit already granted."""
         stream = self._stream
-        return max(0, stream.below_index - stream.next_index) if stream is not None and self.is_open else 0
+        if stream is None or self._carriage.carrier is None or stream.below_index <= stream.next_index:
+            return 0
+        return stream.below_index - stream.next_index
 
     @property
     def due_ns(self) -> int:
@@ -123,9 +125,10 @@ class HostSession:
         """
         self._notice_absence(now_ns)
         path = self._paths[connection[0]]
-        if isinstance(message, FrameMessage):
-            return self._take_frame(path, message, now_ns)
         match message:
+            case FrameMessage():
+                taken = self.take_frame(path.link, message, now_ns)
+                return [Stale(message, taken) if isinstance(taken, StaleReason) else Arrived(message, taken, path.link)]
             case Knock():
                 return [] if self._leaving else self._answer_knock(path, connection, message, now_ns)
             case Refusal(reason):
@@ -146,6 +149,32 @@ class HostSession:
                 return self._take_goodbye(path, connection, counts, now_ns)
             case _:
                 assert_never(message)
+
+    def take_frame(self, link: int, frame: FrameMessage, now_ns: int) -> int | StaleReason:
+        """Take a frame, as `receive` does, without making outputs of it: it comes thirty times a second.
+
+        Args:
+            link: the link that it came over.
+            frame: what came.
+            now_ns: arrival of its last byte on the host's clock, ns.
+
+        Returns:
+            How many frames before it never came, or why it must not be used.
+        """
+        if (absent_ns := self._presence.absent_ns(self._due, now_ns)) > 0:
+            self._excuse(absent_ns, now_ns)
+        path, stream = self._paths[link], self._stream
+        if stream is None or frame.session != stream.hello.session:
+            return StaleReason.OLD_SESSION
+        if stream.hello.boot_id != self._boot_id:
+            return StaleReason.OLD_SESSION  # sent before a sleep, so its marks are on the earlier clock
+        taken = stream.take(frame.sent_index)
+        if isinstance(taken, StaleReason):
+            return taken
+        if path.hello is None:
+            path.lived(now_ns)
+        path.heard_ns = now_ns
+        return taken
 
     def tick(self, now_ns: int) -> list[Output]:
         """Do what is due: repeat unanswered hellos, begin the next clock wave, give up a silent or stuck link."""
@@ -248,9 +277,10 @@ class HostSession:
 
     def _notice_absence(self, now_ns: int) -> None:
         """Do not count the time in which this process did not run as anyone's silence."""
-        absent_ns = self._presence.absent_ns(self._due, now_ns)
-        if absent_ns <= 0:
-            return
+        if (absent_ns := self._presence.absent_ns(self._due, now_ns)) > 0:
+            self._excuse(absent_ns, now_ns)
+
+    def _excuse(self, absent_ns: int, now_ns: int) -> None:
         for path in self._paths:
             path.heard_ns = min(now_ns, path.heard_ns + absent_ns)
         self._carriage.absent(absent_ns, now_ns)
@@ -318,20 +348,6 @@ class HostSession:
         self._streams = True
         stream.hello, stream.changes = hello, hello.rung.changes
         return [Accepted(hello=hello, resumed=resumed, lost=lost, link=path.link)]
-
-    def _take_frame(self, path: HostPath, frame: FrameMessage, now_ns: int) -> list[Output]:
-        stream = self._stream
-        if stream is None or frame.session != stream.hello.session:
-            return [Stale(frame, StaleReason.OLD_SESSION)]
-        if stream.hello.boot_id != self._boot_id:
-            return [Stale(frame, StaleReason.OLD_SESSION)]  # sent before a sleep, so its marks are on the earlier clock
-        taken = stream.take(frame.sent_index)
-        if isinstance(taken, StaleReason):
-            return [Stale(frame, taken)]
-        if not path.is_open:
-            path.lived(now_ns)
-        path.heard_ns = now_ns
-        return [Arrived(frame, taken, path.link)]
 
     # Accounts and echoes.
 

@@ -54,7 +54,7 @@ class Stream:
                 return StaleReason.DUPLICATE
             self.missing.remove(index)
             return StaleReason.LATE
-        lost = self.pass_over(index)
+        lost = self.pass_over(index) if index > self.next_index else 0
         self.next_index = index + 1
         return lost
 

@@ -5,7 +5,7 @@ behind image bytes. `sent_index` numbers the frames that a board's session has s
 granting twice is harmless and every gap is a loss.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import Enum
 
 from common.camera_identity import UNKNOWN_CAMERA, CameraIdentity, Lock
@@ -58,7 +58,7 @@ class RefusalReason(Enum):
     VERSION = 1
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class BoardCounts:
     """What became of a board session's frames so far. grabbed = sent + all dropped + the one that may wait in the outbox."""
 
@@ -67,7 +67,7 @@ class BoardCounts:
     dropped: tuple[tuple[DropReason, int], ...] = ()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class CameraDescription:
     """What a host must know about the board's camera.
 
@@ -110,7 +110,7 @@ class CameraDescription:
         return self.pacing is Pacing.DEMAND or self.steering is Steering.GRID
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Rung:
     """How far the board has lowered the camera's output so that the link can carry it.
 
@@ -133,7 +133,7 @@ class Rung:
     height_px: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class HostHello:
     """Host: I am here, and this connection is for this lane.
 
@@ -145,7 +145,7 @@ class HostHello:
     reads_long: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class BoardHello:
     """Board: accepted. Frames will be numbered starting at `counts.sent`.
 
@@ -160,7 +160,7 @@ class BoardHello:
     is_long: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Knock:
     """Board: I do not know you (or have just dialled you). Say hello on this connection, for this lane.
 
@@ -171,7 +171,7 @@ class Knock:
     session: str
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Refusal:
     """Board: not now (busy) or never (version)."""
 
@@ -218,7 +218,7 @@ class Pong:
     t2_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Status:
     """Board: what became of my frames so far, and what the camera delivers now."""
 
@@ -227,7 +227,7 @@ class Status:
     rung: Rung
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class End:
     """Board: the last frame has been sent. This message follows it on the frames connection."""
 
@@ -235,28 +235,28 @@ class End:
     counts: BoardCounts
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Bye:
     """Either side: I am leaving on purpose. A board's goodbye carries its final counts."""
 
     counts: BoardCounts = BoardCounts()
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Steer:
     """Host: make your camera expose later by this much from now on. Less than one period. The stamps show whether it did."""
 
     later_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class SetLocks:
     """Host: hold these controls of your camera at these values. Saying it again is harmless. `LockState` answers."""
 
     locks: Locks
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class LockState:
     """Board: how my camera is held now. It answers `SetLocks`, and follows a long hello and every change.
 

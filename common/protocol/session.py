@@ -1,50 +1,53 @@
-"""What both roles of a session share: their outputs, and the times after which they act.
-
-A session may use several links at once. Each connection's name begins with the number of its link, so names are unique across links.
+"""What the host's role of a session tells its shell; with the terms of both roles (`terms`), which are importable from here, too.
 
 The state machines (`board_session`, `host_session`) are sans-I/O: messages and `now_ns` go in, a list of outputs comes out. Shells own
 the sockets and clocks. They send each `Outgoing` unchanged, except that `wire.encode_stamped` sets its send time at the last moment.
 """
 
-from dataclasses import dataclass
 from enum import Enum
-from typing import Final
 
-from common.protocol.message import BoardCounts, BoardHello, FrameMessage, LockState, Message, RefusalReason, Rung
+from common.protocol.message import BoardCounts, BoardHello, FrameMessage, LockState, RefusalReason, Rung
+from common.protocol.terms import (
+    HELLO_RETRY_NS,
+    MS,
+    SILENCE_NS,
+    STATUS_NS,
+    STATUS_SLOW_NS,
+    TAKEOVER_NS,
+    Outgoing,
+    connection_name,
+)
 from common.value import value
 
-MS: Final = 1_000_000
-
-HELLO_RETRY_NS: Final = 200 * MS
-"""Time between two attempts to be heard. A peer that appears is met within this time."""
-
-TAKEOVER_NS: Final = 1000 * MS
-"""After this much silence from its host, a board accepts another host. This is two missed clock waves."""
-
-SILENCE_NS: Final = 3000 * MS
-"""After this much silence a peer is considered gone. No stall seen on Wi-Fi or on a swapping phone lasted longer."""
-
-STATUS_NS: Final = 500 * MS
-"""Time between two accounts of the board's frames."""
-
-STATUS_SLOW_NS: Final = 1000 * MS
-"""The same where frames are further apart than this: one account a second takes 0.5 % of a 115200 baud line."""
-
-
-@value()
-class Outgoing:
-    """Send this message on that connection.
-
-    Attributes:
-        connection: the link's own name for a byte path; opaque here.
-        message: what to send.
-    """
-
-    connection: bytes
-    message: Message
+__all__ = [
+    "HELLO_RETRY_NS",
+    "MS",
+    "SILENCE_NS",
+    "STATUS_NS",
+    "STATUS_SLOW_NS",
+    "TAKEOVER_NS",
+    "Accepted",
+    "Arrived",
+    "ClockVoid",
+    "Counted",
+    "Echo",
+    "LinkDown",
+    "LinkUp",
+    "LocksTold",
+    "OtherBoard",
+    "Outgoing",
+    "Output",
+    "Refused",
+    "Stale",
+    "StaleReason",
+    "Stepped",
+    "Unbelievable",
+    "Vanished",
+    "connection_name",
+]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@value(kw_only=True)
 class Accepted:
     """Host: from now on the board sends its frames over this link.
 
@@ -57,7 +60,7 @@ class Accepted:
     link: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class LinkUp:
     """Host: our board answers on this link, which may now carry frames."""
 
@@ -65,7 +68,7 @@ class LinkUp:
     hello: BoardHello
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class LinkDown:
     """Host: this link is lost or, if `stuck`, leaves a hello for frames unanswered. The session keeps greeting it."""
 
@@ -73,7 +76,7 @@ class LinkDown:
     stuck: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class OtherBoard:
     """Host: this link leads to a different board from the one we talk to. Nothing from it is used."""
 
@@ -103,7 +106,7 @@ class StaleReason(Enum):
     BEYOND_CREDIT = 3
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Stale:
     """Host: a frame that must not be used."""
 
@@ -123,7 +126,7 @@ class Echo:
     link: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Counted:
     """Host: the board's account of the running session.
 
@@ -136,21 +139,21 @@ class Counted:
     last: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Stepped:
     """Host: the board's camera delivers something else from now on."""
 
     rung: Rung
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class LocksTold:
     """Host: the board says how its camera is held."""
 
     state: LockState
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Refused:
     """Host: the board at the other end of a link refuses to talk to us."""
 
@@ -158,19 +161,19 @@ class Refused:
     link: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Unbelievable:
     """Host: the board says something that cannot be true. None of it was used."""
 
     problem: str
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class ClockVoid:
     """Host: the board had forgotten us. One of the two clocks may have stood still, so nothing learnt about them so far may be used."""
 
 
-@dataclass(frozen=True, slots=True)
+@value()
 class Vanished:
     """Host: the board fell silent or said goodbye. The fate of frames still under way in that session is unknown."""
 
@@ -194,13 +197,3 @@ Output = (
     | ClockVoid
     | Vanished
 )
-
-
-def connection_name(link: int, path: bytes) -> bytes:
-    """Make a connection's name unique over all links.
-
-    Args:
-        link: number of the link, below 256.
-        path: the link's own name for the connection.
-    """
-    return bytes((link,)) + path

@@ -9,6 +9,9 @@ WAVE_ECHOES: Final = 3
 WAVE_ECHOES_EARLY: Final = 5
 """Echoes back to back. The first wakes both sides; the others measure without that bias (study of links, 3d)."""
 
+WAVE_ECHOES_OLD: Final = 2
+"""The same after the first minute, unless one of them is slow. Old facts hold the offset by then, so one swift echo a second is enough (bench_clock)."""
+
 WAVE_NS: Final = 500 * MS
 """Time between two waves once the skew is known. An echo costs the board as much as half a frame (bench_link)."""
 
@@ -29,6 +32,9 @@ REPEATS: Final = 5
 SLOW_ECHO_NS: Final = 1 * MS
 """A slower echo than any fast link's says little. While the skew is being learnt it is repeated, up to a limit per wave. This halves the
 errors after ten seconds of Wi-Fi (bench_clock)."""
+
+_REPEATS_OLD: Final = WAVE_ECHOES - WAVE_ECHOES_OLD
+"""On a slow link an old session's wave is as long as a younger one's."""
 
 WAVE_EARLY_NS: Final = 50 * MS
 EARLY_NS: Final = 1000 * MS
@@ -103,8 +109,10 @@ class Waves:
         old_ns = WAVE_STANDBY_NS if standby else WAVE_NS if age_ns < OLD_NS else WAVE_OLD_NS
         self._due_ns = now_ns + (WAVE_EARLY_NS if early else WAVE_YOUNG_NS if age_ns < YOUNG_NS else old_ns)
         self._wave += 1
-        self._echoes_left = WAVE_ECHOES_EARLY if early else WAVE_ECHOES
-        self._repeats_left = REPEATS if EARLY_NS <= age_ns < YOUNG_NS else 0
+        self._echoes_left = WAVE_ECHOES_EARLY if early else WAVE_ECHOES if age_ns < OLD_NS else WAVE_ECHOES_OLD
+        self._repeats_left = (
+            0 if early or YOUNG_NS <= age_ns < OLD_NS else REPEATS if age_ns < YOUNG_NS else _REPEATS_OLD
+        )
         return self._given(), self._ping()
 
     def answered(self, pong: Pong, now_ns: int) -> tuple[list[Echo], Ping | None]:

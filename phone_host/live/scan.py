@@ -22,9 +22,11 @@ from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import report_of
 from phone_host.run.sinks import FunctionSink
+from phone_host.run.turn_remarks import turn_remarks
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
-from phone_host.scan.scan import LEAST_WEIGHT, Scan, ScannedPair, ScanWanted, Submap
+from phone_host.scan.scan import LEAST_WEIGHT, ScannedPair, ScanWanted, Submap
+from phone_host.scan.turntable import scan_for
 
 _SINK: Final = "scan"
 _NS: Final = 1e9
@@ -63,7 +65,7 @@ class LiveScan:
         waits: bool,
         is_timeless: bool,
     ) -> None:
-        self.scan, self._is_timeless = Scan(wanted), is_timeless
+        self.scan, self._is_timeless = scan_for(wanted), is_timeless
         self.kept = KeptSubmaps(kept_in, self.scan, resumed)
         self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
@@ -140,6 +142,7 @@ class LiveScan:
             remarks.append(Remark(words, "a greater --voxel is faster", is_note=True))
         remarks.extend(self.kept.remarks)
         model = self.scan.model()
+        remarks.extend(turn_remarks(self.scan))
         report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
         return FinishedScan(report, model)
 
@@ -155,8 +158,8 @@ class LiveScan:
         if earlier and not self._is_replayed:  # numbers and times go on where they ended
             number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
         self._last = self.scan.take(str(number), stamp_s, result.processed)
-        taken, fused = self._counts
-        self._counts = taken + 1, fused + self._last.is_fused
+        # Not one more: with a pair, others that were lost may have become part of the model.
+        self._counts = self._counts[0] + 1, self.scan.fused
         self.kept.after_pair()
         now_ns = now.monotonic_ns()
         if now_ns - self._asked_ns < _WATCHED_NS and now_ns - self._renewed_ns >= _RENEW_NS:

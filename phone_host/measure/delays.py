@@ -54,6 +54,7 @@ class Series:
     def __init__(self) -> None:
         # Not zeros: the kernel would provide their pages only on the first write.
         self._values = np.ones(EXACT, np.int64)
+        self._places = self._values.data  # written to without numpy, which costs several us a frame
         self._kept = 0
         self._stride = 1
         self._count = 0
@@ -68,8 +69,8 @@ class Series:
                 self._stride *= 2
                 thinned = np.ones(EXACT, np.int64)  # a new array: copies still use the old one
                 thinned[: self._kept] = self._values[::2]
-                self._values = thinned
-            self._values[self._kept] = value
+                self._values, self._places = thinned, thinned.data
+            self._places[self._kept] = value
             self._kept += 1
         self._count += 1
         self._sum += value

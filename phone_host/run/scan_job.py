@@ -25,7 +25,9 @@ from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import report_of, require_something
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_trust import judge_pair
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, Submap
+from phone_host.run.turn_remarks import turn_remarks
+from phone_host.scan.scan import ScannedPair, ScanWanted, Submap
+from phone_host.scan.turntable import scan_for
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image
 from phone_host.stereo.view_files import ViewFiles
@@ -111,7 +113,7 @@ class _Work:
     def __init__(self, job: ScanJob, watcher: Watcher) -> None:
         self._job, self._watcher = job, watcher
         self._cores = Cores(job.make_core)
-        self.scan = Scan(job.wanted)
+        self.scan = scan_for(job.wanted)
         self.kept = KeptSubmaps(job.out, self.scan, job.resumed)
         self._known = {pair.name: pair for pair in self.scan.pairs}
         self._is_judged = False
@@ -176,6 +178,8 @@ class _Work:
             *alone_remarks(left, right, is_told=is_told, pairs=len(files.pairs)),
             *note,
             *self.kept.remarks,
+            *turn_remarks(self.scan),
         )
-        report = report_of(self.scan, model, self._pairs, remarks, matcher=self._job.matcher, axes=self._job.axes)
+        pairs = [pair if isinstance(pair, FailedPair) else self.scan.final(pair) for pair in self._pairs]
+        report = report_of(self.scan, model, pairs, remarks, matcher=self._job.matcher, axes=self._job.axes)
         return FinishedScan(report, model, self._job.commands)

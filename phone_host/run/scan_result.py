@@ -1,6 +1,7 @@
 """What a scan has come to, from files or live: its report, and what must be said of it."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,7 @@ from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan, ScanModel, ScannedPair
+from phone_host.scan.tracking_words import OF_TURNING, Weakness
 
 
 def report_of(
@@ -53,12 +55,31 @@ def require_something(report: ScanReport) -> None:
     if report.failed and not report.scanned:
         raise report.failed[0].none_of(len(report.pairs))
     if report.settings is None:
+        require_turning(report)
         why = next((remark for remark in report.remarks if not remark.is_note), None)
         raise DataError(
             f"none of the {len(report.scanned)} pairs has depth{f': {why.problem}' if why else ''}",
             (why.remedy if why else "")
             or "check that the pictures are sharp and bright, and that --calibration fits them",
         )
+
+
+def require_turning(report: ScanReport) -> None:
+    """Refuse pairs in which no object was seen to turn, though it was asked for.
+
+    Raises:
+        DataError: so it is; it says why most pairs cannot be used.
+    """
+    reasons = Counter(pair.weakness for pair in report.scanned if pair.weakness in OF_TURNING)
+    most = reasons.most_common(1)[0][0] if reasons else Weakness.NONE
+    if most is Weakness.NOTHING_TURNS:
+        raise DataError("nothing turns in these pairs", "turn the object by 3 to 15 degrees between the pairs")
+    if most is Weakness.ALL_TURNS:
+        raise DataError(
+            "the background of these pairs moves, too", "let the cameras stand still, or leave --turntable out"
+        )
+    if most is Weakness.OUTSIDE:
+        raise DataError("what turns reaches out of the picture", "move the cameras back, or the object to the middle")
 
 
 def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
@@ -70,7 +91,7 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
     """
     known = model.noise_m[np.isfinite(model.noise_m)]
     noise_m, noise_p95_m = (float(np.percentile(known, share)) if len(known) else math.nan for share in (50, 95))
-    volume = None if scan.tracker is None else scan.tracker.volume
+    volume = scan.volume
     return ModelFigures(
         points=len(model.mesh.points_m),
         triangles=len(model.mesh.triangles),
@@ -88,7 +109,7 @@ def memory_remarks(scan: Scan) -> Sequence[Remark]:
     Args:
         scan: that made it.
     """
-    if scan.tracker is None or not scan.tracker.volume.left_out:
+    if scan.volume is None or not scan.volume.left_out:
         return ()
     return (
         Remark(

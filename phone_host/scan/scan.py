@@ -26,7 +26,7 @@ from phone_host.scan.surface_noise import surface_noise_m
 from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
-from phone_host.scan.volume import BlockValues
+from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.images import size_px, to_grey
 
@@ -53,12 +53,14 @@ class ScanWanted:
         most_bytes: memory of the model at most.
         box: what lies outside does not belong to the model; None: everything belongs.
         threads: that compute; results do not depend on them.
+        turntable: whether the cameras stand still and an object turns before them.
     """
 
     voxel_m: float = math.nan
     most_bytes: int = 300_000_000
     box: Box | None = None
     threads: int = 1
+    turntable: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -159,6 +161,7 @@ class Scan:
         self._pairs: list[ScannedPair] = []
         self._closed = _Closed()
         self._untracked = 0  # pairs before the first that this tracker took
+        self._later: dict[str, ScannedPair] = {}  # pairs of which something else has become, by name
         self._is_changed = False  # whether submaps that are closed do not hold any more
 
     @property
@@ -170,6 +173,11 @@ class Scan:
     def fused(self) -> int:
         """Pairs that became part of the model."""
         return sum(pair.is_fused for pair in self._pairs)
+
+    @property
+    def volume(self) -> Volume | None:
+        """The model; None before the first pair that has depth."""
+        return None if self.tracker is None else self.tracker.volume
 
     @property
     def settings(self) -> VolumeSettings | None:
@@ -212,9 +220,7 @@ class Scan:
                     "the scan that is gone on with has another calibration, size or crop",
                     "give the same options as then, or begin a new scan",
                 )
-            if size_px(view.grey) != self.size_px:
-                here, before = (size_text(size) for size in (size_px(view.grey), self.size_px))
-                raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
+            require_size(name, view, self.size_px)
             told = self.tracker.track(view)
             self._joined(told.joined)
             pair = ScannedPair(
@@ -238,7 +244,16 @@ class Scan:
             self._pairs[at] = replace(
                 self._pairs[at], world_camera=view.world_camera, state=view.state, weakness=view.weakness
             )
+            self._later[self._pairs[at].name] = self._pairs[at]
             self._is_changed = self._is_changed or at < self._closed.pairs
+
+    def final(self, pair: ScannedPair) -> ScannedPair:
+        """Return what has become of a pair since it was taken.
+
+        Args:
+            pair: as it was told then.
+        """
+        return self._later.get(pair.name, pair)
 
     @property
     def is_submap_due(self) -> bool:
@@ -303,15 +318,31 @@ class Scan:
 
     def model(self) -> ScanModel:
         """Return the surface so far, without crumbs and what lies outside the box; without triangles before any was seen."""
-        if self.tracker is None:
+        volume = self.volume
+        if volume is None:
             return ScanModel(Mesh.empty(), np.zeros(0, np.float32))
-        volume = self.tracker.volume
         mesh = mesh_of(volume.blocks, volume.settings.voxel_m, LEAST_WEIGHT)
         if self._wanted.box is not None:
             inside = self._wanted.box.holds(mesh.points_m)
             mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))
         mesh = without_crumbs(mesh)
         return ScanModel(mesh, surface_noise_m(mesh.points_m, volume.blocks, volume.settings))
+
+
+def require_size(name: str, view: View, size: tuple[int, int]) -> None:
+    """Refuse a view of another size than those before it.
+
+    Args:
+        name: of its pair.
+        view: that was taken.
+        size: width and height of those before it, px.
+
+    Raises:
+        DataError: so it is.
+    """
+    if size_px(view.grey) != size:
+        here, before = (size_text(each) for each in (size_px(view.grey), size))
+        raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
 
 
 def view_of(processed: Processed) -> View:

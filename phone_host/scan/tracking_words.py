@@ -1,6 +1,7 @@
 """What the tracker says of a view, and what helps. Pure."""
 
 from enum import Enum
+from typing import Final
 
 
 class Tracking(Enum):
@@ -26,6 +27,9 @@ class Weakness(Enum):
     POOR_FIT = "poor fit"
     FLAT = "flat"
     APART = "apart"
+    NOTHING_TURNS = "nothing turns"
+    ALL_TURNS = "background turns too"
+    OUTSIDE = "out of the picture"
 
     @property
     def advice(self) -> str:
@@ -39,4 +43,11 @@ class Weakness(Enum):
             Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
             Weakness.APART: "followed again, but apart from the model: move back to where it was",
             Weakness.FLAT: "only a plane is in view: show something with depth beside it",
+            Weakness.NOTHING_TURNS: "nothing has turned since the last pair: turn the object by 3 to 15 degrees between the pairs",
+            Weakness.ALL_TURNS: "the background moves, too: the cameras must stand still, or leave --turntable out",
+            Weakness.OUTSIDE: "what turns reaches out of the picture: move the cameras back, or the object to the middle",
         }[self]
+
+
+OF_TURNING: Final = (Weakness.NOTHING_TURNS, Weakness.ALL_TURNS, Weakness.OUTSIDE)
+"""Why a pair is of no use where an object is to turn before cameras that stand still."""

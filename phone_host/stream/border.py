@@ -24,7 +24,7 @@ _MOST_HELD: Final = 4
 """While this many frames wait for an echo, the board gets no further credit."""
 
 
-@value(kw_only=True)
+@value()
 class Arrival:
     """A frame that came, with its link, session account and camera at that time, and the last byte's arrival, ns."""
 
@@ -68,12 +68,12 @@ class Border:
     @property
     def waits_for_echo(self) -> bool:
         """Whether the next echo is wanted as soon as possible."""
-        return self._quarantine.held > 0 or (self._clock.estimate is None and self._clock.in_doubt)
+        return len(self._quarantine.held) > 0 or (self._clock.estimate is None and self._clock.in_doubt)
 
     @property
     def takes_frames(self) -> bool:
         """Whether a frame that came now could be of use."""
-        return self._clock.estimate is not None and self._quarantine.held < _MOST_HELD
+        return self._clock.estimate is not None and len(self._quarantine.held) < _MOST_HELD
 
     def round_trip_ns(self, link: int) -> int | None:
         """Return the least recent round trip over one link, ns; None before its first echo."""
@@ -145,28 +145,28 @@ class Border:
             passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns)
         else:
             passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns - _WAIT_NS)
-        return [known for arrival in passed for known in self._examine(arrival)]
+        return [(arrival.link, known) for arrival in passed if (known := self._examine(arrival)) is not None]
 
-    def admit(self, arrival: Arrival) -> list[Admitted]:
+    def admit(self, arrival: Arrival) -> BoardFrame | None:
         """Take a frame that has come.
 
         Args:
             arrival: what came.
 
         Returns:
-            The frame with its marks on the host's clock, if it may pass now. Empty if it was dropped or must wait for
+            The frame with its marks on the host's clock, if it may pass now. None if it was dropped or must wait for
             an echo.
         """
         if self._clock.estimate is None and not self._clock.in_doubt:
             self._account.no_clock += 1
-            return []
+            return None
         known = self._examine(arrival)
-        if not known or arrival.camera.pacing is Pacing.DEMAND:
+        if known is None or arrival.camera.pacing is Pacing.DEMAND:
             return known
-        transit_ns = arrival.received_ns - known[0][1].marks.sent_ns
+        transit_ns = arrival.received_ns - known.marks.sent_ns
         sent_ns, period_ns = arrival.frame.marks.sent_ns, arrival.camera.period_ns
         passes = self._quarantine.arrived(arrival, sent_ns, transit_ns, period_ns, arrival.received_ns)
-        return known if passes else []
+        return known if passes else None
 
     def tick(self, now_ns: int) -> None:
         """Let time pass: drop and count frames that no echo has proven in time."""
@@ -176,20 +176,20 @@ class Border:
                 "frame_unproven", arrival.account.disbelieved[Disbelief.UNPROVEN], why="the board answers no echo"
             )
 
-    def _examine(self, arrival: Arrival) -> list[Admitted]:
-        """Map a frame's marks to the host's clock. If that is impossible, count the reason and return nothing."""
+    def _examine(self, arrival: Arrival) -> BoardFrame | None:
+        """Map a frame's marks to the host's clock. If that is impossible, count the reason and return None."""
         frame, estimate = arrival.frame, self._clock.estimate
         reason = Disbelief.CLOCK if estimate is None else self._doubts(arrival, estimate)
         if estimate is None or reason is not None:
             arrival.account.disbelieved[reason or Disbelief.CLOCK] += 1
-            return []
+            return None
         # Only `sent` is mapped to the host's clock, once, when the frame is believed. The other marks keep their
         # distance from it.
         sent_ns = frame.marks.sent_ns
         offset_ns, uncertainty_ns = estimate.offset_at(sent_ns), estimate.uncertainty_at(sent_ns)
         name, asked_px = self._account.links[arrival.link].name, (arrival.camera.width_px, arrival.camera.height_px)
         marks = frame.marks.moved_to(sent_ns + offset_ns)
-        known = BoardFrame(
+        return BoardFrame(
             message=frame,
             link=name,
             marks=marks,
@@ -199,7 +199,6 @@ class Border:
             asked_px=asked_px,
             orientation=arrival.camera.orientation,
         )
-        return [(arrival.link, known)]
 
     def _doubts(self, arrival: Arrival, estimate: ClockEstimate) -> Disbelief | None:
         frame, camera = arrival.frame, arrival.camera
@@ -211,9 +210,12 @@ class Border:
         arrived_ns = arrival.received_ns - estimate.offset_at(arrival.received_ns - estimate.offset_ns)
         # Computing the bound takes some us, so do it only if it decides: a frame that arrived after it was sent is
         # within any bound.
-        newest_ns = max(frame.marks.exposed_ns, frame.marks.grabbed_ns, frame.marks.sent_ns)
-        bound_ns = 0 if newest_ns <= arrived_ns else estimate.bound_at(arrived_ns)
-        return disbelief(frame.marks, arrived_ns, bound_ns, labelled=labelled)
+        marks = frame.marks
+        if marks.exposed_ns <= marks.grabbed_ns <= marks.sent_ns <= arrived_ns:
+            bound_ns = 0
+        else:
+            bound_ns = estimate.bound_at(arrived_ns)
+        return disbelief(marks, arrived_ns, bound_ns, labelled=labelled)
 
     def passed(self, frame: FrameMessage) -> None:
         """Take note of a frame that was passed on. Until an echo proves it, a clock step makes it suspect."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from common import now
 from common.errors import ProtocolError
-from common.link.base import Broken, Garbage, Incoming, Link
+from common.link.base import Broken, Link, Packet
 from common.link.several import SeveralLinks
 from common.link.waiter import Waiter
 from common.protocol.message import BoardHello, Locks, LockState, Ping
@@ -21,6 +21,8 @@ from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
+
+_NEVER: Final = 2**63 - 1
 
 _LONGEST_WAIT_MS: Final = 50
 """Longest time between two ticks of the sink."""
@@ -43,6 +45,8 @@ class Receiver:
         self, links: Sequence[Link], host_id: str, sink: FrameSink, listener: BoardListener | None = None
     ) -> None:
         self._links = tuple(links)
+        self._prefixes = tuple(connection_name(number, b"") for number in range(len(links)))
+        self._looked_ns = now.monotonic_ns()
         self._several = SeveralLinks(links)
         facts = [
             LinkFacts(
@@ -161,19 +165,30 @@ class Receiver:
     def _receive(self) -> None:
         """Take everything that has come."""
         for number, incoming in self._several.receive():
-            self._take(number, incoming, now.monotonic_ns())
+            now_ns = now.monotonic_ns()
+            connection = self._prefixes[number] + incoming.connection
+            if isinstance(incoming, Packet):
+                self._take(connection, incoming, now_ns)
+            elif isinstance(incoming, Broken):
+                self._reception.interrupted(connection, now_ns)
+            else:
+                self._reception.count_garbage("not a packet")
 
     def _step(self) -> None:
-        now_ns = now.monotonic_ns()
-        links_due_ns = min([link.due_ns for link in self._links])
-        wait_ns = min(self._reception.due_ns, links_due_ns) - now_ns
+        """Wait, and do what has come or is due. Runs for each frame, so the clock is read no more often than decides something."""
+        links_due_ns = _NEVER
+        for link in self._links:
+            links_due_ns = min(links_due_ns, link.due_ns)
+        wait_ns = min(self._reception.due_ns, links_due_ns) - self._looked_ns
         ready = self._waiter.wait(min(_LONGEST_WAIT_MS, -(-wait_ns // 1_000_000)) if wait_ns > 0 else 0)
-        self._watch_clock()
+        slept_ns, jumped = self._standstill.look()
+        if slept_ns or jumped:
+            self._note_standstill(slept_ns)
         if ready or now.monotonic_ns() >= links_due_ns:
             self._receive()
             if self._wake_read in ready:
                 os.read(self._wake_read, 4096)
-        now_ns = now.monotonic_ns()
+        self._looked_ns = now_ns = now.monotonic_ns()
         self._reception.tick(now_ns)
         if self._corrections.is_due:
             self._hand_on_corrections(now_ns)
@@ -186,32 +201,24 @@ class Receiver:
         if (later_ns := self._corrections.take()) and self._steered_session in {"", hello.session}:
             self._reception.steer(later_ns, now_ns)
 
-    def _watch_clock(self) -> None:
-        """Notice that this machine's clock stood still, or may have, before taking anything that came meanwhile."""
-        slept_ns, jumped = self._standstill.look()
+    def _note_standstill(self, slept_ns: int) -> None:
+        """Handle that this machine's clock stood still, or may have, before taking anything that came meanwhile."""
         if slept_ns:
             self._reception.slept(slept_ns, now.monotonic_ns())
-        elif jumped:
+        else:
             self._reception.doubt_clock(
                 "the time of day was set: this machine may have stood still", now.monotonic_ns()
             )
 
-    def _take(self, link: int, incoming: Incoming, now_ns: int) -> None:
-        reception, connection = self._reception, connection_name(link, incoming.connection)
-        if isinstance(incoming, Broken):
-            reception.interrupted(connection, now_ns)
-            return
-        if isinstance(incoming, Garbage):
-            reception.count_garbage("not a packet")
-            return
+    def _take(self, connection: bytes, packet: Packet, now_ns: int) -> None:
         try:
-            message = decode(incoming.header, incoming.payload)
+            message = decode(packet.header, packet.payload)
         except VersionError as error:
-            reception.refuse_version(connection, error.theirs, now_ns)
+            self._reception.refuse_version(connection, error.theirs, now_ns)
         except ProtocolError as error:
-            reception.count_garbage(error.problem)
+            self._reception.count_garbage(error.problem)
         else:
-            reception.receive(connection, message, now_ns)
+            self._reception.receive(connection, message, now_ns)
 
     def _send(self, outgoing: Outgoing) -> None:
         link = self._links[outgoing.connection[0]]

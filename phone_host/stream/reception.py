@@ -34,6 +34,7 @@ from common.protocol.session import (
     Output,
     Refused,
     Stale,
+    StaleReason,
     Stepped,
     Unbelievable,
     Vanished,
@@ -55,6 +56,11 @@ _LOG = logging.getLogger(__name__)
 
 class Reception:
     """The board as this host knows it.
+
+    Attributes:
+        account: the links' account so far.
+        tail_known: whether the board has told the last account of this session.
+        due_ns: when to call `tick` next even if nothing comes, ns; as of the last `tick`.
 
     Args:
         links: the links' facts, the preferred link first.
@@ -84,7 +90,10 @@ class Reception:
         self._streamed_over: int | None = None
         self._refusals = Refusals()
         self._locks = LockAsking()
-        self._due_ns = 0
+        self.due_ns = 0
+        self._has_news = True
+        self._is_choosing = len(links) > 1
+        self._is_paced = any(link.self_paced for link in links)
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
         self._border = Border(self.account, sink.void)
@@ -124,11 +133,6 @@ class Reception:
         """Whether the board's camera has reached the end of its images."""
         return bool(self.account.sessions) and self.account.sessions[-1].ended
 
-    @property
-    def due_ns(self) -> int:
-        """When to call `tick` next even if nothing comes, ns; as of the last `tick`."""
-        return self._due_ns
-
     def receive(self, connection: bytes, message: Message, now_ns: int) -> None:
         """Take a message.
 
@@ -137,6 +141,14 @@ class Reception:
             message: the message.
             now_ns: arrival of its last byte, ns.
         """
+        if isinstance(message, FrameMessage):
+            lost, link = self._session.take_frame(connection[0], message, now_ns), connection[0]
+            if isinstance(lost, StaleReason):
+                self.account.current.count_stale(lost)
+            else:
+                self._accept_frame(message, lost, link, now_ns)
+            return
+        self._has_news = True
         self._handle(self._session.receive(connection, message, now_ns), now_ns)
 
     def refuse_version(self, connection: bytes, theirs: int, now_ns: int) -> None:
@@ -157,24 +169,32 @@ class Reception:
 
     def interrupted(self, connection: bytes, now_ns: int) -> None:
         """Take note that a connection broke."""
+        self._has_news = True
         self._handle(self._session.interrupted(connection, now_ns), now_ns)
 
     def tick(self, now_ns: int) -> None:
         """Do what is due, and grant credit if there is room for frames."""
+        if self._has_news or now_ns >= self.due_ns:
+            self._attend(now_ns)
+        self._sink.tick()
+        self._grant(now_ns)
+
+    def _attend(self, now_ns: int) -> None:
+        """Do what is due. A frame that passes makes nothing due: it only shows that its link is alive."""
+        self._has_news = False
         if self._border.waits_for_echo:
+            self._has_news = True
             self._border.tick(now_ns)
             self._session.probe(now_ns)
+        if self._locks.is_due(now_ns):
+            self._handle(self._session.set_locks(self._locks.wanted), now_ns)
         due_ns = self._session.due_ns
         if now_ns >= due_ns:
             self._handle(self._session.tick(now_ns), now_ns)
-            if len(self._links) > 1 and (best := self._choice.best(now_ns)) is not None:
+            if self._is_choosing and (best := self._choice.best(now_ns)) is not None:
                 self._handle(self._session.carry(best, now_ns), now_ns)
             due_ns = self._session.due_ns
-        if self._locks.is_due(now_ns):
-            self._handle(self._session.set_locks(self._locks.wanted), now_ns)
-        self._sink.tick()
-        self._grant(now_ns)
-        self._due_ns = due_ns
+        self.due_ns = due_ns
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
@@ -184,14 +204,17 @@ class Reception:
     def hold(self, locks: Locks) -> None:
         """Have the board's camera held like this, in this session and every later one."""
         self._locks.want(locks)
+        self._has_news = True
 
     def slept(self, slept_ns: int, now_ns: int) -> None:
         """Take note that this machine has slept: its clock stood still while the board's and the cameras' went on."""
+        self._has_news = True
         self._border.slept(slept_ns)
         self._handle(self._session.begin_clock(now_ns), now_ns)
 
     def doubt_clock(self, why: str, now_ns: int) -> None:
         """Take note that this machine's clock may have stood still. An echo asked for from now on will tell."""
+        self._has_news = True
         self._border.void(why)
         self._handle(self._session.begin_clock(now_ns), now_ns)
 
@@ -216,16 +239,23 @@ class Reception:
             _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
 
     def _grant(self, now_ns: int) -> None:
-        carrier, hello = self._session.carrier, self._hello
-        if carrier is None or hello is None or not self._border.takes_frames:
-            return  # without a clock, frames could not be paired
-        if (room := self._sink.room()) is not None:
-            self._handle(self._session.grant(room), now_ns)
+        if self._hello is None:
             return
-        round_trip_ns = (self._border.round_trip_ns(carrier) or 0) if self._links[carrier].self_paced else None
-        frames = self._flow.credit(self._session.outstanding, hello.camera.period_ns, round_trip_ns)
-        if frames:
+        if (frames := self._sink.room()) is None:
+            outstanding, round_trip_ns = (
+                self._session.outstanding,
+                self._paced_round_trip_ns() if self._is_paced else None,
+            )
+            frames = self._flow.credit(outstanding, self._hello.camera.period_ns, round_trip_ns)
+        if frames and self._border.takes_frames:  # without a clock, frames could not be paired
             self._handle(self._session.grant(frames), now_ns)
+
+    def _paced_round_trip_ns(self) -> int | None:
+        """Round trip of the carrier if it paces itself, ns; 0 before its first echo."""
+        carrier = self._session.carrier
+        if carrier is None or not self._links[carrier].self_paced:
+            return None
+        return self._border.round_trip_ns(carrier) or 0
 
     def _handle(self, outputs: list[Output], now_ns: int) -> None:  # noqa: C901 - one line for each kind of output
         for output in outputs:
@@ -371,16 +401,17 @@ class Reception:
 
     def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
         """Count a frame of the present session and give it to the border."""
-        account, tally = self.account.current, self.account.links[link]
+        account, tally = self.account.sessions[-1], self.account.links[link]
         account.received += 1
         account.lost += lost
         tally.frames += 1
         tally.bytes += len(frame.payload)
         assert self._hello is not None
-        for passed in self._border.admit(
-            Arrival(frame=frame, link=link, account=account, camera=self._hello.camera, received_ns=now_ns)
-        ):
-            self._pass(*passed)
+        arrival = Arrival(frame, link, account, self._hello.camera, now_ns)
+        if (believed := self._border.admit(arrival)) is None:
+            self._has_news = True
+        else:
+            self._pass(link, believed)
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
         """Pass a believed frame to the sink, if the sink wants it."""
@@ -390,7 +421,8 @@ class Reception:
             return
         message, marks = frame.message, frame.marks
         transit_ns = frame.received_ns - marks.sent_ns
-        self._choice.frame(link, transit_ns, frame.received_ns)
+        if self._is_choosing:
+            self._choice.frame(link, transit_ns, frame.received_ns)
         self._flow.arrived(
             transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, frame.received_ns
         )

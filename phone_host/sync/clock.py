@@ -135,7 +135,7 @@ class ClockEstimate:
         It grows with the distance from the echoes.
         """
         age_ns = board_ns - self.reference_ns
-        grown = self.skew_uncertainty * abs(age_ns) + widening_ns(age_ns)
+        grown = self.skew_uncertainty * abs(age_ns) + SKEW_CHANGE / 2 * age_ns * age_ns  # widening_ns, once per frame
         total_ns = self.uncertainty_ns + math.ceil(grown)
         # The bound is at least half of the limits' distance, which never gets smaller. It takes longer to compute than all of this.
         return total_ns if 2 * total_ns <= self.high_ns - self.low_ns else min(total_ns, self.bound_at(board_ns))

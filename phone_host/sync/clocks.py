@@ -22,21 +22,18 @@ class LinkClocks:
     Args:
         links: number of links.
 
-    Attributes: since_ns: board's time of the first echo after the last doubt. Earlier stamps may come from a clock that
-        has stepped since. None: no doubt yet.
+    Attributes:
+        estimate: the present estimate; None before the first echo, and while echoes contradict each other.
+        since_ns: board's time of the first echo after the last doubt. Earlier stamps may come from a clock that has
+            stepped since. None: no doubt yet.
     """
 
     def __init__(self, links: int) -> None:
         self._estimators = [ClockEstimator() for _ in range(links)]
-        self._estimate: ClockEstimate | None = None
+        self.estimate: ClockEstimate | None = None
         self._believed: ClockEstimate | None = None
         self._contested = self._void = False
         self.since_ns: int | None = None
-
-    @property
-    def estimate(self) -> ClockEstimate | None:
-        """The present estimate; None before the first echo, and while echoes contradict each other."""
-        return self._estimate
 
     @property
     def in_doubt(self) -> bool:
@@ -70,8 +67,8 @@ class LinkClocks:
             heard = Heard.AGREED if self._fits_what_was_believed(estimator.estimate) else Heard.STEPPED
             self._void = False
             self.since_ns = estimator.began_ns
-        self._estimate = None if self.in_doubt else self._solved(estimator.estimate)
-        self._believed = self._estimate or self._believed
+        self.estimate = None if self.in_doubt else self._solved(estimator.estimate)
+        self._believed = self.estimate or self._believed
         return heard
 
     def void(self, *, stepped: bool = False) -> None:
@@ -85,7 +82,7 @@ class LinkClocks:
         self._believed = None if stepped else self._believed
         self._forget(keep=None)
         self._void, self._contested = True, False
-        self._estimate = None
+        self.estimate = None
 
     def down(self, link: int) -> None:
         """Take note that a link is gone.
@@ -118,7 +115,7 @@ class LinkClocks:
 
     def _solved(self, newest: ClockEstimate | None) -> ClockEstimate | None:
         if newest is None:
-            return self._estimate
+            return self.estimate
         moment_ns = newest.reference_ns
         known = [moved(own, moment_ns) for one in self._estimators if (own := one.estimate) is not None]
         best = min(known, key=lambda one: one.uncertainty_ns)

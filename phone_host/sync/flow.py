@@ -87,7 +87,11 @@ class Flow:
         """
         self._newest_ns = transit_ns
         transit_ns = max(1, transit_ns)
-        self._keep_least(transit_ns, now_ns)
+        if self._window == 1 and now_ns - self._base_since_ns >= _BASE_SPAN_NS:
+            # Keep the least of this span and the previous one. A new span begins only with one frame in flight: queued
+            # frames tell nothing about an empty link.
+            self._base_before_ns, self._base_ns, self._base_since_ns = self._base_ns, transit_ns, now_ns
+        self._base_ns = min(self._base_ns or transit_ns, transit_ns)
         self._arrivals += 1
         if self._arrivals <= self._window:
             self._transit_ns = transit_ns  # sent before the window changed
@@ -109,12 +113,3 @@ class Flow:
     def _change(self, by: int) -> None:
         self._window += by
         self._arrivals = 0
-
-    def _keep_least(self, transit_ns: int, now_ns: int) -> None:
-        """Keep the least transit time of this span and the previous one.
-
-        A new span begins only with one frame in flight: queued frames tell nothing about an empty link.
-        """
-        if self._window == 1 and now_ns - self._base_since_ns >= _BASE_SPAN_NS:
-            self._base_before_ns, self._base_ns, self._base_since_ns = self._base_ns, transit_ns, now_ns
-        self._base_ns = min(self._base_ns or transit_ns, transit_ns)

@@ -66,6 +66,8 @@ def disbelief(marks: BoardMarks, received_ns: int, bound_ns: int, *, labelled: b
     Returns:
         The reason to disbelieve the frame; None if nothing is impossible.
     """
+    if marks.exposed_ns <= marks.grabbed_ns <= marks.sent_ns <= received_ns <= marks.exposed_ns + _HISTORY_NS:
+        return None  # the usual case; it passes each of the tests below
     exposed_ns = marks.grabbed_ns if labelled else marks.exposed_ns
     if max(exposed_ns, marks.sent_ns) > received_ns + bound_ns:
         return Disbelief.FUTURE
@@ -77,7 +79,7 @@ def disbelief(marks: BoardMarks, received_ns: int, bound_ns: int, *, labelled: b
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Held(Generic[F]):
+class Held(Generic[F]):
     """A waiting frame: when it was sent (board's clock), its transit time, and its wait's begin (host's clock), ns."""
 
     frame: F
@@ -87,16 +89,15 @@ class _Held(Generic[F]):
 
 
 class Quarantine(Generic[F]):
-    """Lets frames pass in order of arrival. Frames that need an echo's confirmation wait for it."""
+    """Lets frames pass in order of arrival. Frames that need an echo's confirmation wait for it.
+
+    Attributes:
+        held: the frames that wait for an echo, the oldest first.
+    """
 
     def __init__(self) -> None:
         self._recent: deque[int] = deque(maxlen=_RECENT)
-        self._held: deque[_Held[F]] = deque()
-
-    @property
-    def held(self) -> int:
-        """Frames that wait for an echo."""
-        return len(self._held)
+        self.held: deque[Held[F]] = deque()
 
     def arrived(self, frame: F, sent_ns: int, transit_ns: int, period_ns: int, now_ns: int) -> bool:
         """Take a frame.
@@ -111,10 +112,13 @@ class Quarantine(Generic[F]):
         Returns:
             Whether it may pass now. If not, it is kept until `confirmed`, `expired` or `void` returns it.
         """
-        if not self._held and self._is_usual(transit_ns, period_ns):
-            self._recent.append(transit_ns)
-            return True
-        self._held.append(_Held(frame=frame, sent_ns=sent_ns, transit_ns=transit_ns, since_ns=now_ns))
+        recent = self._recent
+        if recent and not self.held:
+            slack_ns = STEP_PERIODS * period_ns
+            if max(recent) - slack_ns < transit_ns < min(recent) + slack_ns:
+                recent.append(transit_ns)
+                return True
+        self.held.append(Held(frame=frame, sent_ns=sent_ns, transit_ns=transit_ns, since_ns=now_ns))
         return False
 
     def confirmed(self, board_ns: int, before_ns: int) -> list[F]:
@@ -125,8 +129,8 @@ class Quarantine(Generic[F]):
             before_ns: only frames whose wait began by this moment may pass, host's clock, ns.
         """
         passed = []
-        while self._held and self._held[0].sent_ns <= board_ns and self._held[0].since_ns <= before_ns:
-            held = self._held.popleft()
+        while self.held and self.held[0].sent_ns <= board_ns and self.held[0].since_ns <= before_ns:
+            held = self.held.popleft()
             self._recent.append(held.transit_ns)
             passed.append(held.frame)
         return passed
@@ -134,22 +138,16 @@ class Quarantine(Generic[F]):
     def expired(self, now_ns: int) -> list[F]:
         """Give up and return frames that waited too long: a board that does not answer cannot be believed."""
         dropped = []
-        while self._held and now_ns - self._held[0].since_ns > PATIENCE_NS:
-            dropped.append(self._held.popleft().frame)
+        while self.held and now_ns - self.held[0].since_ns > PATIENCE_NS:
+            dropped.append(self.held.popleft().frame)
         return dropped
 
     def void(self) -> list[F]:
         """Take note that the clock is in doubt or begins anew. Return the frames that will not pass."""
-        dropped = [held.frame for held in self._held]
-        self._held.clear()
+        dropped = [held.frame for held in self.held]
+        self.held.clear()
         self._recent.clear()
         return dropped
-
-    def _is_usual(self, transit_ns: int, period_ns: int) -> bool:
-        if not self._recent:
-            return False
-        slack_ns = STEP_PERIODS * period_ns
-        return max(self._recent) - slack_ns < transit_ns < min(self._recent) + slack_ns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,6 +20,7 @@ EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup   
   phone-host scan left/ right/ --calibration rig.yaml --box 400x300x400@0,100,900 --out cup    # only what is in this box
   phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
   phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --record cup.mcap --out cup    # live
+  phone-host scan left/ right/ --calibration rig.yaml --turntable --out cup    # the cup was turned, the cameras stood still
   phone-host scan left/ right/ --calibration rig.yaml --resume cup --out cup    # go on after it was killed
   phone-host scan --replay session.mcap --calibration rig.yaml --out cup    # every pair of a recording
 """
@@ -40,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_overlay_argument(parser)
     add_image_arguments(parser)
     add_model_arguments(parser)
+    _add_turntable_argument(parser)
     _add_resume_argument(parser)
     parser.add_argument(
         "--out",
@@ -98,6 +100,15 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         default=300e6,
         metavar="SIZE",
         help="memory of the model at most; what does not fit is left out, and told (default 300MB)",
+    )
+
+
+def _add_turntable_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--turntable",
+        action="store_true",
+        help="the cameras stand still and an object turns before them, on anything or by hand, about one axis and by 3 to 15 degrees between the"
+        " pairs; background and table are left out, and the turn is closed after 360 degrees",
     )
 
 

@@ -38,6 +38,7 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
+        turntable=options.turntable,
     )
 
 
@@ -54,6 +55,10 @@ def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
     """
     if options.resume is None:
         return ()
+    if options.turntable:
+        raise SettingsError(
+            "--resume beside --turntable: the end needs all of its pairs", "scan the pictures or the recording again"
+        )
     try:
         submaps = read_submaps(options.resume)
     except OSError as error:

@@ -1,0 +1,277 @@
+"""A scan of a thing that turns before cameras that stand still, on a turntable or by hand, without a mat. Pure.
+
+While pairs come, the thing is told from the background and tracked like any scene: in its own axes the cameras go around it. The views are kept. In the
+end one axis and all angles are fitted to them (`full_turn`), the background is learnt from all of them, and the model is made again from the start.
+
+Views are kept in memory, cropped to the thing, one every two degrees, some 0.3 MB each, and never more than `_MOST_BYTES`; folders are not read twice.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.geometry.se3 import SE3, vectors_of
+from phone_host.model import Processed
+from phone_host.scan.fineness import fineness_for
+from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
+from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted, require_size, view_of
+from phone_host.scan.table_cut import above, points_of, table_height_m
+from phone_host.scan.tracker import PoseGate, Tracker
+from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.turning_background import Background
+from phone_host.scan.turning_mask import Turning, TurningMask
+from phone_host.scan.view import View
+from phone_host.scan.volume import Volume
+from phone_host.stereo.images import size_px
+
+_LEAST_TURN: Final = 0.035
+"""rad from one kept view to the next, 2 degrees."""
+
+_MOST_TURN: Final = 2 * np.pi + 0.6
+"""rad after which no more views are kept: a whole turn, and enough to see that it is closed."""
+
+_MOST_BYTES: Final = 200_000_000
+
+_WORDS: Final = {
+    Turning.NOTHING: Weakness.NOTHING_TURNS,
+    Turning.EVERYTHING: Weakness.ALL_TURNS,
+    Turning.OUTSIDE: Weakness.OUTSIDE,
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Station:
+    """A view that is kept: the pair's number, the view with the depths of the background, the thing's pixels, where tracking puts the camera, and how surely."""
+
+    pair: int
+    view: View
+    mask: NDArray[np.bool_]
+    world_camera: SE3
+    is_sure: bool
+
+    @property
+    def thing(self) -> View:
+        """The view without the depths of the background."""
+        return _masked(self.view, self.mask)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Finished:
+    """The end of a scan: how many pairs were taken, the turn, and the volume made again."""
+
+    taken: int
+    turn: FullTurn | None
+    volume: Volume | None
+
+
+def scan_for(wanted: ScanWanted) -> Scan:
+    """Return what takes the pairs of a scan: of cameras that move, or of an object that turns.
+
+    Args:
+        wanted: what for.
+    """
+    return TurntableScan(wanted) if wanted.turntable else Scan(wanted)
+
+
+class TurntableScan(Scan):
+    """Takes pairs of a thing that turns and grows a model of it.
+
+    Args:
+        wanted: what for.
+    """
+
+    def __init__(self, wanted: ScanWanted) -> None:
+        super().__init__(wanted)
+        self._mask = TurningMask()
+        self._waiting: tuple[int, View] | None = None
+        self._last: ScannedPair | None = None
+        self._window: tuple[slice, slice] | None = None
+        self._stations: list[_Station] = []
+        self._least_turn = _LEAST_TURN
+        self._turned = 0.0
+        self._direction = np.zeros(3)
+        self._finished: _Finished | None = None
+
+    @property
+    def is_submap_due(self) -> bool:
+        """Never: what the end needs are the views."""
+        return False
+
+    @property
+    def volume(self) -> Volume | None:
+        """The model; in the end the one that was made again."""
+        finished = self._finished
+        return super().volume if finished is None or finished.volume is None else finished.volume
+
+    @property
+    def turn(self) -> FullTurn | None:
+        """The turn, once the model was asked for; None: too few views agree on an axis."""
+        return None if self._finished is None else self._finished.turn
+
+    @property
+    def views(self) -> int:
+        """How many views are kept."""
+        return len(self._stations)
+
+    def take(self, name: str, stamp_s: float, processed: Processed) -> ScannedPair:
+        """Take the next pair.
+
+        Args:
+            name: of the pair.
+            stamp_s: when it was taken, s.
+            processed: with disparity and cloud.
+
+        Returns:
+            What became of it.
+
+        Raises:
+            DataError: its size is not that of the pairs before it.
+        """
+        view = view_of(processed)
+        if not self._pairs:
+            self.geometry, self.size_px = view.geometry, size_px(view.grey)
+        require_size(name, view, self.size_px)
+        density = float(np.isfinite(view.depth_m).mean())
+        found = self._mask.take(view.grey, view.depth_m, view.geometry)
+        if found.turning is Turning.THING and self._waiting is not None:
+            self._take_waiting()
+        if density < PoseGate().least_depths:
+            pair = _lost(name, stamp_s, density, Weakness.NO_DEPTH)
+        elif found.turning is Turning.NOTHING and self._last is not None:
+            pair = replace(self._last, name=name, stamp_s=stamp_s, density=density)  # it pauses, or turns slowly
+        elif found.turning is not Turning.THING:
+            if not self._stations:
+                self._waiting = len(self._pairs), view
+            pair = _lost(name, stamp_s, density, _WORDS[found.turning])
+        else:
+            pair = self._tracked(len(self._pairs), view, found.mask, (name, stamp_s, density))
+        self._pairs.append(pair)
+        if pair.is_fused:
+            self._last = pair
+        return pair
+
+    def final(self, pair: ScannedPair) -> ScannedPair:
+        """Return what has become of a pair in the end: the views of the turn lie on its circle.
+
+        Args:
+            pair: as it was told when it was taken.
+        """
+        return next((each for each in self._pairs if each.name == pair.name), pair)
+
+    def model(self) -> ScanModel:
+        """Return the surface so far, made from all views together once there are enough of them."""
+        if self._finished is None or self._finished.taken != len(self._pairs):
+            self._finished = self._end()
+        return super().model()
+
+    def _tracked(
+        self, number: int, view: View, mask: NDArray[np.bool_], told_of: tuple[str, float, float]
+    ) -> ScannedPair:
+        """Track a view of the thing; keep it if it is fused and shows it from a new side."""
+        rows, columns = self._window_of(view)
+        cropped = _cropped(view, rows, columns)
+        own = np.ascontiguousarray(mask[rows, columns])
+        thing = _masked(cropped, own)
+        if self.tracker is None:
+            self.tracker = Tracker(
+                fineness_for(thing, self._wanted.voxel_m, self._wanted.most_bytes), self._wanted.threads
+            )
+        told = self.tracker.track(thing)
+        # The axis tells what a small or round thing does not.
+        weakness = Weakness.NONE if told.weakness is Weakness.FLAT else told.weakness
+        state = Tracking.TRACKING if told.state is Tracking.WEAK and weakness is Weakness.NONE else told.state
+        if told.is_fused or told.moved.is_known:
+            self._keep(_Station(number, cropped, own, told.world_camera, told.is_fused))
+        name, stamp_s, density = told_of
+        return ScannedPair(
+            name=name,
+            stamp_s=stamp_s,
+            world_camera=told.world_camera,
+            state=state,
+            weakness=weakness,
+            density=density,
+            corners=told.moved.inliers,
+            overlap=np.nan if told.fit is None else told.fit.overlap,
+            off_m=np.nan if told.fit is None else told.fit.off_m,
+        )
+
+    def _take_waiting(self) -> None:
+        """Take the view before the first one in which something had turned: now it is known what."""
+        assert self._waiting is not None
+        (number, view), self._waiting = self._waiting, None
+        mask = self._mask.before(view.depth_m, view.geometry)
+        pair = self._pairs[number]
+        self._pairs[number] = self._tracked(number, view, mask, (pair.name, pair.stamp_s, pair.density))
+
+    def _window_of(self, view: View) -> tuple[slice, slice]:
+        if self._window is None:
+            assert self._mask.ball is not None
+            self._window = self._mask.ball.window(view.grey.shape, view.geometry)
+        return self._window
+
+    def _keep(self, station: _Station) -> None:
+        if self._stations:
+            step = vectors_of((self._stations[-1].world_camera.inverse() @ station.world_camera).R)
+            self._direction = self._direction + (step if step @ self._direction >= 0 else -step)
+            along = float(step @ self._direction) / max(float(np.linalg.norm(self._direction)), 1e-9)
+            if np.linalg.norm(step) < self._least_turn or self._turned > _MOST_TURN:
+                return
+            self._turned += along
+        self._stations.append(station)
+        if sum(each.view.grey.nbytes * 8 + each.mask.nbytes for each in self._stations) > _MOST_BYTES:
+            self._stations, self._least_turn = self._stations[::2], 2 * self._least_turn
+
+    def _end(self) -> _Finished:
+        """Fit the turn, and make the model again."""
+        taken, settings = len(self._pairs), self.settings
+        if settings is None or len(self._stations) < LEAST_VIEWS:
+            return _Finished(taken, None, None)
+        background = Background(
+            [each.view.grey for each in self._stations], [each.view.depth_m for each in self._stations]
+        )
+        things = [
+            _masked(each.view, each.mask & ~background.is_seen(each.view.grey, each.view.depth_m))
+            for each in self._stations
+        ]
+        given = [
+            TurnView(thing, each.world_camera, each.is_sure) for thing, each in zip(things, self._stations, strict=True)
+        ]
+        turn = full_turn(given, settings, self._wanted.threads)
+        if turn is None:
+            return _Finished(taken, None, None)
+        volume = Volume(settings, self._wanted.threads)
+        still = points_of(background.depth_m, self._stations[0].view.geometry)
+        seen = np.concatenate([points_of(thing.depth_m, thing.geometry) for thing in things[:LEAST_VIEWS]])
+        height_m = table_height_m(still, seen, turn.axis, settings.voxel_m)
+        for station, thing, angle, is_used in zip(self._stations, things, turn.angles, turn.used, strict=True):
+            if is_used:
+                pose = turn.axis.camera_world(float(angle)).inverse()
+                volume.fuse(above(thing, turn.axis, height_m, settings.voxel_m), pose)
+                pair = replace(self._pairs[station.pair], world_camera=pose)
+                if not station.is_sure:  # the others have shown where it belongs
+                    pair = replace(pair, state=Tracking.RELOCALISED, weakness=Weakness.NONE)
+                self._pairs[station.pair] = pair
+        return _Finished(taken, turn, volume)
+
+
+def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPair:
+    return ScannedPair(
+        name=name, stamp_s=stamp_s, world_camera=SE3.identity(), state=Tracking.LOST, weakness=why, density=density
+    )
+
+
+def _cropped(view: View, rows: slice, columns: slice) -> View:
+    geometry = view.geometry
+    return replace(
+        view,
+        grey=view.grey[rows, columns].copy(),
+        colours=view.colours[rows, columns].copy(),
+        depth_m=view.depth_m[rows, columns].copy(),
+        geometry=replace(geometry, cx_px=geometry.cx_px - columns.start, cy_px=geometry.cy_px - rows.start),
+    )
+
+
+def _masked(view: View, mask: NDArray[np.bool_]) -> View:
+    return replace(view, depth_m=np.where(mask, view.depth_m, np.float32(np.nan)))
