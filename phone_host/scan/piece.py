@@ -28,6 +28,9 @@ _PARTNER_VOXELS: Final = 10
 _FLOOR_VOXELS: Final = 0.3
 """The surface's own noise: what is left of a voxel between its values."""
 
+_ROUNDING_VOXELS: Final = 0.05
+"""A surface is no more exact: without noise, views of one plane are 0.2 mm off voxels of 20 mm, and those of the next plane twice that."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseGate:
@@ -117,7 +120,8 @@ class Piece:
         far = np.linalg.norm(correction[3:]) > gate.most_shift_m or np.linalg.norm(correction[:3]) > gate.most_turn
         if far:
             return Weakness.TOO_FAST
-        if fit.near < gate.least_near or fit.off_m > gate.most_off * self.usual_off_m:
+        usual_m = np.maximum(self.usual_off_m, _ROUNDING_VOXELS * self.volume.settings.voxel_m)
+        if fit.near < gate.least_near or fit.off_m > gate.most_off * usual_m:
             return Weakness.POOR_FIT
         return Weakness.NONE
 

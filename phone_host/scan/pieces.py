@@ -178,20 +178,23 @@ class Pieces:
                 self._loops.append(self._loop(number, other.pose @ pose.inverse()))
         return found
 
-    def join(self, view: View, pose: SE3, met: Found) -> tuple[Joined, ...]:
+    def join(self, view: View, pose: SE3, met: Found, *, least: int = 0) -> tuple[Joined, ...]:
         """Take the piece that is tracked, and those connected with it, into the model; that is tracked from now on.
 
         Args:
             view: that belongs to both.
             pose: where it was taken, in the piece's axes.
             met: the same in the model's.
+            least: earlier views of the piece that must fit the model, too.
 
         Returns:
-            Their views; none: the piece contradicts the model, and stays apart.
+            Their views; none: the piece contradicts the model, and stays apart, or the model is tracked already.
         """
+        if self._active == _MODEL:
+            return ()
         loop = self._loop(_MODEL, met.pose @ pose.inverse())
         others = self._also(view, loop)
-        if others is None:
+        if others is None or len(others) < least:
             return ()
         self._loops += [loop, *others]
         self._start(loop)

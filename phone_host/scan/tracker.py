@@ -6,7 +6,7 @@ A camera that is lost goes on in a piece of its own, until one of its views show
 (`pieces`). Nothing that a view shows raises an exception.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -27,6 +27,8 @@ _ODOMETRY: Final = OdometrySettings(corners=400, apart_px=8, keyframe_share=0.6,
 """The model carries the accuracy; odometry, on half the image, only has to start near it. At VGA that saves 20 of 30 ms of processor time."""
 
 _DIRECTIONS: Final = 6
+_CONFIRMED: Final = 1
+"""Views of a piece that must fit the model where the one that leaves it tells its place by corners alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -125,7 +127,7 @@ class Tracker:
             if active is self._model:
                 return self._fused(view, pose, moved, weakness, fit)
             return self._apart(view, pose, moved, weakness, fit)
-        return self._found_again(view, moved) or self._begun(view, believed, moved, doubt, fit)
+        return self._found_again(view, believed, moved) or self._begun(view, believed, moved, doubt, fit)
 
     def kept(self, places_before: int) -> TrackerState:
         """Return what a later tracker needs to go on, beside the model's blocks.
@@ -146,38 +148,36 @@ class Tracker:
         self._model.usual_off_m = state.usual_off_m
         self._model.places.add(state.places)
 
-    def _found_again(self, view: View, moved: Moved) -> Tracked | None:
+    def _found_again(self, view: View, believed: SE3, moved: Moved) -> Tracked | None:
         """Look whether a view that does not fit where it was expected shows another place that was seen."""
         found = self._pieces.recognised(view)
         if found is None:
             return None
         weakness = Weakness.NONE if found.fit.told == _DIRECTIONS else Weakness.FLAT
-        self._pieces.go_on_in(found.piece)
         if found.piece is self._model:
+            # The corners still tell where the view is in the piece that it leaves: its surface has to confirm that.
+            is_followed = moved.is_known and moved.inliers >= self._gate.weak_inliers
+            joined = self._pieces.join(view, believed, found, least=_CONFIRMED) if is_followed else ()
+            self._pieces.go_on_in(found.piece)
             self._was_lost = True
-            return self._fused(view, found.pose, moved, weakness, found.fit)
+            return replace(self._fused(view, found.pose, moved, weakness, found.fit), joined=joined)
+        self._pieces.go_on_in(found.piece)
         return self._apart(view, found.pose, moved, weakness, found.fit)
 
     def _apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         """Go on in a piece that is not part of the model yet; join it where the view shows a place of the model."""
-        met = None if weakness is not Weakness.NONE else self._pieces.met(view, pose)
-        if met is None:
-            self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
-            return self._lost(pose, moved, Weakness.APART, fit)
+        met = None if weakness is Weakness.FEW_CORNERS else self._pieces.met(view, pose)
+        if met is None or met.fit.told < _DIRECTIONS:  # later views tell more of where the piece is
+            return self._still_apart(view, pose, moved, weakness, fit)
         joined = self._pieces.join(view, pose, met)
         if not joined:
-            self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
-            return self._lost(pose, moved, Weakness.APART, fit)
+            return self._still_apart(view, pose, moved, weakness, fit)
         self._was_lost = True
-        told = self._fused(view, met.pose, moved, weakness, met.fit)
-        return Tracked(
-            world_camera=told.world_camera,
-            state=told.state,
-            weakness=told.weakness,
-            moved=moved,
-            fit=met.fit,
-            joined=joined,
-        )
+        return replace(self._fused(view, met.pose, moved, weakness, met.fit), joined=joined)
+
+    def _still_apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
+        self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
+        return self._lost(pose, moved, Weakness.APART, fit)
 
     def _begun(self, view: View, believed: SE3, moved: Moved, why: Weakness, fit: Registered) -> Tracked:
         """Begin a piece with a view that belongs to none."""

@@ -68,7 +68,7 @@ def test_a_scan_goes_on_from_its_submaps() -> None:
 def test_what_is_joined_later_is_in_the_submaps() -> None:
     """Pairs that were lost when a submap was closed and in the model afterwards: the next one is whole, and a scan goes on from it with all."""
     scan = taken(Scan(WANTED), POSES[:3])
-    away = [SE3.of(np.array([0.0, turn, 0.0, 0.3 * turn, 0.0, 0.0])) for turn in np.linspace(1.1, 0.3, 9)]
+    away = [SE3.of(np.array([0.0, turn, 0.0, 0.3 * turn, 0.0, 0.0])) for turn in np.linspace(1.1, 0.1, 11)]
     told = [scan.take(f"away {number}", 3.0 + number, shown(pose)) for number, pose in enumerate(away[:3])]
     assert [pair.is_fused for pair in told] == [False] * 3
     first = scan.close_submap()
