@@ -85,24 +85,39 @@ def find_marked(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
     Returns:
         (columns * rows, 2) px, row by row, NaN where one is not seen; (0, 2) if fewer than eight are.
     """
+    found = marked_corners(grey, columns, rows, marks)
+    found[_astray(found, plan_of(columns, rows, marks))] = np.nan
+    return found if np.isfinite(found[:, 0]).sum() >= LEAST_SEEN else np.empty((0, 2))
+
+
+def marked_corners(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
+    """Find the corners of a board with marks, without asking whether they fit their neighbours: for those who fit a pose to them.
+
+    Args:
+        grey: as `find_marked` takes it, and the others.
+        columns: corners in a row.
+        rows: corners in a column.
+        marks: the board's marks.
+
+    Returns:
+        (columns * rows, 2) px, row by row, NaN where one is not seen.
+    """
     small, factors = shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))
     rough, share = (
         (_charuco(small, columns, rows, marks), 1 - marks.mark_share)
         if isinstance(marks, Charuco)
         else (_april_grid(small, columns, rows), marks.gap_share)
     )
-    seen = np.isfinite(rough).all(axis=1)
+    found, seen = np.full((columns * rows, 2), np.nan), np.isfinite(rough).all(axis=1)
     if seen.sum() < LEAST_SEEN:
-        return np.empty((0, 2))
-    found = np.full((columns * rows, 2), np.nan)
+        return found
     whole = (rough[seen] + 0.5) / factors - 0.5
     along, down = _steps(plan_of(columns, rows, marks)[seen], whole, share)
     known = np.isfinite(along[:, 0])
     if known.any():
         fitted = fit_corners(grey, whole[known], along[known], down[known], _REACH_SHARE)
         found[np.flatnonzero(seen)[known]] = np.where(fitted.are_sure()[:, np.newaxis], fitted.px, np.nan)
-    found[_astray(found, plan_of(columns, rows, marks))] = np.nan
-    return found if np.isfinite(found[:, 0]).sum() >= LEAST_SEEN else np.empty((0, 2))
+    return found
 
 
 def _steps(plan: Corners, found: Corners, length: float) -> tuple[Corners, Corners]:

@@ -1,4 +1,4 @@
-"""The axes of points in files. Inside the programs they are always the left camera's: x right, y down, z forward. Pure.
+"""The axes of points in files. Inside the programs they are the left camera's: x right, y down, z forward; those of a scan on a mat are the mat's. Pure.
 
 Viewers such as MeshLab and Blender take y for up and look along -z: half a turn about x. Both frames are right-handed, so nothing is mirrored.
 """
@@ -15,6 +15,7 @@ class Axes(Enum):
 
     CAMERA = "camera"
     Y_UP = "y-up"
+    MAT = "mat"
 
     @property
     def text(self) -> str:
@@ -23,11 +24,12 @@ class Axes(Enum):
 
     @property
     def signs(self) -> NDArray[np.float32]:
-        """(3,) float32: factors of x, y, z that take the left camera's axes to these."""
-        return np.array([1, 1, 1] if self is Axes.CAMERA else [1, -1, -1], dtype=np.float32)
+        """(3,) float32: factors of x, y, z that take the programs' axes to these."""
+        return np.array([1, -1, -1] if self is Axes.Y_UP else [1, 1, 1], dtype=np.float32)
 
 
 _TEXTS: Final = {
     Axes.CAMERA: "x right, y down, z forward of the left camera",
     Axes.Y_UP: "x right, y up, z backward of the left camera",
+    Axes.MAT: "x along the rows of the mat, y away from its last row, z up, from its middle",
 }

@@ -27,6 +27,7 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
         "interrupted_of": report.interrupted_of or None,
         "path_m": round(report.path_m, 6),
         "off_model_m": _number(report.off_m),
+        "mat": _mat(report),
         "model": {
             "axes": report.axes.text,
             "points": model.points,
@@ -47,6 +48,24 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
     }
 
 
+def _mat(report: ScanReport) -> dict[str, Any] | None:
+    mat = report.on_mat
+    if mat is None:
+        return None
+    return {
+        "name": mat.name,
+        "pairs": mat.pairs,
+        "corners": mat.corners,
+        "seen_left": mat.seen[0],
+        "seen_right": mat.seen[1],
+        "sigma_m": _number(mat.sigma_m),
+        "square_m": mat.square_m,
+        "measured_m": _number(mat.measured_m),
+        "measured_sigma_m": _number(mat.measured_sigma_m),
+        "to_scale": mat.is_to_scale,
+    }
+
+
 def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
     if isinstance(pair, FailedPair):
         return {"name": pair.name, "problem": pair.problem, "remedy": pair.remedy}
@@ -59,6 +78,14 @@ def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
         "corners": pair.corners,
         "overlap": _number(pair.overlap),
         "off_m": _number(pair.off_m),
+        "mat": None
+        if pair.mat is None
+        else {
+            "left": pair.mat.seen[0],
+            "right": pair.mat.seen[1],
+            "rms_px": _number(pair.mat.rms_px),
+            "sigma_m": _number(pair.mat.sigma_m),
+        },
         "place_m": [round(value, 6) for value in pair.world_camera.t_m.tolist()],
     }
 

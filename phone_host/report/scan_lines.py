@@ -5,6 +5,7 @@ from typing import Final
 
 from common.imagesize.head import size_text
 from common.words import counted, distance_text
+from phone_host.report.mat_figures import MatFigures
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict, stretches
 from phone_host.report.stereo_report import ALWAYS
 
@@ -28,6 +29,8 @@ def scan_lines(report: ScanReport, out: str) -> list[str]:
         ]
         if math.isfinite(report.off_m):
             lines.append(f"a pair's depths lie {distance_text(report.off_m)} off the model (mean; median of the pairs)")
+    if report.on_mat is not None:
+        lines.append(mat_line(report.on_mat))
     told = [f"note: {stretch.sentence}" for stretch in stretches(report.scanned)]
     lines += told[:_MOST_LINES]
     if len(told) > _MOST_LINES:
@@ -37,6 +40,20 @@ def scan_lines(report: ScanReport, out: str) -> list[str]:
     lines += [f"warning: {pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed[:_MOST_LINES]]
     lines += [remark.line for remark in report.remarks]
     return [*lines, f"written to {out}: {', '.join((MODEL, TRAJECTORY, *ALWAYS))}"]
+
+
+def mat_line(mat: MatFigures) -> str:
+    """Say what a mat told.
+
+    Args:
+        mat: its figures.
+    """
+    left, right = (f"{count:.0f}" for count in mat.seen)
+    square = f"{mat.measured_m * 1e3:.2f} \u00b1 {mat.measured_sigma_m * 1e3:.2f} mm"
+    return (
+        f"the mat is seen in {counted(mat.pairs, 'pair')}, {left} and {right} of its {mat.corners} corners (median); places are known to"
+        f" \u00b1 {mat.sigma_m * 1e3:.2g} mm; its squares measure {square}"
+    )
 
 
 def area_text(area_m2: float) -> str:

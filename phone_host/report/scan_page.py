@@ -14,7 +14,7 @@ from phone_host.report.page_frame import document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
 from phone_host.report.page_script import Script
 from phone_host.report.report_page import Figure, figures_row, heading
-from phone_host.report.scan_lines import area_text
+from phone_host.report.scan_lines import area_text, mat_line
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict, stretches
 from phone_host.scan.scan import ScannedPair
 from phone_host.svg.plot_course import Course, over_views
@@ -59,6 +59,7 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
         section("Model", "", view) if view else "",
         list_section("Remarks", remarks),
         next_section((), commands),
+        _on_mat(report),
         _fits(report),
         files_section(files),
     ]
@@ -105,9 +106,32 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
     )
 
 
+def _on_mat(report: ScanReport) -> str:
+    """Show what the mat told: its corners in each pair."""
+    told, pairs = report.on_mat, report.scanned
+    if told is None or len(pairs) < 2:
+        return ""
+    courses = tuple(
+        Course(
+            label,
+            colour,
+            np.array([math.nan if pair.mat is None else pair.mat.seen[side] for pair in pairs]),
+            np.zeros(len(pairs)),
+        )
+        for side, (label, colour) in enumerate((("left image", 0), ("right image", 2)))
+    )
+    names = [pair.name for pair in pairs]
+    return section(
+        "The mat",
+        f"{mat_line(told).capitalize()}; by its name, {told.square_m * 1e3:g} mm.",
+        legend([(one.label, one.colour) for one in courses])
+        + two_widths(partial(over_views, names, courses, "corners", "corners of the mat that each pair shows")),
+    )
+
+
 def _fits(report: ScanReport) -> str:
     pairs = report.scanned
-    if len(pairs) < 2:
+    if len(pairs) < 2 or report.mat is not None:
         return ""
     names = [pair.name for pair in pairs]
 

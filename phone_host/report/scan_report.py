@@ -14,8 +14,10 @@ import numpy as np
 from common.words import counted
 from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
+from phone_host.report.mat_figures import MatFigures, mat_figures
 from phone_host.report.report_page import Headline
 from phone_host.report.stereo_report import FailedPair, Remark, Size
+from phone_host.scan.mat import Mat
 from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
 from phone_host.scan.scan import ScannedPair
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -84,6 +86,7 @@ class ScanReport:
         axes: of model.ply.
         remarks: what the user must know.
         interrupted_of: how many pairs were to be taken when it was interrupted; 0: it was not.
+        mat: on which the object lies; None: there is none.
     """
 
     pairs: tuple[ScannedPair | FailedPair, ...]
@@ -95,6 +98,7 @@ class ScanReport:
     axes: Axes = Axes.CAMERA
     remarks: tuple[Remark, ...] = ()
     interrupted_of: int = 0
+    mat: Mat | None = None
 
     @property
     def scanned(self) -> tuple[ScannedPair, ...]:
@@ -116,6 +120,12 @@ class ScanReport:
         """Mean distance of a pair's depths from the model, median of the pairs in it, m; NaN: fewer than two are."""
         off = [pair.off_m for pair in self.scanned if pair.is_fused and math.isfinite(pair.off_m)]
         return float(np.median(off)) if off else math.nan
+
+    @property
+    def on_mat(self) -> MatFigures | None:
+        """What the mat told; None: there is none, or no pair shows it."""
+        told = [pair.mat for pair in self.scanned if pair.mat is not None]
+        return None if self.mat is None or not told else mat_figures(self.mat, told)
 
     @property
     def path_m(self) -> float:

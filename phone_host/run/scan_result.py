@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def report_of(
         matcher: its name.
         axes: of model.ply.
     """
-    return ScanReport(
+    report = ScanReport(
         pairs=tuple(pairs),
         model=figures_of(scan, model),
         settings=scan.settings,
@@ -43,17 +44,29 @@ def report_of(
         matcher=matcher,
         axes=axes,
         remarks=(*remarks, *memory_remarks(scan)),
+        mat=scan.mat,
     )
+    on_mat = report.on_mat
+    return report if on_mat is None else replace(report, remarks=(*report.remarks, *on_mat.remarks))
 
 
 def require_something(report: ScanReport) -> None:
     """Refuse pairs of which nothing at all came.
 
     Raises:
-        DataError: none was computed, or none has depth.
+        DataError: none was computed, none has depth, or none shows the mat.
     """
     if report.failed and not report.scanned:
         raise report.failed[0].none_of(len(report.pairs))
+    if (
+        report.settings is None
+        and report.mat is not None
+        and any(pair.weakness is Weakness.NO_MAT for pair in report.scanned)
+    ):
+        raise DataError(
+            f"the mat {report.mat.name} is not seen in any of {len(report.scanned)} pairs",
+            "show more of it, sharp and without glare; if another one lies there, name it, as in --mat 8x6:28mm:20mm:5x5",
+        )
     if report.settings is None:
         require_turning(report)
         why = next((remark for remark in report.remarks if not remark.is_note), None)

@@ -1,6 +1,6 @@
 """Pairs go in one after another, a model comes out. Pure: no files, no clock.
 
-The world's axes are those of the rectified left camera at the first pair that has depth.
+The world's axes are those of the rectified left camera at the first pair that has depth; with a mat, the mat's.
 """
 
 import math
@@ -18,6 +18,9 @@ from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
 from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.fineness import fineness_for
+from phone_host.scan.mat import Mat
+from phone_host.scan.mat_pose import MatSaid
+from phone_host.scan.mat_tracker import MatTracker, begun_on_mat, box_of_mat
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import only, without_crumbs
 from phone_host.scan.piece import PoseGate
@@ -53,6 +56,7 @@ class ScanWanted:
         most_bytes: memory of the model at most.
         box: what lies outside does not belong to the model; None: everything belongs.
         threads: that compute; results do not depend on them.
+        mat: on which the object lies: it alone tells where each pair was taken; None: there is none.
         turntable: whether the cameras stand still and an object turns before them.
     """
 
@@ -60,7 +64,13 @@ class ScanWanted:
     most_bytes: int = 300_000_000
     box: Box | None = None
     threads: int = 1
+    mat: Mat | None = None
     turntable: bool = False
+
+    @property
+    def model_box(self) -> Box | None:
+        """What lies outside does not belong to the model: the box that was asked for, or the room above the mat; None: everything belongs."""
+        return box_of_mat(self.mat) if self.box is None and self.mat is not None else self.box
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -77,6 +87,7 @@ class ScannedPair:
         corners: that agree on the motion since the last pair; 0 for the first.
         overlap: share of its depths that lie on the model, 0..1; NaN: not compared.
         off_m: mean distance of these from the model, m; NaN: not compared.
+        mat: what the mat told; None: it was not seen, or nobody looked for it.
     """
 
     name: str
@@ -88,6 +99,7 @@ class ScannedPair:
     corners: int = 0
     overlap: float = math.nan
     off_m: float = math.nan
+    mat: MatSaid | None = None
 
     @property
     def is_fused(self) -> bool:
@@ -155,7 +167,7 @@ class Scan:
 
     def __init__(self, wanted: ScanWanted) -> None:
         self._wanted = wanted
-        self.tracker: Tracker | None = None
+        self.tracker: Tracker | MatTracker | None = None
         self.geometry: StereoGeometry | None = None
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
@@ -163,6 +175,11 @@ class Scan:
         self._untracked = 0  # pairs before the first that this tracker took
         self._later: dict[str, ScannedPair] = {}  # pairs of which something else has become, by name
         self._is_changed = False  # whether submaps that are closed do not hold any more
+
+    @property
+    def mat(self) -> Mat | None:
+        """On which the object lies; None: there is none."""
+        return self._wanted.mat
 
     @property
     def pairs(self) -> tuple[ScannedPair, ...]:
@@ -198,20 +215,18 @@ class Scan:
         Raises:
             DataError: its size is not that of the pairs before it.
         """
-        view = view_of(processed)
+        view = view_of(processed, self._wanted.mat)
         density = float(np.isfinite(view.depth_m).mean())
         if self.tracker is None and density >= PoseGate().least_depths:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
-            wanted = self._wanted
-            self.tracker = Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
-            self._untracked = len(self._pairs)
+            self.tracker, self._untracked = self._begun(view), len(self._pairs)
         if self.tracker is None:
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
                 world_camera=SE3.identity(),
                 state=Tracking.LOST,
-                weakness=Weakness.NO_DEPTH,
+                weakness=Weakness.NO_DEPTH if density < PoseGate().least_depths else Weakness.NO_MAT,
                 density=density,
             )
         else:
@@ -233,6 +248,7 @@ class Scan:
                 corners=told.moved.inliers,
                 overlap=math.nan if told.fit is None else told.fit.overlap,
                 off_m=math.nan if told.fit is None else told.fit.off_m,
+                mat=told.mat,
             )
         self._pairs.append(pair)
         return pair
@@ -246,6 +262,19 @@ class Scan:
             )
             self._later[self._pairs[at].name] = self._pairs[at]
             self._is_changed = self._is_changed or at < self._closed.pairs
+
+    def _begun(self, view: View) -> Tracker | MatTracker | None:
+        """Begin with a view that has depth; None: the mat is not seen in it."""
+        wanted = self._wanted
+        if wanted.mat is not None and wanted.model_box is not None:
+            return begun_on_mat(
+                view,
+                wanted.mat,
+                wanted.model_box,
+                lambda inside: fineness_for(inside, wanted.voxel_m, wanted.most_bytes),
+                wanted.threads,
+            )
+        return Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
 
     def final(self, pair: ScannedPair) -> ScannedPair:
         """Return what has become of a pair since it was taken.
@@ -298,7 +327,12 @@ class Scan:
         """
         first = submaps[0]
         self.geometry, self.size_px = first.geometry, first.size_px
-        self.tracker = Tracker(replace(first.settings, most_bytes=self._wanted.most_bytes), self._wanted.threads)
+        settings, wanted = replace(first.settings, most_bytes=self._wanted.most_bytes), self._wanted
+        self.tracker = (
+            MatTracker(wanted.mat, wanted.model_box, settings, wanted.threads)
+            if wanted.mat is not None and wanted.model_box is not None
+            else Tracker(settings, wanted.threads)
+        )
         places = 0
         for each in submaps:
             self._pairs.extend(each.pairs)
@@ -322,8 +356,9 @@ class Scan:
         if volume is None:
             return ScanModel(Mesh.empty(), np.zeros(0, np.float32))
         mesh = mesh_of(volume.blocks, volume.settings.voxel_m, LEAST_WEIGHT)
-        if self._wanted.box is not None:
-            inside = self._wanted.box.holds(mesh.points_m)
+        box = self._wanted.model_box
+        if box is not None:
+            inside = box.holds(mesh.points_m)
             mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))
         mesh = without_crumbs(mesh)
         return ScanModel(mesh, surface_noise_m(mesh.points_m, volume.blocks, volume.settings))
@@ -345,11 +380,12 @@ def require_size(name: str, view: View, size: tuple[int, int]) -> None:
         raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
 
 
-def view_of(processed: Processed) -> View:
+def view_of(processed: Processed, mat: Mat | None = None) -> View:
     """Return a pair as the tracker takes it, without the depths beside steps.
 
     Args:
         processed: with disparity and cloud.
+        mat: that is looked for in both images; None: none is.
     """
     assert processed.geometry is not None
     assert processed.cloud is not None
@@ -361,4 +397,6 @@ def view_of(processed: Processed) -> View:
         depth_m=without_edges(processed.cloud[..., 2], processed.geometry),
         geometry=processed.geometry,
         noise_px=NOISE_PX / scale,
+        right=None if mat is None else to_grey(processed.pair.right),
+        epipolar=processed.pair.epipolar,
     )

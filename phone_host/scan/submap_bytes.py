@@ -4,6 +4,7 @@ A head line, then a deflated npz of arrays: nothing in it is code, and whatever 
 """
 
 import io
+import math
 import zipfile
 import zlib
 from typing import Any, Final
@@ -15,6 +16,7 @@ from common.errors import DataError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.blocks import VOXELS
+from phone_host.scan.mat_pose import MatSaid, MatScale
 from phone_host.scan.places import Place
 from phone_host.scan.scan import ScannedPair, Submap
 from phone_host.scan.tracker import TrackerState
@@ -22,11 +24,12 @@ from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume import BlockValues
 from phone_host.scan.volume_settings import VolumeSettings
 
-_HEAD: Final = b"tandemscan submap 1\n"
+_HEAD: Final = b"tandemscan submap 2\n"
 _LEVEL: Final = 1
 """Ten times as fast as the usual 6, for a tenth more bytes."""
 
 _MOST_BYTES: Final = 4 << 30
+_MAT_VALUES: Final = 6
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -48,6 +51,7 @@ def submap_bytes(submap: Submap) -> bytes:
             [(pair.stamp_s, pair.density, pair.corners, pair.overlap, pair.off_m) for pair in pairs], np.float64
         ),
         poses=_rows([pair.world_camera for pair in pairs]),
+        mats=np.array([_mat_row(pair.mat) for pair in pairs], np.float64).reshape(-1, _MAT_VALUES),
         model=np.array(
             [
                 submap.settings.voxel_m,
@@ -119,6 +123,7 @@ def _read(content: bytes) -> Submap:
             corners=int(corners),
             overlap=overlap,
             off_m=off_m,
+            mat=_mat_of(held["mats"][at]),
         )
         for at, ((stamp_s, density, corners, overlap, off_m), pose) in enumerate(
             zip(numbers, _poses(held["poses"]), strict=True)
@@ -152,6 +157,17 @@ def _places(held: Arrays) -> tuple[Place, ...]:
     if not poses:
         return ()
     return tuple(Place(*each) for each in zip(poses, points, descriptors, strict=True))
+
+
+def _mat_row(mat: MatSaid | None) -> list[float]:
+    if mat is None:
+        return [math.nan] * _MAT_VALUES
+    return [*mat.seen, mat.rms_px, mat.sigma_m, mat.scale.value, mat.scale.sigma]
+
+
+def _mat_of(row: NDArray[np.float64]) -> MatSaid | None:
+    left, right, rms_px, sigma_m, value, sigma = row.tolist()
+    return None if math.isnan(left) else MatSaid((int(left), int(right)), rms_px, sigma_m, MatScale(value, sigma))
 
 
 def _rows(poses: list[SE3]) -> NDArray[np.float64]:

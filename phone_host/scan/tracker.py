@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
+from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Joined, Pieces
@@ -42,6 +43,7 @@ class Tracked:
         moved: what odometry says.
         fit: how the depth lies against the model; None where it was not compared.
         joined: earlier views that were lost, and have become part of the model with this one.
+        mat: what a mat told; None: there is none, or it was not seen.
     """
 
     world_camera: SE3
@@ -50,6 +52,7 @@ class Tracked:
     moved: Moved
     fit: Registered | None
     joined: tuple[Joined, ...] = ()
+    mat: MatSaid | None = None
 
     @property
     def is_fused(self) -> bool:

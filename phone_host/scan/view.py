@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.model import Image, StereoGeometry
+from phone_host.model import Epipolar, Image, StereoGeometry
 
 Depth = NDArray[np.float32]
 
@@ -30,6 +30,8 @@ class View:
         noise_px: standard deviation of a disparity, px, > 0.
         patch_px: side of the patches whose depths err together, px; a depth camera's window is smaller. A matcher smooths over 40 px, but the
             rectification's errors reach over half of the image: with 320 a rig at rest stays within 2 mm, with 40 it wanders 6.
+        right: (H, W) uint8, the rectified right image, for those who look for a mat in both; None: nobody does.
+        epipolar: which way the epipolar lines run.
     """
 
     grey: Image
@@ -38,6 +40,8 @@ class View:
     geometry: StereoGeometry
     noise_px: float
     patch_px: float = 320.0
+    right: Image | None = None
+    epipolar: Epipolar = Epipolar.LEFT
 
     @property
     def noise_per_m(self) -> float:

@@ -86,12 +86,14 @@ class Volume:
         """Memory of the blocks in use."""
         return self.blocks.count * BLOCK_BYTES
 
-    def fuse(self, view: View, world_camera: SE3) -> NDArray[np.uint8]:
+    def fuse(self, view: View, world_camera: SE3, room_for: Depth | None = None) -> NDArray[np.uint8]:
         """Fuse a view.
 
         Args:
             view: what the camera saw.
             world_camera: where it was.
+            room_for: (H, W) float32, those of its depths that are part of the model, NaN elsewhere: only for them is room made, while
+                the others still tell what is empty; None: all.
 
         Returns:
             (count,) 1 for each block that got something. Blocks for which there was no memory are added to `left_out`.
@@ -100,7 +102,8 @@ class Volume:
         colours = np.ascontiguousarray(view.colours, np.uint8)
         if depth.shape != view.grey.shape or colours.shape != (*depth.shape, 3):
             raise ValueError(f"depth {depth.shape} and colours {colours.shape} of an image {view.grey.shape}")
-        self._make_room(depth, Camera(view.geometry, view.grey.shape, world_camera))
+        shown = depth if room_for is None else np.ascontiguousarray(room_for, np.float32)
+        self._make_room(shown, Camera(view.geometry, view.grey.shape, world_camera))
         if self._library is None:
             packed = replace(view, depth_m=depth, colours=colours)
             return self._noted(volume_numpy.fuse(self.blocks, self.settings, packed, world_camera.inverse()))
@@ -162,7 +165,7 @@ class Volume:
         chosen, back = np.zeros(self.blocks.count, np.uint8), into_of.inverse()
         chosen[numbers[numbers >= 0]] = 1
         rows = np.column_stack([back.R, back.t_m / voxel_m])
-        if self._library is None:
+        if self._library is None or not self._library.can_absorb:
             self._noted(absorbed(self.blocks, held, chosen, rows))
             return
         into, other = self._arrays(), _arrays_of(held, of.settings)

@@ -20,7 +20,7 @@ from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, Re
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
 
-_ABI: Final = 5  # TANDEM_ABI of tandem.h
+_ABI: Final = 4  # TANDEM_ABI of tandem.h
 _HERE: Final = Path(__file__).resolve().parent
 _INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
 _REINSTALL: Final = "reinstall"
@@ -228,6 +228,11 @@ class Library:
     def cast(self, job: CastJob) -> None:
         """Show a volume's surface as a camera sees it; see cast_kernel.c."""
         _require_done(self.handle.tandem_cast(self.isa, ctypes.byref(job)))
+
+    @property
+    def can_absorb(self) -> bool:
+        """Whether it has `absorb`: a library of the same ABI that was built earlier has not, and numpy does it."""
+        return hasattr(self.handle, "tandem_absorb")
 
     def absorb(self, job: AbsorbJob) -> None:
         """Take a field into another; see absorb.c."""

@@ -124,12 +124,9 @@ def declare(handle: ctypes.CDLL) -> None:
     handle.tandem_cast.argtypes = [_INT, ctypes.POINTER(CastJob)]
     handle.tandem_touch.argtypes = [ctypes.POINTER(TouchJob)]
     handle.tandem_register.argtypes = [ctypes.POINTER(RegisterJob)]
-    handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
-    for function in (
-        handle.tandem_fuse,
-        handle.tandem_cast,
-        handle.tandem_touch,
-        handle.tandem_register,
-        handle.tandem_absorb,
-    ):
+    functions = [handle.tandem_fuse, handle.tandem_cast, handle.tandem_touch, handle.tandem_register]
+    if hasattr(handle, "tandem_absorb"):
+        handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
+        functions.append(handle.tandem_absorb)
+    for function in functions:
         function.restype = _INT

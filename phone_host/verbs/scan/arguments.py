@@ -18,6 +18,7 @@ SUMMARY = "put pairs from several places together to one model with colours"
 EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup    # folders: photographs on the way around the cup
   phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
   phone-host scan left/ right/ --calibration rig.yaml --box 400x300x400@0,100,900 --out cup    # only what is in this box
+  phone-host scan left/ right/ --calibration rig.yaml --mat --out cup    # on the sheet of `phone-host target mat`, any way around
   phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
   phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --record cup.mcap --out cup    # live
   phone-host scan left/ right/ --calibration rig.yaml --turntable --out cup    # the cup was turned, the cameras stood still
@@ -83,7 +84,15 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --voxel, --box and --memory: how the model is made."""
+    """Declare --mat, --voxel, --box and --memory: how the model is made."""
+    parser.add_argument(
+        "--mat",
+        nargs="?",
+        const="usual",
+        metavar="10x8:25mm:18mm:5x5",
+        help="scan what lies on a printed mat, whether it is turned or the cameras go around it: the sheet of `phone-host target mat`, or any ChArUco"
+        " sheet by its squares, side of a square, side of a mark and family; the model stands on the sheet's middle, z up",
+    )
     parser.add_argument(
         "--voxel",
         metavar="MM",
@@ -92,7 +101,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--box",
         metavar="WxHxD@X,Y,Z",
-        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward)",
+        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat",
     )
     parser.add_argument(
         "--memory",

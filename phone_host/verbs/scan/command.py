@@ -19,8 +19,8 @@ from phone_host.verbs.given_pictures import given_pictures
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
-from phone_host.verbs.scan.wanted import resumed_of, scan_wanted
-from phone_host.verbs.stereo_options import metric_core, output_options, require_metres
+from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
+from phone_host.verbs.stereo_options import metric_core, require_metres
 
 _CHECK_FAILED: Final = 4
 
@@ -59,7 +59,7 @@ def _scan_pictures(options: argparse.Namespace) -> ScanReport:
         matcher=matcher,
         matcher_note="" if options.matcher else default_note(),
         wanted=wanted,
-        axes=output_options(options).axes,
+        axes=axes_of(options, wanted),
         most_pixels=limit,
         mounted=orientations(options),
         resumed=resumed_of(options),

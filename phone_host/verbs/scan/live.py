@@ -26,9 +26,8 @@ from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
 from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run
-from phone_host.verbs.scan.wanted import resumed_of, scan_wanted
+from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
 from phone_host.verbs.serve.choices import run_options
-from phone_host.verbs.stereo_options import output_options
 
 
 def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
@@ -46,6 +45,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
         DataError: the rig cannot be used, or no pair has depth.
     """
     wanted, of_run = scan_wanted(options), _run_options(options)
+    axes = axes_of(options, wanted)
     found = checked(of_run)
     _require(options, found.values)
     _require_place(options)
@@ -57,7 +57,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     prepared = opened.prepared(sys.argv, (live.sink,))
 
     def finished() -> FinishedScan:
-        return live.finished(prepared.host.snapshot(), found.values.matcher, output_options(options).axes)
+        return live.finished(prepared.host.snapshot(), found.values.matcher, axes)
 
     try:
         ended = _followed(prepared, live, signals)

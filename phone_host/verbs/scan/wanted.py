@@ -1,4 +1,4 @@
-"""Reads how a model is to be made: --voxel, --box and --memory."""
+"""Reads how a model is to be made: --mat, --voxel, --box and --memory."""
 
 import argparse
 import math
@@ -10,13 +10,19 @@ from common.errors import SettingsError, UnavailableError
 from common.program.quantities import decimal_number
 from common.program.terminal import say
 from common.words import counted
+from phone_host.output.axes import Axes
 from phone_host.run.kept_submaps import read_submaps
 from phone_host.scan.box import Box
+from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.stereo.match_tandem import matching_threads
+from phone_host.verbs.stereo_options import output_options
 from phone_host.verbs.units import length_mm
 
 _LEAST_VOXEL_MM, _MOST_VOXEL_MM = 0.2, 200.0
+_USUAL: Final = "usual"
+"""What `--mat` without a value is."""
+
 _LEAST_BYTES: Final = 10_000_000
 _BOX: Final = re.compile(r"([^x@]+)x([^x@]+)x([^x@]+)@([^,@]+),([^,@]+),([^,@]+)")
 _BOX_REMEDY: Final = "give sides and middle in mm, such as 400x300x400@0,100,900"
@@ -33,11 +39,14 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
     """
     if options.memory < _LEAST_BYTES:
         raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
+    if options.mat is not None and options.turntable:
+        raise SettingsError("--turntable beside --mat", "leave --turntable out: the mat tells how it turns")
     return ScanWanted(
         voxel_m=math.nan if options.voxel is None else voxel_of(options.voxel),
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
+        mat=None if options.mat is None else parse_mat(USUAL_MAT if options.mat == _USUAL else options.mat),
         turntable=options.turntable,
     )
 
@@ -77,6 +86,24 @@ def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
         sys.stderr,
     )
     return submaps
+
+
+def axes_of(options: argparse.Namespace, wanted: ScanWanted) -> Axes:
+    """Return the axes of the files.
+
+    Args:
+        options: options as `scan` declares them.
+        wanted: what they ask for.
+
+    Raises:
+        SettingsError: --axes beside a mat.
+    """
+    asked = output_options(options).axes
+    if wanted.mat is None:
+        return asked
+    if asked is not Axes.CAMERA:
+        raise SettingsError(f"--axes {asked.value} beside --mat", "leave --axes out: the model stands on the mat, z up")
+    return Axes.MAT
 
 
 def voxel_of(text: str) -> float:

@@ -16,7 +16,7 @@
 #define TANDEM_API __attribute__((visibility("default")))
 
 /* Raise it, here and in library.py, when a signature or a struct changes. */
-#define TANDEM_ABI 5
+#define TANDEM_ABI 4
 
 /* Instruction sets, from the plainest. The numbers are part of the ABI, isa_name() their names for people. */
 enum tandem_isa {

@@ -1,0 +1,108 @@
+"""The printed mat that objects are laid on: which one, and where its corners are seen. Pure.
+
+A mat is a ChArUco sheet. Its axes: the origin in the sheet's middle, x along its rows, y away from its last row, z up, out of the paper.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import SettingsError
+from phone_host.calibration.board_names import board_name, named_board
+from phone_host.calibration.marked import marked_corners
+from phone_host.calibration.target import Board
+from phone_host.model import Image
+
+Floats = NDArray[np.float64]
+
+USUAL_MAT: Final = "10x8:25mm:18mm:5x5"
+"""The sheet of `phone-host target mat`: squares, side of a square, side of a mark, family."""
+
+_KIND: Final = "charuco:"
+
+
+@dataclass(frozen=True, slots=True)
+class Mat:
+    """A sheet to lay objects on.
+
+    Attributes:
+        board: its corners, with marks that tell them apart.
+    """
+
+    board: Board
+
+    @property
+    def name(self) -> str:
+        """As `parse_mat` reads it."""
+        return board_name(self.board).removeprefix(_KIND)
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height of the printed squares, m."""
+        return (self.board.columns + 1) * self.board.square_m, (self.board.rows + 1) * self.board.square_m
+
+    def points_m(self) -> Floats:
+        """Return its corners in the order of `Board.points_m`, (N, 3), m, in the mat's axes."""
+        board = self.board
+        middle = np.array([board.columns - 1, board.rows - 1, 0]) * board.square_m / 2
+        return np.asarray((board.points_m() - middle) * [1.0, -1.0, 1.0], np.float64)
+
+
+def parse_mat(text: str) -> Mat:
+    """Read a mat.
+
+    Args:
+        text: squares, side of a square, side of a mark and ArUco family, as in "10x8:25mm:18mm:5x5".
+
+    Raises:
+        SettingsError: it is none.
+    """
+    name = text.strip().lower().removeprefix(_KIND)
+    try:
+        return Mat(named_board(_KIND + name, None))
+    except SettingsError as error:
+        raise SettingsError(
+            f"--mat is {text!r}",
+            f"give squares, side of a square, side of a mark and family, as in --mat {USUAL_MAT}, the sheet of `phone-host target mat`",
+        ) from error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MatCorners:
+    """The mat's corners in both images of a rectified pair.
+
+    Attributes:
+        left_px: (N, 2) px, NaN = not seen.
+        right_px: (N, 2) px, likewise.
+    """
+
+    left_px: Floats
+    right_px: Floats
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """How many are seen, left and right."""
+        return _count(self.left_px), _count(self.right_px)
+
+
+def mat_corners(left: Image, right: Image, mat: Mat) -> MatCorners:
+    """Find a mat's corners in a rectified pair.
+
+    Args:
+        left: (H, W) uint8 grey.
+        right: the same.
+        mat: what to look for.
+    """
+    return MatCorners(_found(left, mat), _found(right, mat))
+
+
+def _found(grey: Image, mat: Mat) -> Floats:
+    board = mat.board
+    assert board.marks is not None
+    return marked_corners(grey, board.columns, board.rows, board.marks)
+
+
+def _count(corners: Floats) -> int:
+    return int(np.isfinite(corners).all(axis=1).sum())

@@ -1,0 +1,243 @@
+"""Where each view was taken, from a printed mat in it. Pure.
+
+Only the mat counts, so it is the same whether the cameras go around it or it is turned before them, and the background may do what it likes. The world's axes
+are the mat's: the model stands upright on its middle. A view that shows too little of the mat is followed by
+its corners from the last one and laid against the model.
+
+What lies outside the box above the sheet gets no room in the model. It still tells that nothing is before it.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.geometry.se3 import SE3
+from phone_host.scan.box import Box
+from phone_host.scan.mat import Mat, mat_corners
+from phone_host.scan.mat_pose import MatPose, MatScale, fit_mat
+from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
+from phone_host.scan.registration import Registered, RegistrationSettings, registered
+from phone_host.scan.tracker import Tracked, TrackerState
+from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.view import Camera, Depth, View, halved, reduced
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.stereo.native.library import Library, Missing, native
+
+ABOVE_M: Final = 0.0025
+"""What is lower is the sheet: paper is not flat to a millimetre, and neither is its depth."""
+
+_HEIGHT_SHARE: Final = 2.0
+"""Of the longer side of the sheet: higher things do not stand on it."""
+
+_FIRST_SCALE: Final = MatScale(1.0, 0.05)
+"""Printed "fit to page" a sheet is up to 7 % smaller."""
+
+_SCALE_DRIFT: Final = 1e-4
+"""What a view tells of the squares is off by so much in the same way as the next one: the lens, the paper."""
+
+_MOST_SIGMA_VOXELS: Final = 1.0
+"""Standard deviation of the pose where the object stands, 50 mm above the sheet: surer than a voxel, or not believed."""
+
+STANDS_M: Final = np.array([0.0, 0.0, 0.05])
+
+_PARTNER_VOXELS, _FLOOR_VOXELS = 10, 0.3
+_ALIGNED_PX: Final = 320
+_LEAST_OVERLAP, _LEAST_NEAR, _LEAST_DIRECTIONS = 0.35, 0.5, 6
+_ODOMETRY: Final = OdometrySettings(corners=400)
+_LEAST_CORNERS: Final = 15
+_FUSED_OFF_VOXELS: Final = 2.0
+"""Mean distance to the model beyond which a view without a mat is not believed."""
+
+
+def box_of_mat(mat: Mat) -> Box:
+    """Return the room above a mat, in its axes."""
+    width, height = mat.size_m
+    top = _HEIGHT_SHARE * max(width, height)
+    return Box((-width / 2, -height / 2, ABOVE_M), (width / 2, height / 2, top))
+
+
+class MatFinder:
+    """Finds the mat in one view after another, and learns how large its squares are.
+
+    Args:
+        mat: which one.
+    """
+
+    def __init__(self, mat: Mat) -> None:
+        self._mat, self._points_m = mat, mat.points_m()
+        self.scale = _FIRST_SCALE
+
+    def find(self, view: View) -> MatPose | None:
+        """Find it in a view that holds its right image, too; None: too little of it is seen."""
+        assert view.right is not None
+        corners = mat_corners(view.grey, view.right, self._mat)
+        known = MatScale(self.scale.value, float(np.hypot(self.scale.sigma, _SCALE_DRIFT)))
+        found = fit_mat(self._points_m, corners, view.geometry, view.epipolar, known)
+        if found is not None:
+            self.scale = found.scale
+        return found
+
+
+class MatTracker:
+    """Follows a mat and builds the model of what stands on it.
+
+    Args:
+        mat: which one.
+        box: where the model is, in the mat's axes.
+        settings: of the model.
+        threads: that compute, >= 1; results do not depend on them.
+        library: computes; None: that of this installation.
+    """
+
+    def __init__(
+        self,
+        mat: Mat,
+        box: Box,
+        settings: VolumeSettings,
+        threads: int = 1,
+        library: Library | Missing | None = None,
+    ) -> None:
+        found = native() if library is None else library
+        self.volume = Volume(settings, threads, found)
+        self._library = found if isinstance(found, Library) else None
+        self._finder, self._threads = MatFinder(mat), threads
+        self._room = room_of(box, settings.truncation_m + 2 * settings.voxel_m)
+        self._pose = SE3.identity()
+        self._was_lost = False
+        self._last: View | None = None
+
+    def track(self, view: View) -> Tracked:
+        """Take the next view; all have one size and one geometry.
+
+        Returns:
+            Where it was taken, and how sure that is.
+        """
+        found, most_m = self._finder.find(view), _MOST_SIGMA_VOXELS * self.volume.settings.voxel_m
+        if found is not None and found.sigma_at(STANDS_M) <= most_m:
+            return replace(self._fused(view, found.camera_mat.inverse(), Weakness.NONE, None), mat=found.said(STANDS_M))
+        start = self._followed(view)
+        if start is None:
+            return self._lost(None)
+        fit = self._laid(view, start)
+        is_told = fit.told >= _LEAST_DIRECTIONS and fit.overlap >= _LEAST_OVERLAP and fit.near >= _LEAST_NEAR
+        if not is_told or not fit.off_m <= _FUSED_OFF_VOXELS * self.volume.settings.voxel_m:
+            return self._lost(fit)
+        return self._fused(view, start @ fit.start_now, Weakness.NO_MAT, fit)
+
+    def kept(self, places_before: int) -> TrackerState:
+        """See `Tracker.kept`: there are no places, the mat is one."""
+        del places_before
+        return TrackerState(self._pose, float("nan"), ())
+
+    def go_on(self, state: TrackerState) -> None:
+        """See `Tracker.go_on`."""
+        self._pose, self._was_lost = state.pose, True
+
+    def _lost(self, fit: Registered | None) -> Tracked:
+        self._was_lost = True
+        return _told(self._pose, Tracking.LOST, Weakness.NO_MAT, fit)
+
+    def _fused(self, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
+        self._pose = pose
+        inside = depths_inside(view, pose, self._room)
+        self._last = reduced(replace(view, depth_m=inside))
+        # What is farther than the field reaches is as good as at its end: nothing is before it.
+        reach = np.minimum(view.depth_m, np.float32(self.volume.settings.far_m))
+        self.volume.fuse(replace(view, depth_m=reach), pose, inside)
+        state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
+        if self._was_lost and state is Tracking.TRACKING and self.volume.fused > 1:
+            state = Tracking.RELOCALISED
+        self._was_lost = False
+        return _told(pose, state, weakness, fit)
+
+    def _followed(self, view: View) -> SE3 | None:
+        """Return where a view was taken by the corners that stand on the mat; None: too few are followed from the last view.
+
+        The shape alone does not tell: a ball fits from everywhere.
+        """
+        if self._last is None:
+            return None
+        odometry = Odometry(_ODOMETRY)
+        odometry.step(self._last)
+        moved = odometry.step(reduced(view))
+        return self._pose @ moved.before_now if moved.is_known and moved.inliers >= _LEAST_CORNERS else None
+
+    def _laid(self, view: View, start: SE3) -> Registered:
+        """Lay what a view shows near the model against it."""
+        depth, geometry, step = depths_inside(view, start, self._room), view.geometry, 1
+        while depth.shape[1] > _ALIGNED_PX:
+            (depth, geometry), step = halved(depth, geometry), 2 * step
+        surface = self.volume.cast(Camera(geometry, depth.shape, start), depth)
+        voxel_m = self.volume.settings.voxel_m
+        settings = RegistrationSettings(
+            most_m=_PARTNER_VOXELS * voxel_m,
+            floor_m=_FLOOR_VOXELS * voxel_m,
+            noise_per_m=view.noise_per_m,
+            geometry=geometry,
+            patch_px=view.patch_px / step,
+            threads=self._threads,
+        )
+        return registered(depth, surface, settings, self._library)
+
+
+def begun_on_mat(
+    view: View, mat: Mat, box: Box, fineness: Callable[[View], VolumeSettings], threads: int
+) -> MatTracker | None:
+    """Begin with a view of a mat.
+
+    Args:
+        view: the first one that has depth.
+        mat: which one.
+        box: where the model is, in the mat's axes.
+        fineness: how fine a model is made from a view of what is in it.
+        threads: that compute.
+
+    Returns:
+        A tracker that has not taken the view yet; None: too little of the mat is seen, or nothing in the box has a depth.
+    """
+    found = MatFinder(mat).find(view)
+    if found is None:
+        return None
+    inside = depths_inside(view, found.camera_mat.inverse(), room_of(box, ABOVE_M))
+    if not np.isfinite(inside).any():
+        return None
+    return MatTracker(mat, box, fineness(replace(view, depth_m=inside)), threads)
+
+
+def room_of(box: Box, rim_m: float) -> Box:
+    """Return a box that is larger by a rim on all sides, and reaches below the sheet: its surface closes the model from below."""
+    low, high = np.array(box.low_m) - rim_m, np.array(box.high_m) + rim_m
+    x, y, z = np.minimum(low, [np.inf, np.inf, -rim_m]).tolist()
+    return Box((x, y, z), (float(high[0]), float(high[1]), float(high[2])))
+
+
+def depths_inside(view: View, world_camera: SE3, box: Box) -> Depth:
+    """Return the depths (H, W) of what lies inside a box, NaN elsewhere.
+
+    Args:
+        view: that shows it.
+        world_camera: where it was taken.
+        box: in the world's axes.
+    """
+    of, depth = view.geometry, view.depth_m
+    rows, columns = np.indices(depth.shape, np.float32)
+    aside = (columns - np.float32(of.cx_px)) * (depth / np.float32(of.focal_px))
+    below = (rows - np.float32(of.cy_px)) * (depth / np.float32(of.focal_px))
+    turn, shift = world_camera.R.astype(np.float32), world_camera.t_m.astype(np.float32)
+    inside: NDArray[np.bool_] = np.isfinite(depth)
+    with np.errstate(invalid="ignore"):
+        for axis in range(3):
+            at = turn[axis, 0] * aside + turn[axis, 1] * below + turn[axis, 2] * depth + shift[axis]
+            inside &= (at >= box.low_m[axis]) & (at <= box.high_m[axis])
+    return np.where(inside, depth, np.float32(np.nan))
+
+
+_NOT_MOVED: Final = Moved(world_camera=SE3.identity(), before_now=SE3.identity(), is_known=False, followed=0, inliers=0)
+
+
+def _told(pose: SE3, state: Tracking, weakness: Weakness, fit: Registered | None) -> Tracked:
+    return Tracked(world_camera=pose, state=state, weakness=weakness, moved=_NOT_MOVED, fit=fit)

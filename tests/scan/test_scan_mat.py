@@ -1,0 +1,219 @@
+"""The mat: which one, where it lies, and a scan of what stands on it."""
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from common import now
+from common.errors import SettingsError
+from phone_host.cli import main
+from phone_host.geometry.se3 import SE3, vectors_of
+from phone_host.model import Image, Processed
+from phone_host.output.axes import Axes
+from phone_host.output.rig_yaml import write_rig
+from phone_host.report.mat_figures import mat_figures
+from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
+from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
+from phone_host.scan.mat_tracker import ABOVE_M
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+from phone_host.scan.submap_bytes import submap_bytes, submap_of
+from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_rig
+from tests.support.mat_rigs import rig_of
+from tests.support.mats import BALL_M, MAT, MatPainter, looking_at, of_right
+
+RIG = rig_of("small")
+SURE = MatScale()
+STANDS_M = np.array([0.0, 0.0, 0.05])
+AT_M = np.array([0.0, 0.0, 0.035])
+
+
+def from_side(degrees: float) -> SE3:
+    """Where the mat lies for a left camera that looks at it from a side."""
+    return looking_at(math.radians(degrees), math.radians(40), 0.38, AT_M)
+
+
+@cache
+def painters() -> tuple[MatPainter, MatPainter]:
+    return MatPainter(RIG.left, fine=2), MatPainter(RIG.right, fine=2)
+
+
+def pictures(degrees: float, stretch: float = 1.0) -> tuple[Image, Image]:
+    left, right = painters()
+    camera_mat = from_side(degrees)
+    return left.image(camera_mat, 1, stretch), right.image(of_right(RIG, camera_mat), 2, stretch)
+
+
+def found_in(images: tuple[Image, Image], scale: MatScale) -> MatPose | None:
+    rectifier = Rectifier(RIG)
+    pair = rectifier.rectify(*images)
+    corners = mat_corners(pair.left, pair.right, MAT)
+    return fit_mat(MAT.points_m(), corners, rectifier.geometry, pair.epipolar, scale)
+
+
+def true_pose(degrees: float) -> SE3:
+    return SE3(Rectifier(RIG).rectification.R_left, np.zeros(3)) @ from_side(degrees)
+
+
+def test_the_usual_mat_is_that_of_the_target_command() -> None:
+    """Without a value, --mat means 10x8 squares of 25 mm; its middle is the origin, its first corner upper left."""
+    mat = parse_mat(USUAL_MAT)
+    assert mat.name == USUAL_MAT
+    assert mat.size_m == pytest.approx((0.25, 0.2))
+    assert mat.points_m()[0] == pytest.approx([-0.1, 0.075, 0])
+    assert mat.points_m().mean(axis=0) == pytest.approx([0, 0, 0])
+    assert parse_mat(" 8x6:28mm:20mm:6x6 ").name == "8x6:28mm:20mm:6x6"
+
+
+@pytest.mark.parametrize("text", ["left", "10x8", "10x8:25mm", "10x8:25mm:24mm:5x5", "10x8:25:18:5x5", "2x2:25mm:18mm:5x5", "10x8:25mm:18mm:7x7", "90x90:25mm:18mm:5x5"])  # fmt: skip
+def test_what_is_no_mat_is_refused_in_one_line_that_shows_how(text: str) -> None:
+    """Each bad value names the option, and the remedy shows a good one."""
+    with pytest.raises(SettingsError) as refused:
+        parse_mat(text)
+    assert "--mat" in str(refused.value)
+    assert USUAL_MAT in refused.value.remedy
+
+
+def test_the_pose_is_that_of_the_rendered_mat() -> None:
+    """From corners in both images, the pose is exact to 0.2 mm where the object stands and 0.1 degrees, and says how exact it is."""
+    for degrees in (0, 130, 250):
+        found, truth = found_in(pictures(degrees), SURE), true_pose(degrees)
+        assert found is not None
+        off_m = float(np.linalg.norm(found.camera_mat.apply(STANDS_M) - truth.apply(STANDS_M)))
+        assert off_m < 0.0002
+        assert off_m < 5 * found.sigma_at(STANDS_M)
+        assert np.linalg.norm(vectors_of(found.camera_mat.R.T @ truth.R)) < math.radians(0.1)
+        assert min(found.seen) >= 20
+
+
+def test_a_sheet_that_was_printed_too_small_is_measured_by_the_rig() -> None:
+    """Printed at 96 %, the squares come out so long, and the pose is that of the sheet as it lies there."""
+    found = found_in(pictures(40, stretch=0.96), MatScale(1.0, 0.05))
+    assert found is not None
+    assert found.scale.value == pytest.approx(0.96, abs=0.002)
+    assert found.scale.sigma < 0.002
+    assert np.linalg.norm(found.camera_mat.t_m - true_pose(40).t_m) < 0.0005
+
+
+def test_one_image_is_enough_and_none_gives_no_pose() -> None:
+    """With the left image covered, the right one tells the pose; with both covered there is none."""
+    left, right = pictures(0)
+    black = np.zeros_like(left)
+    alone = found_in((black, right), SURE)
+    assert alone is not None
+    assert alone.seen[0] == 0
+    assert np.linalg.norm(alone.camera_mat.apply(STANDS_M) - true_pose(0).apply(STANDS_M)) < 0.001
+    assert found_in((black, np.zeros_like(right)), SURE) is None
+
+
+@cache
+def walked(degrees: float) -> Processed:
+    core = StereoCore(
+        MatchSettings(matcher=MatcherName.TANDEM, disparities=96),
+        Rectifier(RIG),
+        wanted=DepthWanted(search_from_m=0.28),
+    )
+    return core.compute(*pictures(degrees), now.monotonic_ns)
+
+
+def scanned(degrees: list[float], wanted: ScanWanted) -> tuple[Scan, list[ScannedPair]]:
+    scan = Scan(wanted)
+    return scan, [scan.take(str(at), float(at), walked(at)) for at in degrees]
+
+
+WANTED = ScanWanted(voxel_m=0.002, mat=MAT)
+
+
+def test_what_stands_on_the_mat_becomes_a_model_in_the_mats_axes() -> None:
+    """Steps of 60 degrees are no matter; only the ball remains, where it stands, and the same bytes come again."""
+    scan, pairs = scanned([0, 60, 120, 180, 240, 300], WANTED)
+    assert {pair.state for pair in pairs} == {Tracking.TRACKING}
+    mesh = scan.model().mesh
+    points = mesh.points_m.astype(float)
+    off = np.abs(np.linalg.norm(points - [0, 0, BALL_M], axis=1) - BALL_M)
+    assert len(mesh.triangles) > 1000
+    assert points[:, 2].min() >= ABOVE_M
+    assert off[points[:, 2] > 0.02].mean() < 0.0015
+    again = scanned([0, 60, 120, 180, 240, 300], replace(WANTED, threads=2))[0].model().mesh
+    assert mesh.points_m.tobytes() == again.points_m.tobytes()
+
+
+def test_a_pair_without_the_mat_is_lost_with_a_reason_or_followed_by_what_stands_on_it() -> None:
+    """Before the mat was seen nothing is fused. Later the ball alone tells where it is when it hardly moved, not when it was turned half around."""
+    scan = Scan(WANTED)
+    first = scan.take("first", 0.0, without_marks(0))
+    assert (first.state, first.weakness) == (Tracking.LOST, Weakness.NO_MAT)
+    seen = scan.take("seen", 1.0, walked(0))
+    assert seen.state is Tracking.TRACKING
+    assert seen.mat is not None
+    held = scan.take("held", 2.0, without_marks(3))
+    assert (held.state, held.weakness, held.mat) == (Tracking.WEAK, Weakness.NO_MAT, None)
+    truth = (SE3(Rectifier(RIG).rectification.R_left, np.zeros(3)) @ from_side(3)).inverse()
+    assert np.linalg.norm(held.world_camera.t_m - truth.t_m) < 0.003
+    turned = scan.take("turned", 3.0, without_marks(180))
+    assert (turned.state, turned.weakness) == (Tracking.LOST, Weakness.NO_MAT)
+    assert scan.fused == 2
+
+
+def without_marks(degrees: float) -> Processed:
+    """A pair in which only the ball is more than grey; its depth is whole."""
+    whole = walked(degrees)
+    assert whole.cloud is not None
+    points = true_pose(degrees).inverse().apply(whole.cloud.reshape(-1, 3).astype(float))
+    with np.errstate(invalid="ignore"):
+        is_ball = np.linalg.norm(points - [0, 0, BALL_M], axis=1) < BALL_M + 0.004
+    left = np.where(is_ball.reshape(whole.pair.left.shape), whole.pair.left, np.uint8(128))
+    return replace(whole, pair=replace(whole.pair, left=left, right=np.full_like(whole.pair.right, 128)))
+
+
+def test_the_command_scans_pictures_of_an_object_on_a_mat(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four photographs a quarter turn apart become a model that stands upright; the report tells the squares; a mat that is not there is told."""
+    write_rig(tmp_path / "rig.yaml", RIG, rectify_rig(RIG))
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+    for number, degrees in enumerate((0, 60, 180, 240)):
+        for side, image in zip(("left", "right"), pictures(degrees), strict=True):
+            cv2.imwrite(str(tmp_path / side / f"{number}.png"), image)
+    given = ["scan", *(str(tmp_path / each) for each in ("left", "right")), "--calibration", str(tmp_path / "rig.yaml")]
+    wanted = ["--near", "280mm", "--voxel", "2mm"]
+    assert main([*given, *wanted, "--mat", "--out", str(tmp_path / "ball")]) == 0
+    report = json.loads((tmp_path / "ball" / "report.json").read_text())
+    assert report["in_model"] == 4
+    assert report["model"]["axes"] == Axes.MAT.text
+    assert report["mat"]["to_scale"]
+    assert report["mat"]["measured_m"] == pytest.approx(0.025, rel=0.002)
+    assert report["model"]["extent_m"][2] == pytest.approx(2 * BALL_M, abs=0.006)
+    assert "its squares measure 25.0" in capsys.readouterr().out
+    assert "The mat" in (tmp_path / "ball" / "index.html").read_text()
+    assert main([*given, *wanted, "--mat", "8x6:28mm:20mm:4x4", "--out", str(tmp_path / "none")]) == 4
+    assert "the mat 8x6:28mm:20mm:4x4 is not seen in any of 4 pairs" in capsys.readouterr().err
+
+
+def test_a_mat_that_was_printed_too_small_is_told() -> None:
+    """At 97 % the report says how long the squares are and what to do; to scale it says nothing."""
+    seen = MatSaid((30, 31), 0.03, 0.0001, MatScale(0.97, 0.0002))
+    told = mat_figures(MAT, [seen])
+    assert not told.is_to_scale
+    assert "24.25 mm" in told.remarks[0].problem
+    assert mat_figures(MAT, [replace(seen, scale=MatScale(1.004, 0.0002))]).remarks == ()
+
+
+def test_what_a_mat_told_is_kept_in_submaps() -> None:
+    """A submap that is read again tells the same of the mat, and a scan goes on from it with the next pair."""
+    scan, pairs = scanned([0, 60], WANTED)
+    kept = submap_of(submap_bytes(scan.close_submap()), "kept")
+    assert [pair.mat for pair in kept.pairs] == [pair.mat for pair in pairs]
+    later = Scan(WANTED)
+    later.go_on([kept])
+    assert later.take("next", 2.0, walked(180)).is_fused
