@@ -201,13 +201,14 @@ class Scan:
         """How the model is made; None before the first pair that has depth."""
         return None if self.tracker is None else self.tracker.volume.settings
 
-    def take(self, name: str, stamp_s: float, processed: Processed) -> ScannedPair:
+    def take(self, name: str, stamp_s: float, processed: Processed, skew_s: float = 0.0) -> ScannedPair:
         """Take the next pair.
 
         Args:
             name: of the pair.
             stamp_s: when it was taken, s.
             processed: with disparity and cloud.
+            skew_s: by how much its two images were not taken at the same moment, s; a moving camera's depths count for less then.
 
         Returns:
             What became of it.
@@ -215,7 +216,7 @@ class Scan:
         Raises:
             DataError: its size is not that of the pairs before it.
         """
-        view = view_of(processed, self._wanted.mat)
+        view = replace(view_of(processed, self._wanted.mat), stamp_s=stamp_s, skew_s=skew_s)
         density = float(np.isfinite(view.depth_m).mean())
         if self.tracker is None and density >= PoseGate().least_depths:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)

@@ -6,6 +6,7 @@ A camera that is lost goes on in a piece of its own, until one of its views show
 (`pieces`). Nothing that a view shows raises an exception.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -28,6 +29,9 @@ _ODOMETRY: Final = OdometrySettings(corners=400, apart_px=8, keyframe_share=0.6,
 """The model carries the accuracy; odometry, on half the image, only has to start near it. At VGA that saves 20 of 30 ms of processor time."""
 
 _DIRECTIONS: Final = 6
+_SKEWED_PX: Final = 0.5
+"""By how much the picture may move between the moments of its left and its right image: less is within a matcher's noise."""
+
 _CONFIRMED: Final = 1
 """Views of a piece that must fit the model where the one that leaves it tells its place by corners alone."""
 
@@ -99,6 +103,7 @@ class Tracker:
         self._pose = SE3.identity()  # in the axes of the piece that is tracked
         self._was_lost = False
         self._count = 0
+        self._stamp_s = float("nan")
 
     @property
     def volume(self) -> Volume:
@@ -116,7 +121,9 @@ class Tracker:
             Where it was taken, and how sure that is.
         """
         self._count += 1
-        moved = self._odometry.step(reduced(view))
+        small = reduced(view)
+        moved = self._odometry.step(small)
+        view = self._as_sure_as_timed(view, moved.shift_px * view.grey.shape[1] / small.grey.shape[1])
         believed = orthonormal(self._pose @ moved.before_now)
         if not np.isfinite(view.depth_m).mean() >= self._gate.least_depths:
             return self._lost(believed, moved, Weakness.NO_DEPTH, None)
@@ -186,6 +193,14 @@ class Tracker:
         """Begin a piece with a view that belongs to none."""
         pose = self._pieces.begin(self._count, view, believed, why)
         return self._lost(believed if pose is None else pose, moved, why, fit)
+
+    def _as_sure_as_timed(self, view: View, shift_px: float) -> View:
+        """Return a view with the noise that it gets where its images were not taken at the same moment and the camera moved."""
+        since_s, self._stamp_s = view.stamp_s - self._stamp_s, view.stamp_s
+        if not (view.skew_s and since_s > 0):
+            return view
+        skewed_px = abs(view.skew_s) / since_s * shift_px
+        return replace(view, noise_px=math.hypot(view.noise_px, skewed_px)) if skewed_px > _SKEWED_PX else view
 
     def _weakness(self, moved: Moved, fit: Registered) -> Weakness:
         """Return what is wrong with a pose that is believed."""
