@@ -49,7 +49,8 @@ from phone_host.report.run_json import build
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.model_job import check_model, export_model, print_model
-from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+from phone_host.scan.scan_model import ScanModel
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
@@ -180,7 +181,8 @@ def write_model(path: str | Path, model: ScanModel) -> None:
         OSError: it cannot be written.
     """
     mesh = model.mesh
-    write_surface(Path(path), PointCloud(mesh.points_m, mesh.colours), mesh.triangles)
+    seen = model.seen if model.is_closed else None
+    write_surface(Path(path), PointCloud(mesh.points_m, mesh.colours), mesh.triangles, seen=seen)
 
 
 def _addresses(link: str | Sequence[str]) -> list[LinkUri]:

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from common.words import counted
+
 MAGIC: Final = b"\x89MCAP0\r\n"
 CHANNELS: Final = "channels"
 """Name of the metadata record in which a recording tells its channels outside of any chunk: chunk 1 may be the spoiled one."""
@@ -105,7 +107,7 @@ class Damage:
     @property
     def text(self) -> str:
         """For people: what is wrong, and where, if it is at one place."""
-        return f"at byte {self.at}: {self.words}; {self.lost} bytes passed over" if self.lost else self.words
+        return f"at byte {self.at}: {self.words}; {counted(self.lost, 'byte')} passed over" if self.lost else self.words
 
 
 Record = Message | Attachment | Metadata | Damage

@@ -25,8 +25,9 @@ from phone_host.run.sinks import FunctionSink
 from phone_host.run.turn_remarks import turn_remarks
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
-from phone_host.scan.scan import LEAST_WEIGHT, Scan, ScannedPair, ScanWanted, Submap
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, Submap
 from phone_host.scan.turntable import scan_for
+from phone_host.scan.volume_settings import LEAST_WEIGHT
 
 _SINK: Final = "scan"
 _NS: Final = 1e9

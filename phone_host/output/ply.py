@@ -21,6 +21,7 @@ from phone_host.output.strips import strips
 from phone_host.stereo.native.library import Library, Missing, PackJob, native
 
 _VERTEX = np.dtype([*((name, "<f4") for name in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))])
+_SEEN_VERTEX = np.dtype([*((name, _VERTEX[name]) for name in _VERTEX.names or ()), ("seen", "u1")])
 _PROPERTIES = (
     "property float x\nproperty float y\nproperty float z\n"
     "property uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -95,7 +96,13 @@ def cloud_ply(cloud: CloudImage, colours: Image, axes: Axes = Axes.CAMERA) -> by
     return _header(points.size, axes) + points.tobytes()
 
 
-def write_surface(path: Path, cloud: PointCloud, triangles: NDArray[np.int32], axes: Axes = Axes.CAMERA) -> None:
+def write_surface(
+    path: Path,
+    cloud: PointCloud,
+    triangles: NDArray[np.int32],
+    axes: Axes = Axes.CAMERA,
+    seen: NDArray[np.bool_] | None = None,
+) -> None:
     """Write a surface with its colours.
 
     Args:
@@ -103,18 +110,24 @@ def write_surface(path: Path, cloud: PointCloud, triangles: NDArray[np.int32], a
         cloud: its points, in the left camera's axes.
         triangles: (T, 3) int32 numbers of points, anticlockwise from outside.
         axes: axes of the file's points.
+        seen: (N,) whether some view saw each point: a property `seen`, 1 or 0, after the colours; None: there is none.
 
     Raises:
         OSError: the file cannot be written.
     """
-    vertices = np.empty(len(cloud.points_m), _VERTEX)
+    vertices = np.empty(len(cloud.points_m), _VERTEX if seen is None else _SEEN_VERTEX)
     for channel, name in enumerate("xyz"):
         vertices[name] = cloud.points_m[:, channel] * axes.signs[channel]
     for channel, name in enumerate(("red", "green", "blue")):
         vertices[name] = cloud.colours[:, channel]
+    if seen is not None:
+        vertices["seen"] = seen
     faces = np.empty(len(triangles), _TRIANGLE)
     faces["corners"], faces["numbers"] = 3, triangles
-    header = _header(len(vertices), axes, f"element face {len(faces)}\nproperty list uchar int vertex_indices\n")
+    further = "" if seen is None else "property uchar seen\n"
+    header = _header(
+        len(vertices), axes, f"{further}element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+    )
     write_parts(path, [header, vertices.tobytes(), faces.tobytes()])
 
 

@@ -79,7 +79,7 @@ class _Writing:
 
     def abandon(self, cause: str) -> None:
         """See Target."""
-        _LOG.error(event("recording_ended_early", file=self.file.path, cause=cause, remedy="the run goes on"))
+        _LOG.error(event("recording_ended_early", file=self.file.path, cause=cause, remedy="what is in it can be used"))
         self.file.abandon()
 
     def _write_captured(self) -> None:

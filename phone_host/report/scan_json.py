@@ -37,6 +37,7 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
             "extent_m": [round(length, 6) for length in model.size.extent_m],
             "noise_m": _number(model.noise_m),
             "noise_p95_m": _number(model.noise_p95_m),
+            "unseen_share": _number(model.unseen_share),
             "voxel_m": settings.voxel_m if settings else None,
             "far_m": round(settings.far_m, 6) if settings else None,
             "memory_bytes": model.memory_bytes,

@@ -15,7 +15,15 @@ from phone_host.report.page_links import FileLink, NextCommand, files_section, l
 from phone_host.report.page_script import Script
 from phone_host.report.report_page import Figure, figures_row, heading
 from phone_host.report.scan_lines import area_text, mat_line
-from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict, stretches
+from phone_host.report.scan_report import (
+    MODEL,
+    TRAJECTORY,
+    ModelFigures,
+    ScanReport,
+    scan_verdict,
+    share_text,
+    stretches,
+)
 from phone_host.scan.scan import ScannedPair
 from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_parts import legend
@@ -79,7 +87,6 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
         return ()
     area, unit = area_text(model.size.area_m2).split(" ")
     width, height, depth = (f"{length * 1e3:.0f}" for length in model.size.extent_m)
-    border, border_unit = distance_text(model.size.border_m).split(" ")
     off = f"{report.off_m * 1e3:.2g}" if math.isfinite(report.off_m) else "\u2013"
     return (
         Figure(label="pairs in the model", value=f"{report.fused}", unit=f"of {len(report.pairs)}"),
@@ -91,12 +98,7 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
         ),
         Figure(label="pairs off the model", value=off, unit="mm", note="mean; median of the pairs"),
         Figure(label="surface", value=area, unit=unit, note=f"{width} x {height} x {depth} mm"),
-        Figure(
-            label="open border",
-            value=border,
-            unit=border_unit,
-            note="where the surface ends, because nothing more was seen; 0 is closed",
-        ),
+        _border(model),
         Figure(
             label="voxels",
             value=f"{settings.voxel_m * 1e3:.3g}",
@@ -127,6 +129,16 @@ def _on_mat(report: ScanReport) -> str:
         legend([(one.label, one.colour) for one in courses])
         + two_widths(partial(over_views, names, courses, "corners", "corners of the mat that each pair shows")),
     )
+
+
+def _border(model: ModelFigures) -> Figure:
+    """Tell what nobody saw: how much of a closed surface, or where an open one ends."""
+    if math.isfinite(model.unseen_share):
+        share, unit = share_text(model.unseen_share).split(" ")
+        return Figure(label="not seen", value=share, unit=unit, note="of the surface: closed, and pink in the model")
+    border, unit = distance_text(model.size.border_m).split(" ")
+    note = "where the surface ends, because nothing more was seen; 0 is closed"
+    return Figure(label="open border", value=border, unit=unit, note=note)
 
 
 def _fits(report: ScanReport) -> str:

@@ -59,6 +59,7 @@ class ModelFigures:
         size: area, border and extent.
         noise_m: median standard deviation of its points, if the views err independently, m; NaN without points.
         noise_p95_m: of which 19 in 20 are better.
+        unseen_share: share of a closed surface that nobody saw, 0..1; NaN: it is open there.
         memory_bytes: of the field.
         left_out: blocks for which there was no memory.
     """
@@ -68,6 +69,7 @@ class ModelFigures:
     size: MeshSize = NO_SIZE
     noise_m: float = math.nan
     noise_p95_m: float = math.nan
+    unseen_share: float = math.nan
     memory_bytes: int = 0
     left_out: int = 0
 
@@ -174,4 +176,11 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
     sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
     noise = f"its surface is known to \u00b1 {report.model.noise_m * 1e3:.2g} mm if the pairs err independently"
     verdict = Headline.GOOD if min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
-    return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}; {noise}."
+    unseen = report.model.unseen_share
+    closed = "" if math.isnan(unseen) else f"; {share_text(unseen)} of it was not seen"
+    return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}; {noise}{closed}."
+
+
+def share_text(share: float) -> str:
+    """Write a share in percent: `12 %`, `0.4 %`, `0 %`."""
+    return f"{100 * share:.0f} %" if share >= 0.01 or share == 0 else f"{100 * share:.1g} %"

@@ -15,7 +15,7 @@ from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
-from phone_host.scan.scan import ScanModel
+from phone_host.scan.scan_model import ScanModel
 
 NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html"
 """The names that `scan` writes into its folder."""
@@ -51,7 +51,8 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
     folder = ListedFolder(out, NAMES)
     try:
         folder.add(MODEL, TRAJECTORY, *ALWAYS)
-        write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes)
+        seen = scan.model.seen if scan.model.is_closed else None
+        write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
         write_text(out / TRAJECTORY, trajectory_of(report))
         write_text(out / "report.json", json_text(scan_json(report), indent=2) + "\n")
         voxel_m = report.settings.voxel_m if report.settings else 1.0

@@ -12,7 +12,8 @@ from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan, ScanModel, ScannedPair
+from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.tracking_words import OF_TURNING, Weakness
 
 
@@ -111,6 +112,7 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
         size=size_of(model.mesh),
         noise_m=noise_m,
         noise_p95_m=noise_p95_m,
+        unseen_share=model.unseen_share if model.is_closed else math.nan,
         memory_bytes=0 if volume is None else volume.memory_bytes,
         left_out=0 if volume is None else volume.left_out,
     )

@@ -82,4 +82,14 @@ def _loops(case: int) -> list[list[int]]:
 
 
 def _fan(loop: list[int]) -> list[tuple[int, int, int]]:
-    return [(loop[0], loop[at + 1], loop[at]) for at in range(1, len(loop) - 1)]
+    """Return triangles from one point of a loop to the others, from one such that no triangle's new side lies in a face of the cube.
+
+    The neighbour might have the same side there: four triangles at one edge, or two in one plane.
+    """
+    turned = (loop[first:] + loop[:first] for first in range(len(loop)))
+    best = next(each for each in turned if not any(_share_a_face(each[0], other) for other in each[2:-1]))
+    return [(best[0], best[at + 1], best[at]) for at in range(1, len(best) - 1)]
+
+
+def _share_a_face(one: int, other: int) -> bool:
+    return any(set(EDGES[one]) | set(EDGES[other]) <= set(face) for face in _FACES)

@@ -19,6 +19,9 @@ _AT_ONCE: Final = 256
 _KEY_BITS: Final = 20
 """Of a voxel's number along each axis: a volume of 1 mm voxels may be 1 km wide."""
 
+_LEAST_SHARE: Final = 0.01
+"""Of an edge between a point and its ends: nearer, the points of several edges would be one, and triangles a line."""
+
 _AXIS_OF_EDGE: Final = np.repeat(np.arange(3), 4)
 
 
@@ -105,7 +108,7 @@ def _part(blocks: Blocks, numbers: NDArray[np.int64], least_weight: int) -> _Par
     distinct, first = np.unique(keys, return_index=True)
     flat, axis = flat.reshape(-1, 2)[first], _AXIS_OF_EDGE[edges].ravel()[first]
     values = field.ravel()[flat].astype(np.float64)
-    share = values[:, 0] / (values[:, 0] - values[:, 1])
+    share = np.clip(values[:, 0] / (values[:, 0] - values[:, 1]), _LEAST_SHARE, 1 - _LEAST_SHARE)
     points = world.reshape(-1, 3)[first].astype(np.float64)
     points[np.arange(len(points)), axis] += share
     shades = tint.reshape(-1, 3)[flat].astype(np.float64)

@@ -13,6 +13,9 @@ Flags = NDArray[np.bool_]
 _CRUMB_SHARE: Final = 0.01
 """Of the largest piece's triangles: smaller pieces are wrong matches that float, or bits of the background."""
 
+_LOOSE_SHARE: Final = 0.05
+"""Of the largest body's content: two things in a box both stay."""
+
 _COARSER: Final = 1.15
 
 
@@ -40,14 +43,19 @@ def size_of(mesh: Mesh) -> MeshSize:
     if not len(mesh.triangles):
         return NO_SIZE
     points = mesh.points_m.astype(np.float64)
-    a, b, c = (points[mesh.triangles[:, corner]] for corner in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    area = areas_m2(mesh).sum()
     edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
     keys, counts = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_counts=True)
     open_ = keys[counts == 1]
     border = np.linalg.norm(points[open_ // len(points)] - points[open_ % len(points)], axis=1).sum()
     x, y, z = np.ptp(points[np.unique(mesh.triangles)], axis=0).tolist()
     return MeshSize(float(area), float(border), (x, y, z))
+
+
+def areas_m2(mesh: Mesh) -> NDArray[np.float64]:
+    """Return the area of each triangle, (T,) m^2."""
+    a, b, c = np.moveaxis(mesh.points_m.astype(np.float64)[mesh.triangles], 1, 0)
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, np.float64)
 
 
 def only(mesh: Mesh, wanted: Flags) -> Mesh:
@@ -64,6 +72,20 @@ def without_crumbs(mesh: Mesh) -> Mesh:
     piece = _pieces(mesh)[mesh.triangles[:, 0]]
     sizes = np.bincount(piece)
     return only(mesh, sizes[piece] >= _CRUMB_SHARE * sizes.max())
+
+
+def without_loose_bodies(mesh: Mesh) -> Mesh:
+    """Leave out bodies of less than a twentieth of the largest one's content, and hollows inside it.
+
+    Args:
+        mesh: closed.
+    """
+    if not len(mesh.triangles):
+        return mesh
+    piece = _pieces(mesh)[mesh.triangles[:, 0]]
+    corners = mesh.points_m.astype(np.float64)[mesh.triangles]
+    contents = np.bincount(piece, (np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]).sum(axis=1) / 6)
+    return only(mesh, contents[piece] >= _LOOSE_SHARE * contents.max())
 
 
 def _pieces(mesh: Mesh) -> NDArray[np.int64]:

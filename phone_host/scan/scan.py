@@ -9,23 +9,24 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
+from phone_host.scan.carving import Carved, Carving
+from phone_host.scan.cells import Cells
+from phone_host.scan.closing import Floor
 from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.fineness import fineness_for
+from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.mat import Mat
 from phone_host.scan.mat_pose import MatSaid
-from phone_host.scan.mat_tracker import MatTracker, begun_on_mat, box_of_mat
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import only, without_crumbs
+from phone_host.scan.mat_tracker import ABOVE_M, MatTracker, begun_on_mat, box_of_mat
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
-from phone_host.scan.surface_noise import surface_noise_m
+from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
@@ -35,10 +36,6 @@ from phone_host.stereo.images import size_px, to_grey
 
 NOISE_PX: Final = 0.5
 """Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
-
-LEAST_WEIGHT: Final = 8
-"""Of a voxel on the surface: an eighth of a sure depth. One view at a slant gives less, and is off by 5 mm where others are off by 4."""
-
 
 _SUBMAP_PAIRS: Final = 20
 """Fused pairs after which a submap is closed: four seconds at five pairs a second."""
@@ -54,7 +51,7 @@ class ScanWanted:
     Attributes:
         voxel_m: distance of two values of the field, m; NaN: as the depths' noise deserves.
         most_bytes: memory of the model at most.
-        box: what lies outside does not belong to the model; None: everything belongs.
+        box: what lies outside does not belong to the model, and what nobody saw inside is closed; None: everything belongs, and nothing is closed.
         threads: that compute; results do not depend on them.
         mat: on which the object lies: it alone tells where each pair was taken; None: there is none.
         turntable: whether the cameras stand still and an object turns before them.
@@ -71,6 +68,11 @@ class ScanWanted:
     def model_box(self) -> Box | None:
         """What lies outside does not belong to the model: the box that was asked for, or the room above the mat; None: everything belongs."""
         return box_of_mat(self.mat) if self.box is None and self.mat is not None else self.box
+
+    @property
+    def floor(self) -> Floor | None:
+        """The plane on which the thing stands: the mat; None: it is not known."""
+        return None if self.mat is None else Floor(skip_m=ABOVE_M)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -119,6 +121,7 @@ class Submap:
         size_px: width and height of their rectified images.
         blocks: those that got something since then, with all that they hold.
         tracker: where it stood at the end, and the places since then.
+        carved: what all views since the beginning told of the box; None: there is none.
     """
 
     is_whole: bool
@@ -128,6 +131,7 @@ class Submap:
     size_px: tuple[int, int]
     blocks: BlockValues
     tracker: TrackerState
+    carved: Carved | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,19 +142,6 @@ class _Closed:
     fused: int = 0
     places: int = 0
     blocks: int = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ScanModel:
-    """A surface.
-
-    Attributes:
-        mesh: its triangles.
-        noise_m: (V,) float32 standard deviation of its points, m, if the views err independently.
-    """
-
-    mesh: Mesh
-    noise_m: NDArray[np.float32]
 
 
 class Scan:
@@ -168,6 +159,8 @@ class Scan:
     def __init__(self, wanted: ScanWanted) -> None:
         self._wanted = wanted
         self.tracker: Tracker | MatTracker | None = None
+        self._carving: Carving | None = None
+        self._depths = KeptDepths()
         self.geometry: StereoGeometry | None = None
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
@@ -221,6 +214,7 @@ class Scan:
         if self.tracker is None and density >= PoseGate().least_depths:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
             self.tracker, self._untracked = self._begun(view), len(self._pairs)
+            self._carving = self._carving_of(self._wanted.model_box)
         if self.tracker is None:
             pair = ScannedPair(
                 name=name,
@@ -239,6 +233,10 @@ class Scan:
             require_size(name, view, self.size_px)
             told = self.tracker.track(view)
             self._joined(told.joined)
+            if told.is_fused:
+                self._depths.remember(view, told.world_camera)
+                if self._carving is not None:
+                    self._carving.see(view, told.world_camera)
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
@@ -318,6 +316,7 @@ class Scan:
             size_px=self.size_px,
             blocks=blocks,
             tracker=tracker,
+            carved=None if self._carving is None else self._carving.carved,
         )
 
     def go_on(self, submaps: Sequence[Submap]) -> None:
@@ -340,11 +339,18 @@ class Scan:
             self.tracker.volume.put(each.blocks)
             self.tracker.go_on(each.tracker)
             places += len(each.tracker.places)
+        carved, self._carving = submaps[-1].carved, self._carving_of(wanted.model_box)
+        if self._carving is not None:
+            if carved is None or carved.cells != self._carving.cells:
+                raise SettingsError(
+                    "the scan that is gone on with had another box", "give the same --box as then, or begin a new scan"
+                )
+            self._carving.go_on(carved)
         written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
     def crop(self, box: Box | None) -> None:
-        """Keep only what lies in a box: when the model is made, for the field holds it all.
+        """Keep only what lies in a box, and close it: when the model is made, for the field holds it all.
 
         Args:
             box: m; None: everything.
@@ -352,17 +358,25 @@ class Scan:
         self._wanted = replace(self._wanted, box=box)
 
     def model(self) -> ScanModel:
-        """Return the surface so far, without crumbs and what lies outside the box; without triangles before any was seen."""
-        volume = self.volume
+        """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""
+        volume, wanted = self.volume, self._wanted
         if volume is None:
-            return ScanModel(Mesh.empty(), np.zeros(0, np.float32))
-        mesh = mesh_of(volume.blocks, volume.settings.voxel_m, LEAST_WEIGHT)
-        box = self._wanted.model_box
-        if box is not None:
-            inside = box.holds(mesh.points_m)
-            mesh = only(mesh, np.logical_and.reduce(inside[mesh.triangles], axis=1))
-        mesh = without_crumbs(mesh)
-        return ScanModel(mesh, surface_noise_m(mesh.points_m, volume.blocks, volume.settings))
+            return ScanModel.empty()
+        box = wanted.model_box
+        if box is None:
+            return open_model(volume)
+        carving = self._carving
+        if carving is None or carving.cells != Cells.of(box, volume.settings.voxel_m):  # it was chosen after some views
+            carving = Carving(Cells.of(box, volume.settings.voxel_m), wanted.threads)
+            self._depths.carve(carving)
+        return closed_model(volume, carving, box, wanted.floor)
+
+    def _carving_of(self, box: Box | None) -> Carving | None:
+        """Return what a box is carved by; None: there is none, or no model yet."""
+        settings = self.settings
+        return (
+            None if box is None or settings is None else Carving(Cells.of(box, settings.voxel_m), self._wanted.threads)
+        )
 
 
 def require_size(name: str, view: View, size: tuple[int, int]) -> None:

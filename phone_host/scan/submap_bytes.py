@@ -16,6 +16,8 @@ from common.errors import DataError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.blocks import VOXELS
+from phone_host.scan.carving import Carved
+from phone_host.scan.cells import Cells
 from phone_host.scan.mat_pose import MatSaid, MatScale
 from phone_host.scan.places import Place
 from phone_host.scan.scan import ScannedPair, Submap
@@ -40,7 +42,7 @@ def submap_bytes(submap: Submap) -> bytes:
         submap: any.
     """
     file = io.BytesIO()
-    pairs, places, of = submap.pairs, submap.tracker.places, submap.geometry
+    pairs, places, of, carved = submap.pairs, submap.tracker.places, submap.geometry, submap.carved
     np.savez(
         file,
         is_whole=np.array(submap.is_whole),
@@ -73,6 +75,8 @@ def submap_bytes(submap: Submap) -> bytes:
         place_sizes=np.array([len(place.points_m) for place in places], np.int64),
         place_points=np.concatenate([np.zeros((0, 3)), *(place.points_m for place in places)]),
         descriptors=np.concatenate([np.zeros((0, 32), np.uint8), *(place.descriptors for place in places)]),
+        carved=np.zeros((3, 0, 0, 0), np.uint8) if carved is None else carved.counts,
+        cells=np.zeros(6) if carved is None else _numbers(carved),
     )
     return _HEAD + zlib.compress(file.getvalue(), _LEVEL)
 
@@ -137,7 +141,25 @@ def _read(content: bytes) -> Submap:
         size_px=(width_px, height_px),
         blocks=_blocks(held),
         tracker=TrackerState(_poses(held["pose"])[0], float(held["usual_off_m"]), _places(held)),
+        carved=_carved(held),
     )
+
+
+def _numbers(carved: Carved) -> NDArray[np.float64]:
+    cells = carved.cells
+    return np.array([*cells.low, cells.voxels, carved.views, cells.voxel_m])
+
+
+def _carved(held: Arrays) -> Carved | None:
+    counts = held["carved"].astype(np.uint8)
+    kinds, tall, deep, wide = counts.shape
+    if kinds != 3:
+        raise ValueError("cells")
+    if not counts.size:
+        return None
+    x, y, z, voxels, views = held["cells"][:5].astype(np.int64).tolist()
+    cells = Cells((x, y, z), (wide, deep, tall), voxels, float(held["cells"][5]))
+    return Carved(cells, counts, views)
 
 
 def _blocks(held: Arrays) -> BlockValues:

@@ -17,7 +17,8 @@ from phone_host.model import Processed
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.piece import PoseGate
-from phone_host.scan.scan import Scan, ScanModel, ScannedPair, ScanWanted, require_size, view_of
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, require_size, view_of
+from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.table_cut import above, points_of, table_height_m
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness

@@ -11,7 +11,7 @@ import cv2
 from common.camera.imagefile import SUFFIXES
 from common.errors import UnavailableError
 from common.places import make_folder
-from phone_host.model import CameraModel, Rig
+from phone_host.model import CameraModel, Image, Rig
 from phone_host.output.atomic import write_bytes
 from phone_host.scene.scene import Look, Renderer, Scene, rig_poses
 
@@ -115,7 +115,7 @@ def render_films(
     }
     for film in films.values():
         for folder in (film.left, film.right):
-            _refuse_foreign(folder, film.frames)
+            prepare_folder(folder, film.frames)
     poses = rig_poses(rig)
     left = {quality: film.left for quality, film in films.items()}
     right = {quality: film.right for quality, film in films.items()}
@@ -125,12 +125,17 @@ def render_films(
     return tuple(films.values())
 
 
-def _name(index: int, frames: int) -> str:
-    return f"{index:0{len(str(frames))}d}.jpg"
+def prepare_folder(folder: Path, frames: int) -> None:
+    """Make a folder for images, and refuse one with an image that will not be replaced: it would be shown with them.
 
+    Args:
+        folder: for the images of one camera.
+        frames: how many there will be.
 
-def _refuse_foreign(folder: Path, frames: int) -> None:
-    """Refuse a folder with an image that the film will not replace: it would be shown as part of the film."""
+    Raises:
+        OSError: the folder cannot be written to.
+        UnavailableError: there is such an image.
+    """
     ours = {_name(index, frames) for index in range(frames)}
     images = [path for path in folder.glob("*") if path.suffix.lower() in SUFFIXES]
     foreign = sorted(path.name for path in images if path.name not in ours)
@@ -140,6 +145,31 @@ def _refuse_foreign(folder: Path, frames: int) -> None:
             f"{image} is no image of the film, but would be shown with it",
             "move it away, or give another folder with --out",
         )
+    make_folder(folder)
+    if folder.is_symlink():
+        raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(folder))
+
+
+def write_image(folder: Path, index: int, frames: int, image: Image, quality: int) -> None:
+    """Write an image of a film.
+
+    Args:
+        folder: one that `prepare_folder` made.
+        index: its number.
+        frames: how many there will be.
+        image: (H, W, 3) uint8 BGR.
+        quality: of the JPEG, 1 to 100.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    assert done
+    write_bytes(folder / _name(index, frames), jpeg.tobytes())
+
+
+def _name(index: int, frames: int) -> str:
+    return f"{index:0{len(str(frames))}d}.jpg"
 
 
 def _render(
@@ -149,15 +179,9 @@ def _render(
     times_s: Sequence[float],
     advance: Callable[[], None],
 ) -> None:
-    for target in targets.values():
-        make_folder(target)
-        if target.is_symlink():
-            raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(target))
     for index, time_s in enumerate(times_s):
         image = renderer.frame(time_s)
         assert image.shape == (model.height_px, model.width_px, 3)
         for quality, target in targets.items():
-            done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
-            assert done
-            write_bytes(target / _name(index, len(times_s)), jpeg.tobytes())
+            write_image(target, index, len(times_s), image, quality)
         advance()

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from phone_host.calibration.sheets.layout import marked_sheet
 from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard
 from phone_host.calibration.sheets.sheet import Paper
-from phone_host.model import CameraModel, Image, Rig
+from phone_host.model import CameraModel, Image, Rig, Side
 from phone_host.scene.objects import OBJECTS
 from phone_host.scene.printed import printed_sheet
 from phone_host.scene.scene_model import (
@@ -163,19 +163,33 @@ class ObjectScene:
         right = Pose(rig.R_right_left @ left.R_camera_scene, left.centre_m + left.R_camera_scene.T @ beside)
         return Scene((*_SURROUNDINGS, *bodies), _LIGHT), left, right
 
+    def image(self, number: int, side: Side) -> Image:
+        """Render what a camera sees, before it is compressed.
+
+        Args:
+            number: of the view.
+            side: which camera.
+
+        Returns:
+            (H, W, 3) uint8 BGR.
+        """
+        scene, *poses = self.scene(number)
+        model, pose, look = (
+            (self.rig.left, poses[0], self.setting.looks[0])
+            if side is Side.LEFT
+            else (self.rig.right, poses[1], self.setting.looks[1])
+        )
+        # The time chooses the noise of the frame.
+        return render(scene, model, pose, look, t_s=float(number + 1000 * self.setting.seed))
+
     def view(self, number: int) -> ObjectView:
         """Render a view.
 
         Args:
             number: 0 to `setting.views` - 1; more go on around. Equal numbers give equal bytes.
         """
-        scene, left, right = self.scene(number)
-        images = []
-        for model, pose, look in zip((self.rig.left, self.rig.right), (left, right), self.setting.looks, strict=True):
-            # The time chooses the noise of the frame.
-            image = render(scene, model, pose, look, t_s=float(number + 1000 * self.setting.seed))
-            images.append(_compressed(image, self.setting.jpeg_quality))
-        return ObjectView(left=images[0], right=images[1], T_mat_left=self.pose(number))
+        left, right = (_compressed(self.image(number, side), self.setting.jpeg_quality) for side in Side)
+        return ObjectView(left=left, right=right, T_mat_left=self.pose(number))
 
 
 def object_scene(name: str, setting: Setting | None = None) -> ObjectScene:

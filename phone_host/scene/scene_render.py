@@ -5,6 +5,7 @@ then costs only the moving bodies, their shadows and their edges. Inside a surfa
 because the texture is band-limited; pixels at the border of two surfaces are averaged over 3 x 3 samples.
 """
 
+import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -68,7 +69,7 @@ class Renderer:
         self._size = (model.height_px, model.width_px)
         self._focal_px = model.mean_focal_px
         self._centre = pose.centre_m.astype(np.float32)
-        rays = np.tensordot(pose.R_camera_scene.T, pixel_rays(model), axes=1)
+        rays = np.tensordot(pose.R_camera_scene.T, _rays_of(model), axes=1)
         self._rays = rays.astype(np.float32).reshape(3, -1)
         self._steps = tuple(np.gradient(rays, axis=axis).astype(np.float32).reshape(3, -1) for axis in (2, 1))
         self._block_rays, self._block_angle = _blocks(rays)
@@ -312,6 +313,14 @@ def render(
         (H, W, 3) uint8 BGR.
     """
     return Renderer(scene.at(t_s), model, Pose() if pose is None else pose, look).frame(t_s)
+
+
+@functools.lru_cache(maxsize=4)
+def _rays_of(model: CameraModel) -> NDArray[np.float64]:
+    """Return the rays of a camera, which a walk around a thing needs at each step."""
+    rays = pixel_rays(model)
+    rays.setflags(write=False)
+    return rays
 
 
 def _by_body(surface: NDArray[np.int16], at: Flat) -> Iterator[tuple[int, Flat]]:

@@ -21,6 +21,7 @@ from phone_host.report.mat_figures import mat_figures
 from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
 from phone_host.scan.mat_tracker import ABOVE_M
+from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -136,14 +137,17 @@ WANTED = ScanWanted(voxel_m=0.002, mat=MAT)
 
 
 def test_what_stands_on_the_mat_becomes_a_model_in_the_mats_axes() -> None:
-    """Steps of 60 degrees are no matter; only the ball remains, where it stands, and the same bytes come again."""
+    """Steps of 60 degrees are no matter; only the ball remains, closed down to the sheet, and the same bytes come again."""
     scan, pairs = scanned([0, 60, 120, 180, 240, 300], WANTED)
     assert {pair.state for pair in pairs} == {Tracking.TRACKING}
-    mesh = scan.model().mesh
-    points = mesh.points_m.astype(float)
+    model = scan.model()
+    mesh, points = model.mesh, model.mesh.points_m.astype(float)[model.seen]
     off = np.abs(np.linalg.norm(points - [0, 0, BALL_M], axis=1) - BALL_M)
     assert len(mesh.triangles) > 1000
     assert points[:, 2].min() >= ABOVE_M
+    assert size_of(mesh).border_m == 0
+    assert mesh.points_m[:, 2].min() == pytest.approx(0, abs=1e-4)
+    assert 0.2 < model.unseen_share < 0.4
     assert off[points[:, 2] > 0.02].mean() < 0.0015
     again = scanned([0, 60, 120, 180, 240, 300], replace(WANTED, threads=2))[0].model().mesh
     assert mesh.points_m.tobytes() == again.points_m.tobytes()

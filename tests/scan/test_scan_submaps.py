@@ -12,6 +12,7 @@ from common.ledger import StageTimes
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair
 from phone_host.run.kept_submaps import KeptSubmaps, read_submaps
+from phone_host.scan.box import Box
 from phone_host.scan.scan import Scan, ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.volume import Volume
@@ -165,3 +166,16 @@ def test_a_folder_that_vanishes_ends_the_keeping_only(tmp_path: Path) -> None:
         kept.after_pair()
     assert "could not have been resumed" in kept.remarks[0].problem
     kept.done()
+
+
+def test_what_the_views_told_of_a_box_is_kept() -> None:
+    """A scan in a box goes on with the same counts, so its closed model is the same; with another box it is refused."""
+    wanted = replace(WANTED, box=Box((-0.3, -0.3, 0.5), (0.3, 0.3, 1.2)))
+    scan = taken(Scan(wanted), POSES[:2])
+    kept = submap_of(submap_bytes(scan.close_submap()), "a file")
+    again = Scan(wanted)
+    again.go_on([kept])
+    assert scan.model().is_closed
+    assert np.array_equal(triangles(again), triangles(scan))
+    with pytest.raises(SettingsError, match="another box"):
+        Scan(replace(WANTED, box=Box((-0.3, -0.3, 0.5), (0.3, 0.3, 1.5)))).go_on([kept])

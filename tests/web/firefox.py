@@ -97,6 +97,14 @@ class Firefox:
             time.sleep(0.05)
         return value
 
+    @contextmanager
+    def behind(self) -> Iterator[None]:
+        """Put another tab before it while the block runs."""
+        other = self._run("browsingContext.create", {"type": "tab", "background": False})["context"]
+        yield
+        self._run("browsingContext.close", {"context": other})
+        self._run("browsingContext.activate", {"context": self._context})
+
     def picture(self) -> str:
         """Return what the page looks like: a PNG in base64."""
         return str(self._run("browsingContext.captureScreenshot", {"context": self._context})["data"])

@@ -224,6 +224,39 @@ def test_a_tab_in_the_background_says_so_on_both_sides(camera: PlayedFeed, opene
     camera.until(lambda: camera.of_kind("track")[-1]["visible"])
 
 
+def test_a_phone_that_is_turned_says_so_until_it_is_turned_back(camera: PlayedFeed, opened: Opener) -> None:
+    """Chromium itself tells that the screen has turned; frames carry the turn, the page asks to turn back, and streams again then."""
+    page = started(opened, size=PHONE, is_mobile=True)
+    says(page, "Streaming")
+    screen = page.context.new_cdp_session(page)
+
+    def turn(kind: str, angle: int, width: int, height: int) -> None:
+        held = {"type": kind, "angle": angle}
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": True}
+        screen.send("Emulation.setDeviceMetricsOverride", {**size, "screenOrientation": held})
+
+    turn("landscapePrimary", 90, 844, 390)
+    assert "Turn it back" in says(page, "The phone was turned")
+    camera.until(lambda: camera.of_kind("track")[-1]["rotation"] == 90)
+    camera.until(lambda: camera.frames[-1].rotation == 90)
+    turn("portraitPrimary", 0, 390, 844)
+    says(page, "Streaming")
+    camera.until(lambda: camera.frames[-1].rotation == 0)
+
+
+def test_the_screen_stays_on_while_it_is_a_camera(opened: Opener) -> None:
+    """The browser's wake lock is held from the start of the camera to its stop."""
+    keeping = """window.locks = []; const own = navigator.wakeLock.request.bind(navigator.wakeLock);
+    navigator.wakeLock.request = async kind => { const lock = await own(kind); window.locks.push(lock); return lock; };"""
+    page = started(opened, permissions=("camera", "screen-wake-lock"), script=keeping)
+    says(page, "Streaming")
+    page.wait_for_function("() => window.locks.length === 1 && !window.locks[0].released")
+    assert page.evaluate("() => window.locks[0].type") == "screen"
+    page.click("#own-go")
+    says(page, "The camera is off")
+    page.wait_for_function("() => window.locks[0].released")
+
+
 def test_when_the_program_goes_and_comes_the_same_camera_goes_on(camera: PlayedFeed, opened: Opener) -> None:
     """The page says that nobody answers, comes back by itself, and goes on with its numbers; a page that is loaded again is the camera again."""
     page = started(opened)

@@ -63,6 +63,40 @@ def test_firefox_films_by_the_other_way(camera: PlayedFeed, server: PageServer, 
     assert all(each.callback_us <= each.encoded_us <= each.sent_us for each in frames)
 
 
+_LOCKS = """window.locks = []; {
+  const own = navigator.wakeLock.request.bind(navigator.wakeLock);
+  navigator.wakeLock.request = async kind => { const lock = await own(kind); window.locks.push(lock); return lock; };
+}"""
+_HELD = "window.locks.filter(lock => !lock.released).length"
+
+
+def test_behind_another_tab_it_says_so_and_in_front_it_goes_on(
+    camera: PlayedFeed, server: PageServer, tmp_path: Path
+) -> None:
+    """The program is told at once; the screen's wake lock, which the browser takes from hidden tabs, is asked for again in front, and given back by Stop."""
+    with firefox(tmp_path, ALLOWED) as page:
+        page.goto(server.url)
+        page.until("document.body.dataset.line === 'open'")
+        page.evaluate(_LOCKS)
+        page.evaluate("location.hash = 'camera'")
+        page.until("document.querySelector('#own-go[data-running=no]') !== null")
+        page.evaluate("document.querySelector('#own-go').click()")
+        camera.until(lambda: camera.frames)
+        page.until(f"{_HELD} === 1")
+        with page.behind():
+            page.until("document.visibilityState === 'hidden'")
+            camera.until(lambda: not camera.of_kind("track")[-1]["visible"])
+            page.until("document.getElementById('own-words').textContent.startsWith('This tab is in the background')")
+            page.until(f"{_HELD} === 0")
+        camera.until(lambda: camera.of_kind("track")[-1]["visible"])
+        page.until("document.getElementById('own-words').textContent.startsWith('Streaming')")
+        last = camera.frames[-1].received_ns
+        camera.until(lambda: camera.frames[-1].received_ns > last)
+        page.until(f"{_HELD} === 1")
+        page.evaluate("document.querySelector('#own-go').click()")
+        page.until(f"{_HELD} === 0")
+
+
 def test_firefox_without_permission_says_what_to_do(camera: PlayedFeed, server: PageServer, tmp_path: Path) -> None:
     """A person who refused the camera reads where to allow it; no frame is sent."""
     with firefox(tmp_path, DENIED) as page:

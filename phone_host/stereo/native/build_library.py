@@ -39,6 +39,7 @@ PER_ISA: Final = (
     "vote_kernel.c",
     "support_kernel.c",
     "fuse_kernel.c",
+    "carve_kernel.c",
     "cast_kernel.c",
 )
 """Compiled once per instruction set."""
@@ -52,6 +53,7 @@ ONCE: Final = (
     "crew.c",
     "volume.c",
     "fuse.c",
+    "carve.c",
     "cast.c",
     "register.c",
     "absorb.c",

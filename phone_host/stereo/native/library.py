@@ -15,7 +15,7 @@ from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
 from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
-from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
+from phone_host.stereo.native.volume_jobs import AbsorbJob, CarveJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
@@ -224,6 +224,10 @@ class Library:
     def fuse(self, job: FuseJob) -> None:
         """Fuse a depth image into a volume; see fuse_kernel.c."""
         _require_done(self.handle.tandem_fuse(self.isa, ctypes.byref(job)))
+
+    def carve(self, job: CarveJob) -> None:
+        """Note where a camera looked through a grid of cells; see carve_kernel.c."""
+        _require_done(self.handle.tandem_carve(self.isa, ctypes.byref(job)))
 
     def cast(self, job: CastJob) -> None:
         """Show a volume's surface as a camera sees it; see cast_kernel.c."""

@@ -67,6 +67,26 @@ class FuseJob(ctypes.Structure):
     )
 
 
+class CarveJob(ctypes.Structure):
+    """`struct tandem_carve_job`."""
+
+    _fields_ = (
+        ("looked_through", _POINTER),
+        ("hidden", _POINTER),
+        ("blank", _POINTER),
+        ("depth_m", _POINTER),
+        ("camera_world", _POSE),
+        ("counts", _INT * 3),
+        ("low_m", _FLOAT * 3),
+        ("cell_m", _FLOAT),
+        *_CAMERA,
+        ("noise_per_m", _FLOAT),
+        ("sigmas", _FLOAT),
+        ("clear_m", _FLOAT),
+        ("threads", _INT),
+    )
+
+
 class CastJob(ctypes.Structure):
     """`struct tandem_cast_job`."""
 
@@ -121,12 +141,12 @@ class AbsorbJob(ctypes.Structure):
 def declare(handle: ctypes.CDLL) -> None:
     """State the arguments and results of these functions."""
     handle.tandem_fuse.argtypes = [_INT, ctypes.POINTER(FuseJob)]
+    handle.tandem_carve.argtypes = [_INT, ctypes.POINTER(CarveJob)]
     handle.tandem_cast.argtypes = [_INT, ctypes.POINTER(CastJob)]
     handle.tandem_touch.argtypes = [ctypes.POINTER(TouchJob)]
     handle.tandem_register.argtypes = [ctypes.POINTER(RegisterJob)]
-    functions = [handle.tandem_fuse, handle.tandem_cast, handle.tandem_touch, handle.tandem_register]
+    for name in ("fuse", "carve", "cast", "touch", "register"):
+        getattr(handle, f"tandem_{name}").restype = _INT
     if hasattr(handle, "tandem_absorb"):
         handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
-        functions.append(handle.tandem_absorb)
-    for function in functions:
-        function.restype = _INT
+        handle.tandem_absorb.restype = _INT

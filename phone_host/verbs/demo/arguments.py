@@ -5,10 +5,12 @@ from pathlib import Path
 
 from common.program.quantities import reading, seconds
 
-SUMMARY = "run both programs on this machine with a rendered scene, and report the depth error and every delay"
+SUMMARY = "run both programs on this machine with a rendered scene or thing, and compare depth or model with the truth"
 
 EXAMPLES = """  phone-host demo
-  phone-host demo --seconds 30 --out scan-demo
+  phone-host demo --seconds 30 --out demo
+  phone-host demo --scan                   # scan a thing on the mat, as `scan --mat` does; about a minute
+  phone-host demo --scan --object thin
 """
 
 
@@ -17,10 +19,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds",
         type=reading(seconds, "--seconds"),
-        default=12.0,
         metavar="S",
-        help="seconds to stream (default 12)",
+        help="seconds to stream (default 12); not with --scan",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("out/demo"), metavar="DIR", help="folder for the results (default out/demo)"
+        "--scan",
+        action="store_true",
+        help="scan a rendered thing that stands on the mat instead, compare the model with it, and slice it where PrusaSlicer is installed",
+    )
+    parser.add_argument(
+        "--object",
+        choices=("speckled", "thin", "shiny", "plain"),
+        help="the thing to scan: speckled (default), with thin parts, shiny, or nearly without texture",
+    )
+    parser.add_argument(
+        "--views", type=int, metavar="N", help="pairs all around the thing (default 36, 6 to 360), with --scan"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for the results (default out/demo, with --scan out/demo-scan)"
     )

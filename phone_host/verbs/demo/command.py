@@ -37,16 +37,28 @@ from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene
 from phone_host.stereo.rectify import rectify_rig
 
 _CHECK_FAILED = 4
+_SECONDS = 12.0
+_OUT = Path("out/demo")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Render, stream, measure and compare with the true depth."""
+    """Render, stream, measure and compare with the truth."""
+    if options.scan:
+        from phone_host.verbs.demo.scanned import run_scan_demo  # noqa: PLC0415 - the other demo needs none of it
+
+        return run_scan_demo(options)
+    for name in ("object", "views"):
+        if getattr(options, name):
+            raise SettingsError(f"--{name} is for a scan", "add --scan, or leave it out")
+    if options.seconds is None:
+        options.seconds = _SECONDS
     if not 1 <= options.seconds <= 3600:
         raise SettingsError(f"--seconds is {options.seconds:g}", "give 1 to 3600 seconds")
     logs.set_up(30)
     signals = StopSignals()
     console = Console(stderr=True)
-    out: Path = options.out
+    out: Path = options.out or _OUT
+    options.out = out
     rig, scene = unlike_rig(), demo_scene()
 
     try:

@@ -20,6 +20,7 @@ export class Awake {
     if (!this.isWanted || document.visibilityState !== 'visible' || (this.sentinel && !this.sentinel.released)) return;
     try {
       this.sentinel = (await navigator.wakeLock?.request('screen')) ?? null;
+      if (!this.isWanted) this.want(false); // stopped meanwhile
     } catch {
       // a battery that is low, or a browser without it: the screen may go dark
     }

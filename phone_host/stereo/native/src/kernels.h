@@ -40,6 +40,7 @@ typedef void tandem_support_cost_rows_fn(const struct support *job, int from, in
 typedef void tandem_support_drop_rows_fn(const struct support *job, int from, int to);
 typedef size_t tandem_support_scratch_fn(int width);
 typedef void tandem_fuse_blocks_fn(const struct tandem_fuse_job *job, int32_t from, int32_t to);
+typedef void tandem_carve_layer_fn(const struct tandem_carve_job *job, int32_t layer);
 typedef void tandem_cast_row_fn(const struct tandem_cast_job *job, int32_t v);
 typedef void tandem_cast_normals_fn(const struct tandem_cast_job *job, int32_t v);
 
@@ -59,6 +60,7 @@ typedef void tandem_cast_normals_fn(const struct tandem_cast_job *job, int32_t v
     KERNEL(support_drop_rows)  \
     KERNEL(support_scratch)   \
     KERNEL(fuse_blocks)       \
+    KERNEL(carve_layer)       \
     KERNEL(cast_row)          \
     KERNEL(cast_normals)
 

@@ -194,6 +194,29 @@ struct tandem_cast_job {
 
 TANDEM_API int32_t tandem_cast(int32_t isa, struct tandem_cast_job *job);
 
+/* Where a camera looked through a grid of cells, and where it could not; see carve_kernel.c. */
+struct tandem_carve_job {
+    uint8_t *looked_through;   /* (z, y, x) views that measured something clearly beyond the cell, 255 = that or more */
+    uint8_t *hidden;           /* (z, y, x) views that measured something clearly before it */
+    uint8_t *blank;            /* (z, y, x) views that have no depth there */
+    const float *depth_m;      /* (height, width), packed, NAN = none, infinite = nothing is there */
+    float camera_world[12];
+    int32_t counts[3];         /* cells along x, y, z */
+    float low_m[3];            /* middle of the first one */
+    float cell_m;              /* from middle to middle */
+    int32_t width;
+    int32_t height;
+    float focal_px;
+    float cx_px;
+    float cy_px;
+    float noise_per_m;
+    float sigmas;              /* "clearly" is so many standard deviations of the depth */
+    float clear_m;             /* and this */
+    int32_t threads;           /* results do not depend on it */
+};
+
+TANDEM_API int32_t tandem_carve(int32_t isa, struct tandem_carve_job *job);
+
 /* How a depth image lies against such a surface; see register.c. */
 struct tandem_register_job {
     const float *depth_m;      /* (height, width), packed, NAN = none */

@@ -1,0 +1,120 @@
+"""Where in a box the cameras looked through, and where something hid what lies there. Pure.
+
+The volume knows the space near surfaces only. A closed model also needs to know what is empty, so a grid of cells counts the views that
+measured something clearly beyond each cell - the mat, the table, the background - and those that measured something clearly before it.
+
+Source: K. N. Kutulakos and S. M. Seitz, "A Theory of Shape by Space Carving", 2000.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.geometry.se3 import SE3
+from phone_host.scan import carving_numpy
+from phone_host.scan.cells import Cells
+from phone_host.scan.jobs import aim, rows_of
+from phone_host.scan.view import View
+from phone_host.stereo.native.library import Library, Missing, native
+from phone_host.stereo.native.volume_jobs import CarveJob
+
+_SIGMAS: Final = 3.0
+_HALF_DIAGONAL: Final = 0.87
+_LEAST_VIEWS: Final = 2
+"""A single wrong depth must not dig into a thing."""
+
+_LEAST_SHARE: Final = 0.125
+"""Of the views that tell something of a cell; what is looked through by fewer is hidden, and some depths were wrong."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carved:
+    """What a carving has counted.
+
+    Attributes:
+        cells: how the grid lies.
+        counts: (3, Z, Y, X) uint8, as in `Carving`.
+        views: that were seen.
+    """
+
+    cells: Cells
+    counts: NDArray[np.uint8]
+    views: int
+
+
+class Carving:
+    """Counts, for each cell of a box, the views that looked through it.
+
+    Attributes:
+        cells: how the grid lies.
+        counts: (3, Z, Y, X) uint8, 255 = that or more: views that looked through a cell, because they measured something clearly beyond it; those
+            from which it is hidden, because they measured something clearly before it; those that have no depth there.
+        views: that were seen.
+
+    Args:
+        cells: how the grid lies.
+        threads: that work on it, >= 1; results do not depend on them.
+        library: computes; None: that of this installation.
+    """
+
+    def __init__(self, cells: Cells, threads: int = 1, library: Library | Missing | None = None) -> None:
+        found = native() if library is None else library
+        self._library = found if isinstance(found, Library) else None
+        self._threads, self.cells, self.views = threads, cells, 0
+        self.counts = np.zeros((3, *cells.counts[::-1]), np.uint8)
+
+    def see(self, view: View, world_camera: SE3) -> None:
+        """Take a view.
+
+        Args:
+            view: its depths count however far they are; infinite: nothing is there.
+            world_camera: where it was taken.
+        """
+        self.views += 1
+        depth = np.ascontiguousarray(view.depth_m, np.float32)
+        clear_m = _HALF_DIAGONAL * self.cells.side_m
+        if self._library is None:
+            pose = np.column_stack([world_camera.inverse().R, world_camera.inverse().t_m]).astype(np.float32)
+            told = carving_numpy.told(self.cells, replace(view, depth_m=depth), pose, _SIGMAS, clear_m)
+            self.counts += np.array(told) & (self.counts < 255)
+            return
+        job = CarveJob(
+            looked_through=self.counts[0].ctypes.data,
+            hidden=self.counts[1].ctypes.data,
+            blank=self.counts[2].ctypes.data,
+            depth_m=depth.ctypes.data,
+            camera_world=rows_of(world_camera.inverse()),
+            counts=self.cells.counts,
+            low_m=tuple(self.cells.first_m.tolist()),
+            cell_m=self.cells.side_m,
+            noise_per_m=view.noise_per_m,
+            sigmas=_SIGMAS,
+            clear_m=clear_m,
+            threads=self._threads,
+        )
+        aim(job, view.geometry, depth.shape)
+        self._library.carve(job)
+
+    @property
+    def empty(self) -> NDArray[np.bool_]:
+        """(Z, Y, X): the cells that views enough looked through."""
+        through, hidden, _ = self.counts.astype(np.float32)
+        least = min(_LEAST_VIEWS, self.views)
+        return np.asarray((through >= max(least, 1)) & (through >= _LEAST_SHARE * (through + hidden)), np.bool_)
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """(Z, Y, X): the others that something hid, from more views than have no depth there: a thing is seen from most sides, its shadow is not."""
+        _, hidden, blank = self.counts
+        return ~self.empty & (hidden > 0) & (hidden >= blank)
+
+    @property
+    def carved(self) -> Carved:
+        """A copy of what was counted."""
+        return Carved(self.cells, self.counts.copy(), self.views)
+
+    def go_on(self, carved: Carved) -> None:
+        """Go on from what another one has counted in the same cells."""
+        self.counts[:], self.views = carved.counts, carved.views

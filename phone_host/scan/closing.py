@@ -1,0 +1,184 @@
+"""A volume's field with all that its box holds: what nobody saw is inside where something hid it. So the surface has no holes. Pure.
+
+Near a surface that was seen the field is what the views measured. Elsewhere it is that of the carved cells. Outside the box and below its floor
+there is nothing. The blocks around the surface are made one after another, from those where it is known to pass on to their neighbours, until
+it ends nowhere; what is far from it is never made.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.scan.blocks import ONE, SIDE, Blocks
+from phone_host.scan.box import Box
+from phone_host.scan.carving import Carving
+from phone_host.scan.cell_field import CellField, cell_field
+from phone_host.scan.volume_settings import LEAST_WEIGHT, VolumeSettings
+from phone_host.scan.windows import windows_of
+
+Floats = NDArray[np.float32]
+Places = NDArray[np.int32]
+F: Final = np.float32
+
+_AT_ONCE: Final = 512
+_SIZE: Final = SIDE + 2
+_NOT_SEEN: Final = 1
+_SOFT: Final = F(4)
+"""Weight of what was not measured, where a known value is smoothed with it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A plane that a thing stands on; z is up.
+
+    Attributes:
+        z_m: its height, m.
+        skip_m: height above it, m, in which its own surface and that of the thing cannot be told apart; what stands there goes on down to it.
+    """
+
+    z_m: float = 0.0
+    skip_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """Some blocks with a voxel more on each side, [z, y, x]; weights are those of the volume, 1 where nobody saw a surface."""
+
+    field: Floats
+    weights: NDArray[np.uint16]
+
+
+class _Closed:
+    """The closed field, block by block.
+
+    Attributes:
+        low_m: lowest corner of what is not outside.
+    """
+
+    def __init__(
+        self, blocks: Blocks, settings: VolumeSettings, cells: CellField, box: Box, floor: Floor | None
+    ) -> None:
+        self._blocks, self._cells = blocks, cells
+        self._voxel_m, self._truncation_m = settings.voxel_m, settings.truncation_m
+        x_m, y_m, z_m = box.low_m
+        if floor and z_m <= floor.z_m + floor.skip_m:
+            z_m = floor.z_m
+        self.low_m = x_m, y_m, z_m
+        self._high_m, self._foot = box.high_m, None
+        if floor and floor.skip_m:
+            self._foot = int(np.ceil((floor.z_m + floor.skip_m) / settings.voxel_m))
+
+    def part(self, places: Places) -> _Part:
+        """Return the field of blocks at places (N, 3)."""
+        raw = self._uncut(places)
+        field, weights = raw.field, raw.weights
+        if self._foot is not None:
+            beneath = np.flatnonzero(SIDE * places[:, 2] - 1 < self._foot)
+            above = places[beneath].copy()
+            above[:, 2] = self._foot // SIDE
+            foot = self._uncut(above).field[:, self._foot % SIDE + 1]
+            heights = SIDE * places[beneath, 2, np.newaxis] - 1 + np.arange(_SIZE)
+            low = heights < self._foot
+            field[beneath] = np.where(low[..., np.newaxis, np.newaxis], foot[:, np.newaxis], field[beneath])
+            weights[beneath] = np.where(low[..., np.newaxis, np.newaxis], np.uint16(_NOT_SEEN), weights[beneath])
+        outside = self._outside(places)
+        is_cut = outside > field
+        return _Part(np.where(is_cut, outside, field), np.where(is_cut, np.uint16(_NOT_SEEN), weights))
+
+    def _uncut(self, places: Places) -> _Part:
+        found = windows_of(self._blocks, places, 2)
+        near = (found.weights >= LEAST_WEIGHT) & (found.field < ONE)
+        field = found.field.astype(F) / F(ONE)
+        block, z, y, x = np.nonzero(~near)
+        voxels = SIDE * places[block].astype(np.int64) + np.column_stack([x, y, z]) - 2
+        field[block, z, y, x] = self._cells.at(voxels)
+        trust = np.where(near, np.minimum(found.weights, 64).astype(F), _SOFT)
+        smooth = _summed(field * trust) / _summed(trust)
+        inner = np.s_[:, 1:-1, 1:-1, 1:-1]
+        return _Part(smooth, np.where(near[inner], found.weights[inner], np.uint16(_NOT_SEEN)))
+
+    def _outside(self, places: Places) -> Floats:
+        """Return how far voxels lie outside the box, in truncations; inside it is below 0. (N, 10, 10, 10)."""
+        first = SIDE * places.astype(np.int64) - 1
+        far = []
+        for axis in range(3):
+            at = (first[:, axis, np.newaxis] + np.arange(_SIZE)) * self._voxel_m
+            far.append(np.maximum(self.low_m[axis] - at, at - self._high_m[axis]) / self._truncation_m)
+        x, y, z = far
+        most = np.maximum(np.maximum(x[:, np.newaxis, np.newaxis], y[:, np.newaxis, :, np.newaxis]), z[:, :, np.newaxis, np.newaxis])  # fmt: skip
+        return np.asarray(np.clip(most, -1, 1), F)
+
+
+def _summed(values: Floats) -> Floats:
+    """Filter by (1, 2, 1) along each axis, without a border: each side is two shorter."""
+    for axis in (1, 2, 3):
+        parts = [np.take(values, np.arange(first, values.shape[axis] - 2 + first), axis=axis) for first in range(3)]
+        values = F(0.25) * (parts[0] + parts[2]) + F(0.5) * parts[1]
+    return values
+
+
+def closed(blocks: Blocks, settings: VolumeSettings, carving: Carving, box: Box, floor: Floor | None) -> Blocks:
+    """Close a volume's field.
+
+    Args:
+        blocks: of the volume.
+        settings: of the volume.
+        carving: what the views told of the box.
+        box: where the thing is.
+        floor: what it stands on; None: nothing.
+
+    Returns:
+        Blocks around a surface that is closed. Weights are those of the volume where the surface was seen, else 1; there are no colours but
+        where the volume has some.
+    """
+    cells = cell_field(carving, blocks, LEAST_WEIGHT, has_floor=floor is not None)
+    field = _Closed(blocks, settings, cells, box, floor)
+    made, waiting = Blocks(), _begin(blocks, cells, field.low_m, box)
+    steps = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], np.int32)
+    while len(waiting):
+        active = []
+        for first in range(0, len(waiting), _AT_ONCE):
+            places = waiting[first : first + _AT_ONCE]
+            part = field.part(places)
+            below = (part.field < 0).reshape(len(places), -1)
+            active.append(places[below.any(axis=1) & ~below.all(axis=1)])
+            made = _with(made, places, part, blocks)
+        around = np.unique((np.concatenate(active)[:, np.newaxis] + steps).reshape(-1, 3), axis=0)
+        waiting = around[made.find(around) < 0]
+    return made
+
+
+def _begin(blocks: Blocks, cells: CellField, low_m: tuple[float, float, float], box: Box) -> Places:
+    """Return the blocks in the box that the volume has, and those where the cells' field changes its sign, or is below 0 on the floor."""
+    values, wide = cells.values, cells.cells.voxels
+    below, found = values < 0, []
+    for axis in range(3):
+        changes = np.argwhere(np.diff(below, axis=axis))[:, ::-1]
+        found.append((changes - 1 + np.array(cells.cells.low)) * wide // SIDE)
+    floor = np.argwhere(below[1])[:, ::-1]
+    found.append(
+        (np.column_stack([floor, np.ones(len(floor), np.int64)]) - 1 + np.array(cells.cells.low)) * wide // SIDE
+    )
+    places = blocks.places[: blocks.count]
+    side_m = SIDE * cells.cells.voxel_m
+    inside = (places * side_m < np.array(box.high_m)) & ((places + 1) * side_m > np.array(low_m))
+    found.append(places[inside.all(axis=1)])
+    return np.unique(np.concatenate(found).astype(np.int32), axis=0)
+
+
+def _with(made: Blocks, places: Places, part: _Part, blocks: Blocks) -> Blocks:
+    """Return the blocks with some more."""
+    count = made.count
+    if count + len(places) > made.room:
+        made = made.grown(max(2 * made.room, count + len(places)))
+    made.add(places)
+    numbers, inner = slice(count, count + len(places)), np.s_[:, 1:-1, 1:-1, 1:-1]
+    field = np.rint(part.field[inner] * ONE).astype(np.int16).reshape(len(places), -1)
+    made.field[numbers] = np.where(field == 0, np.int16(1), field)
+    made.weights[numbers] = part.weights[inner].reshape(len(places), -1)
+    there = blocks.find(places)
+    has = there >= 0
+    made.colours[count : count + len(places)][has] = blocks.colours[there[has]]
+    return made

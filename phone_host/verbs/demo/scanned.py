@@ -1,0 +1,208 @@
+"""phone-host demo --scan: a rendered thing on the mat is scanned with both programs, compared with what it is, and sliced."""
+
+import argparse
+import math
+import sys
+from contextlib import nullcontext
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
+
+from common.errors import DataError, SettingsError, UnavailableError
+from common.program import logs
+from common.program.commandline import INTERRUPTED
+from common.program.invocation import command_line
+from common.program.signals import StopSignals
+from common.program.terminal import say
+from common.words import counted
+from phone_host.children.board_process import socket_folder
+from phone_host.demo.scan_demonstration import ScanDemo, render_pictures, with_truth
+from phone_host.demo.scan_truth import ModelErrors
+from phone_host.live.scan_view import ScanPicture
+from phone_host.output.atomic import write_bytes, write_text
+from phone_host.output.json_text import json_text
+from phone_host.output.listed import ListedFolder
+from phone_host.output.meshes.formats import mesh_bytes
+from phone_host.output.meshes.solid import Solid
+from phone_host.output.rig_yaml import write_rig
+from phone_host.output.upright import upright_model
+from phone_host.printers.preparing import Wanted, job_of
+from phone_host.printers.printer_uri import FileUri
+from phone_host.printers.slicing import SlicingWanted
+from phone_host.report.page_links import NextCommand
+from phone_host.report.scan_json import scan_json
+from phone_host.report.scan_lines import scan_lines
+from phone_host.run.progress_bar import busy_bar, progress_bar, step_bar
+from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
+from phone_host.run.scan_result import require_something
+from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
+from phone_host.stereo.default_matcher import default_matcher
+from phone_host.stereo.rectify import rectify_rig
+
+_CHECK_FAILED: Final = 4
+_OUT: Final = Path("out/demo-scan")
+_OBJECT: Final = "speckled"
+_VIEWS: Final = 36
+"""A step of 10 degrees, as one takes photographs around a thing."""
+
+_LEAST_VIEWS, _MOST_VIEWS = 6, 360
+_STL, _GCODE = "model.stl", "model.gcode"
+_BED_MM: Final = (220.0, 220.0, 250.0)
+
+_WORST_MM: Final = 1.0
+"""A model that is farther off on average is not what the demo promises."""
+
+
+def run_scan_demo(options: argparse.Namespace) -> int:
+    """Render, scan, compare with the thing, slice.
+
+    Args:
+        options: of `demo`, with --scan.
+    """
+    views = _VIEWS if options.views is None else options.views
+    if options.seconds is not None:
+        raise SettingsError(
+            "--seconds is of the demo that streams", "leave it out: a scan takes as many pairs as --views says"
+        )
+    if not _LEAST_VIEWS <= views <= _MOST_VIEWS:
+        raise SettingsError(f"--views is {views}", f"give {_LEAST_VIEWS} to {_MOST_VIEWS}")
+    logs.set_up(30)
+    signals, console, out = StopSignals(), Console(stderr=True), options.out or _OUT
+    scene = object_scene(options.object or _OBJECT, Setting(views=views))
+    try:
+        done = _scanned(scene, out, console, signals)
+        if done is None:
+            if signals.interrupted:
+                raise KeyboardInterrupt  # told as by every other command
+            return 0
+        scan, errors = done
+        require_something(scan.report)
+        write_scan(out, scan)
+        told = scan_json(scan.report) | {"command": "demo", "truth": _truth_json(errors)}
+        write_text(out / "report.json", json_text(told, indent=2) + "\n")
+        printed = {} if signals.stop else _printed(out, console)
+    except OSError as error:
+        raise UnavailableError(
+            f"{error.filename or out} cannot be written ({error.strerror})",
+            "make room on the disk, or give another folder with --out",
+        ) from None
+    if options.json:
+        print(json_text(told | {"print": printed}))
+    else:
+        say(scan_lines(scan.report, str(out)))
+    say(_closing(out, printed), sys.stderr)
+    if signals.stop:
+        return INTERRUPTED if signals.interrupted else 0
+    return 0 if scan.report.is_sound and errors.mean_mm <= _WORST_MM else _CHECK_FAILED
+
+
+def _scanned(
+    scene: ObjectScene, out: Path, console: Console, signals: StopSignals
+) -> tuple[FinishedScan, ModelErrors] | None:
+    """Render and scan; None: it was stopped before there was anything to scan.
+
+    Raises:
+        OSError: the folder cannot be written to.
+        UnavailableError: something that is not ours is in the way, or the board process died.
+    """
+    _clear(out)
+    views = scene.setting.views
+    with progress_bar(console) as progress:
+        task = progress.add_task(f"rendering {views} views of a thing for two cameras", total=2 * views)
+        pictures = render_pictures(scene, out / "film", lambda: progress.advance(task), lambda: signals.stop)
+    if pictures is None:
+        return None
+    write_rig(out / "rig.yaml", scene.rig, rectify_rig(scene.rig))
+    with socket_folder() as sockets:
+        demo = ScanDemo(scene, pictures, out, sockets, default_matcher())
+        picture = ScanPicture(demo.live, console) if console.is_terminal else None
+        with picture or nullcontext():
+            demo.run(lambda: signals.stop, picture.refresh if picture else None)
+    if signals.stop and not demo.live.counts[1]:
+        return None
+    with busy_bar("making the surface, comparing it with the thing", console):
+        scan, errors = demo.finished()
+    demo.live.kept.done()
+    return replace(with_truth(scan, errors), commands=_by_hand(out)), errors
+
+
+def _clear(out: Path) -> None:
+    """Remove an earlier demo's results from the folder, and report anything in the way before rendering.
+
+    Raises:
+        UnavailableError: something that is not ours is in the way.
+        OSError: the folder cannot be used.
+    """
+    folder = ListedFolder(out, rf"{NAMES}|rig\.yaml|model\.stl|model\.gcode", kept="film")
+    try:
+        folder.add("film", "rig.yaml", _STL, _GCODE)
+    finally:
+        folder.close()
+
+
+def _printed(out: Path, console: Console) -> dict[str, Any]:
+    """Write the model for printers, and slice it where a slicer is installed.
+
+    Returns:
+        What came of it, for --json.
+
+    Raises:
+        OSError: the folder cannot be written to.
+    """
+    upright = upright_model(out, None, None)
+    points_m = (upright.points_mm / 1000.0).astype(np.float32)
+    solid = Solid(points_m, upright.model.solid.triangles, np.zeros((0, 3), np.uint8))
+    write_bytes(out / _STL, mesh_bytes(solid, "stl", None))
+    found: dict[str, Any] = {"stl": str(out / _STL), "gcode": None, "seconds": None, "problem": None}
+    wanted = Wanted(SlicingWanted(_BED_MM))
+    try:
+        with (
+            step_bar("slicing", None, console) as watcher,
+            job_of(out, wanted, FileUri(f"file:{out / _GCODE}", str(out / _GCODE)), watcher.say) as job,
+        ):
+            write_bytes(out / _GCODE, job.gcode.read_bytes())
+    except (UnavailableError, DataError) as error:
+        return found | {"problem": error.problem, "remedy": error.remedy}
+    seconds = None if math.isnan(job.facts.seconds) else round(job.facts.seconds)
+    return found | {"gcode": str(out / _GCODE), "seconds": seconds}
+
+
+def _truth_json(errors: ModelErrors) -> dict[str, float | int | None]:
+    return {
+        name: None if isinstance(value, float) and math.isnan(value) else value
+        for name, value in asdict(errors).items()
+    }
+
+
+def _by_hand(out: Path) -> tuple[NextCommand, ...]:
+    """Return the commands that do the same, and what comes after it."""
+    film = out / "film"
+    own = command_line(
+        "phone-host", "scan", film / "left", film / "right", "--mat", "--calibration", out / "rig.yaml", "--out", "scan"
+    )
+    return (
+        NextCommand("The same by hand, from the pictures", own),
+        NextCommand("Your own things: print the mat", command_line("phone-host", "target", "mat")),
+    )
+
+
+def _closing(out: Path, printed: dict[str, Any]) -> str:
+    lines = [
+        f"look at   {out}/index.html       the model, to turn",
+        f"          {out}/model.ply        its surface, in any 3D viewer",
+    ]
+    if printed:
+        lines.append(f"          {out}/{_STL}        for any slicer, mm, z up")
+    if printed.get("gcode"):
+        minutes = (
+            f": {counted(round(printed['seconds'] / 60), 'minute')} on a usual printer" if printed["seconds"] else ""
+        )
+        lines.append(f"          {out}/{_GCODE}      sliced{minutes}")
+    elif printed.get("problem"):
+        lines.append(f"not sliced: {printed['problem']}; {printed['remedy']}")
+    lines.append("try next")
+    lines += [f"  {one.command}" for one in _by_hand(out)]
+    return "\n".join(lines)

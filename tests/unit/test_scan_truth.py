@@ -1,0 +1,48 @@
+"""The comparison of a model with the thing: a perfect model has no error and covers everything, a shifted or cut one does not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from phone_host.demo.scan_truth import model_errors
+from phone_host.scan.mesh import Mesh
+from phone_host.scene.scene_model import Body, Sphere
+from phone_host.scene.solid import Solid
+
+RADIUS_M = 0.03
+BALL = Solid((Body("ball", Sphere(RADIUS_M), (0.01, 0.0, 0.05)),))
+
+
+def ball_mesh(shift_m: float = 0.0, above_m: float = -1.0) -> Mesh:
+    """Points of the ball's surface 1 mm apart, moved outwards, without those below a height; three of them each are a triangle."""
+    samples = BALL.surface(0.001)
+    points = (samples.points + shift_m * samples.normals).T
+    points = points[points[:, 2] > above_m]
+    count = len(points) // 3 * 3
+    triangles = np.arange(count, dtype=np.int32).reshape(-1, 3)
+    return Mesh(points.astype(np.float32), np.zeros((len(points), 3), np.uint8), triangles)
+
+
+def test_a_perfect_model_has_no_error() -> None:
+    """Points of the surface itself are at most a rounding off, and cover all of it."""
+    errors = model_errors(ball_mesh(), BALL)
+    assert errors.p95_mm < 1e-4
+    assert errors.coverage == 1.0
+
+
+def test_a_model_that_is_half_a_millimetre_too_large_is_half_a_millimetre_off() -> None:
+    """Mean, median and 95th percentile all are that distance."""
+    errors = model_errors(ball_mesh(0.0005), BALL)
+    assert (errors.mean_mm, errors.median_mm, errors.p95_mm) == pytest.approx((0.5, 0.5, 0.5), abs=1e-3)
+
+
+def test_what_is_missing_is_not_covered() -> None:
+    """Without its lower half, but for the rim that the upper one reaches over, half of the ball is there; nothing is there of no model."""
+    errors = model_errors(ball_mesh(above_m=0.05), BALL)
+    # A zone of height h of a ball has the area 2 pi r h; the model covers 2 mm beyond its rim.
+    assert errors.coverage == pytest.approx(0.5 * (1.0 + 0.002 / RADIUS_M), abs=0.01)
+    nothing = model_errors(Mesh.empty(), BALL)
+    assert nothing.points == 0
+    assert nothing.coverage == 0.0
+    assert math.isnan(nothing.mean_mm)
