@@ -47,7 +47,7 @@ $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
 	@.ci/test $*
 
 test-slow: $(READY) ## run the tests with large samples, too slow for every day; the unit tests use small ones
-	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract
+	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract tests/print
 
 coverage: $(READY) ## run the unit and scan tests; lists branches of the pure modules that no test takes (CI requires 98 %)
 	@COVERAGE=1 .ci/test unit scan
@@ -125,7 +125,8 @@ printers: ## install what judges prints, other programs' servers and senders, in
 	@build/printers/octoprint/bin/python -m pip -qq --no-input install "OctoPrint>=1.11.8,<1.12"
 	@build/printers/moonraker/bin/python -m pip -qq --no-input install "moonraker>=0.11"
 	@build/printers/printrun/bin/python -m pip -qq --no-input install --no-deps "Printrun>=2.2" pyserial
-	@build/printers/meshes/bin/python -m pip -qq --no-input install pymeshlab trimesh manifold3d lxml networkx
+	@build/printers/meshes/bin/python -m pip -qq --no-input install pymeshlab trimesh manifold3d lib3mf lxml networkx
+	@cd build/printers && if apt-get -qq download cura 2>/dev/null; then dpkg -x cura_*.deb cura && rm cura_*.deb; fi # its definitions, for cura-engine
 
 vendor: ## build the page's libraries and the static pages' scripts again (after changing phone_host/web/page; needs node; FETCH=1: take npm's files, too)
 	@$(if $(FETCH),node .ci/vendor.mjs fetch &&) node .ci/vendor.mjs build

@@ -44,6 +44,7 @@ class LiveScan:
 
     Attributes:
         scan: what has become of them; whole once the run has ended.
+        mat: on which the model stands; None: there is none.
         patches: its surface, for whoever watches; while the run goes on, `surface_since` asks them.
         sink: for the host.
 
@@ -66,7 +67,7 @@ class LiveScan:
         waits: bool,
         is_timeless: bool,
     ) -> None:
-        self.scan, self._is_timeless = scan_for(wanted), is_timeless
+        self.scan, self.mat, self._is_timeless = scan_for(wanted), wanted.mat, is_timeless
         self.kept = KeptSubmaps(kept_in, self.scan, resumed)
         self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
@@ -143,6 +144,9 @@ class LiveScan:
             remarks.append(Remark(words, "a greater --voxel is faster", is_note=True))
         remarks.extend(self.kept.remarks)
         model = self.scan.model()
+        if self.scan.settings is not None:
+            with self._watching:
+                self.patches.become(model.mesh, self.scan.settings.voxel_m)
         remarks.extend(turn_remarks(self.scan))
         report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
         return FinishedScan(report, model)

@@ -76,9 +76,10 @@ def job_of(what: Path, wanted: Wanted, uri: PrinterUri, tell: Callable[[str], No
     _require_printable(upright, bed_mm, tell)
     with _folder() as folder:
         gcode = folder / f"{upright.model.stem}.gcode"
-        _slice(upright, folder / f"{upright.model.stem}.stl", gcode, wanted.slicing, tell)
-        facts = facts_of(gcode, most)
-        require_inside(gcode, facts, bed_mm)
+        stl = folder / f"{upright.model.stem}.stl"
+        _write(upright, stl)
+        tell("slicing")
+        facts = sliced(stl, gcode, wanted.slicing, most)
         yield Job(gcode, gcode.name, facts)
 
 
@@ -92,15 +93,13 @@ def _folder() -> Iterator[Path]:
         yield Path(name)
 
 
-def _slice(upright: Upright, stl: Path, gcode: Path, wanted: SlicingWanted, tell: Callable[[str], None]) -> None:
+def _write(upright: Upright, stl: Path) -> None:
     points_m = (upright.points_mm / 1000).astype(np.float32)
     solid = Solid(points_m, upright.model.solid.triangles, np.zeros((0, 3), np.uint8))
     try:
         write_bytes(stl, mesh_bytes(solid, "stl", None))
     except OSError as error:
         raise _full(error) from None
-    tell("slicing")
-    sliced(stl, gcode, wanted)
 
 
 def _full(error: OSError) -> UnavailableError:

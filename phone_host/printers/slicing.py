@@ -40,6 +40,9 @@ _USUAL: Final = (
 )
 """PLA in a printer with a nozzle of 0.4 mm: what nearly everybody begins with. Without the last one, the bed would stay hot."""
 
+_BARE: Final = "--skirts=0"
+"""Without the line that is drawn around the thing first, for what fills the bed."""
+
 _USUAL_CURA: Final = {
     "machine_nozzle_size": "0.4",
     "material_diameter": "1.75",
@@ -84,6 +87,10 @@ class SlicingWanted:
     slicer: Slicer | None = None
 
 
+class _OutsideError(DataError):
+    """Raised for a print that leaves the bed. The slicer's fault, or that of whoever placed the model."""
+
+
 def find_slicer(wanted: Slicer | None = None) -> tuple[Slicer, str]:
     """Return a slicer, and the path of its program.
 
@@ -103,29 +110,52 @@ def find_slicer(wanted: Slicer | None = None) -> tuple[Slicer, str]:
     )
 
 
-def sliced(stl: Path, gcode: Path, wanted: SlicingWanted) -> None:
+def sliced(stl: Path, gcode: Path, wanted: SlicingWanted, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
     """Slice a model in the middle of the bed.
 
     Args:
         stl: the model, mm.
         gcode: the file to write.
         wanted: how.
+        most_characters: that a line of it may have.
+
+    Returns:
+        What the file asks of the printer.
 
     Raises:
         UnavailableError: no slicer is installed.
         SettingsError: the profile is none of this slicer.
-        DataError: it cannot slice the model.
+        DataError: it cannot slice the model, or what it wrote leaves the bed.
     """
     slicer, program = find_slicer(wanted.slicer)
     environment = dict(os.environ)
     match slicer:
         case Slicer.PRUSA:
             asked = _prusa(program, stl, gcode, wanted)
+            if wanted.profile is None:
+                return _sliced_bare_if_needed(asked, environment, gcode, wanted, most_characters)
         case Slicer.CURA:
             asked = _cura(program, stl, gcode, wanted)
             environment.setdefault(_CURA_PATH, os.pathsep.join(map(str, _cura_folders())))
         case _:
             assert_never(slicer)
+    return _run(asked, environment, gcode, wanted, most_characters)
+
+
+def _sliced_bare_if_needed(
+    asked: list[str], environment: dict[str, str], gcode: Path, wanted: SlicingWanted, most_characters: int
+) -> GcodeFacts:
+    """Slice with a skirt around the thing; where that leaves the bed, without."""
+    try:
+        return _run(asked, environment, gcode, wanted, most_characters)
+    except _OutsideError:
+        return _run([asked[0], _BARE, *asked[1:]], environment, gcode, wanted, most_characters)
+
+
+def _run(
+    asked: list[str], environment: dict[str, str], gcode: Path, wanted: SlicingWanted, most_characters: int
+) -> GcodeFacts:
+    program = asked[0]
     try:
         done = subprocess.run(
             asked, capture_output=True, text=True, check=False, timeout=_PATIENCE_S, errors="replace", env=environment
@@ -141,6 +171,9 @@ def sliced(stl: Path, gcode: Path, wanted: SlicingWanted) -> None:
             f"the slicer refuses the model ({words[:200] or f'exit code {done.returncode}'})",
             "see what phone-host printcheck says of it",
         )
+    facts = facts_of(gcode, most_characters)
+    require_inside(gcode, facts, wanted.bed_mm)
+    return facts
 
 
 def _prusa(program: str, stl: Path, gcode: Path, wanted: SlicingWanted) -> list[str]:
@@ -207,7 +240,7 @@ def require_inside(gcode: Path, facts: GcodeFacts, bed_mm: tuple[float, float, f
         raise DataError(f"{gcode} extrudes nothing", "slice the model again; see what the slicer says of it")
     for axis, low, high, most in zip(_AXES, facts.low_mm, facts.high_mm, bed_mm, strict=True):
         if math.isfinite(low) and (low < -_SLACK_MM or high > most + _SLACK_MM):
-            raise DataError(
+            raise _OutsideError(
                 f"{gcode} leaves the bed: {axis} from {low:.1f} to {high:.1f} mm, the bed from 0 to {most:g}",
                 "scale or move the model in the slicer, or give the printer's --bed",
             )

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Final
 
-from common.errors import SettingsError
+from common.errors import SettingsError, TandemError
 from phone_host.output.atomic import write_bytes
 from phone_host.output.meshes.decimated import NoLibraryError, decimated
 from phone_host.output.meshes.formats import FORMATS, mesh_bytes
@@ -13,11 +14,12 @@ from phone_host.output.meshes.printable import Printer, Problem, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
 from phone_host.output.upright import upright_model
-from phone_host.printers.door import Wishes
+from phone_host.printers.door import Job, Wishes
 from phone_host.printers.doors import door_to, key_of
+from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, job_of
-from phone_host.printers.printer_uri import read_uri
-from phone_host.printers.printing import Place, printed
+from phone_host.printers.printer_uri import ServerUri, read_uri
+from phone_host.printers.printing import Place, RunningPrint, printed
 from phone_host.printers.progress import Ended, Progress
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.settings import printer_keys
@@ -140,11 +142,74 @@ def print_model(
     Raises:
         TandemError: it cannot be printed, or the printer is gone.
     """
-    uri = read_uri(printer)
-    table, file = printer_keys(None if config is None else Path(config))
-    door = door_to(uri, key_of(uri, table, file))
-    door.require_ready()
     slicing = SlicingWanted(bed_mm, None if profile is None else Path(profile))
-    with job_of(Path(what), Wanted(slicing, unit, up), uri, lambda _: None) as job:
-        place = Place(door, printer, str(what))
-        return printed(place, job, wishes or Wishes(), tell or (lambda _: None))
+    file = None if config is None else Path(config)
+    with closing(prepare_print(Path(what), printer, Wanted(slicing, unit, up), config=file)) as prepared:
+        return printed(prepared.place, prepared.job, wishes or Wishes(), tell or (lambda _: None))
+
+
+class PreparedPrint:
+    """A print that only has to be confirmed: sliced, checked, and its printer ready.
+
+    Attributes:
+        place: where it is printed.
+        job: what is printed, with what it asks of the printer.
+
+    Args:
+        place: see there.
+        job: see there.
+        kept: what is kept until it is closed: the sliced file.
+    """
+
+    def __init__(self, place: Place, job: Job, kept: ExitStack) -> None:
+        self.place, self.job = place, job
+        self._kept = kept
+
+    def start(
+        self,
+        tell: Callable[[Progress], None] | None = None,
+        over: Callable[[Ended | TandemError], None] | None = None,
+        journal: Journal | None = None,
+    ) -> RunningPrint:
+        """Begin to print, in a thread of its own; the user has confirmed it.
+
+        Args:
+            tell: called several times a second, in that thread, with how far it is.
+            over: called once, in that thread, when it has ended; close this then.
+            journal: keeps how far it is, so that a later start can say what became of a killed print.
+        """
+        running = RunningPrint(self.place, self.job, journal, tell, over)
+        running.start()
+        return running
+
+    def close(self) -> None:
+        """Remove the sliced file. Not while it is printed."""
+        self._kept.close()
+
+
+def prepare_print(
+    what: Path,
+    printer: str,
+    wanted: Wanted,
+    *,
+    config: Path | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> PreparedPrint:
+    """Do all that comes before a print: ask the printer, check and slice the model. Nothing is heated or moved; it may take minutes.
+
+    Args:
+        what: the folder of a scan, a mesh file, or G-code.
+        printer: its address.
+        wanted: how.
+        config: settings file with the keys of servers; None: the usual one.
+        tell: is told what is done next.
+
+    Raises:
+        TandemError: it cannot be printed, or the printer is not ready.
+    """
+    uri = read_uri(printer)
+    door = door_to(uri, key_of(uri, *printer_keys(config)) if isinstance(uri, ServerUri) else "")
+    door.require_ready()
+    with ExitStack() as kept:
+        job = kept.enter_context(job_of(what, wanted, uri, tell))
+        return PreparedPrint(Place(door, printer, str(what.absolute())), job, kept.pop_all())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from phone_host.scan.blocks import SIDE
 from phone_host.scan.cube_cases import CORNERS
 from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import thinned
+from phone_host.scan.mesh_parts import only, thinned
 from phone_host.scan.volume import Volume
 
 SIDE_BLOCKS: Final = 8
@@ -68,6 +68,21 @@ class Patches:
         for place in wanted:
             self._make(volume, place, np.flatnonzero((cubes == place).all(axis=1)))
 
+    def become(self, mesh: Mesh, voxel_m: float) -> None:
+        """Show another surface in place of the volume's: the finished one. The volume is not renewed afterwards.
+
+        Args:
+            mesh: the surface.
+            voxel_m: of the field that it was made of, m.
+        """
+        side_m = SIDE * SIDE_BLOCKS * voxel_m
+        cubes = np.floor(mesh.points_m[mesh.triangles].mean(axis=1) / side_m).astype(np.int32)
+        places, cube_of = np.unique(cubes, axis=0, return_inverse=True)
+        parts = {tuple(place): only(mesh, cube_of == number) for number, place in enumerate(places.tolist())}
+        gone = dict.fromkeys(set(self._made) - set(parts), Mesh.empty())
+        for place, part in (gone | parts).items():
+            self._put(place, side_m, part, voxel_m)
+
     def since(self, number: int, most_points: int) -> tuple[Patch, ...]:
         """Return the patches that are newer than one, oldest first.
 
@@ -81,13 +96,15 @@ class Patches:
 
     def _make(self, volume: Volume, place: NDArray[np.int32], numbers: NDArray[np.int64]) -> None:
         voxel_m = volume.settings.voxel_m
-        mesh = mesh_of(volume.blocks, voxel_m, self._least_weight, numbers)
+        x, y, z = place.tolist()
+        side_m = SIDE * SIDE_BLOCKS * voxel_m
+        self._put((x, y, z), side_m, mesh_of(volume.blocks, voxel_m, self._least_weight, numbers), voxel_m)
+
+    def _put(self, place: tuple[int, int, int], side_m: float, mesh: Mesh, voxel_m: float) -> None:
         most = len(mesh.triangles)
         while len(mesh.points_m) > _MOST_POINTS:
             most //= 2
             mesh, _ = thinned(mesh, most, voxel_m)
-        x, y, z = place.tolist()
-        known = self._made.get((x, y, z))
-        if len(mesh.triangles) or known is not None:
+        if len(mesh.triangles) or place in self._made:
             self._number += 1
-            self._made[x, y, z] = Patch(self._number, (x, y, z), SIDE * SIDE_BLOCKS * voxel_m, mesh)
+            self._made[place] = Patch(self._number, place, side_m, mesh)

@@ -6,6 +6,7 @@ from typing import Final
 
 from common.errors import SettingsError
 from phone_host.live.scan import LiveScan
+from phone_host.output.axes import Axes
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patches
 from phone_host.scan.scan import ScannedPair
@@ -28,7 +29,7 @@ class Scanning:
         self._live: LiveScan | None = None
         self._begun = 0
         self._patches: Patches | None = None  # of a scan that is over: its volume, which is large, is not kept
-        self._counts = 0, 0
+        self._counts, self._axes = (0, 0), Axes.CAMERA.value
         self._over: Scanned | None = None
 
     @contextmanager
@@ -40,6 +41,7 @@ class Scanning:
             begun: number of its activity.
         """
         self._live, self._begun, self._over, self._patches = live, begun, None, None
+        self._axes = (Axes.CAMERA if live.mat is None else Axes.MAT).value
         try:
             yield
         finally:
@@ -86,8 +88,10 @@ class Scanning:
     def surface(self, since: int, most_points: int) -> Surface | None:
         """See Source."""
         if (live := self._live) is not None:
-            return Surface(self._begun, live.surface_since(since, most_points))
-        return None if self._patches is None else Surface(self._begun, self._patches.since(since, most_points))
+            return Surface(self._begun, live.surface_since(since, most_points), self._axes)
+        return (
+            None if self._patches is None else Surface(self._begun, self._patches.since(since, most_points), self._axes)
+        )
 
 
 def _level(last: ScannedPair | None) -> str:

@@ -30,6 +30,7 @@ def surface_bytes(surface: Surface, since: int) -> bytes:
         "kind": "surface",
         "begun": surface.begun,
         "newest": patches[-1].number if patches else since,
+        "axes": surface.axes,
         "patches": [_entry(each) for each in patches],
     }
     text = json_text(header).encode()

@@ -61,13 +61,24 @@ def test_every_line_is_done_once_and_in_order(faults: Faults) -> None:
     assert (sender.resent > 0) == (there.resends > 0) == bool(faults.corrupted)
 
 
-def test_answers_that_are_lost_cost_time_and_nothing_else() -> None:
-    """The line is sent again, the printer has it already and says so; it is not done twice."""
-    lines = cube(400)
-    with printer(Faults(corrupted=0.02, lost=0.004), seed=4) as there:
+@pytest.mark.parametrize(
+    "wire",
+    [
+        pytest.param({"baud": 115200}, id="usb"),
+        pytest.param(
+            {"baud": 9600, "delay_s": 0.02}, id="bluetooth", marks=[pytest.mark.slow, pytest.mark.timeout(600)]
+        ),
+    ],
+)
+def test_answers_that_are_lost_cost_time_and_nothing_else(wire: dict[str, float]) -> None:
+    """The line is sent again, the printer has it already and says so; it is not done twice. An HC-05 is set to 9600 baud when it is new."""
+    lines = cube(1500)
+    with printer(Faults(corrupted=0.02, lost=0.003, **wire), seed=4) as there:  # type: ignore[arg-type]  # numbers
         sender = printed(there, lines)
     assert there.done == lines
     assert sender.phase is Phase.DONE
+    assert there.lost > 0
+    assert there.resends > 10
 
 
 def test_cancelling_switches_the_heaters_off_within_a_second() -> None:

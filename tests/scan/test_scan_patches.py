@@ -8,6 +8,7 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.mesh import Mesh, mesh_of
+from phone_host.scan.mesh_parts import only
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
@@ -131,3 +132,24 @@ def test_a_resumed_volume_shows_itself_whole() -> None:
     whole = mesh_of(volume.blocks, SETTINGS.voxel_m)
     assert sum(len(each.mesh.triangles) for each in patches.since(0, MANY)) == len(whole.triangles)
     assert len(other.changed_blocks().places) == 0
+
+
+def test_the_finished_surface_takes_the_place_of_what_grew() -> None:
+    """All of it is in patches that lie in their cubes; what was shown where it is not is taken away."""
+    volume = grown()
+    patches = Patches(1)
+    patches.renew(volume)
+    before = {each.place for each in patches.since(0, MANY)}
+    newest = max(each.number for each in patches.since(0, MANY))
+    whole = mesh_of(volume.blocks, SETTINGS.voxel_m)
+    left = only(whole, whole.points_m[whole.triangles].mean(axis=1)[:, 0] < 0)
+    patches.become(left, SETTINGS.voxel_m)
+    found = patches.since(newest, MANY)
+    assert {each.place for each in found} == before
+    assert sum(len(each.mesh.triangles) for each in found) == len(left.triangles) > 500
+    assert any(not len(each.mesh.triangles) for each in found)
+    for each in found:
+        if len(each.mesh.triangles):
+            low = np.array(each.place) * each.side_m
+            assert (each.mesh.points_m >= low - each.side_m / 10).all()
+            assert (each.mesh.points_m <= low + 1.1 * each.side_m).all()

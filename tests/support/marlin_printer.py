@@ -58,6 +58,7 @@ class MarlinPrinter:
         bed: likewise.
         cooled_s: when the last heater was switched off, time.monotonic().
         resends: how often it asked for a line again.
+        lost: answers of it that never arrived.
 
     Args:
         faults: what goes wrong.
@@ -73,7 +74,7 @@ class MarlinPrinter:
         self.done: list[str] = []
         self.nozzle = self.bed = 0.0
         self.cooled_s = 0.0
-        self.resends = 0
+        self.resends = self.lost = 0
         self._last = 0
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -169,6 +170,8 @@ class MarlinPrinter:
             self._is_over.wait(self._faults.delay_s)
         if self._random.random() >= self._faults.lost:
             self._say("ok")
+        else:
+            self.lost += 1
 
     def _say(self, text: str) -> None:
         try:

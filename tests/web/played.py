@@ -116,6 +116,7 @@ class Played:
     scan: ScanState | None = None
     printing: PrintState | None = None
     patches: Patches | None = None
+    axes: str = "camera"
     begun: int = 0
     commands: list[Command] = field(default_factory=list)
     answers: dict[Do, Answer] = field(default_factory=dict)
@@ -238,7 +239,7 @@ class Played:
 
     def surface(self, since: int, most_points: int) -> Surface | None:
         """Implement Source."""
-        return None if self.patches is None else Surface(self.begun, self.patches.since(since, most_points))
+        return None if self.patches is None else Surface(self.begun, self.patches.since(since, most_points), self.axes)
 
     def scanned(self) -> str:
         """Implement Source."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.scan.mesh import Mesh
 from phone_host.scan.patches import Patches
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
@@ -55,7 +56,8 @@ def test_the_surface_grows_until_it_is_saved(
     page.fill("#scan-voxel", "5mm")
     page.click("#scan-go")
     page.wait_for_function("() => document.getElementById('scan-go').textContent === 'Stop'")
-    assert (program.commands[-1].do, program.commands[-1].values) == (Do.SCAN, {"voxel": "5mm", "box": ""})
+    assert program.commands[-1].do is Do.SCAN
+    assert program.commands[-1].values == {"voxel": "5mm", "box": "", "mat": "", "turntable": ""}
     assert page.text_content("#scan-none") == "No surface yet"
     words = "2 pairs in the model: moved too fast: move more slowly, back to where it was"
     growing.show(60)
@@ -164,3 +166,56 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
     assert program.commands[-1].values == {"box": ""}
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
     assert complaints == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "sheet", "wanted"),
+    [
+        ("mat", "", {"mat": "usual", "turntable": ""}),
+        ("mat", "8x6:30mm:22mm:4x4", {"mat": "8x6:30mm:22mm:4x4", "turntable": ""}),
+        ("turntable", "", {"mat": "", "turntable": "yes"}),
+    ],
+)
+def test_what_is_scanned_is_chosen(
+    program: Played, opened: Opener, kind: str, sheet: str, wanted: dict[str, str]
+) -> None:
+    """Only a mat asks for its sheet; the command gets what the options of `scan` are."""
+    program.patches = Patches(1)
+    page = opened("scan")
+    page.wait_for_selector("#panel-scan:not([hidden])")
+    assert page.is_hidden("#scan-mat")
+    page.select_option("#scan-kind", kind)
+    assert page.is_visible("#scan-mat") is (kind == "mat")
+    if sheet:
+        page.fill("#scan-mat", sheet)
+    page.click("#scan-go")
+    page.wait_for_function("() => document.getElementById('scan-go').textContent === 'Stop'")
+    assert program.commands[-1].values == {"voxel": "", "box": "", **wanted}
+
+
+def test_what_stands_on_a_mat_stands_upright(program: Played, opened: Opener) -> None:
+    """A red post on a blue plate, z up: on the screen the post stands above the middle of the plate."""
+    z, turn = np.meshgrid(np.linspace(0, 0.1, 60), np.linspace(0, 2 * np.pi, 60))
+    post = np.stack([0.01 * np.cos(turn), 0.01 * np.sin(turn), z], axis=-1).reshape(-1, 3)
+    x, y = np.meshgrid(np.linspace(-0.08, 0.08, 60), np.linspace(-0.08, 0.08, 60))
+    plate = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    corners = [[n, n + 1, n + 60, n + 1, n + 61, n + 60] for n in range(59 * 60) if n % 60 < 59]
+    quads = np.array(corners, np.int32).reshape(-1, 3)
+    colours = np.repeat(np.array([(255, 0, 0), (0, 0, 255)], np.uint8), 3600, axis=0)
+    mesh = Mesh(np.concatenate([post, plate]).astype(np.float32), colours, np.concatenate([quads, quads + 3600]))
+    program.patches = Patches(1)
+    program.patches.become(mesh, 0.01)
+    program.axes = "mat"
+    program.scan, program.activity = ScanState(words="go on", level="good"), Activity.SCANNING
+    page = opened("scan")
+    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
+    page.wait_for_function("() => document.getElementById('scan-model').dataset.drawn")
+    page.wait_for_timeout(500)
+    picture = cv2.imdecode(np.frombuffer(page.locator("#scan-model").screenshot(), np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    blue, green, red = (picture[..., channel].astype(int) for channel in range(3))
+    rows_of_post = np.flatnonzero(((red > 90) & (blue < 60) & (green < 60))[:, 80:-80].any(axis=1))
+    rows_of_plate = np.flatnonzero(((blue > 90) & (red < 60) & (green < 60)).any(axis=1))
+    assert len(rows_of_post) > 20
+    assert rows_of_post.min() < rows_of_plate.min() - 10
+    assert rows_of_post.max() < rows_of_plate.max()

@@ -3,7 +3,7 @@
 import argparse
 import math
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import INTERRUPTED
@@ -11,16 +11,15 @@ from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.json_text import json_text
-from phone_host.printers.door import Job, PrinterDoor, Wishes
-from phone_host.printers.doors import door_to, key_of
+from phone_host.printers.door import Job, Wishes
 from phone_host.printers.journal import Journal
-from phone_host.printers.preparing import Wanted, is_gcode, job_of
+from phone_host.printers.preparing import Wanted, is_gcode
 from phone_host.printers.printer_uri import FileUri, PrinterUri, ServerUri, read_uri
-from phone_host.printers.printing import Place, printed
+from phone_host.printers.printing import printed
 from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import Slicer, SlicingWanted
+from phone_host.run.model_job import PreparedPrint, prepare_print
 from phone_host.run.progress_bar import share_bar, step_bar
-from phone_host.settings import printer_keys
 from phone_host.verbs.print.finding import find
 from phone_host.verbs.print.keypad import keypad
 from phone_host.verbs.printer_bed import bed_of
@@ -38,34 +37,22 @@ def run(options: argparse.Namespace) -> int:
     if slicer is not None and is_gcode(options.what):
         raise SettingsError("--slicer is for models", f"leave it out, or give a model, not {options.what}")
     wanted = Wanted(SlicingWanted(bed_of(options), options.profile, slicer), options.unit, options.up)
-    door = door_to(uri, _key(options, uri))
-    door.require_ready()
-    journal = Journal(data_folder() / "printing.json")
     with ExitStack() as kept:
         with step_bar("reading", None) as watcher:
-            job = kept.enter_context(job_of(options.what, wanted, uri, watcher.say))
+            prepared = kept.enter_context(
+                closing(prepare_print(options.what, options.printer, wanted, config=options.config, tell=watcher.say))
+            )
         if isinstance(uri, FileUri):
-            return _told(printed(_place(door, uri, options), job, Wishes(), lambda _: None), options, uri, job)
+            return _told(printed(prepared.place, prepared.job, Wishes(), lambda _: None), options, uri, prepared.job)
+        journal = Journal(data_folder() / "printing.json")
         _tell_left(journal)
-        _ask(options, job)
-        return _told(_sent(_place(door, uri, options), job, journal), options, uri, job)
+        _ask(options, prepared.job)
+        return _told(_sent(prepared, journal), options, uri, prepared.job)
 
 
-def _place(door: PrinterDoor, uri: PrinterUri, options: argparse.Namespace) -> Place:
-    return Place(door, uri.text, str(options.what.absolute()))
-
-
-def _key(options: argparse.Namespace, uri: PrinterUri) -> str:
-    """Return the printer's key; empty: it needs none, or has none in the settings file."""
-    if not isinstance(uri, ServerUri):
-        return ""
-    table, file = printer_keys(options.config)
-    return key_of(uri, table, file)
-
-
-def _sent(place: Place, job: Job, journal: Journal) -> Ended:
+def _sent(prepared: PreparedPrint, journal: Journal) -> Ended:
     """Send the print; show how far it is, and take keys and signals."""
-    signals, wishes = StopSignals(), Wishes()
+    signals, wishes, job = StopSignals(), Wishes(), prepared.job
 
     def tell(progress: Progress) -> None:
         if signals.stop:
@@ -79,7 +66,7 @@ def _sent(place: Place, job: Job, journal: Journal) -> Ended:
         bar.say(_words(job.name, progress))
 
     with keypad() as pressed, share_bar(f"{job.name}: waiting for the printer") as bar:
-        return printed(place, job, wishes, tell, journal)
+        return printed(prepared.place, job, wishes, tell, journal)
 
 
 def _words(name: str, progress: Progress) -> str:

@@ -23,14 +23,13 @@ from phone_host.run.scan_result import require_something
 from phone_host.scan.box import Box
 from phone_host.scan.scan import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
-from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
+from phone_host.verbs.scan.arguments import add_model_arguments
 from phone_host.verbs.scan.live import live_scan
-from phone_host.verbs.scan.wanted import box_of, voxel_of
-from phone_host.verbs.stereo_options import output_options
+from phone_host.verbs.scan.wanted import axes_of, box_of, scan_wanted
 
-OF_SCAN: Final = ("voxel", "box")
+OF_SCAN: Final = ("voxel", "box", "mat", "turntable")
 """Options of `scan` that the page may give."""
 
 
@@ -86,7 +85,6 @@ class PageScan:
         return Scanned(words=words, level=level, folder=self.out, files=files, snapshot=snapshot)
 
     def _finished(self) -> FinishedScan:
-        self.live.renew_surface()
         return self.live.finished(self.host.snapshot(), self.matcher, self.axes)
 
 
@@ -119,19 +117,26 @@ def page_scan(
     if not found.values.calibration and not (options.rectified and options.focal):
         raise SettingsError("there is no calibration, so there are no metres", "calibrate, or name a rig.yaml")
     if unknown := set(values) - set(OF_SCAN):
-        raise SettingsError(f"{min(unknown)!r} is no option of a scan that the page can set", "give voxel and box")
-    voxel = values.get("voxel", "").strip()
-    usual = ScanWanted()
-    wanted = ScanWanted(
-        voxel_m=voxel_of(voxel) if voxel else usual.voxel_m,
-        box=asked_box(values),
-        threads=matching_threads(),
-    )
+        raise SettingsError(
+            f"{min(unknown)!r} is no option of a scan that the page can set", f"give some of {', '.join(OF_SCAN)}"
+        )
+    wanted = _wanted(values)
     out = _new_folder(folder)
     opened = open_run(options, found, tell, feed)
     live = live_scan(opened, wanted, out)
     prepared = opened.prepared((), (live.sink, *sinks_of(opened.core)))
-    return PageScan(prepared, live, out, found.values.matcher, output_options(options).axes)
+    return PageScan(prepared, live, out, found.values.matcher, axes_of(options, wanted))
+
+
+def _wanted(values: Choices) -> ScanWanted:
+    """Return what the page wants, by the options of the command."""
+    given = {name: values.get(name, "").strip() for name in OF_SCAN}
+    parser = argparse.ArgumentParser()
+    add_model_arguments(parser)
+    options = parser.parse_args([])
+    options.voxel, options.box, options.mat = (given[name] or None for name in ("voxel", "box", "mat"))
+    options.turntable = bool(given["turntable"])
+    return scan_wanted(options)
 
 
 def asked_box(values: Choices) -> Box | None:

@@ -1,4 +1,4 @@
-// A box around a surface that is pulled by its six faces. Lengths are m, places X right, Y down, Z forward.
+// A box around a surface that is pulled by its six faces. Lengths are m, places in the axes of the model.
 
 import { Vector3 } from './vendor/three.js';
 
@@ -39,7 +39,7 @@ export function boxOf(text) {
 /** Draws the box over a viewer, and lets its faces be pulled. */
 export class CropBox {
   /**
-   * @param {import('./viewer.js').Viewer} viewer
+   * @param {import('./model.js').Model} viewer
    * @param {(box: Box, done: boolean) => void} pulled - called while a face is pulled, and once more when it is let go
    */
   constructor(viewer, pulled) {
@@ -63,7 +63,8 @@ export class CropBox {
   }
 
   /** @param {number[]} place @returns {number[]} px of the page, and whether it lies before the camera */
-  spot([x, y, z]) {
+  spot(place) {
+    const [x, y, z] = this.viewer.ofCamera(place);
     const seen = new Vector3(x, -y, -z).project(this.viewer.camera);
     const { clientWidth, clientHeight } = this.viewer.canvas;
     return [((seen.x + 1) / 2) * clientWidth, ((1 - seen.y) / 2) * clientHeight, seen.z < 1 ? 1 : 0];

@@ -2,7 +2,9 @@
 
 import { Vector3 } from './vendor/three.js';
 
-const AXES = /** @type {const} */ ([['X', [1, 0, 0], '#e0452f'], ['Y', [0, -1, 0], '#2f9e44'], ['Z', [0, 0, -1], '#3b82f6']]);
+/** Ways of the axes inside the viewer: a camera's, and those of what stands on a mat, whose Z points up. */
+const WAYS = { camera: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], mat: [[1, 0, 0], [0, 0, -1], [0, 1, 0]] };
+const AXES = /** @type {const} */ ([['X', '#e0452f'], ['Y', '#2f9e44'], ['Z', '#3b82f6']]);
 const LONGEST_PX = 130;
 
 /** A round length. @param {number} most - m @returns {number} the longest of 1, 2, 5 times a power of ten that is not longer */
@@ -20,6 +22,8 @@ export class CloudLegend {
   constructor(canvas) {
     this.canvas = canvas;
     this.pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+    /** @type {'camera' | 'mat'} */
+    this.kind = 'camera';
   }
 
   /**
@@ -63,8 +67,9 @@ export class CloudLegend {
   axes(camera, w, h) {
     const [x, y] = [w - 42, h - 40];
     this.pen.textAlign = 'center';
-    for (const [name, way, hue] of AXES) {
-      const seen = new Vector3(...way).transformDirection(camera.matrixWorldInverse);
+    for (const [axis, [name, hue]] of AXES.entries()) {
+      const [wx, wy, wz] = WAYS[this.kind][axis];
+      const seen = new Vector3(wx, wy, wz).transformDirection(camera.matrixWorldInverse);
       this.line([[x, y], [x + 24 * seen.x, y - 24 * seen.y]], hue);
       this.words(name, x + 33 * seen.x, y - 33 * seen.y, hue);
     }

@@ -6,7 +6,7 @@ import { opaque, Viewer } from './viewer.js';
 
 /**
  * @typedef {object} Surface
- * @property {[number, number, number]} low - lowest corner, X right Y down Z forward, m
+ * @property {[number, number, number]} low - lowest corner, in the axes of the model, m
  * @property {number} step - of a coordinate, m
  * @property {Uint16Array} points - three coordinates each, in steps from `low`
  * @property {Uint32Array | Uint16Array} triangles - three numbers of points each, anticlockwise from outside
@@ -16,11 +16,16 @@ import { opaque, Viewer } from './viewer.js';
 
 /** @typedef {'colour' | 'shape' | 'noise'} Paint */
 
+/** Axes of a model: a camera's, X right Y down Z forward, or a mat's, Z up. @typedef {'camera' | 'mat'} Axes */
+
 /** What lights it: the order is that of the shader's cases. @type {Paint[]} */
 const PAINTS = ['colour', 'shape', 'noise'];
 
 /** Nothing lies outside of it. */
 const NOWHERE = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
+
+/** Turn and tilt from which a thing on a mat is looked at first, rad. @type {[number, number]} */
+const FROM_ABOVE = [0, 0.35];
 
 /** Points that decide from where all fits in. */
 const LOOKED_AT = 3000;
@@ -80,6 +85,16 @@ export class Model extends Viewer {
     this.surfaces = new Map();
   }
 
+  /** Say which way the axes of all that is shown go. @param {Axes} axes */
+  stands(axes) {
+    this.legend.kind = axes;
+  }
+
+  /** A place of the model as one of a camera: X right, Y down, Z forward. @param {number[]} place @returns {number[]} */
+  ofCamera([x, y, z]) {
+    return this.legend.kind === 'mat' ? [x, -z, y] : [x, y, z];
+  }
+
   /** All of a surface, seen whole. @param {Surface} surface */
   show(surface) {
     this.put('', surface);
@@ -104,9 +119,12 @@ export class Model extends Viewer {
     geometry.setAttribute('noise', new three.BufferAttribute(surface.noise, 1, true));
     const mesh = new three.Mesh(geometry, this.material);
     mesh.frustumCulled = false;
-    const [x, y, z] = surface.low;
+    const [x, y, z] = this.ofCamera(surface.low);
     mesh.position.set(x, -y, -z);
-    mesh.scale.set(surface.step, -surface.step, -surface.step);
+    if (this.legend.kind === 'mat') {
+      mesh.scale.setScalar(surface.step);
+      mesh.rotation.x = -Math.PI / 2;
+    } else mesh.scale.set(surface.step, -surface.step, -surface.step);
     this.scene.add(mesh);
     this.parts.set(name, mesh);
     this.surfaces.set(name, surface);
@@ -134,8 +152,10 @@ export class Model extends Viewer {
   within(box) {
     const { low, high } = box ?? NOWHERE;
     const { uniforms } = this.material;
-    uniforms.low.value.set(low[0], -high[1], -high[2]);
-    uniforms.high.value.set(high[0], -low[1], -low[2]);
+    const [a, b] = [this.ofCamera(low), this.ofCamera(high)];
+    const ends = [0, 1, 2].map((axis) => [Math.min(a[axis], b[axis]), Math.max(a[axis], b[axis])]);
+    uniforms.low.value.set(ends[0][0], -ends[1][1], -ends[2][1]);
+    uniforms.high.value.set(ends[0][1], -ends[1][0], -ends[2][0]);
     this.draw();
   }
 
@@ -167,10 +187,12 @@ export class Model extends Viewer {
 
   /** @returns {?import('./viewer.js').Stand} */
   stand() {
-    const points = this.some();
+    const points = this.some().map((place) => this.ofCamera(place));
     if (!points.length) return null;
     const ends = [0, 1, 2].map((axis) => [Math.min(...points.map((place) => place[axis])), Math.max(...points.map((place) => place[axis]))]);
     const middle = ends.map(([least, most]) => (least + most) / 2);
-    return { middle, front: null, points, reach: [0.5, 0.5], scale: Math.hypot(...ends.map(([least, most]) => most - least)) };
+    const scale = Math.hypot(...ends.map(([least, most]) => most - least));
+    const stand = { middle, front: null, points, reach: /** @type {[number, number]} */ ([0.5, 0.5]), scale };
+    return this.legend.kind === 'mat' ? { ...stand, way: FROM_ABOVE } : stand;
   }
 }

@@ -27,10 +27,15 @@ export class ScanPanel {
     /** Whether the person looks at it in a way of his own. */
     this.isHeld = false;
     this.field = /** @type {HTMLInputElement} */ (byId('scan-box'));
-    this.surface = new GrowingSurface((name, part) => this.model?.put(name, part), () => this.model?.clear());
+    this.surface = new GrowingSurface((name, part, axes) => {
+      this.model?.stands(axes);
+      this.model?.put(name, part);
+    }, () => this.model?.clear());
     onPress(byId('scan-go'), () => this.go(), byId('scan-answer'));
     onPress(byId('scan-draw'), () => this.drawBox(), byId('scan-answer'));
     this.field.addEventListener('change', () => this.typed());
+    byId('scan-kind').addEventListener('change', () => this.kind());
+    this.kind();
     setInterval(() => this.ask(), ASK_MS);
   }
 
@@ -42,7 +47,14 @@ export class ScanPanel {
     if (this.isScanning() || this.state()?.activity === 'ending') return command('stop');
     const value = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (byId(id)).value.trim();
     this.isHeld = false;
-    return begin('scan', { voxel: value('scan-voxel'), box: value('scan-box') });
+    const kind = value('scan-kind');
+    const mat = kind === 'mat' ? value('scan-mat') || 'usual' : '';
+    return begin('scan', { voxel: value('scan-voxel'), box: value('scan-box'), mat, turntable: kind === 'turntable' ? 'yes' : '' });
+  }
+
+  /** Only a mat has a sheet to be named. */
+  kind() {
+    show(byId('scan-sheet'), /** @type {HTMLSelectElement} */ (byId('scan-kind')).value === 'mat');
   }
 
   /** Begin with a box around most of the surface, or keep everything again. */

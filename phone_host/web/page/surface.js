@@ -2,7 +2,7 @@
 
 /** @typedef {import('./model.js').Surface} Surface */
 /** @typedef {{place: number[], low: [number, number, number], step: number, points: number, triangles: number}} Entry */
-/** @typedef {{begun: number, newest: number, patches: Entry[]}} Head */
+/** @typedef {{begun: number, newest: number, axes: import('./model.js').Axes, patches: Entry[]}} Head */
 
 /**
  * Take an answer apart.
@@ -32,7 +32,10 @@ export function patchesOf(buffer) {
 
 /** Asks for a growing surface. */
 export class GrowingSurface {
-  /** @param {(name: string, surface: Surface) => void} put - takes a part @param {() => void} clear - another scan begins */
+  /**
+   * @param {(name: string, surface: Surface, axes: import('./model.js').Axes) => void} put - takes a part
+   * @param {() => void} clear - another scan begins
+   */
   constructor(put, clear) {
     this.put = put;
     this.clear = clear;
@@ -68,7 +71,7 @@ export class GrowingSurface {
       this.clear();
       if (hadSome) return true;
     }
-    for (const [name, surface] of patches) this.put(name, surface);
+    for (const [name, surface] of patches) this.put(name, surface, head.axes);
     this.newest = head.newest;
     return patches.length > 0;
   }

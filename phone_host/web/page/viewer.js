@@ -19,6 +19,7 @@ const VIEWS = { turned: [-0.28, 0.2], front: [0, 0], side: [-1.25, 0.1], above: 
  * @property {number[][]} points - that have to fit in
  * @property {[number, number]} reach - tangents of half the angles across and down that a picture shows at least
  * @property {number} scale - a typical length
+ * @property {[number, number]} [way] - turn and tilt of the front view, rad; missing: as from the places' origin
  */
 
 const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -80,7 +81,8 @@ export class Viewer {
     this.pivot = stand.middle;
     const [yaw, pitch] = VIEWS[name];
     const [x, y, z] = stand.middle;
-    const [turn, tilt] = [Math.atan2(-x, z) + yaw, Math.asin(y / lengthOf(stand.middle)) + pitch];
+    const [way, rise] = stand.way ?? [Math.atan2(-x, z), Math.asin(y / lengthOf(stand.middle))];
+    const [turn, tilt] = [way + yaw, rise + pitch];
     const right = [Math.cos(turn), 0, -Math.sin(turn)];
     const up = [-Math.sin(tilt) * Math.sin(turn), Math.cos(tilt), -Math.sin(tilt) * Math.cos(turn)];
     const back = [Math.cos(tilt) * Math.sin(turn), Math.sin(tilt), Math.cos(tilt) * Math.cos(turn)];

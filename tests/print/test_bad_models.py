@@ -1,0 +1,83 @@
+"""What is wrong with a model, or with the disk, gets one line from each command that takes models; nothing is lost."""
+
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.print.test_print_verb import _cube_file, environment
+
+NAN_PLY = (
+    b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 nan\n0 1 0\n3 0 1 2\n"
+)
+
+
+def said(home: Path, *words: str, most_bytes: int = 0) -> subprocess.CompletedProcess[str]:
+    """Run a command; `most_bytes` is what a file may hold, as on a disk that is full."""
+    limit = ["prlimit", f"--fsize={most_bytes}"] if most_bytes else []
+    asked = [*limit, sys.executable, "-P", "-m", "phone_host.cli", *words]
+    return subprocess.run(
+        asked, env=environment(home), capture_output=True, text=True, check=False, timeout=100, cwd=home, stdin=subprocess.DEVNULL
+    )  # fmt: skip
+
+
+@pytest.fixture
+def models(tmp_path: Path) -> Path:
+    """A folder of bad models."""
+    (tmp_path / "empty.stl").write_bytes(bytes(80) + struct.pack("<I", 0))
+    (tmp_path / "nan.ply").write_bytes(NAN_PLY)
+    _cube_file(tmp_path / "open.stl", 20, is_open=True)
+    _cube_file(tmp_path / "cube.stl", 20)
+    return tmp_path
+
+
+@pytest.mark.parametrize("verb", ["export", "printcheck", "print"])
+@pytest.mark.parametrize(("name", "words"), [("empty.stl", "holds no triangle"), ("nan.ply", "is no place")])
+def test_what_is_no_mesh_is_refused_in_one_line(models: Path, verb: str, name: str, words: str) -> None:
+    """By each command, with exit 4, and nothing is written."""
+    more = {
+        "export": ["--to", "stl", "--out", "out"],
+        "printcheck": ["--out", "out"],
+        "print": ["--printer", "file:x.gcode"],
+    }
+    ended = said(models, verb, name, *more[verb])
+    if verb == "print" and "no slicer is installed" in ended.stderr:
+        pytest.skip("needs a slicer")
+    assert ended.returncode == 4
+    assert words in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+    assert not list(models.rglob("out/*"))
+
+
+def test_an_open_mesh_is_exported_with_a_note_and_cannot_be_mended(models: Path) -> None:
+    """Export keeps every triangle and says so; printcheck draws the hole; --fix refuses in one line."""
+    exported = said(models, "export", "open.stl", "--unit", "mm", "--to", "3mf", "--tolerance", "0.1", "--out", "out")
+    assert exported.returncode == 0
+    assert "note: the mesh is not closed" in exported.stdout
+    checked = said(models, "printcheck", "open.stl", "--unit", "mm", "--out", "out")
+    assert checked.returncode == 4
+    assert "stop: 4 edges end in nothing" in checked.stdout
+    assert (models / "out/open-printcheck.png").stat().st_size > 1000
+    mended = said(models, "printcheck", "open.stl", "--unit", "mm", "--fix", "--out", "out2")
+    assert mended.returncode == 4
+    assert "not closed" in mended.stderr
+    assert len(mended.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "words", [["export", "cube.stl", "--to", "stl"], ["printcheck", "cube.stl", "--fix"]], ids=["export", "check"]
+)
+def test_a_full_disk_is_told_and_what_was_there_stays(models: Path, words: list[str]) -> None:
+    """One line with the folder, exit 3 or 4; no half of a file is left, and an older result is whole."""
+    out = models / "out"
+    out.mkdir()
+    (out / "older.stl").write_text("mine")
+    ended = said(models, *words, "--unit", "mm", "--out", "out", most_bytes=512)
+    assert ended.returncode in {3, 4}
+    assert "out" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+    left = [(path.name, path.read_text()) for path in out.iterdir() if path.name != ".tandemscan"]
+    assert left == [("older.stl", "mine")]
