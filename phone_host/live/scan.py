@@ -25,7 +25,7 @@ from phone_host.run.sinks import FunctionSink
 from phone_host.run.turn_remarks import turn_remarks
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, Submap
+from phone_host.scan.scan import ScannedPair, ScanWanted, Submap
 from phone_host.scan.turntable import scan_for
 from phone_host.scan.volume_settings import LEAST_WEIGHT
 
@@ -162,11 +162,8 @@ class LiveScan:
             return
         if earlier and not self._is_replayed:  # numbers and times go on where they ended
             number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
-        if isinstance(self.scan, Scan):
-            skew_s = 0.0 if self._is_timeless else result.pair.time_skew_ns / _NS
-            self._last = self.scan.take(str(number), stamp_s, result.processed, skew_s)
-        else:
-            self._last = self.scan.take(str(number), stamp_s, result.processed)
+        skew_s = 0.0 if self._is_timeless else result.pair.time_skew_ns / _NS
+        self._last = self.scan.take(str(number), stamp_s, result.processed, skew_s)
         # Not one more: with a pair, others that were lost may have become part of the model.
         self._counts = self._counts[0] + 1, self.scan.fused
         self.kept.after_pair()

@@ -127,7 +127,11 @@ class Places:
         )
 
     def recognised(self, view: View) -> Recognised | None:
-        """Find the place on which most of a view's features agree; None: none has enough."""
+        """Find the place on which most of a view's features agree; None: none has enough.
+
+        Args:
+            view: with depth.
+        """
         seen = _features(view)
         observer = Observer(view.geometry, max(view.noise_px, _DISPARITY_PX), pixel_px=_PIXEL_PX)
         best: Recognised | None = None

@@ -117,13 +117,14 @@ class TurntableScan(Scan):
         """How many views are kept."""
         return len(self._stations)
 
-    def take(self, name: str, stamp_s: float, processed: Processed) -> ScannedPair:
+    def take(self, name: str, stamp_s: float, processed: Processed, skew_s: float = 0.0) -> ScannedPair:
         """Take the next pair.
 
         Args:
             name: of the pair.
             stamp_s: when it was taken, s.
             processed: with disparity and cloud.
+            skew_s: passed over: between the pairs that count, the object rests.
 
         Returns:
             What became of it.
@@ -131,6 +132,7 @@ class TurntableScan(Scan):
         Raises:
             DataError: its size is not that of the pairs before it.
         """
+        del skew_s
         view = view_of(processed)
         if not self._pairs:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
