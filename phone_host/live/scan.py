@@ -22,7 +22,7 @@ from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import report_of
 from phone_host.run.sinks import FunctionSink
-from phone_host.run.turn_remarks import turn_remarks
+from phone_host.run.turn_remarks import field_of_turn, turn_remarks
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan import ScannedPair, ScanWanted, Submap
@@ -149,7 +149,7 @@ class LiveScan:
                 self.patches.become(model.mesh, self.scan.settings.voxel_m)
         remarks.extend(turn_remarks(self.scan))
         report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
-        return FinishedScan(report, model)
+        return FinishedScan(report, model, field=field_of_turn(self.scan))
 
     def _take(self, result: Result) -> None:
         ledger = result.ledger

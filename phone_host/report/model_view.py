@@ -30,11 +30,13 @@ class ShownModel:
         mesh: its triangles.
         noise_m: (V,) standard deviation of its points, m.
         voxel_m: of the field that it was made of, m.
+        is_on_mat: whether its axes are a mat's, z up; else they are a camera's.
     """
 
     mesh: Mesh
     noise_m: NDArray[np.float32]
     voxel_m: float
+    is_on_mat: bool = False
 
 
 def model_view(shown: ShownModel, file: str) -> str:
@@ -57,7 +59,7 @@ def model_view(shown: ShownModel, file: str) -> str:
     low = mesh.points_m.min(axis=0)
     size = mesh.points_m.max(axis=0) - low
     step = float(size.max()) / _STEPS
-    view = {"low": low.tolist(), "size": size.tolist(), "step": step}
+    view = {"low": low.tolist(), "size": size.tolist(), "step": step, "axes": "mat" if shown.is_on_mat else "camera"}
     points = np.rint((mesh.points_m - low) / step).astype(np.uint16)
     levels = np.clip((noise_m - best) / (worst - best), 0, 1) * 255
     data = {
@@ -72,14 +74,15 @@ def model_view(shown: ShownModel, file: str) -> str:
         '<canvas tabindex="0" role="application" aria-label="the model; arrow keys turn it, plus and minus zoom, Home goes back"></canvas>'
         '<canvas aria-hidden="true"></canvas>'
         f'<p class="nocloud" hidden>This browser cannot draw the model (no WebGL 2); {escape(file)} holds it.</p></div>'
-        f"<figcaption>{escape(_words(len(mesh.triangles), total))}</figcaption></figure>"
-        f'<div class="buttons">{_buttons()}</div><div class="buttons">{_paints(best, worst)}</div>'
+        f"<figcaption>{escape(_words(len(mesh.triangles), total, shown))}</figcaption></figure>"
+        f'<div class="buttons">{_buttons(shown)}</div><div class="buttons">{_paints(best, worst)}</div>'
         f"<noscript><p>The model needs a browser that runs the script in this page; {escape(file)} holds it.</p></noscript></div>"
     )
 
 
-def _buttons() -> str:
-    views = (("turned", "turned"), ("front", "as the camera began"), ("side", "side"), ("above", "above"))
+def _buttons(model: ShownModel) -> str:
+    front = "front" if model.is_on_mat else "as the camera began"
+    views = (("turned", "turned"), ("front", front), ("side", "side"), ("above", "above"))
     return "".join(f'<button type="button" data-to="{name}">{words}</button>' for name, words in views)
 
 
@@ -92,9 +95,10 @@ def _paints(best_m: float, worst_m: float) -> str:
     )
 
 
-def _words(shown: int, total: int) -> str:
+def _words(shown: int, total: int, model: ShownModel) -> str:
     number = f"{shown:,} triangles stand for {total:,}" if shown < total else f"{total:,} triangles"
+    axes = "the mat's: Z up" if model.is_on_mat else "the left camera's at the first pair: X right, Y down, Z forward"
     return (
-        f"{number.replace(',', THIN)}; the axes are the left camera's at the first pair: X right, Y down, Z forward. Drag turns, two fingers"
+        f"{number.replace(',', THIN)}; the axes are {axes}. Drag turns, two fingers"
         " or the wheel (after a click) zoom, shift and drag move, a double click goes back. Dark is the surface seen from behind."
     )

@@ -5,8 +5,8 @@ from typing import Any
 
 from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
-from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict
-from phone_host.report.stereo_report import ALWAYS, FailedPair
+from phone_host.report.scan_report import ScanReport, scan_verdict
+from phone_host.report.stereo_report import FailedPair
 from phone_host.scan.scan import ScannedPair
 
 
@@ -45,7 +45,7 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
         },
         "warnings": [remark.text for remark in report.remarks],
         "pairs": [_pair(pair) for pair in report.pairs],
-        "files": [MODEL, TRAJECTORY, *ALWAYS],
+        "files": list(report.files),
     }
 
 

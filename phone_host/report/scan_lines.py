@@ -6,8 +6,7 @@ from typing import Final
 from common.imagesize.head import size_text
 from common.words import counted, distance_text
 from phone_host.report.mat_figures import MatFigures
-from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict, stretches
-from phone_host.report.stereo_report import ALWAYS
+from phone_host.report.scan_report import ScanReport, scan_verdict, stretches
 
 _MOST_LINES: Final = 8
 
@@ -39,7 +38,7 @@ def scan_lines(report: ScanReport, out: str) -> list[str]:
         )
     lines += [f"warning: {pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed[:_MOST_LINES]]
     lines += [remark.line for remark in report.remarks]
-    return [*lines, f"written to {out}: {', '.join((MODEL, TRAJECTORY, *ALWAYS))}"]
+    return [*lines, f"written to {out}: {', '.join(report.files)}"]
 
 
 def mat_line(mat: MatFigures) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from common.imagesize.head import size_text
 from common.words import counted, distance_text
+from phone_host.output.axes import Axes
 from phone_host.report.model_view import ShownModel, model_view
 from phone_host.report.page_frame import document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section
@@ -57,7 +58,7 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
         *(remark.text for remark in report.remarks),
     ]
     files = (
-        FileLink(MODEL, f"the surface with its colours, metres; {report.axes.text} at the first pair"),
+        FileLink(MODEL, f"the surface with its colours, metres; {_axes_words(report.axes)}"),
         FileLink(TRAJECTORY, "where the camera was, a line a pair: s, m, quaternion x y z w (TUM's format)"),
         FileLink("report.json", "all figures, with those of every pair"),
     )
@@ -79,6 +80,10 @@ def _subtitle(report: ScanReport) -> str:
     names = [pair.name for pair in report.pairs]
     which = f"{counted(len(names), 'pair')}, {names[0]} to {names[-1]}" if names else "no pairs"
     return f"{which}; {size_text(report.rectified_px)} px, matcher {report.matcher}"
+
+
+def _axes_words(axes: Axes) -> str:
+    return axes.text if axes is Axes.MAT else f"{axes.text} at the first pair"
 
 
 def _figures(report: ScanReport) -> tuple[Figure, ...]:

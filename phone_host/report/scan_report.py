@@ -16,7 +16,7 @@ from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.report.mat_figures import MatFigures, mat_figures
 from phone_host.report.report_page import Headline
-from phone_host.report.stereo_report import FailedPair, Remark, Size
+from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
 from phone_host.scan.mat import Mat
 from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
 from phone_host.scan.scan import ScannedPair
@@ -88,6 +88,7 @@ class ScanReport:
         axes: of model.ply.
         remarks: what the user must know.
         interrupted_of: how many pairs were to be taken when it was interrupted; 0: it was not.
+        keeps_field: whether field.bin is written, too.
         mat: on which the object lies; None: there is none.
     """
 
@@ -100,7 +101,13 @@ class ScanReport:
     axes: Axes = Axes.CAMERA
     remarks: tuple[Remark, ...] = ()
     interrupted_of: int = 0
+    keeps_field: bool = False
     mat: Mat | None = None
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of what is written."""
+        return (MODEL, TRAJECTORY, *ALWAYS, *(["field.bin"] if self.keeps_field else []))
 
     @property
     def scanned(self) -> tuple[ScannedPair, ...]:

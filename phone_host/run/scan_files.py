@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from phone_host.output.atomic import write_text
+from phone_host.output.atomic import write_bytes, write_text
+from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
 from phone_host.output.ply import PointCloud, write_surface
@@ -15,9 +16,10 @@ from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
+from phone_host.run.kept_field import FIELD
 from phone_host.scan.scan_model import ScanModel
 
-NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html"
+NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html|field\.bin"
 """The names that `scan` writes into its folder."""
 
 
@@ -29,11 +31,13 @@ class FinishedScan:
         report: of it.
         model: its surface.
         commands: what to do next, for the page.
+        field: its field as bytes, for another pass; empty: it takes none.
     """
 
     report: ScanReport
     model: ScanModel
     commands: tuple[NextCommand, ...] = ()
+    field: bytes = b""
 
 
 def write_scan(out: Path, scan: FinishedScan) -> None:
@@ -50,13 +54,15 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
     report, mesh = scan.report, scan.model.mesh
     folder = ListedFolder(out, NAMES)
     try:
-        folder.add(MODEL, TRAJECTORY, *ALWAYS)
+        folder.add(MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else []))
         seen = scan.model.seen if scan.model.is_closed else None
         write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
+        if scan.field:
+            write_bytes(out / FIELD, scan.field)
         write_text(out / TRAJECTORY, trajectory_of(report))
         write_text(out / "report.json", json_text(scan_json(report), indent=2) + "\n")
         voxel_m = report.settings.voxel_m if report.settings else 1.0
-        shown = ShownModel(mesh, scan.model.noise_m, voxel_m)
+        shown = ShownModel(mesh, scan.model.noise_m, voxel_m, is_on_mat=report.axes is Axes.MAT)
         write_text(out / "index.html", scan_page(report, shown, scan.commands))
     finally:
         folder.close()

@@ -25,7 +25,7 @@ from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import report_of, require_something
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_trust import judge_pair
-from phone_host.run.turn_remarks import turn_remarks
+from phone_host.run.turn_remarks import field_of_turn, turn_remarks
 from phone_host.scan.scan import ScannedPair, ScanWanted, Submap
 from phone_host.scan.turntable import scan_for
 from phone_host.stereo.core import StereoCore
@@ -182,4 +182,4 @@ class _Work:
         )
         pairs = [pair if isinstance(pair, FailedPair) else self.scan.final(pair) for pair in self._pairs]
         report = report_of(self.scan, model, pairs, remarks, matcher=self._job.matcher, axes=self._job.axes)
-        return FinishedScan(report, model, self._job.commands)
+        return FinishedScan(report, model, self._job.commands, field_of_turn(self.scan))

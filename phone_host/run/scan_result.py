@@ -11,6 +11,7 @@ from common.errors import DataError
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
+from phone_host.run.turn_remarks import keeps_field
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan, ScannedPair
 from phone_host.scan.scan_model import ScanModel
@@ -45,6 +46,7 @@ def report_of(
         matcher=matcher,
         axes=axes,
         remarks=(*remarks, *memory_remarks(scan)),
+        keeps_field=keeps_field(scan),
         mat=scan.mat,
     )
     on_mat = report.on_mat

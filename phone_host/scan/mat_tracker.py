@@ -33,6 +33,13 @@ ABOVE_M: Final = 0.0025
 _HEIGHT_SHARE: Final = 2.0
 """Of the longer side of the sheet: higher things do not stand on it."""
 
+_TRUNCATION_SHARE, _LEAST_TRUNCATION_VOXELS = 2 / 3, 4.0
+"""Of the usual truncation. Poses are exact, so the field need not bridge their errors, and a surface seen from one side only is fattened by less: on a
+rendered figure 0.10 mm in place of 0.17, and its mean error is 0.23 mm in place of 0.26."""
+
+_FAR_M: Final = 10.0
+"""The background tells what is empty however far it is: its depths weigh little."""
+
 _FIRST_SCALE: Final = MatScale(1.0, 0.05)
 """Printed "fit to page" a sheet is up to 7 % smaller."""
 
@@ -145,9 +152,7 @@ class MatTracker:
         self._pose = pose
         inside = depths_inside(view, pose, self._room)
         self._last = reduced(replace(view, depth_m=inside))
-        # What is farther than the field reaches is as good as at its end: nothing is before it.
-        reach = np.minimum(view.depth_m, np.float32(self.volume.settings.far_m))
-        self.volume.fuse(replace(view, depth_m=reach), pose, inside)
+        self.volume.fuse(view, pose, inside)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
         if self._was_lost and state is Tracking.TRACKING and self.volume.fused > 1:
             state = Tracking.RELOCALISED
@@ -205,7 +210,9 @@ def begun_on_mat(
     inside = depths_inside(view, found.camera_mat.inverse(), room_of(box, ABOVE_M))
     if not np.isfinite(inside).any():
         return None
-    return MatTracker(mat, box, fineness(replace(view, depth_m=inside)), threads)
+    usual = fineness(replace(view, depth_m=inside))
+    truncation = max(_TRUNCATION_SHARE * usual.truncation_voxels, _LEAST_TRUNCATION_VOXELS)
+    return MatTracker(mat, box, replace(usual, far_m=_FAR_M, truncation_voxels=truncation), threads)
 
 
 def room_of(box: Box, rim_m: float) -> Box:

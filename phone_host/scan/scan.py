@@ -19,6 +19,7 @@ from phone_host.scan.carving import Carved, Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor
 from phone_host.scan.depth_edges import without_edges
+from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.mat import Mat
@@ -55,6 +56,7 @@ class ScanWanted:
         threads: that compute; results do not depend on them.
         mat: on which the object lies: it alone tells where each pair was taken; None: there is none.
         turntable: whether the cameras stand still and an object turns before them.
+        onto: the field of an earlier pass, to which this one is added; None: this one is alone.
     """
 
     voxel_m: float = math.nan
@@ -63,6 +65,7 @@ class ScanWanted:
     threads: int = 1
     mat: Mat | None = None
     turntable: bool = False
+    onto: KeptField | None = None
 
     @property
     def model_box(self) -> Box | None:

@@ -11,7 +11,7 @@ from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.closing import Floor, closed
 from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import areas_m2, without_crumbs, without_loose_bodies
+from phone_host.scan.mesh_parts import areas_m2, only, without_crumbs, without_loose_bodies
 from phone_host.scan.surface_noise import surface_noise_m
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT
@@ -44,6 +44,11 @@ class ScanModel:
         """Share of the area that nobody saw, 0..1; NaN without a surface."""
         areas, corners = areas_m2(self.mesh), self.seen[self.mesh.triangles]
         return float(((~corners).mean(axis=1) * areas).sum() / areas.sum()) if areas.sum() > 0 else float("nan")
+
+    @property
+    def seen_mesh(self) -> Mesh:
+        """The triangles of which a view saw all corners: what can be compared with the truth."""
+        return only(self.mesh, np.logical_and.reduce(self.seen[self.mesh.triangles], axis=1))
 
     @staticmethod
     def empty() -> "ScanModel":

@@ -14,11 +14,15 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Processed
+from phone_host.scan.carving import Carving
+from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
+from phone_host.scan.merged_field import merged
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, require_size, view_of
 from phone_host.scan.scan_model import ScanModel
+from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, points_of, table_height_m
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -61,11 +65,12 @@ class _Station:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Finished:
-    """The end of a scan: how many pairs were taken, the turn, and the volume made again."""
+    """The end of a scan: how many pairs were taken, the turn, the volume made again, and how it lies on that of an earlier pass."""
 
     taken: int
     turn: FullTurn | None
     volume: Volume | None
+    match: SurfaceMatch | None = None
 
 
 def scan_for(wanted: ScanWanted) -> Scan:
@@ -111,6 +116,11 @@ class TurntableScan(Scan):
     def turn(self) -> FullTurn | None:
         """The turn, once the model was asked for; None: too few views agree on an axis."""
         return None if self._finished is None else self._finished.turn
+
+    @property
+    def match(self) -> SurfaceMatch | None:
+        """How this pass lies on the earlier one, once the model was asked for; None: there is none, or no turn."""
+        return None if self._finished is None else self._finished.match
 
     @property
     def views(self) -> int:
@@ -168,7 +178,18 @@ class TurntableScan(Scan):
         """Return the surface so far, made from all views together once there are enough of them."""
         if self._finished is None or self._finished.taken != len(self._pairs):
             self._finished = self._end()
+        self._carve()
         return super().model()
+
+    def _carve(self) -> None:
+        """Let the views carve the box, from where they are known to lie in the end."""
+        box, settings = self._wanted.model_box, self.settings
+        if box is None or settings is None:
+            return
+        self._carving = Carving(Cells.of(box, settings.voxel_m), self._wanted.threads)
+        for station in self._stations:
+            if self._pairs[station.pair].is_fused:
+                self._carving.see(station.view, self._pairs[station.pair].world_camera)
 
     def _tracked(
         self, number: int, view: View, mask: NDArray[np.bool_], told_of: tuple[str, float, float]
@@ -257,7 +278,17 @@ class TurntableScan(Scan):
                 if not station.is_sure:  # the others have shown where it belongs
                     pair = replace(pair, state=Tracking.RELOCALISED, weakness=Weakness.NONE)
                 self._pairs[station.pair] = pair
-        return _Finished(taken, turn, volume)
+        if self._wanted.onto is None:
+            return _Finished(taken, turn, volume)
+        first = self._wanted.onto.volume(self._wanted.threads)
+        match = matched_surfaces(first, volume)
+        if match.match is Match.FOUND:
+            volume = merged(first, volume, match.first_second, self._wanted.threads)
+            self._pairs = [
+                replace(pair, world_camera=match.first_second @ pair.world_camera) if pair.is_fused else pair
+                for pair in self._pairs
+            ]
+        return _Finished(taken, turn, volume, match)
 
 
 def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPair:

@@ -17,6 +17,7 @@ from phone_host.model import StereoGeometry
 from phone_host.scan import volume_numpy
 from phone_host.scan.absorbed import absorbed, reached
 from phone_host.scan.blocks import BLOCK_BYTES, SIDE, VOXELS, Blocks
+from phone_host.scan.exposure import gains_of, multiplied
 from phone_host.scan.jobs import aim, rows_of
 from phone_host.scan.view import Camera, Depth, View
 from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
@@ -102,6 +103,8 @@ class Volume:
         colours = np.ascontiguousarray(view.colours, np.uint8)
         if depth.shape != view.grey.shape or colours.shape != (*depth.shape, 3):
             raise ValueError(f"depth {depth.shape} and colours {colours.shape} of an image {view.grey.shape}")
+        if self._fused:
+            colours = multiplied(colours, gains_of(view, world_camera, self.blocks, self.settings.voxel_m))
         shown = depth if room_for is None else np.ascontiguousarray(room_for, np.float32)
         self._make_room(shown, Camera(view.geometry, view.grey.shape, world_camera))
         if self._library is None:

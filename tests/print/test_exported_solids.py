@@ -28,6 +28,10 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 JUDGE: Final = ROOT / "build/printers/meshes/bin/python"
 SPOT: Final = Path(os.environ.get("SCAN_DATA", "")) / "meshes/spot/spot_triangulated.obj"
 EDGE_MM: Final = 1.5
+ROUND: Final = ("speckled", "shiny")
+"""Of these, triangles are left out. Where thin parts are flat, pymeshlab then counts 82 of 28 720 triangles that touch others in their own
+plane; ours counts none (docs/export.md)."""
+
 COLOURED: Final = frozenset((kind, name) for kind in ("obj", "ply", "glb") for name in ("trimesh", "pymeshlab")) | {
     ("3ds", "pymeshlab")
 }
@@ -94,7 +98,7 @@ def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     model = SPOT if request.param == "spot" else thing(request.param, folder)
     out = folder / "out"
     out.mkdir()
-    files = export_model(model, FORMATS, out, tolerance_mm=None if request.param == "spot" else 0.1)
+    files = export_model(model, FORMATS, out, tolerance_mm=0.1 if request.param in ROUND else None)
     stl = (
         np.frombuffer(files[0].read_bytes()[84:], np.uint8).reshape(-1, 50)[:, 12:48].copy().view("<f4").reshape(-1, 3)
     )

@@ -84,6 +84,7 @@ def test_what_nobody_saw_is_told_and_has_its_colour(model: ScanModel) -> None:
     assert not (model.mesh.colours[model.seen] == UNSEEN_RGB).all(axis=1).any()
     assert np.isnan(model.noise_m[~model.seen]).all()
     assert 0.12 < model.unseen_share < 0.35
+    assert model.seen[~under].sum() * 0.9 < len(model.seen_mesh.points_m) <= model.seen.sum()
 
 
 def test_fewer_views_leave_more_unseen() -> None:
@@ -241,3 +242,18 @@ def test_the_file_says_what_was_seen(tmp_path: Path) -> None:
     solid = read_ply_mesh(content, "m.ply", 1.0)
     assert np.array_equal(solid.points_m, points)
     assert np.array_equal(solid.colours, colours)
+
+
+def test_views_of_unlike_exposure_leave_no_seams() -> None:
+    """Every second view twice as bright, bluer, too: the box has one colour, that of the first view, to 3 of 255."""
+    poses, views = around(12), []
+    for number, pose in enumerate(poses):
+        view = thing_view(THING, pose)
+        lit = view.colours * (np.array([0.9, 0.6, 0.5]) if number % 2 else np.ones(3))
+        views.append(replace(view, colours=np.rint(lit).astype(np.uint8)))
+    volume, _ = scanned(poses, views)
+    mesh = mesh_of(volume.blocks, SETTINGS.voxel_m, 8)
+    side = (np.abs(np.abs(mesh.points_m[:, 0]) - 0.05) < 0.002) & (np.abs(mesh.points_m[:, 2] - 0.03) < 0.015)
+    assert side.sum() > 100
+    assert np.abs(np.median(mesh.colours[side], axis=0) - [60, 160, 40]).max() <= 3
+    assert np.percentile(np.abs(mesh.colours[side] - np.array([60.0, 160, 40])).max(axis=1), 95) <= 5

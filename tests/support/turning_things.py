@@ -12,6 +12,8 @@ from common.ledger import StageTimes
 from phone_host.geometry.se3 import SE3, rotations_of
 from phone_host.model import Image, Processed, RectifiedPair, StereoGeometry
 from phone_host.scan.view import View
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK
 from phone_host.scene.scene_model import Body, Box, Look, Plane, RectifiedView, Scene, Sphere, Texture
 from phone_host.scene.scene_render import render
@@ -65,23 +67,31 @@ def world_camera(angle_rad: float) -> SE3:
     return SE3(turn, FOOT_M - turn @ FOOT_M)
 
 
-def turned_scene(angle_rad: float, *, table_turns: bool = False, shift_m: Floats | None = None) -> Scene:
+OVER: Final = SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, _BALL_AT[2] + _BALL_M + 0.0005]))
+"""Takes the thing's own axes to those in which it stands when it was turned over, onto its ball."""
+
+
+def turned_scene(
+    angle_rad: float, *, table_turns: bool = False, shift_m: Floats | None = None, is_over: bool = False
+) -> Scene:
     """Return the thing turned by an angle, on its table before a wall.
 
     Args:
         angle_rad: right-handed about `UP`.
         table_turns: whether table and wall turn with it.
         shift_m: (3,) by which the thing is moved; None: it isn't.
+        is_over: whether it was turned over.
     """
     turn = rotations_of(angle_rad * UP)
-    own = turn @ AXES
     foot = FOOT_M if shift_m is None else FOOT_M + shift_m
+    stands = OVER if is_over else SE3.identity()
+    own, foot = turn @ AXES @ stands.R, foot + turn @ AXES @ stands.t_m
 
     def at(place: Floats) -> tuple[float, float, float]:
         x, y, z = (foot + own @ place).tolist()
         return x, y, z
 
-    still = AXES if not table_turns else own
+    still = AXES if not table_turns else turn @ AXES
     table, wall = FOOT_M, FOOT_M + still @ np.array([0.0, 0.5, 0.0])
     facing = still @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
     return Scene(
@@ -161,3 +171,19 @@ def processed_of(view: View) -> Processed:
     of = view.geometry
     disparity = np.float32(of.focal_px * of.baseline_m) / view.depth_m
     return Processed(RectifiedPair(view.colours, view.colours), disparity, cloud, StageTimes(), geometry=of)
+
+
+def over_m(points_m: Floats) -> Floats:
+    """Take points (N, 3), m, of the thing in the camera's axes as it stood at first to where they are when it was turned over."""
+    return np.asarray(FOOT_M + OVER.apply((points_m - FOOT_M) @ AXES) @ AXES.T, np.float64)
+
+
+def exact_volume(size: Size, voxel_m: float, *, is_over: bool, views: int = 12, threads: int = 1) -> Volume:
+    """The thing alone, fused from exact depths and poses all around; in the camera's axes at the beginning."""
+    volume = Volume(VolumeSettings(voxel_m=voxel_m, far_m=1.0), threads)
+    for number in range(views):
+        angle = 2 * math.pi * number / views
+        view, scene = exact_view(turned_scene(angle, is_over=is_over), size), turned_scene(angle, is_over=is_over)
+        thing = truth(scene, size.view).body >= len(scene.bodies) - 3
+        volume.fuse(replace(view, depth_m=np.where(thing, view.depth_m, np.float32(np.nan))), world_camera(angle))
+    return volume

@@ -269,6 +269,19 @@ def test_the_same_mesh_gives_the_same_bytes() -> None:
     assert all(mesh_bytes(solid, kind, Axes.CAMERA) == mesh_bytes(solid, kind, Axes.CAMERA) for kind in FORMATS)
 
 
+def test_a_ply_does_not_begin_with_what_other_readers_take_for_blanks() -> None:
+    """Assimp skips blanks after the header, though numbers follow: the point in front has none, and the mesh stays the same."""
+    blank_m = np.frombuffer(bytes([0x0A, 0x84, 0xBB, 0x3C]), "<f4")[0] / 1000
+    points = np.array([[blank_m, 0, 0], [0.01, 0, 0], [0, 0.02, 0], [0, 0, 0.03]], np.float32)
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)
+    solid = Solid(points, triangles, np.arange(12, dtype=np.uint8).reshape(4, 3))
+    content = mesh_bytes(solid, "ply", None)
+    assert content.partition(b"end_header\n")[2][:1] not in b"\t\n\v\f\r "
+    found = read_mesh(content, "x.ply", 0.001)
+    assert found.points_m[found.triangles] == pytest.approx(points[triangles], abs=1e-8)
+    assert np.array_equal(found.colours[found.triangles], solid.colours[triangles])
+
+
 def test_our_own_files_are_read_in_their_unit(tmp_path: Path) -> None:
     """They say that they are in mm, so 100 mm are not 100 m; a user who says otherwise is believed."""
     for kind in READABLE:

@@ -149,6 +149,7 @@ def test_settings_are_held_group_by_group_and_read_back(camera: PlayedFeed, open
 
 def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: PlayedFeed, opened: Opener) -> None:
     """Not allowed: how to allow it, and Start is offered again. Taken by another program: it is tried again, and comes by itself."""
+    # Both failures are made up: nobody can take Chromium's built-in camera away. Firefox is refused by its own permission (test_firefox_camera).
     failing = """const own = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices), names = ['NotAllowedError', 'NotReadableError'];
     navigator.mediaDevices.getUserMedia = async wish => { if (names.length) throw new DOMException('', names.shift()); return own(wish); };"""
     page = started(opened, script=failing)

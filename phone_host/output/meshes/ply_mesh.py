@@ -24,16 +24,18 @@ _END: Final = re.compile(rb"end_header\r?\n")
 _MOST_HEADER: Final = 16384
 _CORNER_LISTS: Final = (b"vertex_indices", b"vertex_index")
 _VERTEX: Final = np.dtype([*((name, "<f4") for name in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))])
+_BLANKS: Final = np.frombuffer(b"\t\n\v\f\r ", np.uint8)
 _FACE: Final = np.dtype([("corners", "u1"), ("numbers", "<i4", 3)])
 
 
 def ply_bytes(solid: Solid, comment: str) -> bytes:
-    """Return a binary PLY file in mm.
+    """Return a binary PLY file in mm. Another point may come first than in the mesh: assimp 5.2 takes its first bytes for blanks.
 
     Args:
         solid: the mesh.
         comment: stands in its header, one line.
     """
+    solid = _begun_well(solid)
     vertices = np.empty(len(solid.points_m), _VERTEX)
     for channel, name in enumerate("xyz"):
         vertices[name] = solid.points_mm[:, channel]
@@ -50,6 +52,18 @@ def ply_bytes(solid: Solid, comment: str) -> bytes:
     )
     packed = vertices if solid.has_colours else np.ascontiguousarray(solid.points_mm, "<f4")
     return header.encode("ascii", "replace") + packed.tobytes() + faces.tobytes()
+
+
+def _begun_well(solid: Solid) -> Solid:
+    """Return the mesh with a point in front whose first byte is no blank, if there is one."""
+    first = np.ascontiguousarray(solid.points_mm[:, 0], "<f4").view(np.uint8)[::4]
+    good = np.flatnonzero(~np.isin(first, _BLANKS))
+    if not len(good) or good[0] == 0:
+        return solid
+    order = np.arange(len(first), dtype=np.int32)
+    order[[0, good[0]]] = good[0], 0  # its own inverse
+    colours = solid.colours[order] if solid.has_colours else solid.colours
+    return Solid(solid.points_m[order], order[solid.triangles], colours)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup   
   phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
   phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --record cup.mcap --out cup    # live
   phone-host scan left/ right/ --calibration rig.yaml --turntable --out cup    # the cup was turned, the cameras stood still
+  phone-host scan left2/ right2/ --calibration rig.yaml --turntable --onto cup --out whole    # turned over: its underside, too
   phone-host scan left/ right/ --calibration rig.yaml --resume cup --out cup    # go on after it was killed
   phone-host scan --replay session.mcap --calibration rig.yaml --out cup    # every pair of a recording
 """
@@ -118,6 +119,12 @@ def _add_turntable_argument(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="the cameras stand still and an object turns before them, on anything or by hand, about one axis and by 3 to 15 degrees between the"
         " pairs; background and table are left out, and the turn is closed after 360 degrees",
+    )
+    parser.add_argument(
+        "--onto",
+        type=Path,
+        metavar="DIR",
+        help="with --turntable: a second pass, the object turned over, is added to the one whose results are in DIR; how it lies is found by its shape",
     )
 
 

@@ -11,8 +11,10 @@ from common.program.quantities import decimal_number
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.axes import Axes
+from phone_host.run.kept_field import read_field
 from phone_host.run.kept_submaps import read_submaps
 from phone_host.scan.box import Box
+from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.scan import ScanWanted, Submap
 from phone_host.stereo.match_tandem import matching_threads
@@ -39,16 +41,39 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
     """
     if options.memory < _LEAST_BYTES:
         raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
+    onto = _onto_of(options)
+    usual_m = math.nan if onto is None else onto.settings.voxel_m
     if options.mat is not None and options.turntable:
         raise SettingsError("--turntable beside --mat", "leave --turntable out: the mat tells how it turns")
     return ScanWanted(
-        voxel_m=math.nan if options.voxel is None else voxel_of(options.voxel),
+        voxel_m=usual_m if options.voxel is None else voxel_of(options.voxel),
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
         mat=None if options.mat is None else parse_mat(USUAL_MAT if options.mat == _USUAL else options.mat),
         turntable=options.turntable,
+        onto=onto,
     )
+
+
+def _onto_of(options: argparse.Namespace) -> KeptField | None:
+    """Read the field that --onto names.
+
+    Raises:
+        DataError: there is none, or it is damaged.
+        SettingsError: it is given without --turntable, or is the folder of the results.
+        UnavailableError: it cannot be read.
+    """
+    if options.onto is None:
+        return None
+    if not options.turntable:
+        raise SettingsError("--onto without --turntable", "scan both passes with --turntable")
+    if options.onto.resolve() == options.out.resolve():
+        raise SettingsError("--onto and --out are the same folder", "give the results another folder")
+    try:
+        return read_field(options.onto)
+    except OSError as error:
+        raise UnavailableError(f"--onto {options.onto}: {error.strerror}", "give a folder that can be read") from error
 
 
 def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:

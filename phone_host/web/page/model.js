@@ -25,7 +25,7 @@ const PAINTS = ['colour', 'shape', 'noise'];
 const NOWHERE = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 
 /** Turn and tilt from which a thing on a mat is looked at first, rad. @type {[number, number]} */
-const FROM_ABOVE = [0, 0.35];
+const FROM_ABOVE = [0, 0.3];
 
 /** Points that decide from where all fits in. */
 const LOOKED_AT = 3000;

@@ -92,8 +92,10 @@ function turnModel(root) {
   const { mesh, points, triangles, colours, noise } = /** @type {Record<string, string>} */ (root.dataset);
   try {
     const model = new Model(canvas, over);
+    const shown = JSON.parse(mesh);
+    model.stands(shown.axes);
     model.show({
-      ...JSON.parse(mesh),
+      ...shown,
       points: new Uint16Array(bytes(points).buffer),
       triangles: new Uint32Array(bytes(triangles).buffer),
       colours: bytes(colours),
