@@ -144,7 +144,7 @@ class ScanDemo:
     def finished(self) -> tuple[FinishedScan, ModelErrors]:
         """Make the model, and compare it with the thing. The run has ended."""
         scan = self.live.finished(self._host.snapshot(), self._matcher.value, Axes.MAT)
-        errors = model_errors(scan.model.seen_mesh, self._scene.solid)  # the rest is a guess
+        errors = model_errors(scan.model, self._scene.solid)
         return scan, errors
 
 

@@ -11,6 +11,9 @@ from phone_host.output.model_file import read_model
 from phone_host.scene.object_scene import Setting, object_scene
 from tests.support.programs import PATIENCE_S, host, until
 
+pytestmark = pytest.mark.timeout(5 * PATIENCE_S)
+"""The first test waits for the whole demo."""
+
 
 @pytest.fixture(scope="module")
 def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object], str]:
@@ -33,7 +36,8 @@ def test_the_model_is_the_thing_and_its_errors_are_told(scanned: tuple[Path, dic
     assert truth["mean_mm"] <= 0.5
     assert truth["p95_mm"] <= 1.5
     assert truth["coverage"] >= 0.9
-    points = read_model(out / "model.ply", math.nan).solid.points_m.astype(np.float64)
+    points = read_model(out / "model.ply", math.nan).solid.points_m[::20].astype(np.float64)
+    points = points[points[:, 2] > 0.003]  # what is lower was closed, and seen by nobody
     off_mm = np.abs(object_scene("speckled", Setting()).solid.signed_distance(points)) * 1000
     assert off_mm.mean() == pytest.approx(truth["mean_mm"], abs=0.1)
     assert str(out / "index.html") in told

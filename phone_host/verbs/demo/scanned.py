@@ -52,8 +52,8 @@ _LEAST_VIEWS, _MOST_VIEWS = 6, 360
 _STL, _GCODE = "model.stl", "model.gcode"
 _BED_MM: Final = (220.0, 220.0, 250.0)
 
-_WORST_MM: Final = 1.0
-"""A model that is farther off on average is not what the demo promises."""
+_WORST_MM: Final = 1.5
+"""A model that is farther off on average is no model: thin parts come out 1 mm off, and a scan that was lost several."""
 
 
 def run_scan_demo(options: argparse.Namespace) -> int:
