@@ -162,9 +162,10 @@ class LiveScan:
             return
         if earlier and not self._is_replayed:  # numbers and times go on where they ended
             number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
-        self._last = self.scan.take(str(number), stamp_s, result.processed)
-        taken, fused = self._counts
-        self._counts = taken + 1, fused + self._last.is_fused
+        skew_s = 0.0 if self._is_timeless else result.pair.time_skew_ns / _NS
+        self._last = self.scan.take(str(number), stamp_s, result.processed, skew_s)
+        # Not one more: with a pair, others that were lost may have become part of the model.
+        self._counts = self._counts[0] + 1, self.scan.fused
         self.kept.after_pair()
         now_ns = now.monotonic_ns()
         if now_ns - self._asked_ns < _WATCHED_NS and now_ns - self._renewed_ns >= _RENEW_NS:

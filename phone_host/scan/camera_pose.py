@@ -21,6 +21,7 @@ LEAST_INLIERS: Final = 12
 """Fewer agree by accident with a wrong motion."""
 
 _CONSENSUS_PX: Final = 2.0
+_CONSENSUS_SIGMAS: Final = 4.0
 _DRAWS: Final = 200
 _CERTAINTY: Final = 0.999
 _STEPS: Final = 10
@@ -43,20 +44,21 @@ class CameraPose:
     inliers: Flags
 
 
-def located(points_m: Floats, observed_px: Floats, observer: Observer) -> CameraPose | None:
+def located(points_m: Floats, observed_px: Floats, observer: Observer, draws: int = _DRAWS) -> CameraPose | None:
     """Locate a camera.
 
     Args:
         points_m: (N, 3) points in the world.
         observed_px: (N, 3) u, v, d of each; d NaN = none.
         observer: how they are measured.
+        draws: at most, for the consensus.
 
     Returns:
         The pose, or None: too few points agree on one.
     """
     if len(points_m) < LEAST_INLIERS:
         return None
-    start = _consensus(points_m, observed_px, observer)
+    start = _consensus(points_m, observed_px, observer, draws)
     if start is None:
         return None
     pose = refined(start.camera_world, points_m[start.inliers], observed_px[start.inliers], observer)
@@ -66,7 +68,7 @@ def located(points_m: Floats, observed_px: Floats, observer: Observer) -> Camera
     return CameraPose(refined(pose, points_m[near], observed_px[near], observer), near)
 
 
-def _consensus(points_m: Floats, observed_px: Floats, observer: Observer) -> CameraPose | None:
+def _consensus(points_m: Floats, observed_px: Floats, observer: Observer, draws: int) -> CameraPose | None:
     """Find the pose on which most pixels agree; the draws are the same each time (OpenCV seeds them so)."""
     of = observer.geometry
     matrix = np.array([[of.focal_px, 0, of.cx_px], [0, of.focal_px, of.cy_px], [0, 0, 1]])
@@ -76,8 +78,8 @@ def _consensus(points_m: Floats, observed_px: Floats, observer: Observer) -> Cam
             np.ascontiguousarray(observed_px[:, :2]),
             matrix,
             None,
-            iterationsCount=_DRAWS,
-            reprojectionError=_CONSENSUS_PX,
+            iterationsCount=draws,
+            reprojectionError=max(_CONSENSUS_PX, _CONSENSUS_SIGMAS * observer.pixel_px),
             confidence=_CERTAINTY,
             flags=cv2.SOLVEPNP_AP3P,
         )

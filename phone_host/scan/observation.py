@@ -30,16 +30,18 @@ class Observer:
         geometry: of the rectified pair.
         noise_px: standard deviation of a disparity, px.
         offset_px: by how much all disparities are too large, px; matchers and rectifications have such an error, 0.1 px as a rule.
+        pixel_px: standard deviation of u and v, px.
     """
 
     geometry: StereoGeometry
     noise_px: float
     offset_px: float = 0.0
+    pixel_px: float = FOLLOWING_PX
 
     @property
     def weights(self) -> Floats:
         """(3,) 1 / standard deviation of u, v and d, 1/px."""
-        return np.array([1 / FOLLOWING_PX, 1 / FOLLOWING_PX, 1 / self.noise_px])
+        return np.array([1 / self.pixel_px, 1 / self.pixel_px, 1 / self.noise_px])
 
     def points(self, observed_px: Floats) -> Floats:
         """Return where observations (..., 3) are, (..., 3), m, in the camera's axes; NaN without a disparity."""

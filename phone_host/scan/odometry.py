@@ -65,6 +65,7 @@ class Moved:
         is_known: whether the motion since the last view is known.
         followed: corners that were followed into the view.
         inliers: those that agree on the motion.
+        shift_px: median way of a followed corner since the last view, px of the image that odometry takes; NaN: none was followed.
     """
 
     world_camera: SE3
@@ -72,6 +73,7 @@ class Moved:
     is_known: bool
     followed: int
     inliers: int
+    shift_px: float = float("nan")
 
 
 class Odometry:
@@ -87,6 +89,7 @@ class Odometry:
         self._grey: Image | None = None
         self._pose = SE3.identity()
         self._next_id = 0
+        self._shift_px = float("nan")
         self._offset_px = 0.0
         self._window: list[Keyframe] = []
         self._poses: list[tuple[int, SE3]] = []
@@ -135,12 +138,15 @@ class Odometry:
             is_known=is_known,
             followed=followed_count,
             inliers=0,
+            shift_px=self._shift_px,
         )
 
     def _follow(self, before: Image, view: View) -> int:
         """Follow the held points into the view; return how many were."""
         pixels, found = followed(before, view.grey, self._held.observed_px[:, :2].astype(np.float32))
         held = self._held.only(found)
+        ways = np.linalg.norm(pixels[found] - held.observed_px[:, :2], axis=1)
+        self._shift_px = float(np.median(ways)) if len(ways) else float("nan")
         self._held = replace(held, observed_px=view.observed(pixels[found]))
         return len(held.ids)
 

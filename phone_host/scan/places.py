@@ -28,6 +28,23 @@ _CORNER_STEP: Final = 7
 _RATIO: Final = 0.8
 """Of the distances to the best and to the second best descriptor."""
 
+_PIXEL_PX: Final = 1.5
+"""Standard deviation of a feature's u and v: those of the coarse levels of the image have the noise of their pixels."""
+
+_DISPARITY_PX: Final = 0.4
+"""And of its disparity at least: the matcher's is that of the pixel in the middle. So many allow a wide step; the registration mends the pose."""
+
+_DRAWS: Final = 500
+_SHORT: Final = 8
+"""Places that are compared in full: those that most features vote for."""
+
+_VOTERS: Final = 150
+_VOTED: Final = 200
+"""Features of a view, and of a place, that vote: the strongest."""
+
+_ALIKE_BITS: Final = 50
+"""Of 256 that may differ in a vote; of two features of different corners 5 % differ in so few."""
+
 _APART_DEG: Final = 4.0
 _APART_SHARE: Final = 0.05
 """Of the median depth: as far apart as this, or turned by so much, a view is a place of its own."""
@@ -103,19 +120,42 @@ class Places:
         """Remember places that others have seen."""
         self._places.extend(places)
 
+    def moved(self, by: SE3) -> tuple[Place, ...]:
+        """Return all places, in the axes to which a motion takes them."""
+        return tuple(
+            Place(by @ place.world_camera, by.apply(place.points_m), place.descriptors) for place in self._places
+        )
+
     def recognised(self, view: View) -> Recognised | None:
-        """Find the place on which most of a view's features agree; None: none has enough."""
-        seen, observer = _features(view), Observer(view.geometry, view.noise_px)
+        """Find the place on which most of a view's features agree; None: none has enough.
+
+        Args:
+            view: with depth.
+        """
+        seen = _features(view)
+        observer = Observer(view.geometry, max(view.noise_px, _DISPARITY_PX), pixel_px=_PIXEL_PX)
         best: Recognised | None = None
-        for place in self._places:
+        for place in self._shortlist(seen.descriptors):
             here, there = _matched(seen.descriptors, place.descriptors)
             if len(here) < LEAST_INLIERS:
                 continue
-            found = located(place.points_m[there], seen.observed_px[here], observer)
+            found = located(place.points_m[there], seen.observed_px[here], observer, _DRAWS)
             inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
             if found is not None and inliers >= LEAST_INLIERS and (best is None or inliers > best.inliers):
                 best = Recognised(found.camera_world.inverse(), inliers)
         return best
+
+    def _shortlist(self, descriptors: NDArray[np.uint8]) -> list[Place]:
+        """Return the places that most of a view's features vote for, in the order in which they were seen."""
+        if len(self._places) <= _SHORT or len(descriptors) == 0:
+            return self._places
+        voted = [place.descriptors[:_VOTED] for place in self._places]
+        whose = np.repeat(np.arange(len(voted)), [len(each) for each in voted])
+        found = cv2.BFMatcher(cv2.NORM_HAMMING).match(descriptors[:_VOTERS], np.concatenate(voted))
+        votes = np.bincount(
+            [whose[each.trainIdx] for each in found if each.distance <= _ALIKE_BITS], minlength=len(voted)
+        )
+        return [self._places[at] for at in sorted(np.argsort(-votes, kind="stable")[:_SHORT].tolist())]
 
 
 def _is_near(one: SE3, other: SE3, apart_m: float) -> bool:
@@ -125,13 +165,15 @@ def _is_near(one: SE3, other: SE3, apart_m: float) -> bool:
 
 
 def _features(view: View) -> _Features:
-    """Find features; those that lie on a pixel without a depth have no disparity."""
+    """Find features, the strongest first; those that lie on a pixel without a depth have no disparity."""
     points, descriptors = cv2.ORB.create(nfeatures=_FEATURES, fastThreshold=_CORNER_STEP).detectAndCompute(
         view.grey, None
     )
     if not points:
         return _Features(np.zeros((0, 32), np.uint8), np.zeros((0, 3)))
-    return _Features(np.asarray(descriptors, np.uint8), view.observed(np.array([point.pt for point in points])))
+    order = np.argsort([-point.response for point in points], kind="stable")
+    pixels = np.array([point.pt for point in points])[order]
+    return _Features(np.asarray(descriptors, np.uint8)[order], view.observed(pixels))
 
 
 def _matched(here: NDArray[np.uint8], there: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -25,8 +25,10 @@ from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.mat import Mat
 from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.mat_tracker import ABOVE_M, MatTracker, begun_on_mat, box_of_mat
+from phone_host.scan.piece import PoseGate
+from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
-from phone_host.scan.tracker import PoseGate, Tracker, TrackerState
+from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume import BlockValues, Volume
@@ -166,6 +168,9 @@ class Scan:
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
         self._closed = _Closed()
+        self._untracked = 0  # pairs before the first that this tracker took
+        self._later: dict[str, ScannedPair] = {}  # pairs of which something else has become, by name
+        self._is_changed = False  # whether submaps that are closed do not hold any more
 
     @property
     def mat(self) -> Mat | None:
@@ -192,13 +197,14 @@ class Scan:
         """How the model is made; None before the first pair that has depth."""
         return None if self.tracker is None else self.tracker.volume.settings
 
-    def take(self, name: str, stamp_s: float, processed: Processed) -> ScannedPair:
+    def take(self, name: str, stamp_s: float, processed: Processed, skew_s: float = 0.0) -> ScannedPair:
         """Take the next pair.
 
         Args:
             name: of the pair.
             stamp_s: when it was taken, s.
             processed: with disparity and cloud.
+            skew_s: by how much its two images were not taken at the same moment, s; a moving camera's depths count for less then.
 
         Returns:
             What became of it.
@@ -206,11 +212,11 @@ class Scan:
         Raises:
             DataError: its size is not that of the pairs before it.
         """
-        view = view_of(processed, self._wanted.mat)
+        view = replace(view_of(processed, self._wanted.mat), stamp_s=stamp_s, skew_s=skew_s)
         density = float(np.isfinite(view.depth_m).mean())
         if self.tracker is None and density >= PoseGate().least_depths:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
-            self.tracker = self._begun(view)
+            self.tracker, self._untracked = self._begun(view), len(self._pairs)
             self._carving = self._carving_of(self._wanted.model_box)
         if self.tracker is None:
             pair = ScannedPair(
@@ -229,6 +235,7 @@ class Scan:
                 )
             require_size(name, view, self.size_px)
             told = self.tracker.track(view)
+            self._joined(told.joined)
             if told.is_fused:
                 self._depths.remember(view, told.world_camera)
                 if self._carving is not None:
@@ -247,6 +254,16 @@ class Scan:
             )
         self._pairs.append(pair)
         return pair
+
+    def _joined(self, views: Sequence[Joined]) -> None:
+        """Note that pairs that were lost have become part of the model."""
+        for view in views:
+            at = self._untracked + view.number - 1
+            self._pairs[at] = replace(
+                self._pairs[at], world_camera=view.world_camera, state=view.state, weakness=view.weakness
+            )
+            self._later[self._pairs[at].name] = self._pairs[at]
+            self._is_changed = self._is_changed or at < self._closed.pairs
 
     def _begun(self, view: View) -> Tracker | MatTracker | None:
         """Begin with a view that has depth; None: the mat is not seen in it."""
@@ -267,7 +284,7 @@ class Scan:
         Args:
             pair: as it was told then.
         """
-        return pair
+        return self._later.get(pair.name, pair)
 
     @property
     def is_submap_due(self) -> bool:
@@ -286,9 +303,10 @@ class Scan:
         assert self.geometry is not None
         before, volume = self._closed, self.tracker.volume
         blocks = volume.changed_blocks()
-        is_whole = whole or before.blocks + len(blocks.places) > _MOST_COPIES * volume.blocks.count
+        is_whole = whole or self._is_changed or before.blocks + len(blocks.places) > _MOST_COPIES * volume.blocks.count
         if is_whole:
             before, blocks = _Closed(), volume.changed_blocks(every=True)
+        self._is_changed = False
         tracker = self.tracker.kept(before.places)
         self._closed = _Closed(
             len(self._pairs), self.fused, before.places + len(tracker.places), before.blocks + len(blocks.places)
@@ -331,7 +349,7 @@ class Scan:
                     "the scan that is gone on with had another box", "give the same --box as then, or begin a new scan"
                 )
             self._carving.go_on(carved)
-        written = sum(len(each.blocks.places) for each in submaps)
+        written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
     def crop(self, box: Box | None) -> None:

@@ -1,10 +1,13 @@
 """Where each view was taken, and whether that is sure enough to fuse it: odometry, then the model. Pure.
 
 Odometry says how the camera moved since the last view; the depth is then laid against the model's surface as seen from there. A view that does
-not fit there is compared with the places that were seen. A gate judges what comes out. Only what passes it is fused, so a wrong pose never spoils the model. Nothing that a view shows raises an exception.
+not fit there is compared with the places that were seen. A gate judges what comes out. Only what passes it is fused, so a wrong pose never spoils the model.
+A camera that is lost goes on in a piece of its own, until one of its views shows a place of the model: then the piece is joined to it
+(`pieces`). Nothing that a view shows raises an exception.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -12,10 +15,12 @@ import numpy as np
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
 from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
-from phone_host.scan.places import Place, Places
-from phone_host.scan.registration import Registered, RegistrationSettings, registered
+from phone_host.scan.piece import Piece, PoseGate
+from phone_host.scan.pieces import Joined, Pieces
+from phone_host.scan.places import Place
+from phone_host.scan.registration import Registered
 from phone_host.scan.tracking_words import Tracking, Weakness
-from phone_host.scan.view import Camera, View, halved, reduced
+from phone_host.scan.view import View, reduced
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
@@ -23,41 +28,12 @@ from phone_host.stereo.native.library import Library, Missing, native
 _ODOMETRY: Final = OdometrySettings(corners=400, apart_px=8, keyframe_share=0.6, keyframe_after=5)
 """The model carries the accuracy; odometry, on half the image, only has to start near it. At VGA that saves 20 of 30 ms of processor time."""
 
-_ODOMETRY_PX: Final = 1.0
-"""How far off a view's pixels are after odometry, px: 3 mm at 2 m, as measured on real rooms and streets."""
-
-_ALIGNED_PX: Final = 240
-"""Width up to which depth is laid against the model. Twice that costs 11 of 49 ms of processor time at VGA, and gives the same poses."""
-
 _DIRECTIONS: Final = 6
-_PARTNER_VOXELS: Final = 10
-_FLOOR_VOXELS: Final = 0.3
-"""The surface's own noise: what is left of a voxel between its values."""
+_SKEWED_PX: Final = 0.5
+"""By how much the picture may move between the moments of its left and its right image: less is within a matcher's noise."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PoseGate:
-    """What a pose must fulfil to be believed.
-
-    Attributes:
-        most_shift_m: the model may correct odometry by this much, m.
-        most_turn: and by this much, rad.
-        least_overlap: share of the pixels in view that must have a partner in the model.
-        sure_overlap: the same where corners enough agree on the motion: a street seen at 9 degrees gives 0.25.
-        least_near: share of the partners that must lie within 3 standard deviations.
-        most_off: times the usual mean distance to the model.
-        least_depths: share of the pixels that must have a depth.
-        weak_inliers: corners that agree; with fewer the pose is weak.
-    """
-
-    most_shift_m: float = 0.08
-    most_turn: float = 0.105
-    least_overlap: float = 0.35
-    sure_overlap: float = 0.15
-    least_near: float = 0.5
-    most_off: float = 2.0
-    least_depths: float = 0.02
-    weak_inliers: int = 30
+_CONFIRMED: Final = 1
+"""Views of a piece that must fit the model where the one that leaves it tells its place by corners alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -70,6 +46,7 @@ class Tracked:
         weakness: why it is not surer.
         moved: what odometry says.
         fit: how the depth lies against the model; None where it was not compared.
+        joined: earlier views that were lost, and have become part of the model with this one.
         mat: what a mat told; None: there is none, or it was not seen.
     """
 
@@ -78,6 +55,7 @@ class Tracked:
     weakness: Weakness
     moved: Moved
     fit: Registered | None
+    joined: tuple[Joined, ...] = ()
     mat: MatSaid | None = None
 
     @property
@@ -107,7 +85,7 @@ class Tracker:
     Args:
         settings: of the model.
         threads: that compute, >= 1; results do not depend on them.
-        gate: what is believed.
+        gate: what is believed; None: what usually is.
         library: computes; None: that of this installation.
     """
 
@@ -115,17 +93,26 @@ class Tracker:
         self,
         settings: VolumeSettings,
         threads: int = 1,
-        gate: PoseGate = PoseGate(),
+        gate: PoseGate | None = None,
         library: Library | Missing | None = None,
     ) -> None:
         found = native() if library is None else library
-        self.volume = Volume(settings, threads, found)
-        self._library = found if isinstance(found, Library) else None
-        self._threads, self._gate = threads, gate
+        self._gate = PoseGate() if gate is None else gate
+        self._pieces = Pieces(settings, threads, self._gate, found)
         self._odometry = Odometry(_ODOMETRY)
-        self._pose, self._usual_off_m = SE3.identity(), float("nan")
+        self._pose = SE3.identity()  # in the axes of the piece that is tracked
         self._was_lost = False
-        self._places = Places()
+        self._count = 0
+        self._stamp_s = float("nan")
+
+    @property
+    def volume(self) -> Volume:
+        """The model."""
+        return self._model.volume
+
+    @property
+    def _model(self) -> Piece:
+        return self._pieces.model
 
     def track(self, view: View) -> Tracked:
         """Take the next view; all have one size and one geometry.
@@ -133,17 +120,24 @@ class Tracker:
         Returns:
             Where it was taken, and how sure that is.
         """
-        moved = self._odometry.step(reduced(view))
-        believed = _orthonormal(self._pose @ moved.before_now)
+        self._count += 1
+        small = reduced(view)
+        moved = self._odometry.step(small)
+        view = self._as_sure_as_timed(view, moved.shift_px * view.grey.shape[1] / small.grey.shape[1])
+        believed = orthonormal(self._pose @ moved.before_now)
         if not np.isfinite(view.depth_m).mean() >= self._gate.least_depths:
             return self._lost(believed, moved, Weakness.NO_DEPTH, None)
         if self.volume.blocks.count == 0:
             return self._fused(view, believed, moved, Weakness.NONE, None)
-        fit = self._laid(view, believed, moved.inliers if moved.is_known else 0)
-        doubt = self._doubt(moved, fit)
+        active = self._pieces.active
+        fit = active.laid(view, believed, moved.inliers if moved.is_known else 0)
+        doubt = active.doubt(moved, fit)
         if doubt is Weakness.NONE:
-            return self._fused(view, _orthonormal(believed @ fit.start_now), moved, self._weakness(moved, fit), fit)
-        return self._found_again(view, moved) or self._lost(believed, moved, doubt, fit)
+            pose, weakness = orthonormal(believed @ fit.start_now), self._weakness(moved, fit)
+            if active is self._model:
+                return self._fused(view, pose, moved, weakness, fit)
+            return self._apart(view, pose, moved, weakness, fit)
+        return self._found_again(view, believed, moved) or self._begun(view, believed, moved, doubt, fit)
 
     def kept(self, places_before: int) -> TrackerState:
         """Return what a later tracker needs to go on, beside the model's blocks.
@@ -151,7 +145,8 @@ class Tracker:
         Args:
             places_before: how many of the places are known there already.
         """
-        return TrackerState(self._pose, self._usual_off_m, self._places.since(places_before))
+        model = self._model
+        return TrackerState(self._pieces.in_world(self._pose), model.usual_off_m, model.places.since(places_before))
 
     def go_on(self, state: TrackerState) -> None:
         """Go on where another tracker stood. How the camera has moved since is not known: the next view is looked for like a lost one.
@@ -159,56 +154,53 @@ class Tracker:
         Args:
             state: of the other one; its places are added to those that are known.
         """
-        self._pose, self._usual_off_m, self._was_lost = state.pose, state.usual_off_m, True
-        self._places.add(state.places)
+        self._pose, self._was_lost = state.pose, True
+        self._model.usual_off_m = state.usual_off_m
+        self._model.places.add(state.places)
 
-    def _found_again(self, view: View, moved: Moved) -> Tracked | None:
+    def _found_again(self, view: View, believed: SE3, moved: Moved) -> Tracked | None:
         """Look whether a view that does not fit where it was expected shows another place that was seen."""
-        place = self._places.recognised(view)
-        if place is None:
+        found = self._pieces.recognised(view)
+        if found is None:
             return None
-        fit = self._laid(view, place.world_camera, place.inliers)
-        if self._doubt(moved, fit) is not Weakness.NONE:
-            return None
+        weakness = Weakness.NONE if found.fit.told == _DIRECTIONS else Weakness.FLAT
+        if found.piece is self._model:
+            # The corners still tell where the view is in the piece that it leaves: its surface has to confirm that.
+            is_followed = moved.is_known and moved.inliers >= self._gate.weak_inliers
+            joined = self._pieces.join(view, believed, found, least=_CONFIRMED) if is_followed else ()
+            self._pieces.go_on_in(found.piece)
+            self._was_lost = True
+            return replace(self._fused(view, found.pose, moved, weakness, found.fit), joined=joined)
+        self._pieces.go_on_in(found.piece)
+        return self._apart(view, found.pose, moved, weakness, found.fit)
+
+    def _apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
+        """Go on in a piece that is not part of the model yet; join it where the view shows a place of the model."""
+        met = None if weakness is Weakness.FEW_CORNERS else self._pieces.met(view, pose)
+        if met is None or met.fit.told < _DIRECTIONS:  # later views tell more of where the piece is
+            return self._still_apart(view, pose, moved, weakness, fit)
+        joined = self._pieces.join(view, pose, met)
+        if not joined:
+            return self._still_apart(view, pose, moved, weakness, fit)
         self._was_lost = True
-        weakness = Weakness.NONE if fit.told == _DIRECTIONS else Weakness.FLAT
-        return self._fused(view, _orthonormal(place.world_camera @ fit.start_now), moved, weakness, fit)
+        return replace(self._fused(view, met.pose, moved, weakness, met.fit), joined=joined)
 
-    def _laid(self, view: View, believed: SE3, inliers: int) -> Registered:
-        """Lay a view's depth against the model as seen from where the camera is believed to be, by so many corners."""
-        depth, geometry, step = view.depth_m, view.geometry, 1
-        while depth.shape[1] > _ALIGNED_PX:
-            (depth, geometry), step = halved(depth, geometry), 2 * step
-        # Beyond its reach the model has no partners.
-        depth = np.where(depth <= self.volume.settings.far_m, depth, np.float32(np.nan))
-        voxel_m = self.volume.settings.voxel_m
-        surface = self.volume.cast(Camera(geometry, depth.shape, believed), depth)
-        turn = _ODOMETRY_PX / view.geometry.focal_px if inliers >= self._gate.weak_inliers else float("inf")
-        settings = RegistrationSettings(
-            most_m=_PARTNER_VOXELS * voxel_m,
-            floor_m=_FLOOR_VOXELS * voxel_m,
-            noise_per_m=view.noise_per_m,
-            geometry=geometry,
-            patch_px=view.patch_px / step,
-            start_turn=turn,
-            start_shift_m=turn * float(np.nanmedian(depth)),
-            threads=self._threads,
-        )
-        return registered(depth, surface, settings, self._library)
+    def _still_apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
+        self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
+        return self._lost(pose, moved, Weakness.APART, fit)
 
-    def _doubt(self, moved: Moved, fit: Registered) -> Weakness:
-        """Return why a pose is not believed; NONE: it is."""
-        gate, correction = self._gate, fit.start_now.pose()
-        is_sure = moved.is_known and moved.inliers >= gate.weak_inliers
-        least = gate.sure_overlap if is_sure else gate.least_overlap
-        if not np.isfinite(correction).all() or fit.overlap < least:
-            return Weakness.LITTLE_OVERLAP if moved.is_known else Weakness.TOO_FAST
-        far = np.linalg.norm(correction[3:]) > gate.most_shift_m or np.linalg.norm(correction[:3]) > gate.most_turn
-        if far:
-            return Weakness.TOO_FAST
-        if fit.near < gate.least_near or fit.off_m > gate.most_off * self._usual_off_m:
-            return Weakness.POOR_FIT
-        return Weakness.NONE
+    def _begun(self, view: View, believed: SE3, moved: Moved, why: Weakness, fit: Registered) -> Tracked:
+        """Begin a piece with a view that belongs to none."""
+        pose = self._pieces.begin(self._count, view, believed, why)
+        return self._lost(believed if pose is None else pose, moved, why, fit)
+
+    def _as_sure_as_timed(self, view: View, shift_px: float) -> View:
+        """Return a view with the noise that it gets where its images were not taken at the same moment and the camera moved."""
+        since_s, self._stamp_s = view.stamp_s - self._stamp_s, view.stamp_s
+        if not (view.skew_s and since_s > 0):
+            return view
+        skewed_px = abs(view.skew_s) / since_s * shift_px
+        return replace(view, noise_px=math.hypot(view.noise_px, skewed_px)) if skewed_px > _SKEWED_PX else view
 
     def _weakness(self, moved: Moved, fit: Registered) -> Weakness:
         """Return what is wrong with a pose that is believed."""
@@ -217,18 +209,14 @@ class Tracker:
         return Weakness.FLAT if fit.told < _DIRECTIONS else Weakness.NONE
 
     def _lost(self, pose: SE3, moved: Moved, why: Weakness, fit: Registered | None) -> Tracked:
-        """Go on by odometry alone; nothing is fused."""
+        """Go on; the model stays as it is."""
         self._pose, self._was_lost = pose, True
-        return Tracked(world_camera=pose, state=Tracking.LOST, weakness=why, moved=moved, fit=fit)
+        world = self._pieces.in_world(pose)
+        return Tracked(world_camera=world, state=Tracking.LOST, weakness=why, moved=moved, fit=fit)
 
     def _fused(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered | None) -> Tracked:
         self._pose = pose
-        self.volume.fuse(view, pose)
-        self._places.remember(view, pose)
-        if fit is not None:
-            # Slow, so that one blurred view does not make the next one pass.
-            usual = self._usual_off_m
-            self._usual_off_m = fit.off_m if np.isnan(usual) else 0.9 * usual + 0.1 * fit.off_m
+        self._model.fuse(view, pose, fit)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
         if self._was_lost and fit is not None:
             state = Tracking.RELOCALISED
@@ -236,6 +224,6 @@ class Tracker:
         return Tracked(world_camera=pose, state=state, weakness=weakness, moved=moved, fit=fit)
 
 
-def _orthonormal(pose: SE3) -> SE3:
+def orthonormal(pose: SE3) -> SE3:
     """Return the pose with an exact rotation: products of many drift away from one."""
     return SE3(rotations_of(vectors_of(pose.R)), pose.t_m)

@@ -26,6 +26,7 @@ class Weakness(Enum):
     LITTLE_OVERLAP = "little overlap"
     POOR_FIT = "poor fit"
     FLAT = "flat"
+    APART = "apart"
     NO_MAT = "mat not seen"
     NOTHING_TURNS = "nothing turns"
     ALL_TURNS = "background turns too"
@@ -41,6 +42,7 @@ class Weakness(Enum):
             Weakness.TOO_FAST: "moved too fast: move more slowly, back to where it was",
             Weakness.LITTLE_OVERLAP: "too little of the model is in view: move back to where it was",
             Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
+            Weakness.APART: "followed again, but apart from the model: move back to where it was",
             Weakness.NO_MAT: "too little of the mat is seen: show more of it to both cameras, sharp and without glare",
             Weakness.FLAT: "only a plane is in view: show something with depth beside it",
             Weakness.NOTHING_TURNS: "nothing has turned since the last pair: turn the object by 3 to 15 degrees between the pairs",

@@ -19,11 +19,12 @@ from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.merged_field import merged
+from phone_host.scan.piece import PoseGate
 from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, require_size, view_of
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, points_of, table_height_m
-from phone_host.scan.tracker import PoseGate, Tracker
+from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.turning_background import Background
 from phone_host.scan.turning_mask import Turning, TurningMask
@@ -126,13 +127,14 @@ class TurntableScan(Scan):
         """How many views are kept."""
         return len(self._stations)
 
-    def take(self, name: str, stamp_s: float, processed: Processed) -> ScannedPair:
+    def take(self, name: str, stamp_s: float, processed: Processed, skew_s: float = 0.0) -> ScannedPair:
         """Take the next pair.
 
         Args:
             name: of the pair.
             stamp_s: when it was taken, s.
             processed: with disparity and cloud.
+            skew_s: passed over: between the pairs that count, the object rests.
 
         Returns:
             What became of it.
@@ -140,6 +142,7 @@ class TurntableScan(Scan):
         Raises:
             DataError: its size is not that of the pairs before it.
         """
+        del skew_s
         view = view_of(processed)
         if not self._pairs:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)

@@ -32,6 +32,8 @@ class View:
             rectification's errors reach over half of the image: with 320 a rig at rest stays within 2 mm, with 40 it wanders 6.
         right: (H, W) uint8, the rectified right image, for those who look for a mat in both; None: nobody does.
         epipolar: which way the epipolar lines run.
+        stamp_s: when it was taken, s, from any beginning; NaN: nobody knows.
+        skew_s: by how much its left and its right image were not taken at the same moment, s.
     """
 
     grey: Image
@@ -42,6 +44,8 @@ class View:
     patch_px: float = 320.0
     right: Image | None = None
     epipolar: Epipolar = Epipolar.LEFT
+    stamp_s: float = float("nan")
+    skew_s: float = 0.0
 
     @property
     def noise_per_m(self) -> float:
@@ -95,6 +99,11 @@ def reduced(view: View) -> View:
     """Return a view of half the size, its grey averaged over 2 x 2 pixels; one that is small already as it is."""
     if view.grey.shape[1] < _LEAST_WIDTH_PX:
         return view
+    return half_view(view)
+
+
+def half_view(view: View) -> View:
+    """Return a view of half the size, its grey averaged over 2 x 2 pixels."""
     depth, half = halved(view.depth_m, view.geometry)
     small = (depth.shape[1], depth.shape[0])
     return View(

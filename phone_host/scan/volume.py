@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan import volume_numpy
+from phone_host.scan.absorbed import absorbed, reached
 from phone_host.scan.blocks import BLOCK_BYTES, SIDE, VOXELS, Blocks
 from phone_host.scan.exposure import gains_of, multiplied
 from phone_host.scan.jobs import aim, rows_of
 from phone_host.scan.view import Camera, Depth, View
 from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
-from phone_host.stereo.native.volume_jobs import CastJob, FuseJob, TouchJob, VolumeArrays
+from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, TouchJob, VolumeArrays
 
 _LOOKS_A_BLOCK: Final = 3
 _MOST_STEP_PX: Final = 4
@@ -145,16 +146,7 @@ class Volume:
 
     def put(self, values: BlockValues) -> None:
         """Give blocks these values, in place of those that they have; new ones for which there is no memory are added to `left_out`."""
-        missing = values.places[self.blocks.find(values.places) < 0]
-        wanted, room = self.blocks.count + len(missing), self.blocks.room
-        while room < min(wanted, self.settings.most_blocks):
-            room = min(2 * room, self.settings.most_blocks)
-        if room > self.blocks.room:
-            self.blocks = self.blocks.grown(room)
-        fit = max(self.blocks.room - self.blocks.count, 0)
-        self.left_out += len(missing[fit:])
-        self.blocks.add(missing[:fit])
-        numbers = self.blocks.find(values.places)
+        numbers = self._added(values.places)
         there = numbers >= 0
         self.blocks.field[numbers[there]] = values.field[there]
         self.blocks.weights[numbers[there]] = values.weights[there]
@@ -163,6 +155,46 @@ class Volume:
         changed[numbers[there]] = 1
         self._noted(changed)
         self._copied = self._fused  # whoever puts them has them
+
+    def take_in(self, of: "Volume", into_of: SE3) -> None:
+        """Average another field into this one; what finds no memory is added to `left_out`.
+
+        Args:
+            of: stays as it is; its voxels are as wide.
+            into_of: takes its points to this field's.
+        """
+        voxel_m, held = self.settings.voxel_m, of.blocks
+        numbers = self._added(reached(held.places[: held.count], into_of, voxel_m))
+        chosen, back = np.zeros(self.blocks.count, np.uint8), into_of.inverse()
+        chosen[numbers[numbers >= 0]] = 1
+        rows = np.column_stack([back.R, back.t_m / voxel_m])
+        if self._library is None or not self._library.can_absorb:
+            self._noted(absorbed(self.blocks, held, chosen, rows))
+            return
+        into, other = self._arrays(), _arrays_of(held, of.settings)
+        job = AbsorbJob(
+            into=ctypes.pointer(into),
+            of=ctypes.pointer(other),
+            chosen=chosen.ctypes.data,
+            of_into=(ctypes.c_double * 12)(*rows.ravel().tolist()),
+            most_weight=MOST_WEIGHT,
+            threads=self._threads,
+        )
+        self._library.absorb(job)
+        self._noted(chosen)
+
+    def _added(self, places: NDArray[np.int32]) -> NDArray[np.int64]:
+        """Add the blocks that are missing, as far as there is memory; return the numbers of all, -1: none."""
+        missing = places[self.blocks.find(places) < 0]
+        wanted, room = self.blocks.count + len(missing), self.blocks.room
+        while room < min(wanted, self.settings.most_blocks):
+            room = min(2 * room, self.settings.most_blocks)
+        if room > self.blocks.room:
+            self.blocks = self.blocks.grown(room)
+        fit = max(self.blocks.room - self.blocks.count, 0)
+        self.left_out += len(missing[fit:])
+        self.blocks.add(missing[:fit])
+        return self.blocks.find(places)
 
     def _noted(self, changed: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Remember which blocks got something."""
@@ -236,17 +268,20 @@ class Volume:
         return min(max(int(block_px / _LOOKS_A_BLOCK), 1), _MOST_STEP_PX)
 
     def _arrays(self) -> VolumeArrays:
-        blocks = self.blocks
-        assert blocks.field.shape == (blocks.room, VOXELS)
-        return VolumeArrays(
-            slots=blocks.slots.ctypes.data,
-            places=blocks.places.ctypes.data,
-            field=blocks.field.ctypes.data,
-            weights=blocks.weights.ctypes.data,
-            colours=blocks.colours.ctypes.data,
-            slot_count=len(blocks.slots),
-            room=blocks.room,
-            count=blocks.count,
-            voxel_m=self.settings.voxel_m,
-            truncation_m=self.settings.truncation_m,
-        )
+        return _arrays_of(self.blocks, self.settings)
+
+
+def _arrays_of(blocks: Blocks, settings: VolumeSettings) -> VolumeArrays:
+    assert blocks.field.shape == (blocks.room, VOXELS)
+    return VolumeArrays(
+        slots=blocks.slots.ctypes.data,
+        places=blocks.places.ctypes.data,
+        field=blocks.field.ctypes.data,
+        weights=blocks.weights.ctypes.data,
+        colours=blocks.colours.ctypes.data,
+        slot_count=len(blocks.slots),
+        room=blocks.room,
+        count=blocks.count,
+        voxel_m=settings.voxel_m,
+        truncation_m=settings.truncation_m,
+    )

@@ -1,9 +1,9 @@
-"""How exact a scan on the mat is: `python -m tests.bench.bench_object [--json] [--poses N] [--seeds N] [--views N] [--sizes VGA,HD] [--objects speckled,plain]`.
+"""How exact a scan on the mat is: `python -m tests.bench.bench_object [--json] [--poses N] [--seeds N] [--views N] [--sizes VGA,HD] [--objects speckled,plain] [--step DEG]`.
 
 poses: a rendered mat with a ball on it, seen by two unlike cameras from N places a seed, with blur, noise and JPEG; off by, where the object stands (50 mm above
 the sheet), and turned by. surface: things of `scene.object_scene` from N views all around, matched by `tandem` and scanned with --mat; the distance of points spread
 evenly over the model from the true surface. box: a view taken into a box of 0.3 m at 2 mm, the mat
-found and the depth fused, a second of processor time.
+found and the depth fused, a second of processor time. turntable: `object_turntable`, without a mat.
 
 Rendering the things takes most of the time: half a minute a view at VGA, three times that at HD. Exit 4 when a figure is missed.
 """
@@ -39,6 +39,7 @@ from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
+from tests.bench.object_turntable import turntable_verdicts
 from tests.support.mat_rigs import rig_of
 from tests.support.mats import MAT, MatPainter, looking_at, of_right
 
@@ -195,6 +196,7 @@ def main() -> int:
     parser.add_argument("--sizes", default="VGA,HD", help="of the things' images (default VGA,HD)")
     parser.add_argument("--objects", default="speckled,thin,shiny,plain", help="things (default all)")
     parser.add_argument("--threads", type=int, default=2, help="of the native library and of OpenCV (default 2)")
+    parser.add_argument("--step", type=float, default=5.0, help="of the turntable, degrees; 0: none (default 5)")
     options = parser.parse_args()
     cv2.setNumThreads(options.threads)
     poses, surfaces, verdicts = list[PoseRow](), list[SurfaceRow](), list[Verdict]()
@@ -216,6 +218,8 @@ def main() -> int:
             verdicts.append(_below(f"{name} at {shown.name}: lost", float(row.lost), 0, "views"))
             if (name, shown) == ("speckled", Size.VGA):
                 verdicts.append(box_verdict(seen, options.threads))
+    if options.step:
+        verdicts += turntable_verdicts(options.step)
     if options.json:
         told = {key: [asdict(row) for row in rows] for key, rows in (("poses", poses), ("surfaces", surfaces))}
         print(json.dumps({"machine": str(machine()), **told, "verdicts": [asdict(each) for each in verdicts]}))

@@ -66,6 +66,26 @@ def test_a_scan_goes_on_from_its_submaps() -> None:
     assert np.linalg.norm((told.world_camera.inverse() @ POSES[4]).t_m) < 3e-3
 
 
+def test_what_is_joined_later_is_in_the_submaps() -> None:
+    """Pairs that were lost when a submap was closed and in the model afterwards: the next one is whole, and a scan goes on from it with all."""
+    scan = taken(Scan(WANTED), POSES[:3])
+    away = [SE3.of(np.array([0.0, turn, 0.0, 0.3 * turn, 0.0, 0.0])) for turn in np.linspace(1.1, 0.1, 11)]
+    told = [scan.take(f"away {number}", 3.0 + number, shown(pose)) for number, pose in enumerate(away[:3])]
+    assert [pair.is_fused for pair in told] == [False] * 3
+    first = scan.close_submap()
+    assert not any(pair.is_fused for pair in first.pairs[3:])
+    for number, pose in enumerate(away[3:]):
+        scan.take(f"back {number}", 6.0 + number, shown(pose))
+    assert all(pair.is_fused for pair in scan.pairs)
+    assert all(scan.final(pair).is_fused for pair in told)
+    second = scan.close_submap()
+    assert second.is_whole
+    again = Scan(WANTED)
+    again.go_on([submap_of(submap_bytes(second), "a file")])
+    assert np.array_equal(triangles(again), triangles(scan))
+    assert [pair.state for pair in again.pairs] == [pair.state for pair in scan.pairs]
+
+
 def test_submaps_do_not_grow_for_ever() -> None:
     """On the same surface again and again, some submap holds everything, and those before it are removed."""
     scan, sizes = Scan(WANTED), []

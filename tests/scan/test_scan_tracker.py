@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.tracker import PoseGate, Tracked, Tracker
+from phone_host.scan.piece import PoseGate
+from phone_host.scan.tracker import Tracked, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
@@ -107,3 +108,18 @@ def test_every_weakness_has_advice() -> None:
     """One line each, and none where nothing is wrong."""
     assert all(bool(each.advice) is (each is not Weakness.NONE) for each in Weakness)
     assert not any("\n" in each.advice for each in Weakness)
+
+
+@pytest.mark.parametrize(("skew_s", "share"), [(0.0004, 1.0), (-0.02, 0.5)])
+def test_images_of_two_moments_count_for_less(skew_s: float, share: float) -> None:
+    """The camera moves by some px in 0.1 s: 0.4 ms between left and right change nothing; 20 ms let the second view weigh half or less."""
+    weights = []
+    for skewed in (0.0, skew_s):
+        tracker, grown = Tracker(SETTINGS), 0
+        for number, view in enumerate(film(POSES[:2])):
+            before = tracker.volume.blocks.weights.sum(dtype=np.int64)
+            tracker.track(replace(view, stamp_s=number / 10, skew_s=skewed * number))
+            grown = tracker.volume.blocks.weights.sum(dtype=np.int64) - before
+        weights.append(grown)
+    assert weights[1] <= share * weights[0]
+    assert share < 1 or weights[1] == weights[0]

@@ -56,6 +56,7 @@ ONCE: Final = (
     "carve.c",
     "cast.c",
     "register.c",
+    "absorb.c",
 )
 """Compiled once, for the plainest processor of the architecture."""
 

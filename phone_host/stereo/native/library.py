@@ -15,7 +15,7 @@ from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
 from common.errors import SettingsError, UnavailableError
 from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
-from phone_host.stereo.native.volume_jobs import CarveJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
+from phone_host.stereo.native.volume_jobs import AbsorbJob, CarveJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
@@ -232,6 +232,15 @@ class Library:
     def cast(self, job: CastJob) -> None:
         """Show a volume's surface as a camera sees it; see cast_kernel.c."""
         _require_done(self.handle.tandem_cast(self.isa, ctypes.byref(job)))
+
+    @property
+    def can_absorb(self) -> bool:
+        """Whether it has `absorb`: a library of the same ABI that was built earlier has not, and numpy does it."""
+        return hasattr(self.handle, "tandem_absorb")
+
+    def absorb(self, job: AbsorbJob) -> None:
+        """Take a field into another; see absorb.c."""
+        _require_done(self.handle.tandem_absorb(ctypes.byref(job)))
 
     def register(self, job: RegisterJob) -> None:
         """Compare a depth image with such a surface; see register.c."""

@@ -125,6 +125,19 @@ class RegisterJob(ctypes.Structure):
     )
 
 
+class AbsorbJob(ctypes.Structure):
+    """`struct tandem_absorb_job`."""
+
+    _fields_ = (
+        ("into", ctypes.POINTER(VolumeArrays)),
+        ("of", ctypes.POINTER(VolumeArrays)),
+        ("chosen", _POINTER),
+        ("of_into", ctypes.c_double * 12),
+        ("most_weight", _INT),
+        ("threads", _INT),
+    )
+
+
 def declare(handle: ctypes.CDLL) -> None:
     """State the arguments and results of these functions."""
     handle.tandem_fuse.argtypes = [_INT, ctypes.POINTER(FuseJob)]
@@ -134,3 +147,6 @@ def declare(handle: ctypes.CDLL) -> None:
     handle.tandem_register.argtypes = [ctypes.POINTER(RegisterJob)]
     for name in ("fuse", "carve", "cast", "touch", "register"):
         getattr(handle, f"tandem_{name}").restype = _INT
+    if hasattr(handle, "tandem_absorb"):
+        handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
+        handle.tandem_absorb.restype = _INT

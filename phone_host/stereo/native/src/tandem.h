@@ -240,6 +240,18 @@ struct tandem_register_job {
 
 TANDEM_API int32_t tandem_register(struct tandem_register_job *job);
 
+/* A field taken into another at a rigid motion; see absorb.c. */
+struct tandem_absorb_job {
+    const struct tandem_volume *into; /* its blocks are there already; their values change */
+    const struct tandem_volume *of;   /* its voxels are as wide */
+    uint8_t *chosen;                  /* (count of into): 1: the block is looked at; written: whether it got something */
+    double of_into[12];               /* takes voxels of the one to voxels of the other */
+    int32_t most_weight;
+    int32_t threads;                  /* results do not depend on it */
+};
+
+TANDEM_API int32_t tandem_absorb(struct tandem_absorb_job *job);
+
 /* What these functions return. */
 enum tandem_result {
     TANDEM_DONE = 0,

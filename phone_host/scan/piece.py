@@ -1,0 +1,141 @@
+"""A piece of a scan: a field with axes of its own, the places seen in it, and what a view must fulfil to belong to it. Pure.
+
+A scan is one piece as long as the camera is tracked. A camera that was lost goes on in another, whose place against the others is not known yet.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from phone_host.geometry.se3 import SE3
+from phone_host.scan.odometry import Moved
+from phone_host.scan.places import Places
+from phone_host.scan.registration import Registered, RegistrationSettings, registered
+from phone_host.scan.tracking_words import Weakness
+from phone_host.scan.view import Camera, View, halved
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.stereo.native.library import Library, Missing
+
+_ODOMETRY_PX: Final = 1.0
+"""How far off a view's pixels are after odometry, px: 3 mm at 2 m, as measured on real rooms and streets."""
+
+_ALIGNED_PX: Final = 240
+"""Width up to which depth is laid against the model. Twice that costs 11 of 49 ms of processor time at VGA, and gives the same poses."""
+
+_PARTNER_VOXELS: Final = 10
+_FLOOR_VOXELS: Final = 0.3
+"""The surface's own noise: what is left of a voxel between its values."""
+
+_ROUNDING_VOXELS: Final = 0.05
+"""A surface is no more exact: without noise, views of one plane are 0.2 mm off voxels of 20 mm, and those of the next plane twice that."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseGate:
+    """What a pose must fulfil to be believed.
+
+    Attributes:
+        most_shift_m: the model may correct odometry by this much, m.
+        most_turn: and by this much, rad.
+        least_overlap: share of the pixels in view that must have a partner in the model.
+        sure_overlap: the same where corners enough agree on the motion: a street seen at 9 degrees gives 0.25.
+        least_near: share of the partners that must lie within 3 standard deviations.
+        most_off: times the usual mean distance to the model.
+        least_depths: share of the pixels that must have a depth.
+        weak_inliers: corners that agree; with fewer the pose is weak.
+    """
+
+    most_shift_m: float = 0.08
+    most_turn: float = 0.105
+    least_overlap: float = 0.35
+    sure_overlap: float = 0.15
+    least_near: float = 0.5
+    most_off: float = 2.0
+    least_depths: float = 0.02
+    weak_inliers: int = 30
+
+
+class Piece:
+    """A piece.
+
+    Attributes:
+        volume: its field.
+        places: that were seen in it.
+        usual_off_m: usual distance of a view from the field, m; NaN: none was compared yet.
+
+    Args:
+        settings: of the field.
+        threads: that compute, >= 1; results do not depend on them.
+        gate: what is believed.
+        library: computes.
+    """
+
+    def __init__(self, settings: VolumeSettings, threads: int, gate: PoseGate, library: Library | Missing) -> None:
+        self.volume, self.places, self.usual_off_m = Volume(settings, threads, library), Places(), float("nan")
+        self._library = library if isinstance(library, Library) else None
+        self._threads, self._gate = threads, gate
+
+    def laid(self, view: View, believed: SE3, inliers: int) -> Registered:
+        """Lay a view's depth against the field as seen from where the camera is believed to be.
+
+        Args:
+            view: with depth.
+            believed: where the camera is, in the piece's axes.
+            inliers: corners that agree on it.
+        """
+        depth, geometry, step = view.depth_m, view.geometry, 1
+        while depth.shape[1] > _ALIGNED_PX:
+            (depth, geometry), step = halved(depth, geometry), 2 * step
+        # Beyond its reach the field has no partners.
+        depth = np.where(depth <= self.volume.settings.far_m, depth, np.float32(np.nan))
+        voxel_m = self.volume.settings.voxel_m
+        surface = self.volume.cast(Camera(geometry, depth.shape, believed), depth)
+        turn = _ODOMETRY_PX / view.geometry.focal_px if inliers >= self._gate.weak_inliers else float("inf")
+        settings = RegistrationSettings(
+            most_m=_PARTNER_VOXELS * voxel_m,
+            floor_m=_FLOOR_VOXELS * voxel_m,
+            noise_per_m=view.noise_per_m,
+            geometry=geometry,
+            patch_px=view.patch_px / step,
+            start_turn=turn,
+            start_shift_m=turn * float(np.nanmedian(depth)),
+            threads=self._threads,
+        )
+        return registered(depth, surface, settings, self._library)
+
+    def doubt(self, moved: Moved, fit: Registered) -> Weakness:
+        """Return why a pose is not believed; NONE: it is.
+
+        Args:
+            moved: what odometry says.
+            fit: how the depth lies against the field.
+        """
+        gate, correction = self._gate, fit.start_now.pose()
+        is_sure = moved.is_known and moved.inliers >= gate.weak_inliers
+        least = gate.sure_overlap if is_sure else gate.least_overlap
+        if not np.isfinite(correction).all() or fit.overlap < least:
+            return Weakness.LITTLE_OVERLAP if moved.is_known else Weakness.TOO_FAST
+        far = np.linalg.norm(correction[3:]) > gate.most_shift_m or np.linalg.norm(correction[:3]) > gate.most_turn
+        if far:
+            return Weakness.TOO_FAST
+        usual_m = np.maximum(self.usual_off_m, _ROUNDING_VOXELS * self.volume.settings.voxel_m)
+        if fit.near < gate.least_near or fit.off_m > gate.most_off * usual_m:
+            return Weakness.POOR_FIT
+        return Weakness.NONE
+
+    def fuse(self, view: View, pose: SE3, fit: Registered | None) -> None:
+        """Take a view in.
+
+        Args:
+            view: with depth.
+            pose: where it was taken, in the piece's axes.
+            fit: how it lay against the field before; None: it is the first one.
+        """
+        self.volume.fuse(view, pose)
+        self.places.remember(view, pose)
+        if fit is not None:
+            # Slow, so that one blurred view does not make the next one pass.
+            usual = self.usual_off_m
+            self.usual_off_m = fit.off_m if np.isnan(usual) else 0.9 * usual + 0.1 * fit.off_m

@@ -1,0 +1,89 @@
+"""A camera that is lost goes on in a piece of its own; where a view shows the model again, the piece becomes part of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from phone_host.geometry.se3 import SE3
+from phone_host.scan.blocks import BLOCK_BYTES
+from phone_host.scan.tracker import Tracked, Tracker
+from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.view import View
+from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.stereo.native.library import Library, native
+from tests.support.plane_films import CORNER, distance, plane_view, texture
+
+pytestmark = pytest.mark.skipif(not isinstance(native(), Library), reason="numpy alone takes minutes")
+
+PICTURE = texture()
+SETTINGS = VolumeSettings(voxel_m=0.02, far_m=3.0)
+SEEN = [SE3.of(np.array([0.0, 0.03 * at, 0.0, 0.01 * at, 0.0, 0.0])) for at in range(3)]
+BACK = [SE3.of(np.array([0.0, turn, 0.0, 0.3 * turn, 0.0, 0.0])) for turn in np.linspace(1.1, 0.3, 9)]
+"""From where nothing is seen of what was: 63 degrees turned, and back."""
+
+
+def film(poses: list[SE3]) -> list[View]:
+    """The corner from several places."""
+    return [plane_view(pose, PICTURE, CORNER) for pose in poses]
+
+
+def run(tracker: Tracker) -> list[Tracked]:
+    """Three views, and then, without a way between them, nine that lead back."""
+    return [tracker.track(view) for view in film([*SEEN, *BACK])]
+
+
+def test_a_piece_is_joined_where_a_view_shows_the_model() -> None:
+    """Lost at first, followed apart, relocalised; the views between are in the model then, within 6 mm and 0.4 degrees of the truth."""
+    told = run(Tracker(SETTINGS))
+    at = next(number for number, each in enumerate(told) if each.joined)
+    assert [each.state for each in told[3:at]] == [Tracking.LOST] * (at - 3)
+    assert told[4].weakness is Weakness.APART
+    assert told[at].state is Tracking.RELOCALISED
+    assert [view.number for view in told[at].joined] == list(range(4, at + 1))
+    truth = [*SEEN, *BACK]
+    assert all((distance(view.world_camera, truth[view.number - 1]) < (6e-3, 7e-3)).all() for view in told[at].joined)
+    assert (distance(told[-1].world_camera, BACK[-1]) < (6e-3, 7e-3)).all()
+
+
+def test_the_model_is_as_it_was_until_then() -> None:
+    """What is seen apart changes no voxel of the model; joined, it is in it."""
+    tracker = Tracker(SETTINGS)
+    views = film([*SEEN, *BACK])
+    for view in views[:3]:
+        tracker.track(view)
+    before, count = tracker.volume.blocks.weights.copy(), tracker.volume.blocks.count
+    for view in views[3:]:
+        told = tracker.track(view)
+        if told.is_fused:
+            break
+        assert np.array_equal(tracker.volume.blocks.weights, before)
+    assert tracker.volume.blocks.count > 1.3 * count
+
+
+def test_the_same_views_give_the_same_bits() -> None:
+    """Poses and field, twice, with one thread and with three."""
+    one, three = Tracker(SETTINGS), Tracker(SETTINGS, 3)
+    here, there = (np.array([each.world_camera.pose() for each in run(tracker)]) for tracker in (one, three))
+    assert np.array_equal(here, there)
+    assert np.array_equal(one.volume.blocks.field, three.volume.blocks.field)
+
+
+def test_without_memory_no_piece_is_begun() -> None:
+    """The model has all blocks there are: a view that does not fit is lost, as ever, and nothing grows."""
+    tracker = Tracker(replace(SETTINGS, most_bytes=256 * BLOCK_BYTES))
+    told = run(tracker)
+    assert not any(each.joined for each in told)
+    assert all(each.weakness is not Weakness.APART for each in told)
+
+
+def test_pieces_that_nobody_meets_do_not_grow_in_number() -> None:
+    """Ten jumps, each to another picture: all lost, the model as it was, and no exception."""
+    tracker = Tracker(SETTINGS)
+    for view in film(SEEN):
+        tracker.track(view)
+    before = tracker.volume.blocks.weights.copy()
+    far = SE3.of(np.array([0.0, 1.2, 0.0, 0.5, 0.0, 0.0]))
+    told = [tracker.track(plane_view(far, texture(seed), CORNER)) for seed in range(10, 20)]
+    assert {each.state for each in told} == {Tracking.LOST}
+    assert np.array_equal(tracker.volume.blocks.weights, before)
