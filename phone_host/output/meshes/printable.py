@@ -205,11 +205,11 @@ def _walls(grid: Grid, normals: Points, areas: NDArray[np.float64], least_mm: fl
         for share in np.linspace(0, 1, steps + 1):
             point, triangle = grid.near(middles[rows] + share * way[rows])
             ray = rows[point]
-            other = triangle != ray
-            ray, triangle = ray[other], triangle[other]
+            # Most of what is near looks the same way: that is soon told, and is no far side of a wall.
+            opposite = np.einsum("ij,ij->i", normals[ray], normals[triangle]) < 0
+            ray, triangle = ray[opposite], triangle[opposite]
             met = hits(middles[ray], way[ray], grid.corners[triangle])
-            opposite = (normals[ray] * normals[triangle]).sum(axis=1) < 0
-            thin[ray[(met > _CLEARANCE) & (met < 1) & opposite]] = True
+            thin[ray[(met > _CLEARANCE) & (met < 1)]] = True
     share_of_area = float(areas[thin].sum() / areas.sum()) if areas.sum() else 0.0
     if share_of_area < _LEAST_THIN:
         return []
