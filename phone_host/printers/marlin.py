@@ -58,9 +58,10 @@ _WAKE: Final = "M108"
 """Ends waiting for a temperature, where the firmware hears it at once."""
 
 _FATAL: Final = re.compile(r"halted|kill\(\)|thermal|heating failed|maxtemp|mintemp|stopped|emergency", re.IGNORECASE)
-_ASKED: Final = re.compile(r"(?:resend|rs)[: ]+N?(\d+)", re.IGNORECASE)
+_ASKED: Final = re.compile(r"(?:resend|rs)[: ]+N?(\d{1,9})(?!\d)", re.IGNORECASE)
 _ORDER: Final = re.compile(r"line number is not|expected line", re.IGNORECASE)
-_HEAT: Final = re.compile(r"\b(T|B)\d?:\s*(-?[\d.]+)\s*/\s*(-?[\d.]+)")
+_HEAT: Final = re.compile(r"\b(T|B)\d?:\s*(-?\d{1,5}(?:\.\d+)?)\s*/\s*(-?\d{1,5}(?:\.\d+)?)")
+"""A cable spoils what the printer says, too: only numbers are taken for numbers."""
 
 
 @dataclass(slots=True)

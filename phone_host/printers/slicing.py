@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final, assert_never
 
 from common.errors import DataError, SettingsError, UnavailableError
+from common.places import Kind, kind_of
 from phone_host.printers.gcode import MOST_FOR_LINES, GcodeFacts, examine
 
 
@@ -128,6 +129,8 @@ def sliced(stl: Path, gcode: Path, wanted: SlicingWanted, most_characters: int =
         DataError: it cannot slice the model, or what it wrote leaves the bed.
     """
     slicer, program = find_slicer(wanted.slicer)
+    if wanted.profile is not None and kind_of(wanted.profile) is not Kind.FILE:
+        raise SettingsError(f"--profile {wanted.profile} is no file", "give settings that the slicer has exported")
     environment = dict(os.environ)
     match slicer:
         case Slicer.PRUSA:
@@ -224,6 +227,8 @@ def facts_of(gcode: Path, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
         DataError: it is none, or cannot be read.
     """
     try:
+        if kind_of(gcode) in {Kind.PIPE, Kind.DEVICE, Kind.SOCKET}:  # it would be waited for, and is read twice
+            raise DataError(f"{gcode} is not a plain file", "give the file that a slicer wrote")
         with gcode.open(encoding="utf-8", errors="replace") as file:
             return examine(file, str(gcode), most_characters)
     except OSError as error:
