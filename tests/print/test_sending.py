@@ -180,7 +180,12 @@ def test_a_file_that_cannot_be_read_any_more_cools_the_printer() -> None:
 
 @pytest.mark.parametrize(
     ("uri", "words"),
-    [("serial:/dev/ttyNOPE9", "there is no printer"), ("socket://127.0.0.1:9", "no printer answers")],
+    [
+        ("serial:/dev/ttyNOPE9", "there is no printer"),
+        ("serial:/dev/null", "/dev/null is no serial port"),
+        ("socket://127.0.0.1:9", "no printer answers"),
+        ("socket://..:9", "no name of a host"),
+    ],
 )
 def test_a_printer_that_is_not_there_is_named(uri: str, words: str) -> None:
     """With a remedy."""

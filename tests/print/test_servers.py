@@ -141,6 +141,7 @@ def test_no_server_is_told(job: Job) -> None:
     for uri, words in (
         ("octoprint://127.0.0.1:9", "refuses the connection"),
         ("moonraker://no-such-host.invalid", "has no address"),
+        ("moonraker://..", "has no address"),
     ):
         with pytest.raises(UnavailableError, match=words):
             door_to(read_uri(uri)).send(job, Wishes(), lambda _: None)

@@ -279,7 +279,7 @@ def test_the_journal_tells_of_a_print_whose_program_is_gone(tmp_path: Path) -> N
     assert journal.left() == entry
     journal.note(Entry("cup.gcode", "serial:x", 50, 100, 1))
     assert journal.left() is None
-    for text in ("{}", "[", '{"file": 1, "printer": "", "done": 0, "lines": 0, "pid": 1}'):
+    for text in ("{}", "[", "[" * 9000, '{"file": 1, "printer": "", "done": 0, "lines": 0, "pid": 1}'):
         (tmp_path / "deep" / "printing.json").write_text(text)
         assert journal.left() is None
     journal.forget()
