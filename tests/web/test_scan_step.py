@@ -171,9 +171,10 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
 @pytest.mark.parametrize(
     ("kind", "sheet", "wanted"),
     [
-        ("mat", "", {"mat": "usual", "turntable": ""}),
-        ("mat", "8x6:30mm:22mm:4x4", {"mat": "8x6:30mm:22mm:4x4", "turntable": ""}),
-        ("turntable", "", {"mat": "", "turntable": "yes"}),
+        ("mat", "", {"mat": "usual", "turntable": "", "object": ""}),
+        ("mat", "8x6:30mm:22mm:4x4", {"mat": "8x6:30mm:22mm:4x4", "turntable": "", "object": ""}),
+        ("turntable", "", {"mat": "", "turntable": "yes", "object": ""}),
+        ("object", "", {"mat": "", "turntable": "", "object": "yes"}),
     ],
 )
 def test_what_is_scanned_is_chosen(

@@ -29,7 +29,7 @@ from phone_host.verbs.scan.arguments import add_model_arguments
 from phone_host.verbs.scan.live import live_scan
 from phone_host.verbs.scan.wanted import axes_of, box_of, scan_wanted
 
-OF_SCAN: Final = ("voxel", "box", "mat", "turntable")
+OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object")
 """Options of `scan` that the page may give."""
 
 
@@ -135,7 +135,7 @@ def _wanted(values: Choices) -> ScanWanted:
     add_model_arguments(parser)
     options = parser.parse_args([])
     options.voxel, options.box, options.mat = (given[name] or None for name in ("voxel", "box", "mat"))
-    options.turntable = bool(given["turntable"])
+    options.turntable, options.object = bool(given["turntable"]), bool(given["object"])
     return scan_wanted(options)
 
 
