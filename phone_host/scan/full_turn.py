@@ -36,10 +36,11 @@ _LEAST_CLOSING: Final = 40
 """Sightings of points of one turn in views of another, that close it."""
 
 _LEAST_SIGHTINGS: Final = 20
-"""Of points where they should be, for a view that tracking has lost."""
+"""Of points of other views where they should be, for a view that tracking has lost."""
 
 _CLOSING_VIEWS: Final = 5
 _BESIDE: Final = 2
+_CLOSED_OVERLAP: Final = 0.3
 _CLOSED_VOXELS: Final = 3.0
 """After the fit, the depths of the end must lie on those of the beginning within this, or what closed the turn was something else."""
 
@@ -117,7 +118,7 @@ def full_turn(given: Sequence[TurnView], settings: VolumeSettings, threads: int)
             fit, closed_m = _fitted(chosen, axis, start - shift, may_close=False), float("nan")
     every = np.full(len(given), np.nan)
     every[used] = fit.angles
-    used[used] = (fit.sightings >= _LEAST_SIGHTINGS) | np.array([each.is_sure for each in given])[used]
+    used[used] = _linked(fit.seen, np.array([each.is_sure for each in given])[used])
     gap = float(np.ptp(start) - np.ptp(fit.angles)) if fit.is_closed else float("nan")
     return FullTurn(axis=fit.axis, angles=every, used=used, is_closed=fit.is_closed, gap=gap, closed_m=closed_m)
 
@@ -131,20 +132,39 @@ def _leans_little(cameras_world: Sequence[SE3], axis: TurnAxis) -> Flags:
     return used
 
 
+def _linked(seen: Sequence[Seen], sure: Flags) -> Flags:
+    """Return (N,): the views that are sure, and those that see points enough of them, or of others that do.
+
+    Views that were lost together agree among themselves wherever they are put.
+
+    Args:
+        seen: what each view sees where it should be; empty: nothing was fitted.
+        sure: (N,) whether tracking believes a view.
+    """
+    linked = sure.copy()
+    while seen and linked.any():
+        known = np.unique(np.concatenate([each.points for each, is_in in zip(seen, linked, strict=True) if is_in]))
+        more = np.array([np.count_nonzero(np.isin(each.points, known)) >= _LEAST_SIGHTINGS for each in seen]) & ~linked
+        if not more.any():
+            break
+        linked |= more
+    return linked
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """A fit: axis, (N,) angles, whether the turn was closed, and (N,) how many points each view sees where they should be."""
+    """A fit: axis, (N,) angles, whether the turn was closed, and what each of the N views sees where it should be."""
 
     axis: TurnAxis
     angles: Floats
     is_closed: bool
-    sightings: NDArray[np.int64]
+    seen: tuple[Seen, ...]
 
 
 def _fitted(views: Sequence[View], axis: TurnAxis, angles: Floats, *, may_close: bool = True) -> _Fit:
     """Fit twice, the second time with corners that are looked for where the first says; tell whether the turn was closed."""
     observer = Observer(views[0].geometry, views[0].noise_px)
-    closing, sightings = False, np.zeros(len(views), np.int64)
+    closing, found = False, tuple[Seen, ...]()
     for _ in range(2):
         tracks = tracks_of(views, axis, angles, across_turns=may_close)
         if not len(tracks.points_m):
@@ -156,8 +176,8 @@ def _fitted(views: Sequence[View], axis: TurnAxis, angles: Floats, *, may_close:
         if len(circle.points_m):
             circle = fitted_circle(circle, seen, observer)
         axis, angles = circle.axis, circle.angles
-        sightings = np.array([len(each.points) for each in seen])
-    return _Fit(axis, angles, closing, sightings)
+        found = tuple(seen)
+    return _Fit(axis, angles, closing, found)
 
 
 def _without_outliers(circle: Circle, seen: Sequence[Seen], observer: Observer) -> tuple[Circle, list[Seen]]:
@@ -203,6 +223,9 @@ def _closed_m(views: Sequence[View], axis: TurnAxis, angles: Floats, settings: V
             ),
             library,
         )
+        if not fit.overlap > _CLOSED_OVERLAP:
+            moved.append(np.inf)
+            continue
         middle = np.nanmedian(surface.points_m.reshape(-1, 3), axis=0).astype(np.float64)
-        moved.append(float(np.linalg.norm(fit.start_now.apply(middle) - middle)) if fit.overlap > 0.3 else np.inf)
+        moved.append(float(np.linalg.norm(fit.start_now.apply(middle) - middle)))
     return float(np.median(moved)) if moved else float("inf")

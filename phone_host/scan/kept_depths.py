@@ -1,6 +1,6 @@
 """Small depth images of the views in a model, and where they were taken: for a box that is chosen when they have passed. Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -25,12 +25,22 @@ class _Kept:
     noise_px: float
     world_camera: SE3
 
+    @property
+    def view(self) -> View:
+        """Its depths as a view that can carve; black."""
+        depth = self.depth_m.astype(np.float32)
+        black = np.zeros(depth.shape, np.uint8)
+        return View(
+            grey=black, colours=black[..., np.newaxis], depth_m=depth, geometry=self.geometry, noise_px=self.noise_px
+        )
+
 
 class KeptDepths:
-    """Depth images of the views so far, or of every second, fourth ... of them."""
+    """Depth images of the views so far, or of every second, fourth ... of them; and of the last that are in no model yet."""
 
     def __init__(self) -> None:
         self._kept: list[_Kept] = []
+        self._apart: dict[int, _Kept] = {}
         self._seen, self._every = 0, 1
 
     def remember(self, view: View, world_camera: SE3) -> None:
@@ -40,14 +50,43 @@ class KeptDepths:
             view: what the camera saw.
             world_camera: where it was.
         """
+        if self._is_next():
+            self._keep(_small(view, world_camera))
+
+    def keep_apart(self, number: int, view: View) -> None:
+        """Keep the depths of a view whose place in the model is not known; of too many, the oldest go.
+
+        Args:
+            number: of the view.
+            view: what the camera saw.
+        """
+        self._apart[number] = _small(view, SE3.identity())
+        if len(self._apart) > _MOST:
+            del self._apart[min(self._apart)]
+
+    def joined(self, number: int, world_camera: SE3) -> View | None:
+        """Take a view that was kept apart among those in the model.
+
+        Args:
+            number: of the view.
+            world_camera: where it was.
+
+        Returns:
+            Its small depths, as a black view; None: they were not kept.
+        """
+        found = self._apart.pop(number, None)
+        if found is None:
+            return None
+        if self._is_next():
+            self._keep(replace(found, world_camera=world_camera))
+        return found.view
+
+    def _is_next(self) -> bool:
         self._seen += 1
-        if (self._seen - 1) % self._every:
-            return
-        depth, geometry, noise_px = view.depth_m, view.geometry, view.noise_px
-        while depth.shape[1] > _WIDTH_PX:
-            (depth, geometry), noise_px = halved(depth, geometry), noise_px / 2
-        with np.errstate(over="ignore"):
-            self._kept.append(_Kept(depth.astype(np.float16), geometry, noise_px, world_camera))
+        return not (self._seen - 1) % self._every
+
+    def _keep(self, kept: _Kept) -> None:
+        self._kept.append(kept)
         if len(self._kept) >= _MOST:
             self._kept, self._every = self._kept[::2], 2 * self._every
 
@@ -58,13 +97,12 @@ class KeptDepths:
             carving: of any box.
         """
         for each in self._kept:
-            depth = each.depth_m.astype(np.float32)
-            black = np.zeros(depth.shape, np.uint8)
-            view = View(
-                grey=black,
-                colours=black[..., np.newaxis],
-                depth_m=depth,
-                geometry=each.geometry,
-                noise_px=each.noise_px,
-            )
-            carving.see(view, each.world_camera)
+            carving.see(each.view, each.world_camera)
+
+
+def _small(view: View, world_camera: SE3) -> _Kept:
+    depth, geometry, noise_px = view.depth_m, view.geometry, view.noise_px
+    while depth.shape[1] > _WIDTH_PX:
+        (depth, geometry), noise_px = halved(depth, geometry), noise_px / 2
+    with np.errstate(over="ignore"):
+        return _Kept(depth.astype(np.float16), geometry, noise_px, world_camera)

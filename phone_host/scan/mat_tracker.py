@@ -144,6 +144,10 @@ class MatTracker:
         """See `Tracker.go_on`."""
         self._pose, self._was_lost = state.pose, True
 
+    def know(self, scale: MatScale) -> None:
+        """Take what an earlier tracker has learnt of the printed squares."""
+        self._finder.scale = scale
+
     def _lost(self, fit: Registered | None) -> Tracked:
         self._was_lost = True
         return _told(self._pose, Tracking.LOST, Weakness.NO_MAT, fit)

@@ -89,8 +89,9 @@ class Piece:
         while depth.shape[1] > _ALIGNED_PX:
             (depth, geometry), step = halved(depth, geometry), 2 * step
         # Beyond its reach the field has no partners.
-        depth = np.where(depth <= self.volume.settings.far_m, depth, np.float32(np.nan))
-        voxel_m = self.volume.settings.voxel_m
+        of = self.volume.settings
+        depth, voxel_m = np.where(depth <= of.far_m, depth, np.float32(np.nan)), of.voxel_m
+        within = depth[np.isfinite(depth)]
         surface = self.volume.cast(Camera(geometry, depth.shape, believed), depth)
         turn = _ODOMETRY_PX / view.geometry.focal_px if inliers >= self._gate.weak_inliers else float("inf")
         settings = RegistrationSettings(
@@ -100,7 +101,7 @@ class Piece:
             geometry=geometry,
             patch_px=view.patch_px / step,
             start_turn=turn,
-            start_shift_m=turn * float(np.nanmedian(depth)),
+            start_shift_m=turn * (float(np.median(within)) if len(within) else of.far_m),
             threads=self._threads,
         )
         return registered(depth, surface, settings, self._library)

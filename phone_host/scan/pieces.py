@@ -121,14 +121,17 @@ class Pieces:
             why: it belongs to no piece.
 
         Returns:
-            Its pose in the new piece's axes; None: there is no memory for another.
+            The pose in the axes of the piece that is tracked now, the new one; None: there is no memory for another, and nothing has changed.
         """
         world = self.in_world(believed)
         while len(self._apart) >= _MOST_APART:
-            self._give_up(min(self._apart, key=lambda each: (len(self._apart[each].views), each)))
+            self._give_up_one()
         room = self._settings.most_bytes - self._held_bytes()
         if room < _LEAST_SHARE * self._settings.most_bytes:
-            return None
+            if self._active in {_MODEL, *self._apart}:
+                return None
+            self._active = _MODEL  # the piece that was tracked is one of those that were given up
+            return world
         piece = Piece(replace(self._settings, most_bytes=room), self._threads, self._gate, self._library)
         self._active, self._next = self._next, self._next + 1
         self._apart[self._active] = _Apart(piece, world)
@@ -148,6 +151,18 @@ class Pieces:
         of = self._apart[self._active]
         of.piece.fuse(view, pose, fit)
         of.views.append(_Fused(number, pose, weakness))
+
+    def fuse(self, view: View, pose: SE3, fit: Registered | None) -> None:
+        """Take a view into the model, which is tracked. Where it needs the memory of the pieces beside it, they are given up, the one with the fewest views first.
+
+        Args:
+            view: with depth.
+            pose: where it was taken.
+            fit: how it lay there before; None: it is the first.
+        """
+        self.model.fuse(view, pose, fit)
+        while self._apart and self._held_bytes() > self._settings.most_bytes:
+            self._give_up_one()
 
     def go_on_in(self, piece: Piece) -> None:
         """Track in another piece from now on."""
@@ -277,6 +292,9 @@ class Pieces:
             return None
         pose = start @ fit.start_now
         return Found(piece, SE3(rotations_of(vectors_of(pose.R)), pose.t_m), fit)
+
+    def _give_up_one(self) -> None:
+        self._give_up(min(self._apart, key=lambda each: (len(self._apart[each].views), each)))
 
     def _give_up(self, number: int) -> None:
         del self._apart[number]

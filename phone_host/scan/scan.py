@@ -10,15 +10,13 @@ from typing import Final
 
 import numpy as np
 
-from common.errors import DataError, SettingsError
-from common.imagesize.head import size_text
+from common.errors import SettingsError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carved, Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor
-from phone_host.scan.depth_edges import without_edges
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
@@ -28,15 +26,13 @@ from phone_host.scan.mat_tracker import ABOVE_M, MatTracker, begun_on_mat, box_o
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
+from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.images import size_px, to_grey
-
-NOISE_PX: Final = 0.5
-"""Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
+from phone_host.stereo.images import size_px
 
 _SUBMAP_PAIRS: Final = 20
 """Fused pairs after which a submap is closed: four seconds at five pairs a second."""
@@ -198,7 +194,7 @@ class Scan:
     @property
     def settings(self) -> VolumeSettings | None:
         """How the model is made; None before the first pair that has depth."""
-        return None if self.tracker is None else self.tracker.volume.settings
+        return None if self.volume is None else self.volume.settings
 
     def take(self, name: str, stamp_s: float, processed: Processed, skew_s: float = 0.0) -> ScannedPair:
         """Take the next pair.
@@ -243,6 +239,8 @@ class Scan:
                 self._depths.remember(view, told.world_camera)
                 if self._carving is not None:
                     self._carving.see(view, told.world_camera)
+            elif isinstance(self.tracker, Tracker):  # its piece may be joined later
+                self._depths.keep_apart(len(self._pairs), view)
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
@@ -259,7 +257,7 @@ class Scan:
         return pair
 
     def _joined(self, views: Sequence[Joined]) -> None:
-        """Note that pairs that were lost have become part of the model."""
+        """Note that pairs that were lost have become part of the model; what they saw carves, too."""
         for view in views:
             at = self._untracked + view.number - 1
             self._pairs[at] = replace(
@@ -267,6 +265,9 @@ class Scan:
             )
             self._later[self._pairs[at].name] = self._pairs[at]
             self._is_changed = self._is_changed or at < self._closed.pairs
+            seen = self._depths.joined(at, view.world_camera)
+            if seen is not None and self._carving is not None:
+                self._carving.see(seen, view.world_camera)
 
     def _begun(self, view: View) -> Tracker | MatTracker | None:
         """Begin with a view that has depth; None: mat or table are not seen in it."""
@@ -330,6 +331,9 @@ class Scan:
 
         Args:
             submaps: of another scan, from its last whole one on, in order.
+
+        Raises:
+            SettingsError: that had another box, or a mat where this one has none.
         """
         if _begun_on_table(submaps) != self._wanted.on_table:
             raise SettingsError(
@@ -350,12 +354,21 @@ class Scan:
             self.tracker.volume.put(each.blocks)
             self.tracker.go_on(each.tracker)
             places += len(each.tracker.places)
+        said = [pair.mat for pair in self._pairs if pair.mat is not None]
+        if bool(said) != (wanted.mat is not None):
+            raise SettingsError(
+                f"the scan that is gone on with had {'a' if said else 'no'} mat",
+                "give the same --mat as then, or begin a new scan",
+            )
+        if isinstance(self.tracker, MatTracker):
+            self.tracker.know(said[-1].scale)
         carved, self._carving = submaps[-1].carved, self._carving_of(wanted.model_box)
-        if self._carving is not None:
-            if carved is None or carved.cells != self._carving.cells:
-                raise SettingsError(
-                    "the scan that is gone on with had another box", "give the same --box as then, or begin a new scan"
-                )
+        if (None if carved is None else carved.cells) != (None if self._carving is None else self._carving.cells):
+            raise SettingsError(
+                "the scan that is gone on with had another box",
+                "give the same --box and --mat as then, or begin a new scan",
+            )
+        if carved is not None and self._carving is not None:
             self._carving.go_on(carved)
         written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
@@ -394,41 +407,3 @@ def _begun_on_table(submaps: Sequence[Submap]) -> bool:
     """Return whether submaps are of a thing on a table: then the first pair is not taken in the origin, though no mat told where it was."""
     first = next((pair for submap in submaps for pair in submap.pairs if pair.is_fused), None)
     return first is not None and first.mat is None and bool(np.linalg.norm(first.world_camera.t_m) > 0)
-
-
-def require_size(name: str, view: View, size: tuple[int, int]) -> None:
-    """Refuse a view of another size than those before it.
-
-    Args:
-        name: of its pair.
-        view: that was taken.
-        size: width and height of those before it, px.
-
-    Raises:
-        DataError: so it is.
-    """
-    if size_px(view.grey) != size:
-        here, before = (size_text(each) for each in (size_px(view.grey), size))
-        raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
-
-
-def view_of(processed: Processed, mat: Mat | None = None) -> View:
-    """Return a pair as the tracker takes it, without the depths beside steps.
-
-    Args:
-        processed: with disparity and cloud.
-        mat: that is looked for in both images; None: none is.
-    """
-    assert processed.geometry is not None
-    assert processed.cloud is not None
-    left = processed.pair.left
-    scale = 1.0 if processed.search is None else processed.search.scale
-    return View(
-        grey=to_grey(left),
-        colours=left if left.ndim == 3 else np.repeat(left[..., np.newaxis], 3, axis=2),
-        depth_m=without_edges(processed.cloud[..., 2], processed.geometry),
-        geometry=processed.geometry,
-        noise_px=NOISE_PX / scale,
-        right=None if mat is None else to_grey(processed.pair.right),
-        epipolar=processed.pair.epipolar,
-    )

@@ -218,7 +218,7 @@ class Tracker:
 
     def _fused(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered | None) -> Tracked:
         self._pose = pose
-        self._model.fuse(view, pose, fit)
+        self._pieces.fuse(view, pose, fit)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
         if self._was_lost and fit is not None:
             state = Tracking.RELOCALISED

@@ -6,6 +6,7 @@ end one axis and all angles are fitted to them (`full_turn`), the background is 
 Views are kept in memory, cropped to the thing, one every two degrees, some 0.3 MB each, and never more than `_MOST_BYTES`; folders are not read twice.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -20,11 +21,13 @@ from phone_host.scan.fineness import fineness_for
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.merged_field import merged
 from phone_host.scan.piece import PoseGate
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted, require_size, view_of
+from phone_host.scan.pieces import Joined
+from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, points_of, table_height_m
 from phone_host.scan.table_scan import TableScan
+from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.turning_background import Background
@@ -99,6 +102,7 @@ class TurntableScan(Scan):
         self._last: ScannedPair | None = None
         self._window: tuple[slice, slice] | None = None
         self._stations: list[_Station] = []
+        self._tracked_pairs: list[int] = []
         self._least_turn = _LEAST_TURN
         self._turned = 0.0
         self._direction = np.zeros(3)
@@ -206,10 +210,10 @@ class TurntableScan(Scan):
             self.tracker = Tracker(
                 fineness_for(thing, self._wanted.voxel_m, self._wanted.most_bytes), self._wanted.threads
             )
+        self._tracked_pairs.append(number)
         told = self.tracker.track(thing)
-        # The axis tells what a small or round thing does not.
-        weakness = Weakness.NONE if told.weakness is Weakness.FLAT else told.weakness
-        state = Tracking.TRACKING if told.state is Tracking.WEAK and weakness is Weakness.NONE else told.state
+        self._joined(told.joined)
+        state, weakness = _with_axis(told.state, told.weakness)
         if told.is_fused or told.moved.is_known:
             self._keep(_Station(number, cropped, own, told.world_camera, told.is_fused))
         name, stamp_s, density = told_of
@@ -224,6 +228,17 @@ class TurntableScan(Scan):
             overlap=np.nan if told.fit is None else told.fit.overlap,
             off_m=np.nan if told.fit is None else told.fit.off_m,
         )
+
+    def _joined(self, views: Sequence[Joined]) -> None:
+        """Note that pairs that were lost have become part of the model, and where they were taken."""
+        for view in views:
+            at = self._tracked_pairs[view.number - 1]
+            state, weakness = _with_axis(view.state, view.weakness)
+            self._pairs[at] = replace(self._pairs[at], world_camera=view.world_camera, state=state, weakness=weakness)
+            self._stations = [
+                replace(each, world_camera=view.world_camera, is_sure=True) if each.pair == at else each
+                for each in self._stations
+            ]
 
     def _take_waiting(self) -> None:
         """Take the view before the first one in which something had turned: now it is known what."""
@@ -253,9 +268,10 @@ class TurntableScan(Scan):
 
     def _end(self) -> _Finished:
         """Fit the turn, and make the model again."""
-        taken, settings = len(self._pairs), self.settings
-        if settings is None or len(self._stations) < LEAST_VIEWS:
+        taken = len(self._pairs)
+        if self.tracker is None or len(self._stations) < LEAST_VIEWS:
             return _Finished(taken, None, None)
+        settings = self.tracker.volume.settings
         background = Background(
             [each.view.grey for each in self._stations], [each.view.depth_m for each in self._stations]
         )
@@ -292,6 +308,13 @@ class TurntableScan(Scan):
                 for pair in self._pairs
             ]
         return _Finished(taken, turn, volume, match)
+
+
+def _with_axis(state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
+    """Return what tracking says of a view of a thing that turns: the axis tells what a small or round thing does not."""
+    if weakness is not Weakness.FLAT:
+        return state, weakness
+    return Tracking.TRACKING if state is Tracking.WEAK else state, Weakness.NONE
 
 
 def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPair:

@@ -18,6 +18,7 @@ from phone_host.model import Image, Processed
 from phone_host.output.axes import Axes
 from phone_host.output.rig_yaml import write_rig
 from phone_host.report.mat_figures import mat_figures
+from phone_host.scan.box import Box
 from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
 from phone_host.scan.mat_tracker import ABOVE_M
@@ -214,10 +215,27 @@ def test_a_mat_that_was_printed_too_small_is_told() -> None:
 
 
 def test_what_a_mat_told_is_kept_in_submaps() -> None:
-    """A submap that is read again tells the same of the mat, and a scan goes on from it with the next pair."""
+    """A submap that is read again tells the same of the mat, and a scan goes on from it with the next pair as if it had never ended."""
     scan, pairs = scanned([0, 60], WANTED)
     kept = submap_of(submap_bytes(scan.close_submap()), "kept")
     assert [pair.mat for pair in kept.pairs] == [pair.mat for pair in pairs]
     later = Scan(WANTED)
     later.go_on([kept])
-    assert later.take("next", 2.0, walked(180)).is_fused
+    after, without_end = later.take("next", 2.0, walked(180)), scan.take("next", 2.0, walked(180))
+    assert after.is_fused
+    assert after.mat == without_end.mat
+    assert np.array_equal(after.world_camera.t_m, without_end.world_camera.t_m)
+
+
+def test_a_scan_on_a_mat_goes_on_with_the_same_mat_and_box_only() -> None:
+    """Without the mat, with another box, or with another sheet it is refused in one line."""
+    kept = scanned([0], WANTED)[0].close_submap()
+    box = Box((-0.05, -0.05, 0.0), (0.05, 0.05, 0.1))
+    for wanted, told in (
+        (replace(WANTED, mat=None), "had a mat"),
+        (replace(WANTED, mat=None, box=WANTED.model_box), "had a mat"),
+        (replace(WANTED, box=box), "another box"),
+        (replace(WANTED, mat=parse_mat("8x6:28mm:20mm:5x5")), "another box"),
+    ):
+        with pytest.raises(SettingsError, match=told):
+            Scan(wanted).go_on([kept])

@@ -7,12 +7,20 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.blocks import BLOCK_BYTES
+from phone_host.scan.box import Box
+from phone_host.scan.carving import Carving
+from phone_host.scan.cells import Cells
+from phone_host.scan.kept_depths import KeptDepths
+from phone_host.scan.piece import PoseGate
+from phone_host.scan.pieces import Pieces
+from phone_host.scan.scan import Scan, ScanWanted
 from phone_host.scan.tracker import Tracked, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, native
 from tests.support.plane_films import CORNER, distance, plane_view, texture
+from tests.support.turning_things import processed_of
 
 pytestmark = pytest.mark.skipif(not isinstance(native(), Library), reason="numpy alone takes minutes")
 
@@ -75,6 +83,65 @@ def test_without_memory_no_piece_is_begun() -> None:
     told = run(tracker)
     assert not any(each.joined for each in told)
     assert all(each.weakness is not Weakness.APART for each in told)
+
+
+def test_a_piece_that_is_given_up_while_it_is_tracked_leaves_the_model_tracked() -> None:
+    """Four pieces, the last with the fewest views, and no memory left: the next jump is where it is believed to be in the world."""
+    settings = replace(SETTINGS, most_bytes=8000 * BLOCK_BYTES)
+    pieces = Pieces(settings, 1, PoseGate(), native())
+    view = film(SEEN[:1])[0]
+    for number in range(4):
+        pieces.begin(number, view, SEEN[1], Weakness.TOO_FAST)
+        if number < 3:
+            pieces.fuse_apart(number, view, SEEN[0], Weakness.NONE, None)
+    pieces.model.volume.blocks = pieces.model.volume.blocks.grown(7800)
+    world = pieces.in_world(SEEN[2])
+    assert pieces.begin(5, view, SEEN[2], Weakness.TOO_FAST) is world or pieces.active is pieces.model
+    assert pieces.active is pieces.model
+
+
+def test_pieces_give_way_to_the_model() -> None:
+    """A model that needs their memory gets it: all together never hold more than was allowed."""
+    settings = replace(SETTINGS, voxel_m=0.01, most_bytes=600 * BLOCK_BYTES)
+    pieces = Pieces(settings, 1, PoseGate(), native())
+    view = film(SEEN[:1])[0]
+    pieces.begin(1, view, SEEN[1], Weakness.TOO_FAST)
+    apart = pieces.active
+    pieces.go_on_in(pieces.model)
+    pieces.fuse(view, SEEN[0], None)
+    assert pieces.model.volume.blocks.room > 256
+    pieces.go_on_in(apart)
+    assert pieces.active is pieces.model
+
+
+def test_what_a_joined_piece_saw_carves_too() -> None:
+    """Every view in the model has looked through the box, those that were lost at first as well; a box that is chosen later is carved by them all, too."""
+    box = Box((-0.4, -0.4, 0.4), (0.4, 0.1, 1.2))
+    scan = Scan(ScanWanted(voxel_m=0.02, box=box))
+    pairs = [
+        scan.take(str(number), float(number), processed_of(view)) for number, view in enumerate(film([*SEEN, *BACK]))
+    ]
+    assert Tracking.LOST in {pair.state for pair in pairs}
+    assert scan.fused == len(pairs)
+    carved = scan.close_submap().carved
+    assert carved is not None
+    assert carved.views == scan.fused
+    scan.crop(Box((-0.3, -0.4, 0.4), (0.4, 0.1, 1.2)))
+    assert scan.model().is_closed
+
+
+def test_kept_depths_take_back_what_was_apart() -> None:
+    """A view that is joined carves where it is put; one that is unknown, or was taken back, does not."""
+    kept, view = KeptDepths(), film(SEEN[:1])[0]
+    kept.keep_apart(7, view)
+    assert kept.joined(6, SEEN[0]) is None
+    seen = kept.joined(7, SEEN[0])
+    assert seen is not None
+    assert seen.depth_m.shape[1] <= 160
+    assert kept.joined(7, SEEN[0]) is None
+    carving = Carving(Cells.of(Box((-0.1, -0.1, 0.3), (0.1, 0.1, 0.5)), 0.02))
+    kept.carve(carving)
+    assert carving.views == 1
 
 
 def test_pieces_that_nobody_meets_do_not_grow_in_number() -> None:

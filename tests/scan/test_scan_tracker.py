@@ -104,6 +104,14 @@ def test_without_texture_the_model_carries_the_pose() -> None:
     assert (distance(told[-1].world_camera, path(4, STEP / 4)[3]) < (4e-3, 4e-3)).all()
 
 
+def test_depths_beyond_the_reach_are_no_model_and_no_fault() -> None:
+    """A view of nothing but what is too far to be fused is lost without a warning; the next one is found again."""
+    views, tracker = film(POSES[:3]), Tracker(SETTINGS)
+    far = replace(views[2], depth_m=np.full_like(views[2].depth_m, 50.0))
+    told = run([*views[:2], far, far, views[2]], tracker)
+    assert states(told)[2:] == [Tracking.LOST, Tracking.LOST, Tracking.RELOCALISED]
+
+
 def test_every_weakness_has_advice() -> None:
     """One line each, and none where nothing is wrong."""
     assert all(bool(each.advice) is (each is not Weakness.NONE) for each in Weakness)

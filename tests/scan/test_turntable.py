@@ -158,6 +158,15 @@ def test_a_jerky_turn_is_closed_to_one_surface(jerky: tuple[list[View], list[flo
     assert np.array_equal(again.mesh.triangles, model.mesh.triangles)
 
 
+def test_views_that_were_lost_together_do_not_double_the_surface(jerky: tuple[list[View], list[float]]) -> None:
+    """Turned on by 115 degrees at once and back again, the views between agree with each other only: they stay out, and what is fused lies on the thing."""
+    scan = scanned([jerky[0][number] for number in (0, 1, 2, 3, *range(14, 3, -1))])
+    points = scan.model().mesh.points_m.astype(np.float64)
+    assert scan.turn is not None
+    assert [pair.is_fused for pair in scan.pairs] == [True] * 4 + [False] * 10 + [True]
+    assert np.abs(off_thing_m(points)).mean() < 0.0006
+
+
 def test_a_table_is_found_where_it_lies(jerky: tuple[list[View], list[float]]) -> None:
     """Within a millimetre; without anything that stands still there is none."""
     view = jerky[0][0]

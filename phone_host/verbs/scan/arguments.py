@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_overlay_argument(parser)
     add_image_arguments(parser)
     add_model_arguments(parser)
-    _add_turntable_argument(parser)
+    add_turntable_arguments(parser)
     _add_resume_argument(parser)
     parser.add_argument(
         "--out",
@@ -120,7 +120,8 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_turntable_argument(parser: argparse.ArgumentParser) -> None:
+def add_turntable_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare --turntable and --onto: an object that turns."""
     parser.add_argument(
         "--turntable",
         action="store_true",

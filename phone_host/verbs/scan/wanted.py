@@ -34,15 +34,13 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
     """Read them.
 
     Args:
-        options: options as `add_model_arguments` declares them.
+        options: options as `add_model_arguments` and `add_turntable_arguments` declare them.
 
     Raises:
         SettingsError: one of them is invalid.
     """
     if options.memory < _LEAST_BYTES:
         raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
-    onto = _onto_of(options)
-    usual_m = math.nan if onto is None else onto.settings.voxel_m
     if options.mat is not None and options.turntable:
         raise SettingsError("--turntable beside --mat", "leave --turntable out: the mat tells how it turns")
     if options.object and (options.mat is not None or options.turntable):
@@ -50,6 +48,8 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
             f"--object beside {'--turntable' if options.mat is None else '--mat'}",
             "leave --object out: it is for a table without a mat, around which the cameras go",
         )
+    onto = _onto_of(options)
+    usual_m = math.nan if onto is None else onto.settings.voxel_m
     return ScanWanted(
         voxel_m=usual_m if options.voxel is None else voxel_of(options.voxel),
         most_bytes=int(options.memory),

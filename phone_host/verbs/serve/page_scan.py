@@ -25,7 +25,7 @@ from phone_host.scan.scan import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
-from phone_host.verbs.scan.arguments import add_model_arguments
+from phone_host.verbs.scan.arguments import add_model_arguments, add_turntable_arguments
 from phone_host.verbs.scan.live import live_scan
 from phone_host.verbs.scan.wanted import axes_of, box_of, scan_wanted
 
@@ -120,7 +120,7 @@ def page_scan(
         raise SettingsError(
             f"{min(unknown)!r} is no option of a scan that the page can set", f"give some of {', '.join(OF_SCAN)}"
         )
-    wanted = _wanted(values)
+    wanted = asked_scan(values)
     out = _new_folder(folder)
     opened = open_run(options, found, tell, feed)
     live = live_scan(opened, wanted, out)
@@ -128,11 +128,19 @@ def page_scan(
     return PageScan(prepared, live, out, found.values.matcher, axes_of(options, wanted))
 
 
-def _wanted(values: Choices) -> ScanWanted:
-    """Return what the page wants, by the options of the command."""
+def asked_scan(values: Choices) -> ScanWanted:
+    """Return what the page wants, by the options of the command.
+
+    Args:
+        values: options of `scan` by name, those of OF_SCAN; what is missing or empty is as the command has it.
+
+    Raises:
+        SettingsError: one of them is invalid, or contradicts another.
+    """
     given = {name: values.get(name, "").strip() for name in OF_SCAN}
     parser = argparse.ArgumentParser()
     add_model_arguments(parser)
+    add_turntable_arguments(parser)
     options = parser.parse_args([])
     options.voxel, options.box, options.mat = (given[name] or None for name in ("voxel", "box", "mat"))
     options.turntable, options.object = bool(given["turntable"]), bool(given["object"])

@@ -1,0 +1,45 @@
+"""What is wanted of a scan: the page's words mean what the command's options mean, and what does not go together is refused in one line."""
+
+from pathlib import Path
+
+import pytest
+
+from common.errors import SettingsError
+from phone_host.cli import main
+from phone_host.scan.mat import USUAL_MAT, parse_mat
+from phone_host.verbs.serve.page_scan import asked_scan
+
+
+def test_the_page_wants_what_the_command_wants() -> None:
+    """Nothing, a mat, or a turntable with a box: each is read by the command's own options."""
+    assert (asked_scan({}).mat, asked_scan({}).turntable, asked_scan({}).onto) == (None, False, None)
+    assert asked_scan({"mat": USUAL_MAT, "box": " "}).mat == parse_mat(USUAL_MAT)
+    turned = asked_scan({"turntable": "1", "voxel": "2mm", "box": "400x300x400@0,100,900"})
+    assert (turned.turntable, turned.voxel_m, turned.box is not None) == (True, 0.002, True)
+    with pytest.raises(SettingsError, match="--turntable beside --mat"):
+        asked_scan({"turntable": "1", "mat": USUAL_MAT})
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--mat", "--turntable"], "--turntable beside --mat"),
+        (["--mat", "--onto", "."], "--onto without --turntable"),
+        (["--mat", "--turntable", "--onto", "."], "--turntable beside --mat"),
+        (["--turntable", "--resume", "."], "--resume beside --turntable"),
+        (["--mat", "--axes", "y-up"], "--axes y-up beside --mat"),
+    ],
+)
+def test_what_does_not_go_together_is_one_line(
+    words: list[str], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2, before any picture is read."""
+    for side in ("l", "r"):
+        (tmp_path / side).mkdir()
+        for name in ("0.png", "1.png"):
+            (tmp_path / side / name).write_bytes(b"")
+    rig = ["--rectified", "--focal", "500", "--baseline", "60", "--out", str(tmp_path / "o")]
+    assert main(["scan", str(tmp_path / "l"), str(tmp_path / "r"), *rig, *words]) == 2
+    said = capsys.readouterr().err
+    assert told in said
+    assert len(said.strip().splitlines()) == 1
