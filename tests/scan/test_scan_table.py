@@ -18,6 +18,7 @@ from phone_host.output.meshes.solid import Solid
 from phone_host.scan.box import Box
 from phone_host.scan.scan import ScanWanted
 from phone_host.scan.scan_model import UNSEEN_RGB
+from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.table import Table, find_table
 from phone_host.scan.table_box import thing_box
 from phone_host.scan.tracking_words import Weakness
@@ -187,7 +188,7 @@ def test_a_scan_goes_on_where_it_was_and_not_as_another_one(pictures: Path) -> N
     scan = scan_for(wanted)
     for number in range(4):
         scan.take(str(number), float(number), computed(pictures, number))
-    kept = scan.close_submap()
+    kept = submap_of(submap_bytes(scan.close_submap()), "kept")
     later = scan_for(wanted)
     later.go_on([kept])
     assert later.model().mesh.points_m.tobytes() == scan.model().mesh.points_m.tobytes()

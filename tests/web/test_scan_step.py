@@ -57,7 +57,7 @@ def test_the_surface_grows_until_it_is_saved(
     page.click("#scan-go")
     page.wait_for_function("() => document.getElementById('scan-go').textContent === 'Stop'")
     assert program.commands[-1].do is Do.SCAN
-    assert program.commands[-1].values == {"voxel": "5mm", "box": "", "mat": "", "turntable": ""}
+    assert program.commands[-1].values == {"voxel": "5mm", "box": "", "mat": "", "turntable": "", "object": ""}
     assert page.text_content("#scan-none") == "No surface yet"
     words = "2 pairs in the model: moved too fast: move more slowly, back to where it was"
     growing.show(60)
