@@ -71,7 +71,8 @@ def absorbed(into: Blocks, of: Blocks, chosen: NDArray[np.uint8], rows: Floats) 
         into.field[block, voxel] = np.where(mean == 0, 1, mean)
         into.weights[block, voxel] = np.minimum(held + coming, MOST_WEIGHT)
         mine, theirs = held * (np.abs(before) < ONE), coming * (tinted[known] > 0)
-        other = tint[known] / np.maximum(tinted[known], _NEXT_TO_NOTHING)[:, np.newaxis]
+        share = tinted[known][:, np.newaxis]  # also next to nothing of a colour is that colour
+        other = tint[known] / np.where(share > 0, share, 1)
         old, told = into.colours[block, voxel], mine + theirs > 0
         both = np.where(told, mine + theirs, 1)[:, np.newaxis]
         mixed = np.rint((old * mine[:, np.newaxis] + other * theirs[:, np.newaxis]) / both)
