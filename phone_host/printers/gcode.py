@@ -19,7 +19,12 @@ MOST_FOR_LINES: Final = 90
 MOST_FOR_SERVERS: Final = 4096
 """Klipper has commands as long as the outline of a thing (EXCLUDE_OBJECT_DEFINE)."""
 
-_WORD: Final = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+)?)")
+_WORD: Final = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+)?)")
+"""Firmware takes blanks between a letter and its number."""
+
+_NUMBERED: Final = re.compile(r"[Nn]\s*\d+\s*(?=[A-Za-z])([^*]*)(?:\*\s*\d+)?")
+"""A line that has its number already, and perhaps its checksum, as hosts send them."""
+
 _NAME: Final = re.compile(r"([GMT]\d+)(?!\d)")
 _TIME: Final = re.compile(r";\s*(?:estimated printing time(?: \(normal mode\))?\s*=|TIME:)\s*(.+)", re.IGNORECASE)
 _TIME_PART: Final = re.compile(r"(\d+)\s*([dhms]?)")
@@ -34,6 +39,8 @@ _HEATING: Final = {
 }
 _INCH_MM: Final = 25.4
 _AXES: Final = "XYZ"
+_TURNS: Final = {"G2": -1, "G3": 1}
+"""Of arcs: with the clock, and against it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +49,7 @@ class Line:
 
     Attributes:
         number: in its file, from 1.
-        text: without comment and blanks around it.
+        text: without comment, number and checksum, and blanks around it.
     """
 
     number: int
@@ -100,7 +107,9 @@ def _without_comment(raw: str) -> str:
     text = raw.partition(";")[0]
     if "(" in text:
         text = re.sub(r"\([^)]*\)", "", text)
-    return text.strip().removesuffix("*").strip()
+    text = text.strip().removesuffix("*").strip()
+    numbered = _NUMBERED.fullmatch(text)
+    return text if numbered is None else numbered[1].strip()
 
 
 def name_of(text: str) -> str:
@@ -133,6 +142,8 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
         count += 1
         heaters.take(line.text)
         path.take(line.text)
+        if not path.is_somewhere:
+            raise DataError(f"{name}: line {line.number} moves to no place", "give the file that a slicer wrote")
     if not count:
         raise DataError(f"{name} has no line that a printer would do", "give the file that a slicer wrote")
     ends = _ends(path.low), _ends(path.high)
@@ -188,20 +199,25 @@ class _Path:
         self.low, self.high = [math.inf] * 3, [-math.inf] * 3
         self.extruding = 0
         self._at = [0.0, 0.0, 0.0]
+        self._shift = [0.0, 0.0, 0.0]
+        self._is_homed = [False, False, False]
         self._e = 0.0
         self._is_relative = self._e_is_relative = False
         self._unit = 1.0
+
+    @property
+    def is_somewhere(self) -> bool:
+        """Whether the nozzle is at a place that has numbers."""
+        return all(map(math.isfinite, self._at))
 
     def take(self, text: str) -> None:
         """Take a line."""
         words = _words(text)
         match name_of(text):
-            case "G0" | "G1" | "G2" | "G3":
-                self._move(words)
+            case "G0" | "G1" | "G2" | "G3" as name:
+                self._move(words, _TURNS.get(name, 0))
             case "G28":
-                asked = [axis for axis, letter in enumerate(_AXES) if letter in text.upper()[3:]]
-                for axis in asked or range(3):
-                    self._at[axis] = 0.0
+                self._home([axis for axis, letter in enumerate(_AXES) if letter in text.upper()[3:]])
             case "G90":
                 self._is_relative = self._e_is_relative = False
             case "G91":
@@ -217,23 +233,54 @@ class _Path:
             case "G21":
                 self._unit = 1.0
 
+    def _home(self, asked: list[int]) -> None:
+        for axis in asked or range(3):
+            self._at[axis] = self._shift[axis] = 0.0
+            self._is_homed[axis] = True
+
     def _set(self, words: dict[str, float]) -> None:
+        """Give the place where the nozzle is other numbers: it does not move. Before it was homed, they say where it is."""
         for axis, letter in enumerate(_AXES):
-            self._at[axis] = words.get(letter, self._at[axis] / self._unit) * self._unit
+            if letter in words and self._is_homed[axis]:
+                self._shift[axis] = self._at[axis] - words[letter] * self._unit
+            elif letter in words:
+                self._at[axis] = words[letter] * self._unit
         self._e = words.get("E", self._e)
 
-    def _move(self, words: dict[str, float]) -> None:
+    def _move(self, words: dict[str, float], turn: int) -> None:
+        """Follow a line, or an arc: against the clock (1), or with it (-1)."""
         before = list(self._at)
         for axis, letter in enumerate(_AXES):
             if letter in words:
                 value = words[letter] * self._unit
-                self._at[axis] = self._at[axis] + value if self._is_relative else value
+                self._at[axis] = value + (self._at[axis] if self._is_relative else self._shift[axis])
         amount = words.get("E", 0.0 if self._e_is_relative else self._e)
         fed = amount if self._e_is_relative else amount - self._e
         self._e = self._e + amount if self._e_is_relative else amount
-        if fed <= 0 or not {"X", "Y"} & words.keys():
+        if fed <= 0 or not {"X", "Y", "I", "J"} & words.keys():
             return
         self.extruding += 1
-        for axis in range(3):
-            self.low[axis] = min(self.low[axis], before[axis], self._at[axis])
-            self.high[axis] = max(self.high[axis], before[axis], self._at[axis])
+        for place in (before, self._at, *(self._tips(before, words, turn) if turn else ())):
+            for axis in range(3):
+                self.low[axis] = min(self.low[axis], place[axis])
+                self.high[axis] = max(self.high[axis], place[axis])
+
+    def _tips(self, before: list[float], words: dict[str, float], turn: int) -> Iterator[tuple[float, float, float]]:
+        """Yield where an arc in the plane of the bed reaches farthest along its axes, beside its ends."""
+        along, across = self._at[0] - before[0], self._at[1] - before[1]
+        if "R" in words:
+            radius, chord = words["R"] * self._unit, math.hypot(along, across)
+            if not chord:
+                return
+            # Left of the way for a short arc against the clock; a radius below 0 means the long one.
+            off = math.sqrt(max(radius**2 - chord**2 / 4, 0.0)) * turn * math.copysign(1, radius) / chord
+            x, y = along / 2 - across * off, across / 2 + along * off
+        else:
+            x, y = words.get("I", 0.0) * self._unit, words.get("J", 0.0) * self._unit
+        radius = math.hypot(x, y)
+        begin, end = math.atan2(-y, -x), math.atan2(across - y, along - x)
+        swept = (turn * (end - begin)) % math.tau or math.tau
+        for quarter in range(4):
+            angle = quarter * math.pi / 2
+            if (turn * (angle - begin)) % math.tau < swept:
+                yield before[0] + x + radius * math.cos(angle), before[1] + y + radius * math.sin(angle), self._at[2]

@@ -48,7 +48,7 @@ class Journal:
         try:
             with self._path.open() as file:
                 values = json.loads(file.read(_MOST_BYTES))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return None
         entry = _entry(values)
         return entry if entry is not None and not _is_alive(entry.pid) else None

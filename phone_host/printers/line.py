@@ -113,6 +113,8 @@ class _SocketLine:
             self._socket = _connected(uri)
         except OSError as error:
             raise _unavailable(uri, error.errno, error.strerror or str(error)) from None
+        except UnicodeError:  # what no name in a network can be, such as `..`
+            raise _unavailable(uri, None, "it is no name of a host") from None
 
     def read(self, wait_s: float) -> bytes:
         try:
@@ -157,6 +159,8 @@ def _unavailable(uri: LineUri, number: int | None, words: str = "") -> Unavailab
         return MissingDeviceError(
             f"there is no printer at {uri.place}", "plug it in and switch it on; `ls /dev/serial/by-id` tells its name"
         )
+    if uri.kind is LineKind.SERIAL and number is None:
+        return UnavailableError(f"{uri.place} is no serial port", "`ls /dev/serial/by-id` tells the printer's name")
     if uri.kind is LineKind.SERIAL and number in {11, 16}:
         return TakenError(f"another program has {uri.place}", "end it: OctoPrint, Pronterface, ModemManager")
     if number == 13:

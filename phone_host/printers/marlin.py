@@ -58,9 +58,10 @@ _WAKE: Final = "M108"
 """Ends waiting for a temperature, where the firmware hears it at once."""
 
 _FATAL: Final = re.compile(r"halted|kill\(\)|thermal|heating failed|maxtemp|mintemp|stopped|emergency", re.IGNORECASE)
-_ASKED: Final = re.compile(r"(?:resend|rs)[: ]+N?(\d+)", re.IGNORECASE)
+_ASKED: Final = re.compile(r"(?:resend|rs)[: ]+N?(\d{1,9})(?!\d)", re.IGNORECASE)
 _ORDER: Final = re.compile(r"line number is not|expected line", re.IGNORECASE)
-_HEAT: Final = re.compile(r"\b(T|B)\d?:\s*(-?[\d.]+)\s*/\s*(-?[\d.]+)")
+_HEAT: Final = re.compile(r"\b(T|B)\d?:\s*(-?\d{1,5}(?:\.\d+)?)\s*/\s*(-?\d{1,5}(?:\.\d+)?)")
+"""A cable spoils what the printer says, too: only numbers are taken for numbers."""
 
 
 @dataclass(slots=True)
@@ -233,11 +234,12 @@ class MarlinSender:
         elif number > under_way.number:
             self._fail(
                 f"the printer asks for line {number}, which was not sent yet",
-                "another program may be using its port: end it",
+                "another program may be using its port: end it; see whether its heaters are off",
             )
         else:
             self._fail(
-                f"the printer asks for line {number}, long after it was sent", "see whether its cable is at fault"
+                f"the printer asks for line {number}, long after it was sent",
+                "see whether its heaters are off, and its cable sound",
             )
 
     def _go_back(self, number: int, now_ns: int) -> None:
@@ -281,7 +283,7 @@ class MarlinSender:
         if under_way.tries >= _MOST_TRIES and now_ns - self._last_heard_ns > _USUAL_NS:
             self._fail(
                 "the printer does not answer",
-                "see whether it is on and its cable is plugged in, and whether the baud rate is right",
+                "see whether it is on and its cable is plugged in, whether the baud rate is right, and whether its heaters are off",
             )
             return b""
         self.resent += 1

@@ -51,7 +51,7 @@ def job_of(what: Path, wanted: Wanted, uri: PrinterUri, tell: Callable[[str], No
         what: G-code, a scan's folder or a mesh file.
         wanted: how.
         uri: of the printer.
-        tell: is told what is done next.
+        tell: is told what is done next, several times a second; what it raises ends the work, and a slicer that runs.
 
     Raises:
         SettingsError: G-code is given, and what only a model has.
@@ -79,14 +79,14 @@ def job_of(what: Path, wanted: Wanted, uri: PrinterUri, tell: Callable[[str], No
         stl = folder / f"{upright.model.stem}.stl"
         _write(upright, stl)
         tell("slicing")
-        facts = sliced(stl, gcode, wanted.slicing, most)
+        facts = sliced(stl, gcode, wanted.slicing, most, lambda: tell("slicing"))
         yield Job(gcode, gcode.name, facts)
 
 
 @contextmanager
 def _folder() -> Iterator[Path]:
     try:
-        made = tempfile.TemporaryDirectory(prefix="tandemscan-")
+        made = tempfile.TemporaryDirectory(prefix="tandemscan-", ignore_cleanup_errors=True)
     except OSError as error:
         raise _full(error) from None
     with made as name:

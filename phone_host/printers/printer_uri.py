@@ -135,7 +135,7 @@ def read_uri(text: str) -> PrinterUri:
             return LineUri(text, kind, place.upper(), port=channel)
         case LineKind.SOCKET:
             host, _, port = place.rpartition(":")
-            if not host or not _is_port(port) or query:
+            if not _HOST.fullmatch(host) or not _is_port(port) or query:
                 raise SettingsError(f"--printer {text!r} has no host and port", "give socket://HOST:PORT")
             return LineUri(text, kind, host.strip("[]"), port=int(port))
 

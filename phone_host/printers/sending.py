@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import chain
 from typing import Final
 
@@ -24,6 +25,8 @@ _CANCEL_NS: Final = 5 * SECOND_NS
 """Heaters are switched off within a second; a printer that is deaf for so long will not hear it."""
 
 _COLD: Final = ("M104 S0", "M140 S0")
+_COLD_NOW: Final = "".join(f"{text}\n" for text in ("M108", *_COLD)).encode()
+"""After a failure, without numbers: the printer takes them even where it and we count differently. Whether it hears them, nobody knows."""
 
 
 class LineDoor:
@@ -67,6 +70,10 @@ def _notes(facts: GcodeFacts) -> tuple[str, ...]:
     return ("its G-code leaves heaters on: they were switched off",) if facts.leaves_hot else ()
 
 
+def _unreadable(error: OSError) -> DataError:
+    return DataError(f"the G-code cannot be read any more ({error.strerror})", "copy it to this machine's own disk")
+
+
 def _telling(sender: MarlinSender, facts: GcodeFacts, tell: Callable[[Progress], None]) -> Callable[[], None]:
     began_ns: list[int] = []
 
@@ -95,7 +102,7 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], No
 
     Raises:
         PrinterGoneError: the printer is gone.
-        DataError: a line of the file is none of G-code; the heaters are off.
+        DataError: a line of the file is none of G-code, or cannot be read any more; the heaters are off.
     """
     told_ns, rest, cancelled_ns, failure = 0, b"", 0, None
     while not sender.phase.is_over:
@@ -117,6 +124,9 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], No
         except DataError as error:
             failure, data = error, b""
             wishes.cancel()
+        except OSError as error:  # of the file: the protocol opens nothing else
+            failure, data = _unreadable(error), b""
+            wishes.cancel()
         if data:
             line.write(data)
         if now_ns - told_ns >= _TELL_NS:
@@ -129,5 +139,8 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], No
         rest = rest[-_MOST_LINE:]
     if failure is not None:
         raise failure
+    if sender.phase is Phase.FAILED:
+        with suppress(PrinterGoneError):
+            line.write(_COLD_NOW)
     tell()
     return sender.phase

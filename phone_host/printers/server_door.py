@@ -7,6 +7,7 @@ import math
 import re
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 from common import now
@@ -124,17 +125,18 @@ class _Watch:
         """Ask how it is, and pass a pause on.
 
         Raises:
-            UnavailableError: the server is silent for long.
+            UnavailableError: the server is silent for long, or says nothing that makes sense: a proxy before it may do so while it restarts.
         """
         try:
             if self._wishes.is_paused != self._is_paused:
                 self._is_paused = not self._is_paused
                 (self._server.pause if self._is_paused else self._server.go_on)()
             self._last = self._server.state()
-        except ServerLostError as error:
+        except UnavailableError as error:
             if now.monotonic_ns() - self._heard_ns > _LOST_NS:
+                more = " any more" if isinstance(error, ServerLostError) else ""
                 raise PrinterGoneError(
-                    f"{error.problem} any more: the print goes on there, and cannot be cooled from here",
+                    f"{error.problem}{more}: the print goes on there, and cannot be cooled from here",
                     "go and look",
                 ) from None
             return
@@ -203,21 +205,21 @@ class _Watch:
 
     def _end_and_cool(self) -> None:
         for ask in (self._server.cancel, self._server.cool):
-            try:
+            with suppress(
+                TandemError
+            ):  # one that is refused, with the key or without words, does not keep the other one away
                 ask()
-            except ServerLostError:
-                continue
 
     def _halted(self) -> str:
         try:
             return self._server.halt()
-        except ServerLostError:
+        except TandemError:
             return ""
 
     def _is_cold(self) -> bool:
         try:
             self._last = self._server.state()
-        except ServerLostError:
+        except TandemError:
             return False
         return not self._last.condition.is_active and not self._last.is_hot
 

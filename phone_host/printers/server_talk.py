@@ -27,6 +27,7 @@ _FAILURES: Final[tuple[tuple[type[Exception], str, str], ...]] = (
     (TimeoutError, "does not answer", "see whether it is on, and whether both are in one network"),
     (ConnectionRefusedError, "refuses the connection", "see whether it is running, and at which port"),
     (socket.gaierror, "has no address", "check its name, or give its number"),
+    (UnicodeError, "has no address", "check its name, or give its number"),
     (ConnectionResetError, "hangs up without an answer", "check the port, and whether it needs ?tls=1"),
     (http.client.HTTPException, "does not speak HTTP", "check the port, and whether it needs ?tls=1"),
 )  # fmt: skip

@@ -7,12 +7,16 @@ import math
 import os
 import shutil
 import subprocess
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import Final, assert_never
 
+from common import now
 from common.errors import DataError, SettingsError, UnavailableError
+from common.places import Kind, kind_of
 from phone_host.printers.gcode import MOST_FOR_LINES, GcodeFacts, examine
 
 
@@ -68,6 +72,7 @@ _CURA_PATH: Final = "CURA_ENGINE_SEARCH_PATH"
 _CURA_MACHINE: Final = "fdmprinter.def.json"
 
 _PATIENCE_S: Final = 1800
+_TELL_S: Final = 0.2
 _AXES: Final = "XYZ"
 _SLACK_MM: Final = 0.01
 
@@ -110,7 +115,13 @@ def find_slicer(wanted: Slicer | None = None) -> tuple[Slicer, str]:
     )
 
 
-def sliced(stl: Path, gcode: Path, wanted: SlicingWanted, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
+def sliced(
+    stl: Path,
+    gcode: Path,
+    wanted: SlicingWanted,
+    most_characters: int = MOST_FOR_LINES,
+    tell: Callable[[], None] = lambda: None,
+) -> GcodeFacts:
     """Slice a model in the middle of the bed.
 
     Args:
@@ -118,6 +129,7 @@ def sliced(stl: Path, gcode: Path, wanted: SlicingWanted, most_characters: int =
         gcode: the file to write.
         wanted: how.
         most_characters: that a line of it may have.
+        tell: called several times a second; what it raises ends the slicer.
 
     Returns:
         What the file asks of the printer.
@@ -128,52 +140,96 @@ def sliced(stl: Path, gcode: Path, wanted: SlicingWanted, most_characters: int =
         DataError: it cannot slice the model, or what it wrote leaves the bed.
     """
     slicer, program = find_slicer(wanted.slicer)
+    if wanted.profile is not None and kind_of(wanted.profile) is not Kind.FILE:
+        raise SettingsError(f"--profile {wanted.profile} is no file", "give settings that the slicer has exported")
     environment = dict(os.environ)
     match slicer:
         case Slicer.PRUSA:
             asked = _prusa(program, stl, gcode, wanted)
-            if wanted.profile is None:
-                return _sliced_bare_if_needed(asked, environment, gcode, wanted, most_characters)
         case Slicer.CURA:
             asked = _cura(program, stl, gcode, wanted)
             environment.setdefault(_CURA_PATH, os.pathsep.join(map(str, _cura_folders())))
         case _:
             assert_never(slicer)
-    return _run(asked, environment, gcode, wanted, most_characters)
+    slicing = _Slicing(asked, environment, gcode, wanted.bed_mm, most_characters, tell)
+    if slicer is Slicer.PRUSA and wanted.profile is None:
+        return _sliced_bare_if_needed(slicing)
+    return _run(slicing)
 
 
-def _sliced_bare_if_needed(
-    asked: list[str], environment: dict[str, str], gcode: Path, wanted: SlicingWanted, most_characters: int
-) -> GcodeFacts:
+@dataclass(frozen=True, slots=True)
+class _Slicing:
+    """A slicer as it is started, and what is asked of its file.
+
+    Attributes:
+        asked: its words.
+        environment: of its process.
+        gcode: that it writes.
+        bed_mm: that must hold it.
+        most_characters: of its lines.
+        tell: called several times a second; what it raises ends the slicer.
+    """
+
+    asked: list[str]
+    environment: dict[str, str]
+    gcode: Path
+    bed_mm: tuple[float, float, float]
+    most_characters: int
+    tell: Callable[[], None]
+
+
+def _sliced_bare_if_needed(slicing: _Slicing) -> GcodeFacts:
     """Slice with a skirt around the thing; where that leaves the bed, without."""
     try:
-        return _run(asked, environment, gcode, wanted, most_characters)
+        return _run(slicing)
     except _OutsideError:
-        return _run([asked[0], _BARE, *asked[1:]], environment, gcode, wanted, most_characters)
+        program, *words = slicing.asked
+        return _run(replace(slicing, asked=[program, _BARE, *words]))
 
 
-def _run(
-    asked: list[str], environment: dict[str, str], gcode: Path, wanted: SlicingWanted, most_characters: int
-) -> GcodeFacts:
-    program = asked[0]
+def _run(slicing: _Slicing) -> GcodeFacts:
+    program, gcode = slicing.asked[0], slicing.gcode
     try:
-        done = subprocess.run(
-            asked, capture_output=True, text=True, check=False, timeout=_PATIENCE_S, errors="replace", env=environment
-        )
+        code, told = _ended(slicing)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise UnavailableError(
             f"{program} does not end in order ({error})", "slice elsewhere and print the G-code"
         ) from None
-    if done.returncode or not gcode.exists():
-        said = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+    if code or not gcode.exists():
+        said = [line.strip() for line in told.splitlines() if line.strip()]
         words = next((line for line in said if "error" in line.lower()), said[-1] if said else "")
         raise DataError(
-            f"the slicer refuses the model ({words[:200] or f'exit code {done.returncode}'})",
+            f"the slicer refuses the model ({words[:200] or f'exit code {code}'})",
             "see what phone-host printcheck says of it",
         )
-    facts = facts_of(gcode, most_characters)
-    require_inside(gcode, facts, wanted.bed_mm)
+    facts = facts_of(gcode, slicing.most_characters)
+    require_inside(gcode, facts, slicing.bed_mm)
     return facts
+
+
+def _ended(slicing: _Slicing) -> tuple[int, str]:
+    """Run a slicer to its end; return its exit code, and all that it said. Whatever is raised meanwhile ends it."""
+    end_ns = now.monotonic_ns() + _PATIENCE_S * 1_000_000_000
+    with subprocess.Popen(
+        slicing.asked,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        env=slicing.environment,
+    ) as process:
+        try:
+            while True:
+                slicing.tell()
+                with suppress(subprocess.TimeoutExpired):
+                    said, complaints = process.communicate(timeout=_TELL_S)
+                    return process.returncode, said + complaints
+                if now.monotonic_ns() > end_ns:
+                    raise subprocess.TimeoutExpired(slicing.asked[0], _PATIENCE_S)
+        except BaseException:
+            process.kill()
+            raise
 
 
 def _prusa(program: str, stl: Path, gcode: Path, wanted: SlicingWanted) -> list[str]:
@@ -224,6 +280,8 @@ def facts_of(gcode: Path, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
         DataError: it is none, or cannot be read.
     """
     try:
+        if kind_of(gcode) in {Kind.PIPE, Kind.DEVICE, Kind.SOCKET}:  # it would be waited for, and is read twice
+            raise DataError(f"{gcode} is not a plain file", "give the file that a slicer wrote")
         with gcode.open(encoding="utf-8", errors="replace") as file:
             return examine(file, str(gcode), most_characters)
     except OSError as error:

@@ -6,7 +6,7 @@ only an answer that names both starts it.
 
 import math
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Final
@@ -23,8 +23,15 @@ from phone_host.run.model_job import check_model, export_model
 from phone_host.serve.program import PrintWanted
 from phone_host.web.source import PrintStage, PrintState
 
+_GIVEN_UP_S: Final = 2.0
+"""A slicer is ended at once; whoever waits for a printer's answer is not waited for."""
+
 _END_S: Final = 20.0
 """A printer on a line has its heaters off after a second; a server is given time to answer."""
+
+
+class _GivenUpError(Exception):
+    """Raised inside what prepares a print that nobody wants any more. Nobody's fault."""
 
 
 class Workshop:
@@ -42,7 +49,7 @@ class Workshop:
         self._wanted: PrintWanted | None = None
         self._job: Job | None = None
         self._running: RunningPrint | None = None
-        self._is_unwanted = False
+        self._is_unwanted = self._is_closed = False
         self._preparing: Thread | None = None
 
     @property
@@ -109,6 +116,8 @@ class Workshop:
             raise SettingsError("no printer is given", "give its address, such as octoprint://octopi.local")
         with self._lock:
             self._require_free()
+            if self._is_closed:
+                raise SettingsError("the program ends", "start it again")
             self._wanted, self._is_unwanted = wanted, False
             self._show(PrintStage.PREPARING, "the printer is asked")
             self._preparing = Thread(target=self._prepare, args=(place, wanted), name="prepare a print", daemon=True)
@@ -167,26 +176,38 @@ class Workshop:
                 return "it is cancelled; the heaters are switched off"
             self._is_unwanted = True
             if self._state.stage is PrintStage.ASKS:
-                self._put_away(PrintStage.OVER, "not printed")
+                self._put_away("not printed")
+            else:
+                self._show(PrintStage.PREPARING, "it is given up")
         return "not printed"
 
     def close(self) -> None:
         """End what goes on; the process ends."""
         with self._lock:
-            running, self._is_unwanted = self._running, True
+            running, preparing = self._running, self._preparing
+            self._is_unwanted = self._is_closed = True
         if running is not None:
             running.cancel()
             running.join(_END_S)
+        if preparing is not None:
+            preparing.join(_GIVEN_UP_S)
         with self._lock:
-            self._kept.close()
+            if self._state is not None and self._state.stage is PrintStage.ASKS:
+                self._put_away("not printed")
 
     def _prepare(self, place: Path, wanted: PrintWanted) -> None:
         kept = ExitStack()
+        with self._lock:
+            self._kept = kept
         try:
             assert wanted.door is not None
             assert wanted.uri is not None
             wanted.door.require_ready()
+            self._say("reading")
             job = kept.enter_context(job_of(place, wanted.how, wanted.uri, self._say))
+        except _GivenUpError:
+            self._not_prepared("not printed")
+            return
         except TandemError as error:
             self._not_prepared(f"{error.problem}: {error.remedy}")
             return
@@ -194,9 +215,8 @@ class Workshop:
             self._not_prepared(f"it cannot be prepared ({type(error).__name__}: {error})")
             return
         with self._lock:
-            self._kept = kept
             if self._is_unwanted:
-                self._put_away(PrintStage.OVER, "not printed")
+                self._put_away("not printed")
                 return
             self._job = job
             asks = f"{job.name} on {wanted.text}"
@@ -206,11 +226,22 @@ class Workshop:
 
     def _not_prepared(self, words: str) -> None:
         with self._lock:
-            self._put_away(PrintStage.OVER, "not printed" if self._is_unwanted else words, level="bad")
+            if self._is_unwanted:
+                self._put_away("not printed")
+            else:
+                self._put_away(words, level="bad")
 
     def _say(self, words: str) -> None:
-        if not self._is_unwanted:
-            self._show(PrintStage.PREPARING, words)
+        """Tell what is done next; called several times a second in the thread that prepares.
+
+        Raises:
+            _GivenUpError: nobody wants it any more.
+        """
+        with self._lock:
+            if self._is_unwanted:
+                raise _GivenUpError
+            if self._state is None or self._state.words != words:
+                self._show(PrintStage.PREPARING, words)
 
     def _heard(self, progress: Progress) -> None:
         """Take how far the print is; called in its thread."""
@@ -232,14 +263,17 @@ class Workshop:
         else:
             words, level = "; ".join((f"{name}: printed", *outcome.notes)), "good"
         with self._lock:
-            self._put_away(PrintStage.OVER, words, level=level)
+            self._put_away(words, level=level)
 
-    def _put_away(self, stage: PrintStage, words: str, *, level: str = "unknown") -> None:
-        self._kept.close()
-        self._kept, self._job, self._running = ExitStack(), None, None
-        self._show(stage, words, level=level)
+    def _put_away(self, words: str, *, level: str = "unknown") -> None:
+        kept, self._kept, self._job, self._running = self._kept, ExitStack(), None, None
+        with suppress(OSError):  # a folder that cannot be removed must not keep the next print away
+            kept.close()
+        self._show(PrintStage.OVER, words, level=level)
 
     def _require_free(self) -> None:
+        if self._state is not None and self._state.stage is PrintStage.PREPARING and self._is_unwanted:
+            raise SettingsError("the print before is still given up", "try again in a moment")
         if self._state is not None and self._state.stage is not PrintStage.OVER:
             raise SettingsError("a print is prepared or goes on", "cancel it first")
 

@@ -1,5 +1,6 @@
 """What is wrong with a model, or with the disk, gets one line from each command that takes models; nothing is lost."""
 
+import os
 import struct
 import subprocess
 import sys
@@ -81,3 +82,17 @@ def test_a_full_disk_is_told_and_what_was_there_stays(models: Path, words: list[
     assert len(ended.stderr.splitlines()) == 1
     left = [(path.name, path.read_text()) for path in out.iterdir() if path.name != ".tandemscan"]
     assert left == [("older.stl", "mine")]
+
+
+def test_a_pipe_as_gcode_and_a_profile_that_is_not_there_are_refused_at_once(models: Path) -> None:
+    """Nobody waits for the other end of a pipe; a missing profile is the option's fault, not the model's."""
+    os.mkfifo(models / "pipe.gcode")
+    ended = said(models, "print", "pipe.gcode", "--printer", "file:x.gcode")
+    assert ended.returncode == 4
+    assert ended.stderr.startswith("phone-host: error: pipe.gcode is not a plain file: ")
+    ended = said(models, "print", "cube.stl", "--unit", "mm", "--printer", "file:x.gcode", "--profile", "none.ini")
+    if "no slicer is installed" in ended.stderr:
+        pytest.skip("needs a slicer")
+    assert ended.returncode == 2
+    assert "--profile none.ini is no file" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1

@@ -1,5 +1,6 @@
 """A print over a serial line: every line once, in order, whatever happens to it on the way."""
 
+import errno
 import time
 from collections.abc import Callable, Iterator
 
@@ -14,6 +15,7 @@ from phone_host.printers.printer_uri import LineUri, read_uri
 from phone_host.printers.progress import Phase
 from phone_host.printers.sending import send
 from tests.support.marlin_printer import Faults, MarlinPrinter, cube, printer
+from tests.support.programs import until
 
 S = 1_000_000_000
 
@@ -139,6 +141,7 @@ def test_a_printer_that_fails_is_told(said: str, words: str) -> None:
     """What it says ends the print, with what it said."""
     with printer(Faults(says={50: said})) as there:
         sender = printed(there, cube(300))
+        until(lambda: there.nozzle == there.bed == 0.0, "it was told to be cold, should it hear that")
     assert sender.phase is Phase.FAILED
     assert words in sender.problem
     assert sender.remedy
@@ -160,9 +163,29 @@ def test_a_broken_file_cools_the_printer() -> None:
         assert there.nozzle == there.bed == 0.0
 
 
+def test_a_file_that_cannot_be_read_any_more_cools_the_printer() -> None:
+    """Its stick is pulled in the middle: the heaters are off, then that is said."""
+
+    def pulled() -> Iterator[str]:
+        yield from cube(200)[:100]
+        raise OSError(errno.EIO, "Input/output error")
+
+    with printer() as there:
+        line = open_line(line_uri(f"serial:{there.path}"))
+        with pytest.raises(DataError, match="cannot be read any more"):
+            send(line, MarlinSender(lines_of(pulled(), "cube.gcode"), time.monotonic_ns()), Wishes(), lambda: None)
+        line.close()
+        assert there.nozzle == there.bed == 0.0
+
+
 @pytest.mark.parametrize(
     ("uri", "words"),
-    [("serial:/dev/ttyNOPE9", "there is no printer"), ("socket://127.0.0.1:9", "no printer answers")],
+    [
+        ("serial:/dev/ttyNOPE9", "there is no printer"),
+        ("serial:/dev/null", "/dev/null is no serial port"),
+        ("socket://127.0.0.1:9", "no printer answers"),
+        ("socket://..:9", "no name of a host"),
+    ],
 )
 def test_a_printer_that_is_not_there_is_named(uri: str, words: str) -> None:
     """With a remedy."""

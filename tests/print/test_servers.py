@@ -141,6 +141,7 @@ def test_no_server_is_told(job: Job) -> None:
     for uri, words in (
         ("octoprint://127.0.0.1:9", "refuses the connection"),
         ("moonraker://no-such-host.invalid", "has no address"),
+        ("moonraker://..", "has no address"),
     ):
         with pytest.raises(UnavailableError, match=words):
             door_to(read_uri(uri)).send(job, Wishes(), lambda _: None)
@@ -170,6 +171,36 @@ def test_a_print_that_ends_otherwise_is_told(kind: ServerKind, job: Job, faults:
     assert ended.phase is Phase.FAILED
     assert words in ended.problem
     assert ended.remedy
+
+
+def test_a_proxy_that_errs_for_a_moment_ends_nothing(job: Job) -> None:
+    """OctoPi's proxy says 503 while OctoPrint restarts; the print goes on, and so does the watching."""
+    with print_server(ServerKind.OCTOPRINT, ServerFaults(rate=0.3)) as there:
+        running = RunningPrint(Place(door_to(read_uri(there.uri), KEY), there.uri, "cup.gcode"), job)
+        running.start()
+        until(lambda: running.progress.phase is Phase.PRINTING, "it prints")
+        there.faults.raw = b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\n\r\n"
+        before = there.answers
+        until(lambda: there.answers >= before + 2, "it was asked meanwhile")
+        there.faults.raw = b""
+        assert running.join(60)
+        assert isinstance(running.outcome, Ended)
+        assert running.outcome.phase is Phase.DONE
+
+
+def test_a_key_that_may_not_cool_is_no_reason_to_call_it_cold(job: Job) -> None:
+    """OctoPrint ends the print, and forbids the command for the heaters: nobody says that they are off."""
+    wishes = Wishes()
+
+    def watch(progress: Progress) -> None:
+        if progress.phase is Phase.PRINTING:
+            wishes.cancel()
+
+    faults = ServerFaults(rate=0.01, forbids="/printer/command")
+    with print_server(ServerKind.OCTOPRINT, faults) as there:
+        with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
+            printed(there, job, wishes=wishes, tell=watch)
+        assert there.condition == "cancelled"
 
 
 def test_klipper_that_does_not_cool_is_stopped_at_once(job: Job) -> None:

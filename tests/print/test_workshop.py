@@ -1,6 +1,8 @@
 """What the page makes of a scan, by the station's own parts: checked, saved, printed on a simulated printer."""
 
+import os
 import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -117,3 +119,56 @@ def test_what_is_wrong_with_a_printer_is_said(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="nothing is printed"):
         workshop.cancel()
     workshop.close()
+
+
+@pytest.fixture
+def slow_slicer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A slicer that never ends is the first one on the path; the file tells its process."""
+    program, told = tmp_path / "bin" / "prusa-slicer", tmp_path / "slicer.pid"
+    program.parent.mkdir()
+    program.write_text(f"#!/bin/sh\necho $$ > {told}\nexec sleep 1000\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(program.parent), prepend=os.pathsep)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    return told
+
+
+def _is_there(told: Path) -> bool:
+    return Path(f"/proc/{told.read_text().strip()}").exists()
+
+
+def _sliced_files(folder: Path) -> list[Path]:
+    return list(folder.glob("tandemscan-*"))
+
+
+def test_cancelling_while_it_is_sliced_ends_the_slicer(tmp_path: Path, slow_slicer: Path) -> None:
+    """At once: nothing of it stays, and the next print can be prepared; the end of the program is no different."""
+    workshop, folder = Workshop(lambda: None), scan(tmp_path / "cube", 0.02)
+    wanted = asked_print({"printer": f"file:{tmp_path / 'out.gcode'}"}, None)
+    for end in (workshop.cancel, workshop.close):
+        workshop.prepare(folder, wanted)
+        until(lambda: slow_slicer.exists() and bool(slow_slicer.read_text().strip()), "it is sliced")
+        assert state(workshop).words == "slicing"
+        end()
+        until(lambda: state(workshop).stage is PrintStage.OVER, "it is given up")
+        assert state(workshop).words == "not printed"
+        assert not _is_there(slow_slicer)
+        assert _sliced_files(tmp_path) == []
+        slow_slicer.unlink()
+    with pytest.raises(SettingsError, match="the program ends"):
+        workshop.prepare(folder, wanted)
+
+
+@needs_slicer
+def test_what_was_prepared_is_not_started_after_the_end(tmp_path: Path) -> None:
+    """Its file is gone, so it may not be; a file that somebody else has removed keeps no other print away."""
+    workshop, folder = Workshop(lambda: None), scan(tmp_path / "cube", 0.006)
+    wanted = asked_print({"printer": f"file:{tmp_path / 'out.gcode'}"}, None)
+    workshop.prepare(folder, wanted)
+    until(lambda: state(workshop).stage is PrintStage.ASKS, "it asks")
+    asks = state(workshop).asks
+    workshop.close()
+    with pytest.raises(SettingsError, match="nothing is ready"):
+        workshop.start(asks)
+    assert not (tmp_path / "out.gcode").exists()

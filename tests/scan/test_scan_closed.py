@@ -209,7 +209,7 @@ def test_counts_stay_at_their_greatest() -> None:
     assert np.array_equal(again.empty, carving.empty)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 2**32 - 1), st.floats(0.05, 0.95), st.floats(0.0, 1.0))
 def test_whatever_the_field_the_surface_is_closed(seed: int, inside: float, known: float) -> None:
     """Random fields, as no thing has them: each edge has two triangles that face the same way, and none crosses another."""

@@ -37,6 +37,7 @@ class ServerFaults:
         starts: whether a file that was handed over is begun.
         cools: whether the heaters can be switched off.
         raw: sent in place of every answer; empty: the answer.
+        forbids: end of the paths that the key does not open; empty: it opens all.
         silent_after: answers after which it hangs up on everybody.
     """
 
@@ -50,6 +51,7 @@ class ServerFaults:
     starts: bool = True
     cools: bool = True
     raw: bytes = b""
+    forbids: str = ""
     silent_after: int = 1 << 30
 
 
@@ -63,6 +65,7 @@ class PrintServerStandIn:
         goal: where the nozzle's heater shall go, degrees C.
         cooled_s: when it was switched off, time.monotonic().
         paused: how often it was.
+        answers: how often it was asked.
     """
 
     def __init__(self, kind: ServerKind, faults: ServerFaults) -> None:
@@ -74,7 +77,7 @@ class PrintServerStandIn:
         self.paused = 0
         self.condition = faults.condition
         self.share = 0.0
-        self._answers = 0
+        self.answers = 0
         self._at_s = time.monotonic()
         self.lock = threading.Lock()
         stand_in = self
@@ -121,8 +124,8 @@ class PrintServerStandIn:
 
     def may_answer(self) -> bool:
         """Count an answer; return whether it is given."""
-        self._answers += 1
-        return self._answers <= self.faults.silent_after
+        self.answers += 1
+        return self.answers <= self.faults.silent_after
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -157,13 +160,14 @@ class _Handler(BaseHTTPRequestHandler):
             path = urlsplit(self.path).path
             if self.command != "GET":
                 there.asked.append(f"{self.command} {path}")
-            status, said = self._refusal() or _ANSWERS[there.kind](there, self, path, body)
+            status, said = self._refusal(path) or _ANSWERS[there.kind](there, self, path, body)
         self._say(status, said)
 
-    def _refusal(self) -> tuple[int, Any] | None:
+    def _refusal(self, path: str) -> tuple[int, Any] | None:
         if self.server_of.faults.wants_digest:
             return None if self._proves() else (401, {"error": "Unauthorized"})
-        if self.headers.get("X-Api-Key") == KEY:
+        forbids = self.server_of.faults.forbids
+        if self.headers.get("X-Api-Key") == KEY and not (forbids and path.endswith(forbids)):
             return None
         return (403 if self.server_of.kind is ServerKind.OCTOPRINT else 401), {
             "error": "You do not have the permission"

@@ -155,6 +155,49 @@ def test_the_range_is_that_of_the_moves_that_extrude() -> None:
     assert facts("G20", "G92 X1 Y0", "G1 X2 E1").high_mm[0] == pytest.approx(50.8)
     assert facts("M82", "G92 E10", "G1 X5 Y1 E9", "G1 X6 E9.5").low_mm[0] == 5.0
     assert math.isnan(facts("G28", "M104 S0").low_mm[0])
+    assert facts("G28", "G1 X200", "G92 X0", "G1 X150 E1").high_mm[0] == 350.0  # homed, it is where it is
+    assert facts("G28", "G1 X200", "G92 X0", "G28", "G1 X150 E1").high_mm[0] == 150.0
+
+
+@pytest.mark.parametrize("text", ["G1 X 500 Y20 E5", "N7 G1 X500 Y20 E5*104", "n7G1X500Y20E5", "g1 x+500.0 y20 e5"])
+def test_a_move_is_seen_however_it_is_written(text: str) -> None:
+    """With blanks, with a number and a checksum of its own, in small letters: what a printer does is followed."""
+    assert facts("G28", text).high_mm == (500.0, 20.0, 0.0)
+    [line] = lines_of([text], "x.gcode")
+    assert line.text.upper().startswith("G1")
+    assert "*" not in line.text
+
+
+def test_an_arc_is_followed_where_it_bulges() -> None:
+    """Half a circle beside the bed's edge reaches a radius beyond it on one side only; a full one on all; R is a radius, too."""
+    half = ("G1 X200 Y10", "G3 X200 Y210 I0 J100 E5")
+    assert facts(*half).high_mm[0] == pytest.approx(300)
+    assert facts("G1 X200 Y10", "G2 X200 Y210 I0 J100 E5").high_mm[0] == pytest.approx(200)
+    assert facts("G1 X200 Y10", "G2 X200 Y210 J100 E5").low_mm[0] == pytest.approx(100)
+    assert facts("G1 X200 Y10", "G3 X200 Y210 R100 E5").high_mm[0] == pytest.approx(300)
+    whole = facts("G1 X50 Y50", "G2 I10 E5")
+    assert whole.low_mm[:2] == pytest.approx((50, 40))
+    assert whole.high_mm[:2] == pytest.approx((70, 60))
+    short, long = (facts("G1 X10 Y50", f"G3 X20 Y50 R{radius} E5").low_mm[1] for radius in (10, -10))
+    assert short == pytest.approx(50 - 10 + 10 * math.sqrt(0.75))
+    assert long == pytest.approx(50 - 10 - 10 * math.sqrt(0.75))
+
+
+def test_a_place_without_numbers_is_refused() -> None:
+    """A number of 400 digits is no place: it would be beyond every comparison with the bed."""
+    with pytest.raises(DataError, match="line 2 moves to no place"):
+        examine(["G28", f"G1 X{'9' * 400} E5"], "x.gcode", 4096)
+
+
+def test_what_the_cable_spoils_in_an_answer_is_no_number() -> None:
+    """Temperatures with a point or a sign too many, and a request for a line of many digits, end nothing."""
+    talk = Talk("G1 X1", "G1 X2")
+    assert talk.sent() == framed(1, "G1 X1")
+    talk.hear("T:199.5.1 /200.0 B:59 /60", "T:-.- /. B:1..2 /3", f"Resend: {'9' * 500}")
+    assert talk.sender.heat.bed == (59.0, 60.0)
+    talk.hear("ok T:20.0.0 /0.0.0")
+    assert talk.sent() == framed(2, "G1 X2")
+    assert talk.sender.phase is Phase.PRINTING
 
 
 def test_a_file_tells_its_time_and_whether_it_heats() -> None:
@@ -190,7 +233,7 @@ def test_addresses_of_printers() -> None:
     assert line_uri("serial:ttyACM0?baud=250000").baud == 250000
     assert line_uri("rfcomm://00:11:22:aa:bb:CC?channel=3").port == 3
     assert (line_uri("socket://[::1]:80").place, line_uri("socket://h:80").port) == ("::1", 80)
-    for bad in ("", "/dev/ttyUSB0", "usb:x", "serial:", "serial:x?baud=7", "serial:x?speed=9600", "rfcomm://x", "socket://h", "socket://h:0", "socket://h:1?x=2", "rfcomm://00:11:22:33:44:55?channel=99"):  # fmt: skip
+    for bad in ("", "/dev/ttyUSB0", "usb:x", "serial:", "serial:x?baud=7", "serial:x?speed=9600", "rfcomm://x", "socket://h", "socket://\u00e9..x:9", "socket://h:0", "socket://h:1?x=2", "rfcomm://00:11:22:33:44:55?channel=99"):  # fmt: skip
         with pytest.raises(SettingsError, match="--printer"):
             read_uri(bad)
 
@@ -236,7 +279,7 @@ def test_the_journal_tells_of_a_print_whose_program_is_gone(tmp_path: Path) -> N
     assert journal.left() == entry
     journal.note(Entry("cup.gcode", "serial:x", 50, 100, 1))
     assert journal.left() is None
-    for text in ("{}", "[", '{"file": 1, "printer": "", "done": 0, "lines": 0, "pid": 1}'):
+    for text in ("{}", "[", "[" * 9000, '{"file": 1, "printer": "", "done": 0, "lines": 0, "pid": 1}'):
         (tmp_path / "deep" / "printing.json").write_text(text)
         assert journal.left() is None
     journal.forget()

@@ -86,7 +86,7 @@ def problems(points_mm: Points, triangles: Triangles, printer: Printer, tell: Ca
         points_mm: (V, 3) float64, z up.
         triangles: (T, 3) int32, anticlockwise from outside; at least one.
         printer: what it shall be printed by.
-        tell: is told what is looked for next.
+        tell: is told what is looked for next, and again while that lasts; what it raises ends the search.
     """
     corners = points_mm[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -96,12 +96,12 @@ def problems(points_mm: Points, triangles: Triangles, printer: Printer, tell: Ca
     found = [*_edges(triangles), *_turned(corners), *_bodies(points_mm, triangles)]
     tell("crossings")
     grid = Grid(corners)
-    crossed = crossing(grid, triangles)
+    crossed = crossing(grid, triangles, lambda: tell("crossings"))
     if count := int(crossed.sum()):
         remedy = "export it with --tolerance 0, or scan with a smaller --voxel"
         found.append(_problem(Flaw.CROSSING, f"{count} triangles cross others", remedy, crossed))
     tell("walls")
-    found += _walls(grid, normals, areas, printer.least_wall_mm)
+    found += _walls(grid, normals, areas, printer.least_wall_mm, lambda: tell("walls"))
     return [*found, *_overhangs(corners, areas, up, printer), *_base(corners, areas, up), *_size(corners, printer)]
 
 
@@ -171,16 +171,18 @@ def _bodies(points_mm: Points, triangles: Triangles) -> list[Problem]:
     return [_problem(Flaw.CRUMBS, words, "--fix keeps the largest", body != sizes.argmax(), blocks=False)]
 
 
-def crossing(grid: Grid, triangles: Triangles) -> NDArray[np.bool_]:
+def crossing(grid: Grid, triangles: Triangles, tell: Callable[[], None] = lambda: None) -> NDArray[np.bool_]:
     """Return (T,) bool: the triangles that cross another one without a common corner.
 
     Args:
         grid: of the triangles.
         triangles: (T, 3).
+        tell: called now and then.
     """
     pairs = grid.pairs()
     where = np.zeros(len(triangles), np.bool_)
     for first in range(0, len(pairs), _CHUNK):
+        tell()
         one, other = pairs[first : first + _CHUNK].T
         shared = (triangles[one][:, :, np.newaxis] == triangles[other][:, np.newaxis]).any(axis=(1, 2))
         one, other = one[~shared], other[~shared]
@@ -194,22 +196,25 @@ def crossing(grid: Grid, triangles: Triangles) -> NDArray[np.bool_]:
     return where
 
 
-def _walls(grid: Grid, normals: Points, areas: NDArray[np.float64], least_mm: float) -> list[Problem]:
+def _walls(
+    grid: Grid, normals: Points, areas: NDArray[np.float64], least_mm: float, tell: Callable[[], None]
+) -> list[Problem]:
     """Find triangles behind which the surface comes again sooner than a printer can lay two lines."""
     middles = grid.corners.mean(axis=1)
     way = -normals / np.where(areas > 0, 2 * areas, 1)[:, np.newaxis] * least_mm
     thin = np.zeros(len(middles), np.bool_)
     steps = int(np.ceil(2 * least_mm / grid.cell)) + 1
     for first in range(0, len(middles), _CHUNK // 8):
+        tell()
         rows = np.arange(first, min(len(middles), first + _CHUNK // 8))
         for share in np.linspace(0, 1, steps + 1):
             point, triangle = grid.near(middles[rows] + share * way[rows])
             ray = rows[point]
-            other = triangle != ray
-            ray, triangle = ray[other], triangle[other]
+            # Most of what is near looks the same way: that is soon told, and is no far side of a wall.
+            opposite = np.einsum("ij,ij->i", normals[ray], normals[triangle]) < 0
+            ray, triangle = ray[opposite], triangle[opposite]
             met = hits(middles[ray], way[ray], grid.corners[triangle])
-            opposite = (normals[ray] * normals[triangle]).sum(axis=1) < 0
-            thin[ray[(met > _CLEARANCE) & (met < 1) & opposite]] = True
+            thin[ray[(met > _CLEARANCE) & (met < 1)]] = True
     share_of_area = float(areas[thin].sum() / areas.sum()) if areas.sum() else 0.0
     if share_of_area < _LEAST_THIN:
         return []
