@@ -19,12 +19,15 @@ from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.full_turn import TurnView, full_turn
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import without_loose_bodies
+from phone_host.scan.scan import Scan, ScanWanted
+from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.table_cut import above, table_height_m
 from phone_host.scan.turn_axis import TurnAxis
 from phone_host.scan.turning_mask import Turning, TurningMask, ball_of
 from phone_host.scan.view import View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
+from tests.support.turning_things import processed_of
 
 SETTINGS = VolumeSettings(voxel_m=0.01, far_m=2.0)
 GEOMETRY = StereoGeometry(focal_px=100.0, baseline_m=0.06, cx_px=31.5, cy_px=23.5)
@@ -80,6 +83,22 @@ def test_a_field_of_impossible_settings_is_refused(settings: tuple[float, ...]) 
     np.savez(changed, **arrays)
     with pytest.raises(DataError, match=r"a\.field is damaged"):
         field_of(content[:head] + zlib.compress(changed.getvalue()), "a.field")
+
+
+def test_a_box_of_impossible_cells_is_refused() -> None:
+    """What the views told of a box has three kinds of counts: with another number the submap is no submap."""
+    view = grey_view(1.0)
+    scan = Scan(ScanWanted(voxel_m=0.02, box=Box((-0.1, -0.1, 0.9), (0.1, 0.1, 1.1))))
+    scan.take("0", 0.0, processed_of(view))
+    content = submap_bytes(scan.close_submap())
+    head = content.index(b"\n") + 1
+    with np.load(io.BytesIO(zlib.decompress(content[head:]))) as held:
+        arrays = dict(held)
+    assert arrays["carved"].shape[0] == 3
+    changed = io.BytesIO()
+    np.savez(changed, **(arrays | {"carved": arrays["carved"][:2]}))
+    with pytest.raises(DataError, match=r"a\.submap is damaged"):
+        submap_of(content[:head] + zlib.compress(changed.getvalue()), "a.submap")
 
 
 def test_before_anything_turned_no_pixel_is_the_things() -> None:
