@@ -9,7 +9,6 @@ from common.errors import UnavailableError
 from phone_host.boards.found import Announcement
 from phone_host.printers.announced_printers import FoundPrinter, printers_of
 from phone_host.printers.digest import digest_header
-from phone_host.printers.printer_uri import LineUri, read_uri
 from phone_host.printers.server_answer import Answer, Value
 
 
@@ -103,10 +102,3 @@ def test_printers_are_told_by_their_service_or_their_name() -> None:
         FoundPrinter("octoprint://10.0.0.9:80", "Ender 3"),
         FoundPrinter("prusalink://10.0.0.2:8080", "My PrusaLink"),
     ]
-
-
-def test_a_socket_has_a_host_and_a_port() -> None:
-    """An address of IPv6 loses its brackets."""
-    found = read_uri("socket://[fe80::1]:4000")
-    assert isinstance(found, LineUri)
-    assert (found.place, found.port) == ("fe80::1", 4000)
