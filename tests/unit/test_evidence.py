@@ -321,6 +321,7 @@ def test_a_crop_raises_no_doubt(good: Pair) -> None:
     known = int(np.isfinite(processed.disparity).sum())
     assert density(processed) == pytest.approx(known / (120 * 80))
     assert density(replace(processed, cut=None)) == pytest.approx(known / (320 * 240))
+    assert density(replace(processed, disparity=None)) == 0
     trust = judge_pair(core, processed)
     assert trust.concerns == ()
     assert trust.figures.density > 0.7

@@ -244,6 +244,7 @@ def test_the_range_is_that_of_the_moves_that_extrude() -> None:
     relative = facts("G91", "G1 X5 Y5 Z1 E1", "G1 X5 E1", "G90", "M83", "G1 X2 E.5")
     assert (relative.low_mm, relative.high_mm) == ((0.0, 0.0, 0.0), (10.0, 5.0, 1.0))
     assert facts("G20", "G92 X1 Y0", "G1 X2 E1").high_mm[0] == pytest.approx(50.8)
+    assert facts("G20", "G21", "G1 X2 E1").high_mm[0] == pytest.approx(2)
     assert facts("M82", "G92 E10", "G1 X5 Y1 E9", "G1 X6 E9.5").low_mm[0] == 5.0
     assert math.isnan(facts("G28", "M104 S0").low_mm[0])
     assert facts("G28", "G1 X200", "G92 X0", "G1 X150 E1").high_mm[0] == 350.0  # homed, it is where it is
@@ -359,6 +360,7 @@ def test_a_file_tells_whether_it_leaves_heaters_on() -> None:
     assert not facts("M104 T1 S200", "G1 X1 E1", "M104 T1 S0").leaves_hot
     assert not facts("M109 S200", "G1 X1 E1", "END_PRINT").leaves_hot
     assert facts("M190 R60", "G1 X1 E1").leaves_hot
+    assert not facts("M104", "G1 X1 E1").leaves_hot
 
 
 def test_the_journal_tells_of_a_print_whose_program_is_gone(tmp_path: Path) -> None:

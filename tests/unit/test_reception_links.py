@@ -2,8 +2,12 @@
 
 from dataclasses import replace
 
+import pytest
+
+from common.frame import PixelFormat
+from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
-from common.protocol.message import BoardCounts, Lane, Ping
+from common.protocol.message import BoardCounts, FrameMessage, Lane, Ping
 from common.protocol.session import MS, Outgoing, connection_name
 from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.reception import Reception
@@ -21,12 +25,14 @@ class TwoLines:
         mute: connections on which no answer comes.
     """
 
-    def __init__(self, *round_trips_ns: int) -> None:
+    def __init__(self, *round_trips_ns: int, self_paced: bool = False) -> None:
         self.round_trips_ns = round_trips_ns
         self.mute: set[bytes] = set()
         self.now_ns = 10**12
         self.said: list[Outgoing] = []
-        facts = [LinkFacts(kind, lanes, self_paced=False) for kind, lanes in zip(("tcp", "ipc"), LANES, strict=True)]
+        facts = [
+            LinkFacts(kind, lanes, self_paced=self_paced) for kind, lanes in zip(("tcp", "ipc"), LANES, strict=True)
+        ]
         self.reception = Reception(facts, "host", Unkept(), self.said.append)
         self.board = BoardSession("life", "boot", CAMERA)
 
@@ -92,3 +98,27 @@ def test_a_leave_that_was_taken_before_any_frame_has_an_open_end() -> None:
     lines.reception.lose_tail()
     [account] = lines.reception.account.sessions
     assert (account.session, account.vanished, account.received, account.latest) == ("", True, 0, BoardCounts())
+
+
+def test_a_frame_tells_the_age_of_its_line() -> None:
+    """Of two lines that pace themselves: a frame counts for the line that carried it, and makes its age known."""
+    lines = TwoLines(MS, 400 * MS, self_paced=True)
+    lines.run(1_000 * MS)
+    marks = BoardMarks(exposed_ns=lines.now_ns - 5 * MS, grabbed_ns=lines.now_ns - 2 * MS, sent_ns=lines.now_ns - MS)
+    frame = FrameMessage(
+        session="life",
+        sent_index=0,
+        sequence=0,
+        width_px=CAMERA.width_px,
+        height_px=CAMERA.height_px,
+        pixel_format=PixelFormat.MJPEG,
+        exposure_ns=None,
+        marks=marks,
+        payload=b"image",
+    )
+    lines.reception.receive(LANES[0][Lane.FRAMES], frame, lines.now_ns)
+    lines.run(1_000 * MS)
+    carried, other = lines.reception.account.links
+    assert (carried.frames, other.frames) == (1, 0)
+    assert carried.age.spread().p50_ns == pytest.approx(5 * MS, abs=MS)  # the clock is known to half a round trip
+    assert other.age.spread().count == 0
