@@ -51,6 +51,7 @@ from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.model_job import check_model, export_model, print_model
 from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
 from phone_host.scan.scan_model import ScanModel
+from phone_host.scan.turntable import scan_for
 from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
@@ -84,6 +85,7 @@ __all__ = [
     "import_rig",
     "open_scanner",
     "print_model",
+    "scan_for",
     "triangulate",
     "write_model",
 ]
@@ -171,7 +173,7 @@ def open_scanner(
 
 
 def write_model(path: str | Path, model: ScanModel) -> None:
-    """Write the surface of a scan as PLY: metres, in the axes of the rectified left camera at the first pair that has depth.
+    """Write the surface of a scan as PLY: metres, in the axes of the rectified left camera at the first pair that has depth, or of the mat or table.
 
     Args:
         path: the file; it appears whole or not at all.

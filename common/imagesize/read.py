@@ -1,7 +1,7 @@
 """Reads the header of an image of any known kind, identified by its first bytes, and makes further checks of that kind."""
 
 import struct
-from typing import Final
+from typing import Final, assert_never
 
 from common.frame import FrameFault, SpoiledImageError
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, size_text
@@ -69,6 +69,8 @@ def whole_image(data: bytes, head: ImageHead, name: str) -> bytes:
             return data if head.orientation == UPRIGHT else as_stored(data, name)
         case ImageKind.BMP | ImageKind.PNM | ImageKind.WEBP:
             return data
+        case _:
+            assert_never(head.kind)
 
 
 def _head(data: bytes, name: str) -> ImageHead:

@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Final
+from typing import Final, assert_never
 
 from common.imagesize.read import read_head
 from common.protocol.message import CameraDescription
@@ -136,6 +136,8 @@ def read_recorded(data: memoryview, inflate: Inflate) -> Recorded:
                 found.metadata[name] = values
             case Damage():
                 found.damages.append(record)
+            case _:
+                assert_never(record)
     for count in lost.values():
         found.damages.append(Damage(0, 0, f"{count} messages are of an unknown topic or spoiled"))
     found.is_complete = salvage.is_complete

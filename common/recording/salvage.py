@@ -240,8 +240,7 @@ class Salvage:
             opcode, content = self._record(at)
             if opcode == _CHUNK_OPCODE:
                 _text(content, _CHUNK.size)
-                for _ in self._chunk(content):
-                    break
+                next(self._chunk(content), None)
             elif opcode == _ATTACHMENT:
                 _attachment(content)
             elif opcode == _METADATA:

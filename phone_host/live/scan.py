@@ -45,6 +45,7 @@ class LiveScan:
     Attributes:
         scan: what has become of them; whole once the run has ended.
         mat: on which the model stands; None: there is none.
+        is_upright: whether the model's z is up, from a mat or a table.
         patches: its surface, for whoever watches; while the run goes on, `surface_since` asks them.
         sink: for the host.
 
@@ -68,6 +69,7 @@ class LiveScan:
         is_timeless: bool,
     ) -> None:
         self.scan, self.mat, self._is_timeless = scan_for(wanted), wanted.mat, is_timeless
+        self.is_upright = wanted.mat is not None or wanted.on_table
         self.kept = KeptSubmaps(kept_in, self.scan, resumed)
         self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)

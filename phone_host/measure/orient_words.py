@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, assert_never
 
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.measure.file_remedies import ImageSource
@@ -45,6 +45,8 @@ def mirrored_further(present: Orientation) -> Orientation:
             return Orientation(present.rotate_deg)
         case Flip.V:  # mirrored both ways is turned by 180 degrees
             return Orientation((present.rotate_deg + 180) % 360)
+        case _:
+            assert_never(present.flip)
 
 
 def with_final_options(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +128,8 @@ class Epipolar(Enum):
                 return 0, -1
             case Epipolar.DOWN:
                 return 0, 1
+            case _:
+                assert_never(self)
 
 
 @dataclass(frozen=True, slots=True)

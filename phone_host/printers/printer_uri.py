@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, assert_never
 
 from common.errors import SettingsError
 
@@ -138,6 +138,8 @@ def read_uri(text: str) -> PrinterUri:
             if not _HOST.fullmatch(host) or not _is_port(port) or query:
                 raise SettingsError(f"--printer {text!r} has no host and port", "give socket://HOST:PORT")
             return LineUri(text, kind, host.strip("[]"), port=int(port))
+        case _:
+            assert_never(kind)
 
 
 def _server(text: str, kind: ServerKind, place: str, query: str) -> ServerUri:

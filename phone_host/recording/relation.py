@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, assert_never
 
 from common.errors import DataError
 from common.recording.recorded import Shown, period_ns
@@ -163,3 +163,5 @@ def _unclear(why: Unclear, board: Stream, host: Stream) -> DataError:
                 f"{both} show no movement in common",
                 f"give recordings of the same that overlap by more than {LEAST_S:g} s, in which the cameras move together",
             )
+        case _:
+            assert_never(why)

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.output.axes import Axes
 from phone_host.report.depth_data import text_of
 from phone_host.report.depth_view import THIN
 from phone_host.scan.mesh import Mesh
@@ -30,13 +31,13 @@ class ShownModel:
         mesh: its triangles.
         noise_m: (V,) standard deviation of its points, m.
         voxel_m: of the field that it was made of, m.
-        is_on_mat: whether its axes are a mat's, z up; else they are a camera's.
+        upright: its axes, if z is up in them; None: they are a camera's.
     """
 
     mesh: Mesh
     noise_m: NDArray[np.float32]
     voxel_m: float
-    is_on_mat: bool = False
+    upright: Axes | None = None
 
 
 def model_view(shown: ShownModel, file: str) -> str:
@@ -59,7 +60,12 @@ def model_view(shown: ShownModel, file: str) -> str:
     low = mesh.points_m.min(axis=0)
     size = mesh.points_m.max(axis=0) - low
     step = float(size.max()) / _STEPS
-    view = {"low": low.tolist(), "size": size.tolist(), "step": step, "axes": "mat" if shown.is_on_mat else "camera"}
+    view = {
+        "low": low.tolist(),
+        "size": size.tolist(),
+        "step": step,
+        "axes": "camera" if shown.upright is None else "mat",
+    }
     points = np.rint((mesh.points_m - low) / step).astype(np.uint16)
     levels = np.clip((noise_m - best) / (worst - best), 0, 1) * 255
     data = {
@@ -81,7 +87,7 @@ def model_view(shown: ShownModel, file: str) -> str:
 
 
 def _buttons(model: ShownModel) -> str:
-    front = "front" if model.is_on_mat else "as the camera began"
+    front = "as the camera began" if model.upright is None else "front"
     views = (("turned", "turned"), ("front", front), ("side", "side"), ("above", "above"))
     return "".join(f'<button type="button" data-to="{name}">{words}</button>' for name, words in views)
 
@@ -97,7 +103,11 @@ def _paints(best_m: float, worst_m: float) -> str:
 
 def _words(shown: int, total: int, model: ShownModel) -> str:
     number = f"{shown:,} triangles stand for {total:,}" if shown < total else f"{total:,} triangles"
-    axes = "the mat's: Z up" if model.is_on_mat else "the left camera's at the first pair: X right, Y down, Z forward"
+    axes = (
+        f"the {model.upright.value}'s: Z up"
+        if model.upright
+        else "the left camera's at the first pair: X right, Y down, Z forward"
+    )
     return (
         f"{number.replace(',', THIN)}; the axes are {axes}. Drag turns, two fingers"
         " or the wheel (after a click) zoom, shift and drag move, a double click goes back. Dark is the surface seen from behind."

@@ -83,7 +83,7 @@ def _subtitle(report: ScanReport) -> str:
 
 
 def _axes_words(axes: Axes) -> str:
-    return axes.text if axes is Axes.MAT else f"{axes.text} at the first pair"
+    return axes.text if axes.is_upright else f"{axes.text} at the first pair"
 
 
 def _figures(report: ScanReport) -> tuple[Figure, ...]:

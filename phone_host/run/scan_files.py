@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Final
 
 from phone_host.output.atomic import write_bytes, write_text
-from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
 from phone_host.output.ply import PointCloud, write_surface
@@ -62,7 +61,7 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
         write_text(out / TRAJECTORY, trajectory_of(report))
         write_text(out / "report.json", json_text(scan_json(report), indent=2) + "\n")
         voxel_m = report.settings.voxel_m if report.settings else 1.0
-        shown = ShownModel(mesh, scan.model.noise_m, voxel_m, is_on_mat=report.axes is Axes.MAT)
+        shown = ShownModel(mesh, scan.model.noise_m, voxel_m, upright=report.axes if report.axes.is_upright else None)
         write_text(out / "index.html", scan_page(report, shown, scan.commands))
     finally:
         folder.close()

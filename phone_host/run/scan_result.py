@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.errors import DataError
+from common.words import counted
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
@@ -15,7 +16,7 @@ from phone_host.run.turn_remarks import keeps_field
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan, ScannedPair
 from phone_host.scan.scan_model import ScanModel
-from phone_host.scan.tracking_words import OF_TURNING, Weakness
+from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 
 
 def report_of(
@@ -57,7 +58,7 @@ def require_something(report: ScanReport) -> None:
     """Refuse pairs of which nothing at all came.
 
     Raises:
-        DataError: none was computed, none has depth, or none shows the mat.
+        DataError: none was computed, none has depth, or none shows the mat, or a table with an object.
     """
     if report.failed and not report.scanned:
         raise report.failed[0].none_of(len(report.pairs))
@@ -71,12 +72,33 @@ def require_something(report: ScanReport) -> None:
             "show more of it, sharp and without glare; if another one lies there, name it, as in --mat 8x6:28mm:20mm:5x5",
         )
     if report.settings is None:
+        _require_table(report)
         require_turning(report)
         why = next((remark for remark in report.remarks if not remark.is_note), None)
         raise DataError(
             f"none of the {len(report.scanned)} pairs has depth{f': {why.problem}' if why else ''}",
             (why.remedy if why else "")
             or "check that the pictures are sharp and bright, and that --calibration fits them",
+        )
+
+
+def _require_table(report: ScanReport) -> None:
+    """Refuse pairs of which none shows an object on a table, though it was asked for.
+
+    Raises:
+        DataError: so it is; the reason is that of most pairs.
+    """
+    reasons = Counter(pair.weakness for pair in report.scanned if pair.weakness in OF_TABLE)
+    most = reasons.most_common(1)[0][0] if reasons else Weakness.NONE
+    of = f"in any of {counted(len(report.scanned), 'pair')}"
+    if most is Weakness.NO_TABLE:
+        raise DataError(
+            f"no table is found {of}", "show more of it around the object, from above, and give it some texture"
+        )
+    if most is Weakness.BARE_TABLE:
+        raise DataError(
+            f"nothing stands on the table in the middle of the picture {of}",
+            "aim at the object, and show where it stands; leave --object out to scan all that is in view",
         )
 
 

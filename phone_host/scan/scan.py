@@ -1,6 +1,6 @@
 """Pairs go in one after another, a model comes out. Pure: no files, no clock.
 
-The world's axes are those of the rectified left camera at the first pair that has depth; with a mat, the mat's.
+The world's axes are those of the rectified left camera at the first pair that has depth; with a mat, the mat's; of a thing on a table, the table's.
 """
 
 import math
@@ -52,6 +52,7 @@ class ScanWanted:
         threads: that compute; results do not depend on them.
         mat: on which the object lies: it alone tells where each pair was taken; None: there is none.
         turntable: whether the cameras stand still and an object turns before them.
+        on_table: whether a thing is scanned that stands on a table, without a mat.
         onto: the field of an earlier pass, to which this one is added; None: this one is alone.
     """
 
@@ -61,6 +62,7 @@ class ScanWanted:
     threads: int = 1
     mat: Mat | None = None
     turntable: bool = False
+    on_table: bool = False
     onto: KeptField | None = None
 
     @property
@@ -70,8 +72,8 @@ class ScanWanted:
 
     @property
     def floor(self) -> Floor | None:
-        """The plane on which the thing stands: the mat; None: it is not known."""
-        return None if self.mat is None else Floor(skip_m=ABOVE_M)
+        """The plane on which the thing stands: the mat, or the table; None: it is not known."""
+        return None if self.mat is None and not self.on_table else Floor(skip_m=ABOVE_M)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -166,6 +168,7 @@ class Scan:
         self._closed = _Closed()
         self._untracked = 0  # pairs before the first that this tracker took
         self._later: dict[str, ScannedPair] = {}  # pairs of which something else has become, by name
+        self._missing = Weakness.NO_MAT  # why the last pair that has depth did not begin the model
         self._is_changed = False  # whether submaps that are closed do not hold any more
 
     @property
@@ -220,7 +223,7 @@ class Scan:
                 stamp_s=stamp_s,
                 world_camera=SE3.identity(),
                 state=Tracking.LOST,
-                weakness=Weakness.NO_DEPTH if density < PoseGate().least_depths else Weakness.NO_MAT,
+                weakness=Weakness.NO_DEPTH if density < PoseGate().least_depths else self._missing,
                 density=density,
             )
         else:
@@ -267,7 +270,7 @@ class Scan:
                 self._carving.see(seen, view.world_camera)
 
     def _begun(self, view: View) -> Tracker | MatTracker | None:
-        """Begin with a view that has depth; None: the mat is not seen in it."""
+        """Begin with a view that has depth; None: mat or table are not seen in it."""
         wanted = self._wanted
         if wanted.mat is not None and wanted.model_box is not None:
             return begun_on_mat(
@@ -332,6 +335,11 @@ class Scan:
         Raises:
             SettingsError: that had another box, or a mat where this one has none.
         """
+        if _begun_on_table(submaps) != self._wanted.on_table:
+            raise SettingsError(
+                f"the scan that is gone on with was begun {'without' if self._wanted.on_table else 'with'} --object",
+                "give the same options as then, or begin a new scan",
+            )
         first = submaps[0]
         self.geometry, self.size_px = first.geometry, first.size_px
         settings, wanted = replace(first.settings, most_bytes=self._wanted.most_bytes), self._wanted
@@ -393,3 +401,9 @@ class Scan:
         return (
             None if box is None or settings is None else Carving(Cells.of(box, settings.voxel_m), self._wanted.threads)
         )
+
+
+def _begun_on_table(submaps: Sequence[Submap]) -> bool:
+    """Return whether submaps are of a thing on a table: then the first pair is not taken in the origin, though no mat told where it was."""
+    first = next((pair for submap in submaps for pair in submap.pairs if pair.is_fused), None)
+    return first is not None and first.mat is None and bool(np.linalg.norm(first.world_camera.t_m) > 0)

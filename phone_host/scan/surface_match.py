@@ -232,10 +232,8 @@ def _starts(nearest: _Nearest, other: _Surface) -> list[SE3]:
     chosen: list[SE3] = []
     for number in np.argsort(-scores, kind="stable"):
         pose = SE3(turns[number], shifts[number])
-        if all(_turn_between(pose, each) > _SAME_TURN for each in chosen):
+        if len(chosen) < _KEPT and all(_turn_between(pose, each) > _SAME_TURN for each in chosen):
             chosen.append(pose)
-        if len(chosen) == _KEPT:
-            break
     return chosen
 
 

@@ -41,7 +41,7 @@ class Tracked:
     """What the tracker says of a view.
 
     Attributes:
-        world_camera: where it was taken; where it is lost, as far as is known. The world's axes are the first view's.
+        world_camera: where it was taken; where it is lost, as far as is known. The world's axes are the first view's, if the tracker began in the origin.
         state: how sure that is.
         weakness: why it is not surer.
         moved: what odometry says.
@@ -85,6 +85,7 @@ class Tracker:
     Args:
         settings: of the model.
         threads: that compute, >= 1; results do not depend on them.
+        start: where the first view is taken; None: in the origin.
         gate: what is believed; None: what usually is.
         library: computes; None: that of this installation.
     """
@@ -93,6 +94,7 @@ class Tracker:
         self,
         settings: VolumeSettings,
         threads: int = 1,
+        start: SE3 | None = None,
         gate: PoseGate | None = None,
         library: Library | Missing | None = None,
     ) -> None:
@@ -100,7 +102,7 @@ class Tracker:
         self._gate = PoseGate() if gate is None else gate
         self._pieces = Pieces(settings, threads, self._gate, found)
         self._odometry = Odometry(_ODOMETRY)
-        self._pose = SE3.identity()  # in the axes of the piece that is tracked
+        self._pose = SE3.identity() if start is None else start  # in the axes of the piece that is tracked
         self._was_lost = False
         self._count = 0
         self._stamp_s = float("nan")

@@ -28,6 +28,8 @@ class Weakness(Enum):
     FLAT = "flat"
     APART = "apart"
     NO_MAT = "mat not seen"
+    NO_TABLE = "no table"
+    BARE_TABLE = "nothing on the table"
     NOTHING_TURNS = "nothing turns"
     ALL_TURNS = "background turns too"
     OUTSIDE = "out of the picture"
@@ -44,6 +46,8 @@ class Weakness(Enum):
             Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
             Weakness.APART: "followed again, but apart from the model: move back to where it was",
             Weakness.NO_MAT: "too little of the mat is seen: show more of it to both cameras, sharp and without glare",
+            Weakness.NO_TABLE: "no table is found: show more of it around the object, from above, and give it some texture",
+            Weakness.BARE_TABLE: "nothing stands on the table in the middle of the picture: aim at the object, and show where it stands",
             Weakness.FLAT: "only a plane is in view: show something with depth beside it",
             Weakness.NOTHING_TURNS: "nothing has turned since the last pair: turn the object by 3 to 15 degrees between the pairs",
             Weakness.ALL_TURNS: "the background moves, too: the cameras must stand still, or leave --turntable out",
@@ -53,3 +57,6 @@ class Weakness(Enum):
 
 OF_TURNING: Final = (Weakness.NOTHING_TURNS, Weakness.ALL_TURNS, Weakness.OUTSIDE)
 """Why a pair is of no use where an object is to turn before cameras that stand still."""
+
+OF_TABLE: Final = (Weakness.NO_TABLE, Weakness.BARE_TABLE)
+"""Why a scan of an object on a table does not begin."""

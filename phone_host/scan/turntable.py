@@ -26,6 +26,7 @@ from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, points_of, table_height_m
+from phone_host.scan.table_scan import TableScan
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -77,11 +78,13 @@ class _Finished:
 
 
 def scan_for(wanted: ScanWanted) -> Scan:
-    """Return what takes the pairs of a scan: of cameras that move, or of an object that turns.
+    """Return what takes the pairs of a scan: of cameras that move, also around a thing on a table, or of an object that turns.
 
     Args:
         wanted: what for.
     """
+    if wanted.on_table:
+        return TableScan(wanted)
     return TurntableScan(wanted) if wanted.turntable else Scan(wanted)
 
 

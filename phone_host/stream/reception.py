@@ -7,6 +7,7 @@ time: messages and `now_ns` come in, and outgoing messages go to `send`.
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import assert_never
 
 from common.errors import UnavailableError
 from common.program.logs import event
@@ -257,17 +258,14 @@ class Reception:
             return None
         return self._border.round_trip_ns(carrier) or 0
 
-    def _handle(self, outputs: list[Output], now_ns: int) -> None:  # noqa: C901 - one line for each kind of output
+    def _handle(self, outputs: list[Output], now_ns: int) -> None:
         for output in outputs:
+            assert not isinstance(output, Arrived | Stale)  # frames come by a shorter way, see `receive`
             match output:
                 case Outgoing():
                     self._send(output)
-                case Arrived(frame, lost, link):
-                    self._accept_frame(frame, lost, link, now_ns)
                 case Echo() | ClockVoid():
                     self._note_clock(output, now_ns)
-                case Stale(_, reason):
-                    self.account.current.count_stale(reason)
                 case Accepted():
                     self._begin(output, now_ns)
                 case LinkUp() | LinkDown() | OtherBoard():
@@ -282,6 +280,8 @@ class Reception:
                     self._note_refusal(output, now_ns)
                 case Vanished(orderly):
                     self._note_gone(orderly=orderly, now_ns=now_ns)
+                case _:
+                    assert_never(output)
 
     def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
         """Give an echo to the clock and pass the frames that it has proven; or restart the clock if it is void."""
@@ -359,6 +359,8 @@ class Reception:
                     f"links {names} lead to different boards ({ours.camera.name} and, on link {link + 1}, {hello.camera.name})",
                     "give --link only addresses of the same board",
                 )
+            case _:
+                assert_never(news)
 
     def _begin(self, accepted: Accepted, now_ns: int) -> None:
         hello, link = accepted.hello, accepted.link

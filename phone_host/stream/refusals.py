@@ -1,7 +1,7 @@
 """Boards that refuse this host: which refusal counts now, which were reported, and what they mean. Pure."""
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, assert_never
 
 from common.protocol.message import RefusalReason
 from common.versions import PROTOCOL_VERSION
@@ -103,3 +103,5 @@ def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
             if theirs < ours:
                 return f"the board speaks protocol {theirs}, this host protocol {ours}", "update the board's tandemscan"
             return f"the board speaks protocol {theirs}, this host protocol {ours}", "update this host's tandemscan"
+        case _:
+            assert_never(refusal.reason)

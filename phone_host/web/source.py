@@ -259,7 +259,7 @@ class Command:
     Attributes:
         do: what.
         values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
-            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel`, `box`, `mat` (a sheet, or usual) and `turntable` (yes), which may be
+            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel`, `box`, `mat` (a sheet, or usual), `object` (yes) and `turntable` (yes), which may be
             missing; for CROP, while a scan goes on, `box`; for CHECK_MODEL `bed`; for SAVE_MODEL `format`; for
             PREPARE_PRINT `printer` and `bed`; for PRINT `confirm`, the state's `printing.asks`. Empty for the others.
     """

@@ -11,15 +11,13 @@ from pathlib import Path
 import pytest
 from zeroconf import ServiceInfo, Zeroconf
 
-from common.errors import SettingsError, UnavailableError
+from common.errors import SettingsError
 from common.program.settings import read_file
 from phone_host.boards.found import Announcement
 from phone_host.printers.announced_printers import FoundPrinter, printers_of
-from phone_host.printers.digest import digest_header
 from phone_host.printers.doors import key_of
 from phone_host.printers.gcode import examine
 from phone_host.printers.printer_uri import ServerKind, read_uri
-from phone_host.printers.server_answer import Answer, Value
 from phone_host.printers.server_door import name_there
 from tests.print.test_print_verb import _cube_file, command, done, environment
 from tests.support.marlin_printer import cube
@@ -193,20 +191,6 @@ def test_printers_that_announce_themselves_are_found(tmp_path: Path) -> None:
     assert printers_of(heard)[1] == FoundPrinter("prusalink://10.0.0.5:80", "PrusaLink  [buddy-mk4]")
 
 
-def test_what_a_server_says_is_not_believed() -> None:
-    """Types are checked, words are one short line, absurd numbers are none."""
-    said = Value({"a": {"b": "x\n\x1b[31m" + "y" * 900}, "n": 1e999, "big": 10**400, "t": True, "l": [1, "p", None]})
-    assert said["a"]["b"].text.startswith("x [31my")
-    assert len(said["a"]["b"].text) == 200
-    assert not said["a"]["b"]["c"]["d"].text
-    assert all(said[key].number != said[key].number for key in ("n", "big", "t", "none"))
-    assert (said["t"].is_true, said["n"].is_true, said["l"].texts, said["l"].keys) == (True, False, ("p",), ())
-    for body in (b"", b"[1]", b"{", b"\xff", b"[" * 100_000):
-        with pytest.raises(UnavailableError, match="none of its kind"):
-            Answer("OctoPrint at h:80", 200, body).json()
-        assert Answer("OctoPrint at h:80", 500, body).words == "answer 500"
-
-
 def test_names_on_a_server_are_plain() -> None:
     """Whatever the file is called here."""
     assert name_there("my cup.GCODE") == "tandemscan-my_cup.gcode"
@@ -214,17 +198,6 @@ def test_names_on_a_server_are_plain() -> None:
     assert name_there('"\r\nX: y.g') == "tandemscan-X_y.gcode"
     assert name_there("Tasse-ä.gcode") == "tandemscan-Tasse-.gcode"
     assert name_there(".gcode") == "tandemscan-print.gcode"
-
-
-def test_the_digest_is_that_of_the_rfc() -> None:
-    """RFC 7616, section 3.9.1, with MD5 and SHA-256."""
-    nonce, opaque = "7ypf/xlj9XXwfDPEoM4URrv/xwf94BcCAzFZH4GiTo0v", "FQhe/qaU925kfnzjCev0ciny7QMkPqMAFRtzCUYo5tdS"
-    client = "f2/wE4q74E6zIJEtWaHKaf5wv/H5QzzpXusqGemxURZJ"
-    for algorithm, due in (("MD5", "8ca523f5e9506fed4657c9700eebdbec"), ("SHA-256", "753927fa0e85d155564e2e272a28d1802ca10daf4496794697cf8db5856cb6c1")):  # fmt: skip
-        challenge = f'Digest realm="http-auth@example.org", qop="auth, auth-int", algorithm={algorithm}, nonce="{nonce}", opaque="{opaque}"'
-        said = digest_header(challenge, "Mufasa", "Circle of Life", ("GET", "/dir/index.html"), client)
-        assert f'response="{due}"' in said
-    assert not digest_header("Basic realm=x", "a", "b", ("GET", "/"), client)
 
 
 def test_the_key_of_a_printer_is_found_by_its_place(tmp_path: Path) -> None:

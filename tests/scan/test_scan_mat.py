@@ -19,7 +19,7 @@ from phone_host.output.axes import Axes
 from phone_host.output.rig_yaml import write_rig
 from phone_host.report.mat_figures import mat_figures
 from phone_host.scan.box import Box
-from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
+from phone_host.scan.mat import USUAL_MAT, MatCorners, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
 from phone_host.scan.mat_tracker import ABOVE_M
 from phone_host.scan.mesh_parts import size_of
@@ -239,3 +239,21 @@ def test_a_scan_on_a_mat_goes_on_with_the_same_mat_and_box_only() -> None:
     ):
         with pytest.raises(SettingsError, match=told):
             Scan(wanted).go_on([kept])
+
+
+def test_corners_that_no_pose_explains_have_none() -> None:
+    """Corners at places of chance: a best pose fits them by many pixels, and is not told."""
+    chance = np.random.default_rng(3).uniform((40, 40), (600, 440), (len(MAT.points_m()), 2))
+    rectifier = Rectifier(RIG)
+    assert fit_mat(MAT.points_m(), MatCorners(chance, chance + 3), rectifier.geometry, scale=SURE) is None
+
+
+def test_a_mat_with_nothing_on_it_begins_no_model() -> None:
+    """The mat is seen, but no depth is in the room above it: there is nothing to choose a fineness by, and the pair is lost."""
+    whole = walked(0)
+    assert whole.cloud is not None
+    scan = Scan(WANTED)
+    pair = scan.take("bare", 0.0, replace(whole, cloud=np.full_like(whole.cloud, np.nan)))
+    assert pair.state is Tracking.LOST
+    assert scan.tracker is None
+    assert scan.take("ball", 1.0, whole).state is Tracking.TRACKING

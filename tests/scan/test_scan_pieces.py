@@ -11,7 +11,7 @@ from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.kept_depths import KeptDepths
-from phone_host.scan.piece import PoseGate
+from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Pieces
 from phone_host.scan.scan import Scan, ScanWanted
 from phone_host.scan.tracker import Tracked, Tracker
@@ -154,3 +154,96 @@ def test_pieces_that_nobody_meets_do_not_grow_in_number() -> None:
     told = [tracker.track(plane_view(far, texture(seed), CORNER)) for seed in range(10, 20)]
     assert {each.state for each in told} == {Tracking.LOST}
     assert np.array_equal(tracker.volume.blocks.weights, before)
+
+
+PAPERS = (PICTURE, texture(21), texture(22))
+
+
+def papered(paper: int, pose: SE3 = SEEN[0]) -> View:
+    """The corner with one of the papers."""
+    return plane_view(pose, PAPERS[paper], CORNER)
+
+
+def three_papers() -> tuple[Pieces, list[Piece]]:
+    """A model and two pieces that know the same corner, each by a paper of its own; their axes are those of their first views. The last one is tracked."""
+    pieces = Pieces(SETTINGS, 1, PoseGate(), native())
+    pieces.fuse(papered(0), SEEN[0], None)
+    known = [pieces.model]
+    for number in (1, 2):
+        pieces.begin(number, papered(number, SEEN[number]), SE3.identity(), Weakness.TOO_FAST)
+        known.append(pieces.active)
+    return pieces, known
+
+
+def in_axes(number: int, pose: SE3) -> SE3:
+    """Where a view from a pose in the world is in the axes of a piece."""
+    return SEEN[number].inverse() @ pose
+
+
+def near(found: SE3, truth: SE3) -> bool:
+    """Within 6 mm and 0.4 degrees."""
+    return bool((distance(found, truth) < (6e-3, 7e-3)).all())
+
+
+@pytest.mark.parametrize("tracked", [1, 2])
+def test_pieces_that_met_each_other_are_joined_together(tracked: int) -> None:
+    """A view of the second piece shows the first one; whichever of them meets the model then, both are in it, where they were taken."""
+    pieces, known = three_papers()
+    assert pieces.met(plane_view(SEEN[0], texture(23), CORNER), in_axes(2, SEEN[0])) is None
+    assert pieces.met(papered(1), in_axes(2, SEEN[0])) is None
+    pieces.go_on_in(known[tracked])
+    met = pieces.met(papered(0), in_axes(tracked, SEEN[0]))
+    assert met is not None
+    assert near(met.pose, SEEN[0])
+    joined = pieces.join(papered(0), in_axes(tracked, SEEN[0]), met)
+    assert [view.number for view in joined] == [1, 2]
+    assert all(near(view.world_camera, SEEN[view.number]) for view in joined)
+    assert pieces.active is pieces.model
+
+
+def test_a_piece_that_contradicts_the_model_stays_apart() -> None:
+    """Its views put the corner 12 cm beside that of the model: it is not taken in, and is tracked on."""
+    pieces, known = three_papers()
+    beside = in_axes(2, SEEN[0]) @ SE3.of(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.12]))
+    met = pieces.met(papered(0), beside)
+    assert met is not None
+    before = pieces.model.volume.blocks.weights.copy()
+    assert pieces.join(papered(0), beside, met) == ()
+    assert pieces.active is known[2]
+    assert np.array_equal(pieces.model.volume.blocks.weights, before)
+
+
+def test_only_surfaces_confirm_a_piece() -> None:
+    """Of two views of a piece one has hardly any depth: one of them confirms it, in wide pictures as well, and two that are asked for are not there."""
+    pieces, _ = three_papers()
+    blind = papered(2)
+    blind.depth_m[20:] = blind.depth_m[:, 20:] = np.nan
+    away = SE3.of(np.array([0.0, np.pi, 0.0, 0.0, 0.0, 0.0]))
+    pieces.fuse_apart(3, blind, away, Weakness.NONE, None)
+    pose = in_axes(2, SEEN[0])
+    met = pieces.met(papered(0), pose)
+    assert met is not None
+    assert pieces.join(doubled(papered(0)), pose, met, least=2) == ()
+    joined = pieces.join(doubled(papered(0)), pose, met, least=1)
+    assert [view.number for view in joined] == [2, 3]
+    assert near(joined[0].world_camera, SEEN[2])
+
+
+def doubled(view: View) -> View:
+    """The same view in pixels half as wide."""
+    of, two = view.geometry, np.ones((2, 2))
+    return replace(
+        view,
+        grey=np.kron(view.grey, two).astype(np.uint8),
+        colours=np.repeat(np.repeat(view.colours, 2, axis=0), 2, axis=1),
+        depth_m=np.kron(view.depth_m, two).astype(np.float32),
+        geometry=replace(of, focal_px=2 * of.focal_px, cx_px=2 * of.cx_px + 0.5, cy_px=2 * of.cy_px + 0.5),
+    )
+
+
+def test_a_view_without_depth_belongs_nowhere() -> None:
+    """Its picture shows a place of the model, but no surface says where it was taken."""
+    pieces, _ = three_papers()
+    view = papered(0)
+    assert pieces.recognised(view) is not None
+    assert pieces.recognised(replace(view, depth_m=np.full_like(view.depth_m, np.nan))) is None

@@ -9,15 +9,20 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
+from phone_host.scan.box import Box
 from phone_host.scan.circle_bundle import Circle, Seen, fitted_circle
+from phone_host.scan.field_bytes import KeptField, field_bytes, field_of
 from phone_host.scan.observation import Observer
 from phone_host.scan.scan import ScanWanted
+from phone_host.scan.surface_match import Match
 from phone_host.scan.table_cut import points_of, table_height_m
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.turn_axis import TurnAxis, axis_of, unwrapped
 from phone_host.scan.turning_mask import Turning, TurningMask
 from phone_host.scan.turntable import TurntableScan
 from phone_host.scan.view import View
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
 from tests.support.turning_things import FOOT_M, UP, Size, exact_view, off_thing_m, processed_of, turned_scene
 
 SMALL = Size(320, 240, 420.0, 0.06)
@@ -205,3 +210,59 @@ def test_a_pause_is_no_loss(jerky: tuple[list[View], list[float]]) -> None:
     assert all(pair.is_fused for pair in scan.pairs)
     assert np.array_equal(scan.pairs[4].world_camera.t_m, scan.pairs[2].world_camera.t_m)
     assert scan.views == 4
+
+
+COARSE = replace(WANTED, voxel_m=0.004)
+
+
+def test_pairs_that_tell_nothing_leave_the_turn_alone(jerky: tuple[list[View], list[float]]) -> None:
+    """One without depths, one in which everything moved, and one turned on by a degree only: none is kept, and those after them go on."""
+    views, angles = jerky
+    blind = replace(views[2], depth_m=np.full_like(views[2].depth_m, np.nan))
+    pushed = exact_view(turned_scene(1.0, table_turns=True), SMALL, 50)
+    little = exact_view(turned_scene(angles[2] + math.radians(1.2)), SMALL, 51)
+    scan = scanned([*views[:3], little, blind, pushed, views[2], views[3]], COARSE)
+    assert [pair.weakness for pair in scan.pairs[4:6]] == [Weakness.NO_DEPTH, Weakness.ALL_TURNS]
+    assert scan.views == 4
+    assert scan.pairs[-1].is_fused
+
+
+def test_a_box_is_carved_by_the_views_of_the_turn(jerky: tuple[list[View], list[float]]) -> None:
+    """A third of a turn and a view from far on that is lost: a closed model within the box, made once, carved by the views that are in it."""
+    low, high = FOOT_M - 0.09, FOOT_M + 0.09
+    box = Box(tuple(low.tolist()), tuple(high.tolist()))
+    scan = scanned([*jerky[0][:11], jerky[0][20], jerky[0][21]], replace(COARSE, box=box))
+    model = scan.model()
+    assert model.is_closed
+    assert (model.mesh.points_m > low - 0.005).all()
+    assert (model.mesh.points_m < high + 0.005).all()
+    turn = scan.turn
+    assert np.array_equal(scan.model().mesh.points_m, model.mesh.points_m)
+    assert scan.turn is turn
+
+
+def kept(volume: Volume) -> KeptField:
+    """As the folder of an earlier pass holds it."""
+    return field_of(field_bytes(volume), "field.bin")
+
+
+def test_a_pass_is_laid_onto_an_earlier_one_or_stays_alone(jerky: tuple[list[View], list[float]]) -> None:
+    """Onto the thing as it is, poses and model go into the axes of that; onto nothing, the pass is as without it."""
+    views = jerky[0][:26:2]
+    away = SE3.of(np.array([0.3, -0.2, 0.5, 0.1, 0.0, 0.2]))
+    empty = scanned(views, replace(COARSE, onto=kept(Volume(VolumeSettings(voxel_m=0.004, far_m=1.0)))))
+    alone = empty.model()
+    assert empty.match is not None
+    assert empty.match.match is Match.NONE
+    assert np.abs(off_thing_m(alone.mesh.points_m.astype(np.float64))).mean() < 0.002
+    first = Volume(VolumeSettings(voxel_m=0.004, far_m=1.0))
+    assert empty.volume is not None
+    first.take_in(empty.volume, away)
+    scan = scanned(views, replace(COARSE, onto=kept(first)))
+    points = away.inverse().apply(scan.model().mesh.points_m.astype(np.float64))
+    assert scan.match is not None
+    assert scan.match.match is Match.FOUND
+    assert np.abs(off_thing_m(points)).mean() < 0.002
+    moved = [away @ pair.world_camera for pair in empty.pairs if pair.is_fused]
+    for pair, truth in zip([pair for pair in scan.pairs if pair.is_fused], moved, strict=True):
+        assert np.linalg.norm(pair.world_camera.t_m - truth.t_m) < 0.004

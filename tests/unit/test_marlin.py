@@ -117,6 +117,97 @@ def test_silence_ends_it() -> None:
     assert "does not answer" in quiet.sender.problem
 
 
+def test_a_pause_sends_nothing_and_a_print_that_is_over_is_not_cancelled() -> None:
+    """The line under way is answered, none follows until it goes on; twice is as once, and nothing of that matters after the end."""
+    talk = Talk("G1 X1", "G1 X2")
+    talk.sender.resume()
+    assert talk.sent() == framed(1, "G1 X1")
+    talk.sender.pause()
+    talk.sender.pause()
+    talk.hear("ok", "", "echo:idle", "ok")
+    assert talk.sent(S) == b""
+    assert not talk.sender.may_pause
+    talk.sender.resume()
+    assert talk.sent() == framed(2, "G1 X2")
+    talk.hear("ok")
+    assert talk.sent() == b""
+    assert talk.sender.phase is Phase.DONE
+    assert talk.sender.cancel() == b""
+    assert talk.sender.phase is Phase.DONE
+
+
+def test_a_cancel_between_two_lines_cools() -> None:
+    """Nothing is under way: heaters go off at once, and the next line of the print is never sent."""
+    talk = Talk("G1 X1", "G1 X2")
+    talk.sent()
+    talk.hear("ok")
+    assert talk.sender.cancel()
+    sent = b""
+    while talk.sender.phase is Phase.CANCELLING:
+        sent += talk.sent()
+        talk.hear("ok")
+    assert talk.sender.phase is Phase.CANCELLED
+    assert b"M104 S0" in sent
+    assert b"G1 X2" not in sent
+
+
+def test_it_is_told_when_there_is_something_to_send() -> None:
+    """A printer that does not say `start` gets its time; a line under way has its patience; a line that is asked for again comes soon."""
+    sender = MarlinSender(iter([Line(1, "G1 X1")]), 0)
+    assert sender.to_send(0) == b""
+    assert sender.to_send(sender.due_ns) == framed(0, "M110 N0")
+    waits_until = sender.due_ns
+    assert sender.to_send(waits_until - 1) == b""
+    sender.heard("Resend: 0", waits_until - 1)
+    assert waits_until - 1 < sender.due_ns < waits_until + S
+    assert sender.to_send(waits_until - 1) == b""
+    assert sender.to_send(sender.due_ns) == framed(0, "M110 N0")
+    sender.heard("ok", waits_until + S)
+    assert sender.due_ns <= waits_until + S
+
+
+@pytest.mark.parametrize(
+    ("said", "problem"),
+    [
+        ("start", "has restarted"),
+        ("Error:Printer halted. kill() called!", "the printer says"),
+        ("!! hot", "the printer says"),
+        ("Resend: 7", "line 7, which was not sent yet"),
+    ],
+)
+def test_what_a_printer_says_ends_a_print(said: str, problem: str) -> None:
+    """It has restarted, halted, or counts otherwise: the print has failed, and nothing more is sent."""
+    talk = Talk("G1 X1", "G1 X2")
+    talk.sent()
+    talk.hear(said)
+    assert talk.sender.phase is Phase.FAILED
+    assert problem in talk.sender.problem
+    talk.hear("ok")
+    assert talk.sent(S) == b""
+
+
+def test_a_request_between_two_lines_changes_nothing() -> None:
+    """Nothing is under way: neither a late request for a line that was sent twice nor one out of the blue sends a line again."""
+    talk = Talk("G1 X1", "G1 X2", "G1 X3")
+    first = talk.sent()
+    talk.now_ns = talk.sender.due_ns
+    assert talk.sent() == first
+    talk.hear("ok", "Resend: 2")
+    assert talk.sent() == framed(2, "G1 X2")
+    talk.hear("ok", "Resend: 3")
+    assert talk.sent() == framed(3, "G1 X3")
+
+
+def test_after_a_request_for_the_next_line_its_answer_is_awaited() -> None:
+    """The line under way had arrived: what follows is not sent before the printer had time for the `ok` of its request."""
+    talk = Talk("G1 X1", "G1 X2")
+    talk.sent()
+    talk.hear("Resend: 2")
+    assert talk.sent() == b""
+    talk.now_ns = talk.sender.due_ns
+    assert talk.sent() == framed(2, "G1 X2")
+
+
 def test_a_cancelled_line_is_never_sent_again() -> None:
     """If the printer asks for the line that was under way, it gets one that cools."""
     talk = Talk("M104 S200", "G1 X2")

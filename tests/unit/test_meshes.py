@@ -102,6 +102,20 @@ def test_a_3mf_says_its_unit_and_keeps_colours() -> None:
             assert colours[int(face.get(f"p{key}", ""))] == f"#{red:02X}{green:02X}{blue:02X}FF"
 
 
+def test_a_mesh_without_colours_tells_of_none() -> None:
+    """A GLB has no colours but each place, a 3MF no colour group but each triangle, and a mesh no colours of its faces."""
+    solid = ball(1, coloured=False)
+    content = mesh_bytes(solid, "glb", None)
+    (mesh,) = json.loads(content[20 : 20 + struct.unpack_from("<I", content, 12)[0]])["meshes"]
+    assert set(mesh["primitives"][0]["attributes"]) == {"POSITION"}
+    with zipfile.ZipFile(BytesIO(mesh_bytes(solid, "3mf", None))) as archive:
+        text = archive.read("3D/3dmodel.model").decode()
+    assert text.count("<triangle ") == len(solid.triangles)
+    assert "colorgroup" not in text
+    assert 'pid="' not in text
+    assert solid.face_colours().shape == (0, 3)
+
+
 def chunks(content: bytes, begin: int, end: int) -> list[tuple[int, int, int]]:
     """Number, begin and end of the body of each 3DS chunk in a stretch."""
     found = []
@@ -201,6 +215,8 @@ NAN_OBJ = b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
         ("a.stl", b"", "no whole STL"),
         ("a.ply", mesh_bytes(ball(1), "ply", None)[:-7], "cut short"),
         ("a.ply", TEXT_PLY[:-9], "cut short"),
+        ("a.ply", TEXT_PLY[: TEXT_PLY.index(b"end_header") + 11], "cut short"),
+        ("a.ply", mesh_bytes(ball(1), "ply", None)[:-13] + b"\x04" + bytes(12), "cut short"),
         ("a.ply", b"ply\nno header", "no PLY"),
         ("a.ply", TEXT_PLY.replace(b"property double z\n", b"").replace(b" 0\n", b"\n"), "no points"),
         ("a.ply", TEXT_PLY.replace(b"face 1", b"face 99999999999"), "cut short"),
@@ -252,6 +268,19 @@ def test_fewer_triangles_stay_within_the_tolerance_and_closed() -> None:
     middles = np.linalg.norm(shape.triangles_center, axis=1)
     assert np.abs(middles - 50).max() < 0.2 + 0.1  # the tolerance, and what the ball's own triangles cut off
     assert fewer.solid.colours == pytest.approx(np.clip((fewer.solid.points_m + 0.05) * 2550, 0, 255), abs=2)
+
+
+def test_a_closed_mesh_that_cannot_do_with_less_stays() -> None:
+    """A cube of 12 triangles without colours keeps its 8 corners; where the tolerance leaves no body, the mesh stays as it is."""
+    box = trimesh.creation.box((0.02, 0.02, 0.02))
+    solid = Solid(np.asarray(box.vertices, np.float32), np.asarray(box.faces, np.int32), _NONE)
+    told = decimated(solid, 0.0001)
+    assert told.is_closed
+    assert len(told.solid.triangles) == 12
+    assert not told.solid.has_colours
+    gone = decimated(solid, 10.0)
+    assert gone.is_closed
+    assert gone.solid.size_mm == pytest.approx((20, 20, 20))
 
 
 def test_an_open_mesh_keeps_its_triangles() -> None:

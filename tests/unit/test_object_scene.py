@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from phone_host.calibration.sheets.patterns import DICTIONARIES
 from phone_host.model import CameraModel, Image, Side
 from phone_host.scene.cast import cast, pixel_rays, project
+from phone_host.scene.distance import nearest_on
 from phone_host.scene.object_scene import (
     BASELINE_M,
     MAT,
@@ -22,7 +23,7 @@ from phone_host.scene.object_scene import (
     mat_corners_m,
     object_scene,
 )
-from phone_host.scene.scene_model import Body, Box, Frustum, Pose, Scene, Shape, Sphere, Texture, Torus, rotation
+from phone_host.scene.scene_model import Body, Box, Frustum, Plane, Pose, Scene, Shape, Sphere, Texture, Torus, rotation
 from phone_host.scene.scene_render import render
 from phone_host.scene.solid import Solid
 from phone_host.scene.surface_samples import samples_of
@@ -256,3 +257,19 @@ def test_bare_table_and_all_around() -> None:
     assert project(
         corner[:, None], scene.rig.left, Pose(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 0.4]))
     ).shape == (2, 1)
+
+
+def test_a_plane_is_no_solid() -> None:
+    """It has no inside and no area: neither distances nor samples are made up."""
+    with pytest.raises(ValueError, match="no inside"):
+        nearest_on(Plane(), np.zeros((3, 1)))
+    with pytest.raises(ValueError, match="no solid"):
+        samples_of(Plane(), 0.01)
+
+
+def test_a_distorted_camera_sees_nothing_behind_it() -> None:
+    """Points that all lie behind the camera have no pixel; one ahead on the axis is at the principal point."""
+    model = CameraModel(matrix=np.array([[500.0, 0, 320], [0, 500.0, 240], [0, 0, 1]]), distortion=np.array([0.1, 0, 0, 0, 0]), width_px=640, height_px=480)  # fmt: skip
+    pose = Pose(np.eye(3), np.zeros(3))
+    assert np.isnan(project(np.array([[0.0, 0.1], [0.0, 0.1], [-1.0, -2.0]]), model, pose)).all()
+    assert project(np.array([[0.0], [0.0], [1.0]]), model, pose)[:, 0] == pytest.approx([320, 240])

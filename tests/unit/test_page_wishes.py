@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from phone_host.web.frames import View
 from phone_host.web.rates import Rate, Rates
 from phone_host.web.source import Command, Do
-from phone_host.web.wishes import Ack, MeasureRequest, Want, read_command, read_measure, read_wish
+from phone_host.web.wishes import Ack, MeasureRequest, Want, read_command, read_measure, read_number, read_wish
 
 
 def test_wishes_are_read() -> None:
@@ -64,6 +64,12 @@ def test_points_are_read() -> None:
 def test_what_are_no_points(said: object) -> None:
     """Wrong counts and types, and places outside any image."""
     assert read_measure(json.dumps(said)) is None
+
+
+@pytest.mark.parametrize(("text", "number"), [("0", 0), ("17", 17), ("", None), ("-1", None), ("1.5", None), ("\u0663", None), ("9" * 40, None)])  # fmt: skip
+def test_numbers_of_an_address(text: str, number: int | None) -> None:
+    """Plain digits are a number; signs, points, other scripts' digits, and what is too long are none."""
+    assert read_number(text) == number
 
 
 @given(st.binary(max_size=300))

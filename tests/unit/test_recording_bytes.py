@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from common.frame import PixelFormat
 from common.recording.cdr import BrokenMessageError
 from common.recording.opened import inflate
+from common.recording.recorded import read_recorded
 from common.recording.ros_messages import (
     COMPRESSED_IMAGE,
     IMAGE,
@@ -203,6 +204,7 @@ def _record(opcode: int, content: bytes) -> bytes:
         _record(0x06, struct.pack("<QQQII", 0, 1, 9, 1, 0) + struct.pack("<Q", 9) + bytes(9)),
         _record(0x06, struct.pack("<QQQII", 0, 1, 9, 0, 0) + struct.pack("<Q", 9) + struct.pack("<BQ", 5, 4)),
         _record(0x09, bytes(16) + struct.pack("<I", 1) + b"a" + struct.pack("<IQ", 0, 9) + bytes(4)),
+        _record(0x09, bytes(16) + struct.pack("<I", 1) + b"a" + struct.pack("<IQ", 0, 1) + b"x" + struct.pack("<I", 7)),
         _record(0x0C, struct.pack("<I", 1) + b"a" + struct.pack("<I", 9)),
         _record(0x0C, struct.pack("<I", 2) + b"\xff\xff" + struct.pack("<I", 0)),
         _record(0x0C, struct.pack("<I", 99) + b"a"),
@@ -215,3 +217,33 @@ def test_a_spoiled_record_is_passed_over(spoiled: bytes) -> None:
     assert is_complete
     assert len(_messages(records)) == 2 * PAIRS + 1
     assert [record for record in records if isinstance(record, Damage)]
+
+
+def test_damage_before_the_very_end_costs_nothing_else() -> None:
+    """After it, the record that ends the data is found by its form: all messages are there, and the file counts as ended."""
+    at = WHOLE.rindex(struct.pack("<BQ", 0x0F, 4))
+    records, is_complete = _read(WHOLE[:at] + _record(0x00, b"x") + WHOLE[at:])
+    assert is_complete
+    assert len(_messages(records)) == 2 * PAIRS + 1
+    assert len([record for record in records if isinstance(record, Damage)]) == 1
+
+
+def test_a_channel_without_a_number_is_no_channel() -> None:
+    """Told channels are numbered: one with a name instead is passed over, and every message keeps its topic."""
+    told = b"".join(struct.pack("<I", len(text)) + text for text in (b"left", b"/left x json"))
+    extra = _record(0x0C, struct.pack("<I", 8) + b"channels" + struct.pack("<I", len(told)) + told)
+    at = WHOLE.index(b"\x0c")
+    records, _ = _read(WHOLE[:at] + extra + WHOLE[at:])
+    assert [one.channel for one in _messages(records)] == [one.channel for one in _messages(_read(WHOLE)[0])]
+    assert not [record for record in records if isinstance(record, Damage)]
+
+
+def test_messages_of_an_unknown_channel_are_counted() -> None:
+    """Two of a channel that nothing tells of: one damage says how many, and the images are those without them."""
+    extra = 2 * _record(0x05, struct.pack("<HIQQ", 77, 0, 1, 1) + b"?")
+    at = WHOLE.index(b"\x0c")
+    found = read_recorded(memoryview(WHOLE[:at] + extra + WHOLE[at:]), inflate)
+    assert [damage.words for damage in found.damages] == ["2 messages are of an unknown topic or spoiled"]
+    assert {topic: len(shown) for topic, shown in found.images.items()} == {
+        f"/{side}/image/compressed": PAIRS for side in ("left", "right")
+    }

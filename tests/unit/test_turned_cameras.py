@@ -13,6 +13,7 @@ from common.camera.v4l2_stream import V4l2Settings
 from common.errors import DataError, SettingsError
 from common.orientation import UPRIGHT, Flip, Orientation
 from common.protocol.message import FrameMessage
+from phone_host.calibration.arrangement import composed
 from phone_host.calibration.timing.shots import Shot
 from phone_host.camera import factory as host_factory
 from phone_host.camera.http_uri import without_orientation
@@ -23,6 +24,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.orient import upright
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.stereo.rectifier import Rectifier
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, write_film
@@ -192,3 +194,11 @@ def test_kept_frames_are_read_back_with_their_orientation(tmp_path: Path) -> Non
         footage.read(tmp_path)
     footage.keep(footage.Footage(kept.host, kept.host), tmp_path)  # the next one is upright, so the file goes
     assert not (tmp_path / "board" / "orientation").exists()
+
+
+@pytest.mark.parametrize("first", [Orientation(turn, flip) for turn in (0, 90) for flip in Flip])
+@pytest.mark.parametrize("then", [Orientation(turn, flip) for turn in (0, 90) for flip in Flip])
+def test_two_orientations_one_after_the_other_are_one(first: Orientation, then: Orientation) -> None:
+    """Pixel by pixel, the picture is that of the one that is composed of them."""
+    picture = np.arange(6, dtype=np.uint8).reshape(2, 3)
+    assert np.array_equal(upright(upright(picture, first), then), upright(picture, composed(first, then)))

@@ -57,7 +57,7 @@ def test_the_surface_grows_until_it_is_saved(
     page.click("#scan-go")
     page.wait_for_function("() => document.getElementById('scan-go').textContent === 'Stop'")
     assert program.commands[-1].do is Do.SCAN
-    assert program.commands[-1].values == {"voxel": "5mm", "box": "", "mat": "", "turntable": ""}
+    assert program.commands[-1].values == {"voxel": "5mm", "box": "", "mat": "", "turntable": "", "object": ""}
     assert page.text_content("#scan-none") == "No surface yet"
     words = "2 pairs in the model: moved too fast: move more slowly, back to where it was"
     growing.show(60)
@@ -171,9 +171,10 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
 @pytest.mark.parametrize(
     ("kind", "sheet", "wanted"),
     [
-        ("mat", "", {"mat": "usual", "turntable": ""}),
-        ("mat", "8x6:30mm:22mm:4x4", {"mat": "8x6:30mm:22mm:4x4", "turntable": ""}),
-        ("turntable", "", {"mat": "", "turntable": "yes"}),
+        ("mat", "", {"mat": "usual", "turntable": "", "object": ""}),
+        ("mat", "8x6:30mm:22mm:4x4", {"mat": "8x6:30mm:22mm:4x4", "turntable": "", "object": ""}),
+        ("turntable", "", {"mat": "", "turntable": "yes", "object": ""}),
+        ("object", "", {"mat": "", "turntable": "", "object": "yes"}),
     ],
 )
 def test_what_is_scanned_is_chosen(

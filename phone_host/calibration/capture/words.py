@@ -1,7 +1,7 @@
 """A check of a camera in words: one finding for each thing that was looked at, with its remedy. Pure."""
 
 import math
-from typing import Final
+from typing import Final, assert_never
 
 from common.doctor.finding import Finding, ok, warn
 from common.words import counted
@@ -149,6 +149,8 @@ def warp_finding(rigidity: Rigidity) -> Finding:
         case Warping.UNKNOWN:
             reason, remedy = _REASONS[rigidity.unseen or Unseen.STILL]
             return warn("stabilisation", f"cannot tell: {reason}", remedy)
+        case _:
+            assert_never(rigidity.warping)
 
 
 _STAGES: Final = {

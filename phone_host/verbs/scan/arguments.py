@@ -19,6 +19,7 @@ EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup   
   phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
   phone-host scan left/ right/ --calibration rig.yaml --box 400x300x400@0,100,900 --out cup    # only what is in this box
   phone-host scan left/ right/ --calibration rig.yaml --mat --out cup    # on the sheet of `phone-host target mat`, any way around
+  phone-host scan left/ right/ --calibration rig.yaml --object --out cup    # what stands on a table, without a mat
   phone-host scan left/ right/ --rectified --focal 525 --baseline 60 --out room
   phone-host scan --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --record cup.mcap --out cup    # live
   phone-host scan left/ right/ --calibration rig.yaml --turntable --out cup    # the cup was turned, the cameras stood still
@@ -85,7 +86,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --mat, --voxel, --box and --memory: how the model is made."""
+    """Declare --mat, --object, --voxel, --box and --memory: how the model is made."""
     parser.add_argument(
         "--mat",
         nargs="?",
@@ -95,6 +96,12 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         " sheet by its squares, side of a square, side of a mark and family; the model stands on the sheet's middle, z up",
     )
     parser.add_argument(
+        "--object",
+        action="store_true",
+        help="scan what stands on a table, without a mat, while the cameras go around it: table and background are found and left out, and the model"
+        " stands on the table, z up; the first pair must show the object in its middle and the table around it",
+    )
+    parser.add_argument(
         "--voxel",
         metavar="MM",
         help="how fine the model is, such as 2mm (default: half the noise of the near depths of the first pair)",
@@ -102,7 +109,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--box",
         metavar="WxHxD@X,Y,Z",
-        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat",
+        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat or table",
     )
     parser.add_argument(
         "--memory",

@@ -1,4 +1,4 @@
-"""Reads how a model is to be made: --mat, --voxel, --box and --memory."""
+"""Reads how a model is to be made: --mat, --object, --voxel, --box and --memory."""
 
 import argparse
 import math
@@ -43,6 +43,11 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
         raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
     if options.mat is not None and options.turntable:
         raise SettingsError("--turntable beside --mat", "leave --turntable out: the mat tells how it turns")
+    if options.object and (options.mat is not None or options.turntable):
+        raise SettingsError(
+            f"--object beside {'--turntable' if options.mat is None else '--mat'}",
+            "leave --object out: it is for a table without a mat, around which the cameras go",
+        )
     onto = _onto_of(options)
     usual_m = math.nan if onto is None else onto.settings.voxel_m
     return ScanWanted(
@@ -52,6 +57,7 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
         threads=matching_threads(),
         mat=None if options.mat is None else parse_mat(USUAL_MAT if options.mat == _USUAL else options.mat),
         turntable=options.turntable,
+        on_table=options.object,
         onto=onto,
     )
 
@@ -121,14 +127,17 @@ def axes_of(options: argparse.Namespace, wanted: ScanWanted) -> Axes:
         wanted: what they ask for.
 
     Raises:
-        SettingsError: --axes beside a mat.
+        SettingsError: --axes beside a mat, or beside an object on a table.
     """
     asked = output_options(options).axes
-    if wanted.mat is None:
+    if wanted.mat is None and not wanted.on_table:
         return asked
+    own, option = (Axes.TABLE, "--object") if wanted.on_table else (Axes.MAT, "--mat")
     if asked is not Axes.CAMERA:
-        raise SettingsError(f"--axes {asked.value} beside --mat", "leave --axes out: the model stands on the mat, z up")
-    return Axes.MAT
+        raise SettingsError(
+            f"--axes {asked.value} beside {option}", f"leave --axes out: the model stands on the {own.value}, z up"
+        )
+    return own
 
 
 def voxel_of(text: str) -> float:

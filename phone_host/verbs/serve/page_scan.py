@@ -29,7 +29,7 @@ from phone_host.verbs.scan.arguments import add_model_arguments, add_turntable_a
 from phone_host.verbs.scan.live import live_scan
 from phone_host.verbs.scan.wanted import axes_of, box_of, scan_wanted
 
-OF_SCAN: Final = ("voxel", "box", "mat", "turntable")
+OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object")
 """Options of `scan` that the page may give."""
 
 
@@ -143,7 +143,7 @@ def asked_scan(values: Choices) -> ScanWanted:
     add_turntable_arguments(parser)
     options = parser.parse_args([])
     options.voxel, options.box, options.mat = (given[name] or None for name in ("voxel", "box", "mat"))
-    options.turntable = bool(given["turntable"])
+    options.turntable, options.object = bool(given["turntable"]), bool(given["object"])
     return scan_wanted(options)
 
 

@@ -49,7 +49,7 @@ export class ScanPanel {
     this.isHeld = false;
     const kind = value('scan-kind');
     const mat = kind === 'mat' ? value('scan-mat') || 'usual' : '';
-    return begin('scan', { voxel: value('scan-voxel'), box: value('scan-box'), mat, turntable: kind === 'turntable' ? 'yes' : '' });
+    return begin('scan', { voxel: value('scan-voxel'), box: value('scan-box'), mat, turntable: kind === 'turntable' ? 'yes' : '', object: kind === 'object' ? 'yes' : '' });
   }
 
   /** Only a mat has a sheet to be named. */

@@ -1,0 +1,87 @@
+"""The box around a thing on a table: what the model shows of it above the table, and all that is connected to it. Pure."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.scan.blocks import ONE, SIDE, Blocks
+from phone_host.scan.box import Box
+from phone_host.scan.volume_settings import LEAST_WEIGHT, VolumeSettings
+
+Mask = NDArray[np.bool_]
+
+_CELLS: Final = 64
+"""Along the room's longest side: things closer together than a cell or two count as connected."""
+
+_LEAST_CELL_VOXELS: Final = 3.0
+_NEAR: Final = 0.35
+"""Of the field's range: a voxel with a smaller value is at the surface."""
+
+_MARGIN_VOXELS: Final = 4.0
+
+
+def thing_box(blocks: Blocks, settings: VolumeSettings, room: Box, above_m: float) -> Box | None:
+    """Find the box of the thing that stands nearest to the room's middle.
+
+    Args:
+        blocks: of a volume whose z is up from a table.
+        settings: of the volume.
+        room: where the thing is.
+        above_m: what is lower may be the table.
+
+    Returns:
+        Its box, inside the room and down to `above_m`; None: there is none in the room.
+    """
+    low, high = np.array(room.low_m), np.array(room.high_m)
+    cell_m = max(float((high - low).max()) / _CELLS, _LEAST_CELL_VOXELS * settings.voxel_m)
+    points = _surface_m(blocks, settings, room, above_m)
+    if not len(points):
+        return None
+    at = ((points - low) / cell_m).astype(np.int64)
+    occupied = np.zeros(((high - low) / cell_m).astype(np.int64) + 1, np.bool_)
+    occupied[tuple(at.T)] = True
+    thing = _connected(occupied, _nearest(occupied, low, cell_m))
+    own = points[thing[tuple(at.T)]]
+    margin = _MARGIN_VOXELS * settings.voxel_m
+    least, most = np.maximum(own.min(axis=0) - margin, low), np.minimum(own.max(axis=0) + margin, high)
+    x, y, _ = least.tolist()
+    return Box((x, y, above_m), (float(most[0]), float(most[1]), float(most[2])))
+
+
+def _surface_m(blocks: Blocks, settings: VolumeSettings, room: Box, above_m: float) -> NDArray[np.float64]:
+    """Return the voxels (N, 3), m, at the surface, in the room and above the table."""
+    low, high = np.array(room.low_m), np.array(room.high_m)
+    low[2] = max(low[2], above_m)
+    places, side_m = blocks.places[: blocks.count], SIDE * settings.voxel_m
+    numbers = np.flatnonzero(((places * side_m <= high) & ((places + 1) * side_m >= low)).all(axis=1))
+    near = np.abs(blocks.field[numbers].astype(np.int32)) < _NEAR * ONE
+    block, voxel = np.nonzero(near & (blocks.weights[numbers] >= LEAST_WEIGHT))
+    inside = np.column_stack([voxel % SIDE, voxel // SIDE % SIDE, voxel // SIDE**2])
+    points = (SIDE * places[numbers[block]].astype(np.int64) + inside) * settings.voxel_m
+    return np.asarray(points[((points >= low) & (points <= high)).all(axis=1)], np.float64)
+
+
+def _nearest(occupied: Mask, low: NDArray[np.float64], cell_m: float) -> Mask:
+    """Return the cells of the columns in the middle, or of the nearest one that holds something."""
+    columns = np.argwhere(occupied.any(axis=2))
+    aside = np.linalg.norm((columns + 0.5) * cell_m + low[:2], axis=1)
+    chosen = columns[aside <= aside.min() + cell_m]
+    seed = np.zeros_like(occupied)
+    seed[chosen[:, 0], chosen[:, 1]] = occupied[chosen[:, 0], chosen[:, 1]]
+    return seed
+
+
+def _connected(occupied: Mask, seed: Mask) -> Mask:
+    """Return the cells that are connected to some, also over an edge or a corner."""
+    found = seed
+    while True:
+        wider = found
+        for axis in range(3):
+            padded = np.pad(wider, [(1, 1) if each == axis else (0, 0) for each in range(3)])
+            count = wider.shape[axis]
+            wider = np.logical_or.reduce([padded.take(range(first, first + count), axis=axis) for first in range(3)])
+        wider = wider & occupied
+        if wider.sum() == found.sum():
+            return found
+        found = wider
