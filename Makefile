@@ -49,8 +49,8 @@ $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
 test-slow: $(READY) ## run the tests with large samples, too slow for every day; the unit tests use small ones
 	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract tests/print
 
-coverage: $(READY) ## run the unit and scan tests; lists branches of the pure modules that no test takes (CI requires 98 %)
-	@COVERAGE=1 .ci/test unit scan
+coverage: $(READY) ## run the unit, scan, contract and print tests; lists branches of the pure modules that no test takes (CI requires 98 %)
+	@COVERAGE=1 .ci/test unit scan contract print
 
 test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, and try the phone's stand-in, under qemu-user
 	@$(BIN)/python -m tests.native.arm
