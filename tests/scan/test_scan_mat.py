@@ -249,11 +249,11 @@ def test_corners_that_no_pose_explains_have_none() -> None:
 
 
 def test_a_mat_with_nothing_on_it_begins_no_model() -> None:
-    """The mat is seen, but no depth is in the room above it: there is nothing to choose a fineness by, and the pair is lost."""
+    """The mat is seen, but all depths are far behind it: there is nothing to choose a fineness by, and the pair is lost."""
     whole = walked(0)
     assert whole.cloud is not None
     scan = Scan(WANTED)
-    pair = scan.take("bare", 0.0, replace(whole, cloud=np.full_like(whole.cloud, np.nan)))
+    pair = scan.take("bare", 0.0, replace(whole, cloud=3 * whole.cloud))
     assert pair.state is Tracking.LOST
     assert scan.tracker is None
     assert scan.take("ball", 1.0, whole).state is Tracking.TRACKING
