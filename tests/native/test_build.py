@@ -38,6 +38,7 @@ def test_the_checkout_has_the_library_of_its_sources(native_library: Library) ->
     assert native_library.sources() == sources_digest()
 
 
+@pytest.mark.timeout(600)  # half a minute on two idle cores
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_both_compilers_build_everything_without_a_warning(
     compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
