@@ -34,6 +34,10 @@ _HARDWARE: Final = (
     "host.toml",
     "wall",
     "session.mcap",
+    "octoprint://",
+    "--mat ",  # pictures of a thing on the mat: tests/scan/test_scan_mat.py
+    "--object ",  # on a table: tests/scan/test_scan_table.py
+    "--turntable",  # that turns: tests/scan/test_turntable.py and test_two_passes.py
     "walk/",  # pictures on the way around a thing: tests/scan/test_scan_command.py
     "--resume cup",  # after a scan that was killed: tests/scan/test_scan_resume.py
     "host.mcap",

@@ -165,7 +165,13 @@ def test_a_scan_as_surface_and_files(start: Start, tmp_path: Path) -> None:
     assert status == 200
     assert head["newest"] == len(head["patches"]) > 1
     again = served.get(f"/api/surface?since={head['newest']}")[2]
-    assert json.loads(again[4:]) == {"kind": "surface", "begun": 1, "newest": head["newest"], "patches": []}
+    assert json.loads(again[4:]) == {
+        "kind": "surface",
+        "begun": 1,
+        "newest": head["newest"],
+        "axes": "camera",
+        "patches": [],
+    }
     for wrong in ("-1", "1.5", "", "x", "9" * 400, "%00", "\u0663"):
         assert served.get(f"/api/surface?since={quote(wrong, safe='%')}")[0] == 400, wrong
     source.scan_folder = str(tmp_path)
