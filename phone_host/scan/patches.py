@@ -44,10 +44,11 @@ class Patches:
 
     Args:
         least_weight: of a voxel that counts as seen.
+        most_points: of a patch; one with more is thinned.
     """
 
-    def __init__(self, least_weight: int) -> None:
-        self._least_weight = least_weight
+    def __init__(self, least_weight: int, most_points: int = _MOST_POINTS) -> None:
+        self._least_weight, self._most_points = least_weight, most_points
         self._made: dict[tuple[int, int, int], Patch] = {}
         self._seen = self._number = 0
 
@@ -102,7 +103,7 @@ class Patches:
 
     def _put(self, place: tuple[int, int, int], side_m: float, mesh: Mesh, voxel_m: float) -> None:
         most = len(mesh.triangles)
-        while len(mesh.points_m) > _MOST_POINTS:
+        while len(mesh.points_m) > self._most_points:
             most //= 2
             mesh, _ = thinned(mesh, most, voxel_m)
         if len(mesh.triangles) or place in self._made:

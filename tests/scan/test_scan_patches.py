@@ -4,7 +4,6 @@ import json
 import struct
 
 import numpy as np
-import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.mesh import Mesh, mesh_of
@@ -89,10 +88,9 @@ def test_a_surface_that_goes_away_is_told() -> None:
     assert all(len(each.mesh.triangles) == 0 for each in newer)
 
 
-def test_a_patch_never_has_more_points_than_16_bit_count(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_patch_never_has_more_points_than_are_allowed() -> None:
     """A patch with too many is thinned."""
-    monkeypatch.setattr("phone_host.scan.patches._MOST_POINTS", 300)
-    patches = Patches(1)
+    patches = Patches(1, most_points=300)
     patches.renew(grown())
     sizes = [len(each.mesh.points_m) for each in patches.since(0, MANY)]
     assert max(sizes) <= 300
