@@ -5,7 +5,7 @@ The world's axes are those of the rectified left camera at the first pair that h
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -20,12 +20,14 @@ from phone_host.scan.closing import Floor
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
+from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.mat import Mat
 from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.mat_tracker import ABOVE_M, MatTracker, begun_on_mat, box_of_mat
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
+from phone_host.scan.stretches import Placed
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -54,6 +56,7 @@ class ScanWanted:
         turntable: whether the cameras stand still and an object turns before them.
         on_table: whether a thing is scanned that stands on a table, without a mat.
         onto: the field of an earlier pass, to which this one is added; None: this one is alone.
+        loops: how loops are closed where nothing but the camera's way tells where it is; None: they are not.
     """
 
     voxel_m: float = math.nan
@@ -64,6 +67,7 @@ class ScanWanted:
     turntable: bool = False
     on_table: bool = False
     onto: KeptField | None = None
+    loops: LoopSettings | None = field(default_factory=LoopSettings)
 
     @property
     def model_box(self) -> Box | None:
@@ -235,8 +239,9 @@ class Scan:
             require_size(name, view, self.size_px)
             told = self.tracker.track(view)
             self._joined(told.joined)
+            self._moved(told.moved_views)
             if told.is_fused:
-                self._depths.remember(view, told.world_camera)
+                self._depths.remember(len(self._pairs), view, told.world_camera)
                 if self._carving is not None:
                     self._carving.see(view, told.world_camera)
             elif isinstance(self.tracker, Tracker):  # its piece may be joined later
@@ -269,6 +274,20 @@ class Scan:
             if seen is not None and self._carving is not None:
                 self._carving.see(seen, view.world_camera)
 
+    def _moved(self, views: Sequence[Placed]) -> None:
+        """Note where pairs were taken after a loop has moved them; they carve from there."""
+        if not views:
+            return
+        poses = {self._untracked + view.number - 1: view.world_camera for view in views}
+        for at in poses.keys() - {len(self._pairs)}:  # this pair is told so itself
+            self._pairs[at] = replace(self._pairs[at], world_camera=poses[at])
+            self._later[self._pairs[at].name] = self._pairs[at]
+        self._is_changed = True
+        self._depths.move(poses)
+        if self._carving is not None:
+            self._carving = Carving(self._carving.cells, self._wanted.threads)
+            self._depths.carve(self._carving)
+
     def _begun(self, view: View) -> Tracker | MatTracker | None:
         """Begin with a view that has depth; None: mat or table are not seen in it."""
         wanted = self._wanted
@@ -280,7 +299,8 @@ class Scan:
                 lambda inside: fineness_for(inside, wanted.voxel_m, wanted.most_bytes),
                 wanted.threads,
             )
-        return Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
+        settings = fineness_for(view, wanted.voxel_m, wanted.most_bytes)
+        return Tracker(settings, wanted.threads, loops=wanted.loops)
 
     def final(self, pair: ScannedPair) -> ScannedPair:
         """Return what has become of a pair since it was taken.
@@ -386,6 +406,8 @@ class Scan:
         volume, wanted = self.volume, self._wanted
         if volume is None:
             return ScanModel.empty()
+        if isinstance(self.tracker, Tracker):
+            self._moved(self.tracker.settled())
         box = wanted.model_box
         if box is None:
             return open_model(volume)
