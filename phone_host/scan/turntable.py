@@ -22,11 +22,11 @@ from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.merged_field import merged
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, points_of, table_height_m
-from phone_host.scan.table_scan import TableScan
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -75,17 +75,6 @@ class _Finished:
     turn: FullTurn | None
     volume: Volume | None
     match: SurfaceMatch | None = None
-
-
-def scan_for(wanted: ScanWanted) -> Scan:
-    """Return what takes the pairs of a scan: of cameras that move, also around a thing on a table, or of an object that turns.
-
-    Args:
-        wanted: what for.
-    """
-    if wanted.on_table:
-        return TableScan(wanted)
-    return TurntableScan(wanted) if wanted.turntable else Scan(wanted)
 
 
 class TurntableScan(Scan):

@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.turntable import TurntableScan
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine

@@ -1,19 +1,24 @@
 """A thing that turns before cameras that stand still: its axis, its pixels, the closed turn, and words for what cannot be scanned."""
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from phone_host import api
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
+from phone_host.output.axes import Axes
+from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.scan.box import Box
 from phone_host.scan.circle_bundle import Circle, Seen, fitted_circle
 from phone_host.scan.field_bytes import KeptField, field_bytes, field_of
 from phone_host.scan.observation import Observer
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_match import Match
 from phone_host.scan.table_cut import points_of, table_height_m
 from phone_host.scan.tracking_words import Weakness
@@ -239,6 +244,24 @@ def test_a_box_is_carved_by_the_views_of_the_turn(jerky: tuple[list[View], list[
     turn = scan.turn
     assert np.array_equal(scan.model().mesh.points_m, model.mesh.points_m)
     assert scan.turn is turn
+
+
+def test_the_python_api_adds_a_pass_to_what_it_has_saved(jerky: tuple[list[View], list[float]], tmp_path: Path) -> None:
+    """`scan_for` begins a turn, `save_scan` leaves the command's files and its field, and the next pass is put onto it."""
+    views = jerky[0][:26:2]
+    onto = None
+    for out in ("first", "second"):
+        scan = api.scan_for(api.ScanWanted(turntable=True, voxel_m=0.004, onto=onto))
+        for number, view in enumerate(views):
+            scan.take(str(number), float(number), processed_of(view))
+        api.save_scan(tmp_path / out, scan)
+        onto = api.read_field(tmp_path / out)
+    report = json.loads((tmp_path / "second" / "report.json").read_text())
+    assert (report["in_model"], report["model"]["axes"]) == (len(views), Axes.CAMERA.text)
+    assert {path.name for path in (tmp_path / "second").iterdir()} >= set(report["files"])
+    assert any("lie on the earlier one" in warning for warning in report["warnings"])
+    points = read_ply_mesh((tmp_path / "second" / "model.ply").read_bytes(), "model.ply", 1.0).points_m
+    assert np.abs(off_thing_m(points.astype(np.float64))).mean() < 0.002
 
 
 def kept(volume: Volume) -> KeptField:
