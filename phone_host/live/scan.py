@@ -27,8 +27,8 @@ from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan import ScannedPair, Submap
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.ways import scan_for
 from phone_host.scan.volume_settings import LEAST_WEIGHT
+from phone_host.scan.ways import scan_for
 
 _SINK: Final = "scan"
 _NS: Final = 1e9

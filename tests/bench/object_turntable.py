@@ -49,7 +49,7 @@ def turntable_verdicts(step_deg: float = 5.0) -> list[Verdict]:
         scan.take(str(number), float(number), processed)
         took += time.process_time() - began
     began = time.process_time()
-    points = scan.model().mesh.points_m.astype(np.float64)
+    points = scan.model().seen_mesh.points_m.astype(np.float64)
     ended, turn = time.process_time() - began, scan.turn
     off_mm = 1e3 * np.abs(off_thing_m(points))
     mean, far = (float(off_mm.mean()), float(np.percentile(off_mm, 95))) if len(off_mm) else (math.nan, math.nan)
