@@ -20,7 +20,7 @@ from phone_host.measure.trouble import Trouble
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side
 from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.serve import check
 from phone_host.serve.activities import Activities, Task
 from phone_host.serve.find import board_choice, stranger
