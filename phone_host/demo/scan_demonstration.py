@@ -22,7 +22,7 @@ from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.scan_files import FinishedScan
 from phone_host.scan.mat import USUAL_MAT, parse_mat
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scene.film import prepare_folder, write_image
 from phone_host.scene.object_scene import JPEG_QUALITY, ObjectScene
 from phone_host.stereo.core import StereoCore

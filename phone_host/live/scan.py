@@ -20,14 +20,15 @@ from phone_host.output.axes import Axes
 from phone_host.report.stereo_report import Remark
 from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan
-from phone_host.run.scan_result import report_of
+from phone_host.run.scan_result import own_axes, report_of
 from phone_host.run.sinks import FunctionSink
 from phone_host.run.turn_remarks import field_of_turn, turn_remarks
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
-from phone_host.scan.scan import ScannedPair, ScanWanted, Submap
-from phone_host.scan.turntable import scan_for
+from phone_host.scan.scan import ScannedPair, Submap
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.volume_settings import LEAST_WEIGHT
+from phone_host.scan.ways import scan_for
 
 _SINK: Final = "scan"
 _NS: Final = 1e9
@@ -44,8 +45,7 @@ class LiveScan:
 
     Attributes:
         scan: what has become of them; whole once the run has ended.
-        mat: on which the model stands; None: there is none.
-        is_upright: whether the model's z is up, from a mat or a table.
+        axes: that the model has from mat or table; None: those of the camera.
         patches: its surface, for whoever watches; while the run goes on, `surface_since` asks them.
         sink: for the host.
 
@@ -68,8 +68,7 @@ class LiveScan:
         waits: bool,
         is_timeless: bool,
     ) -> None:
-        self.scan, self.mat, self._is_timeless = scan_for(wanted), wanted.mat, is_timeless
-        self.is_upright = wanted.mat is not None or wanted.on_table
+        self.scan, self.axes, self._is_timeless = scan_for(wanted), own_axes(wanted), is_timeless
         self.kept = KeptSubmaps(kept_in, self.scan, resumed)
         self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)

@@ -16,7 +16,19 @@ from phone_host.run.turn_remarks import keeps_field
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan, ScannedPair
 from phone_host.scan.scan_model import ScanModel
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
+
+
+def own_axes(wanted: ScanWanted) -> Axes | None:
+    """Return the axes that a model has from what the thing stands on; None: it has those of the camera.
+
+    Args:
+        wanted: what is scanned.
+    """
+    if wanted.mat is not None:
+        return Axes.MAT
+    return Axes.TABLE if wanted.on_table else None
 
 
 def report_of(
@@ -48,7 +60,7 @@ def report_of(
         axes=axes,
         remarks=(*remarks, *memory_remarks(scan)),
         keeps_field=keeps_field(scan),
-        mat=scan.mat,
+        mat=scan.wanted.mat,
     )
     on_mat = report.on_mat
     return report if on_mat is None else replace(report, remarks=(*report.remarks, *on_mat.remarks))

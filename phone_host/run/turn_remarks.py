@@ -74,4 +74,6 @@ def field_of_turn(scan: Scan) -> bytes:
     Args:
         scan: whose model was made.
     """
-    return field_bytes(scan.volume) if scan.volume is not None and keeps_field(scan) else b""
+    if not isinstance(scan, TurntableScan) or scan.volume is None or not keeps_field(scan):
+        return b""
+    return field_bytes(scan.volume, scan.carved)

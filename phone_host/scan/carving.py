@@ -97,6 +97,24 @@ class Carving:
         aim(job, view.geometry, depth.shape)
         self._library.carve(job)
 
+    def take_empty(self, cells: NDArray[np.bool_]) -> None:
+        """Take cells (Z, Y, X) for empty, whatever the views have seen of them."""
+        self.counts[0][cells], self.counts[1][cells] = 255, 0
+
+    def take_in(self, carved: Carved) -> None:
+        """Add what another one has counted, in any cells of the same axes: each cell gets what that one tells of its middle."""
+        own, of = self.cells, carved.cells
+        chosen, there = [np.arange(3)], [np.arange(3)]
+        for axis in (2, 1, 0):
+            middles = (own.first_m[axis] + np.arange(own.counts[axis]) * own.side_m) / of.voxel_m
+            numbers = np.floor(np.floor(middles + 0.5) / of.voxels).astype(np.int64) - of.low[axis]
+            inside = np.flatnonzero((numbers >= 0) & (numbers < of.counts[axis]))
+            chosen.append(inside)
+            there.append(numbers[inside])
+        told = self.counts[np.ix_(*chosen)].astype(np.int64) + carved.counts[np.ix_(*there)]
+        self.counts[np.ix_(*chosen)] = np.minimum(told, 255)
+        self.views += carved.views
+
     @property
     def empty(self) -> NDArray[np.bool_]:
         """(Z, Y, X): the cells that views enough looked through."""

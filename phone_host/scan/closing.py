@@ -15,6 +15,7 @@ from phone_host.scan.blocks import ONE, SIDE, Blocks
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.cell_field import CellField, cell_field
+from phone_host.scan.ground import Ground
 from phone_host.scan.volume_settings import LEAST_WEIGHT, VolumeSettings
 from phone_host.scan.windows import windows_of
 
@@ -58,9 +59,16 @@ class _Closed:
     """
 
     def __init__(
-        self, blocks: Blocks, settings: VolumeSettings, cells: CellField, box: Box, floor: Floor | None
+        self,
+        blocks: Blocks,
+        settings: VolumeSettings,
+        cells: CellField,
+        box: Box,
+        floor: Floor | Ground | None,
     ) -> None:
         self._blocks, self._cells = blocks, cells
+        self._ground = floor if isinstance(floor, Ground) else None
+        floor = None if isinstance(floor, Ground) else floor
         self._voxel_m, self._truncation_m = settings.voxel_m, settings.truncation_m
         x_m, y_m, z_m = box.low_m
         if floor and z_m <= floor.z_m + floor.skip_m:
@@ -102,12 +110,15 @@ class _Closed:
     def _outside(self, places: Places) -> Floats:
         """Return how far voxels lie outside the box, in truncations; inside it is below 0. (N, 10, 10, 10)."""
         first = SIDE * places.astype(np.int64) - 1
-        far = []
-        for axis in range(3):
-            at = (first[:, axis, np.newaxis] + np.arange(_SIZE)) * self._voxel_m
-            far.append(np.maximum(self.low_m[axis] - at, at - self._high_m[axis]) / self._truncation_m)
-        x, y, z = far
-        most = np.maximum(np.maximum(x[:, np.newaxis, np.newaxis], y[:, np.newaxis, :, np.newaxis]), z[:, :, np.newaxis, np.newaxis])  # fmt: skip
+        x, y, z = (first[:, axis, np.newaxis] + np.arange(_SIZE) for axis in range(3))
+        far = [
+            np.maximum(low_m - at * self._voxel_m, at * self._voxel_m - high_m)
+            for at, low_m, high_m in zip((x, y, z), self.low_m, self._high_m, strict=True)
+        ]
+        most = np.maximum(np.maximum(far[0][:, np.newaxis, np.newaxis], far[1][:, np.newaxis, :, np.newaxis]), far[2][:, :, np.newaxis, np.newaxis])  # fmt: skip
+        if self._ground is not None:
+            most = np.maximum(most, -self._ground.heights_m((x, y, z), self._voxel_m))
+        most = most / self._truncation_m
         return np.asarray(np.clip(most, -1, 1), F)
 
 
@@ -119,7 +130,9 @@ def _summed(values: Floats) -> Floats:
     return values
 
 
-def closed(blocks: Blocks, settings: VolumeSettings, carving: Carving, box: Box, floor: Floor | None) -> Blocks:
+def closed(
+    blocks: Blocks, settings: VolumeSettings, carving: Carving, box: Box, floor: Floor | Ground | None
+) -> Blocks:
     """Close a volume's field.
 
     Args:
@@ -133,7 +146,7 @@ def closed(blocks: Blocks, settings: VolumeSettings, carving: Carving, box: Box,
         Blocks around a surface that is closed. Weights are those of the volume where the surface was seen, else 1; there are no colours but
         where the volume has some.
     """
-    cells = cell_field(carving, blocks, LEAST_WEIGHT, has_floor=floor is not None)
+    cells = cell_field(carving, blocks, LEAST_WEIGHT, has_floor=isinstance(floor, Floor))
     field = _Closed(blocks, settings, cells, box, floor)
     made, waiting = Blocks(), _begin(blocks, cells, field.low_m, box)
     steps = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], np.int32)

@@ -1,4 +1,4 @@
-"""The field of a finished scan as bytes, and back, so that another pass can be added to it. Pure.
+"""A field as bytes, and back: that of a finished scan, to which another pass is added, and the part of it that a submap holds. Pure.
 
 A head line, then a deflated npz of arrays: nothing in it is code, and whatever the bytes are, they are read or refused in one line.
 """
@@ -6,27 +6,36 @@ A head line, then a deflated npz of arrays: nothing in it is code, and whatever 
 import io
 import zipfile
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.scan.blocks import VOXELS
+from phone_host.scan.carving import Carved
+from phone_host.scan.cells import Cells
 from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings
 
-_HEAD: Final = b"tandemscan field 1\n"
+_HEAD: Final = b"tandemscan field 2\n"
 _LEVEL: Final = 1
+"""Ten times as fast as the usual 6, for a tenth more bytes."""
+
 _MOST_BYTES: Final = 4 << 30
+Arrays = dict[str, NDArray[Any]]
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptField:
-    """The field of a finished scan: how it was made, and its blocks."""
+    """A field: how it was made, its blocks, and what the views told of the box around the thing; None: there was no box."""
 
     settings: VolumeSettings
     blocks: BlockValues
+    carved: Carved | None
 
     def volume(self, threads: int) -> Volume:
         """Return it as a volume.
@@ -39,22 +48,14 @@ class KeptField:
         return made
 
 
-def field_bytes(volume: Volume) -> bytes:
+def field_bytes(volume: Volume, carved: Carved | None = None) -> bytes:
     """Return a volume's field as bytes.
 
     Args:
         volume: any.
+        carved: what the views told of the box around the thing; None: there was no box.
     """
-    file, of, blocks = io.BytesIO(), volume.settings, volume.changed_blocks(every=True)
-    np.savez(
-        file,
-        model=np.array([of.voxel_m, of.far_m, of.most_bytes, of.truncation_voxels], np.float64),
-        places=blocks.places,
-        field=blocks.field,
-        weights=blocks.weights,
-        colours=blocks.colours,
-    )
-    return _HEAD + zlib.compress(file.getvalue(), _LEVEL)
+    return packed(_HEAD, arrays_of(KeptField(volume.settings, volume.changed_blocks(every=True), carved)))
 
 
 def field_of(content: bytes, name: str) -> KeptField:
@@ -67,34 +68,93 @@ def field_of(content: bytes, name: str) -> KeptField:
     Raises:
         DataError: it is damaged, or no field.
     """
+    refusal = DataError(
+        f"{name} is damaged, or no field of this version", "scan the first pass again, with --turntable"
+    )
+    return unpacked(content, _HEAD, field_in, refusal)
+
+
+def packed(head: bytes, arrays: Arrays) -> bytes:
+    """Return arrays as bytes.
+
+    Args:
+        head: the line that tells what they are, in which version.
+        arrays: by name.
+    """
+    file = io.BytesIO()
+    np.savez(file, **arrays)  # type: ignore[arg-type]  # none has the name of an argument
+    return head + zlib.compress(file.getvalue(), _LEVEL)
+
+
+def unpacked(content: bytes, head: bytes, read: Callable[[Arrays], Read], refusal: DataError) -> Read:
+    """Read arrays.
+
+    Args:
+        content: what `packed` gave.
+        head: that it was given.
+        read: makes something of them; what is missing, or cannot be, raises one of ValueError, KeyError, IndexError.
+        refusal: raised where that is not possible.
+
+    Raises:
+        DataError: the refusal.
+    """
     try:
-        return _read(content)
+        if not content.startswith(head):
+            raise ValueError("another head")
+        inflater = zlib.decompressobj()
+        plain = inflater.decompress(content[len(head) :], _MOST_BYTES)
+        if not inflater.eof:
+            raise EOFError
+        with np.load(io.BytesIO(plain), allow_pickle=False) as found:
+            return read(dict(found))
     except (ValueError, KeyError, IndexError, EOFError, OSError, zlib.error, zipfile.BadZipFile) as error:
-        raise DataError(
-            f"{name} is damaged, or no field of this version", "scan the first pass again, with --turntable"
-        ) from error
+        raise refusal from error
 
 
-def _read(content: bytes) -> KeptField:
-    if not content.startswith(_HEAD):
-        raise ValueError("another head")
-    inflater = zlib.decompressobj()
-    plain = inflater.decompress(content[len(_HEAD) :], _MOST_BYTES)
-    if not inflater.eof:
-        raise EOFError
-    with np.load(io.BytesIO(plain), allow_pickle=False) as found:
-        held = dict(found)
+def arrays_of(field: KeptField) -> Arrays:
+    """Return what `field_in` reads."""
+    of, blocks, carved = field.settings, field.blocks, field.carved
+    return {
+        "model": np.array([of.voxel_m, of.far_m, of.most_bytes, of.truncation_voxels], np.float64),
+        "block_places": blocks.places,
+        "field": blocks.field,
+        "weights": blocks.weights,
+        "colours": blocks.colours,
+        "carved": np.zeros((3, 0, 0, 0), np.uint8) if carved is None else carved.counts,
+        "cells": np.zeros(6)
+        if carved is None
+        else np.array([*carved.cells.low, carved.cells.voxels, carved.views, carved.cells.voxel_m]),
+    }
+
+
+def field_in(held: Arrays) -> KeptField:
+    """Return the field in some arrays.
+
+    Raises:
+        ValueError, KeyError: they hold none.
+    """
     voxel_m, far_m, most_bytes, truncation_voxels = held["model"].astype(np.float64).tolist()
     if not (0 < voxel_m < 1 and far_m > 0 and 0 < most_bytes < 1e15 and 1 <= truncation_voxels < 100):
         raise ValueError("impossible settings")
     settings = VolumeSettings(
         voxel_m=voxel_m, far_m=far_m, most_bytes=int(most_bytes), truncation_voxels=truncation_voxels
     )
-    count = len(held["places"])
+    count = len(held["block_places"])
     blocks = BlockValues(
-        held["places"].astype(np.int32).reshape(count, 3),
+        held["block_places"].astype(np.int32).reshape(count, 3),
         held["field"].astype(np.int16).reshape(count, VOXELS),
         held["weights"].astype(np.uint16).reshape(count, VOXELS),
         held["colours"].astype(np.uint8).reshape(count, VOXELS, 3),
     )
-    return KeptField(settings, blocks)
+    return KeptField(settings, blocks, _carved_in(held))
+
+
+def _carved_in(held: Arrays) -> Carved | None:
+    counts = held["carved"].astype(np.uint8)
+    kinds, tall, deep, wide = counts.shape
+    if kinds != 3:
+        raise ValueError("cells")
+    if not counts.size:
+        return None
+    x, y, z, voxels, views = held["cells"][:5].astype(np.int64).tolist()
+    return Carved(Cells((x, y, z), (wide, deep, tall), voxels, float(held["cells"][5])), counts, views)

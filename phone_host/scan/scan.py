@@ -5,7 +5,7 @@ The world's axes are those of the rectified left camera at the first pair that h
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -16,17 +16,14 @@ from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carved, Carving
 from phone_host.scan.cells import Cells
-from phone_host.scan.closing import Floor
-from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
-from phone_host.scan.loop_closing import LoopSettings
-from phone_host.scan.mat import Mat
 from phone_host.scan.mat_pose import MatSaid
-from phone_host.scan.mat_tracker import ABOVE_M, MatTracker, begun_on_mat, box_of_mat
+from phone_host.scan.mat_tracker import MatTracker, begun_on_mat
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.stretches import Placed
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker, TrackerState
@@ -41,43 +38,6 @@ _SUBMAP_PAIRS: Final = 20
 
 _MOST_COPIES: Final = 3
 """Submaps hold no more than this many times the model's blocks."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScanWanted:
-    """What the user asked for.
-
-    Attributes:
-        voxel_m: distance of two values of the field, m; NaN: as the depths' noise deserves.
-        most_bytes: memory of the model at most.
-        box: what lies outside does not belong to the model, and what nobody saw inside is closed; None: everything belongs, and nothing is closed.
-        threads: that compute; results do not depend on them.
-        mat: on which the object lies: it alone tells where each pair was taken; None: there is none.
-        turntable: whether the cameras stand still and an object turns before them.
-        on_table: whether a thing is scanned that stands on a table, without a mat.
-        onto: the field of an earlier pass, to which this one is added; None: this one is alone.
-        loops: how loops are closed where nothing but the camera's way tells where it is; None: they are not.
-    """
-
-    voxel_m: float = math.nan
-    most_bytes: int = 300_000_000
-    box: Box | None = None
-    threads: int = 1
-    mat: Mat | None = None
-    turntable: bool = False
-    on_table: bool = False
-    onto: KeptField | None = None
-    loops: LoopSettings | None = field(default_factory=LoopSettings)
-
-    @property
-    def model_box(self) -> Box | None:
-        """What lies outside does not belong to the model: the box that was asked for, or the room above the mat; None: everything belongs."""
-        return box_of_mat(self.mat) if self.box is None and self.mat is not None else self.box
-
-    @property
-    def floor(self) -> Floor | None:
-        """The plane on which the thing stands: the mat, or the table; None: it is not known."""
-        return None if self.mat is None and not self.on_table else Floor(skip_m=ABOVE_M)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -150,7 +110,7 @@ class _Closed:
 
 
 class Scan:
-    """Takes pairs and grows a model.
+    """Takes pairs and grows a model. `ways.scan_for` begins one: a thing that turns or stands on a table has a class of its own.
 
     Attributes:
         tracker: of the pairs since the first that has depth; None before it.
@@ -159,9 +119,16 @@ class Scan:
 
     Args:
         wanted: what for.
+
+    Raises:
+        SettingsError: that needs another class.
     """
 
     def __init__(self, wanted: ScanWanted) -> None:
+        if type(self) is Scan and (wanted.turntable or wanted.on_table):
+            raise SettingsError(
+                "Scan alone takes neither turntable nor on_table", "call scan_for(wanted) in place of Scan(wanted)"
+            )
         self._wanted = wanted
         self.tracker: Tracker | MatTracker | None = None
         self._carving: Carving | None = None
@@ -176,9 +143,9 @@ class Scan:
         self._is_changed = False  # whether submaps that are closed do not hold any more
 
     @property
-    def mat(self) -> Mat | None:
-        """On which the object lies; None: there is none."""
-        return self._wanted.mat
+    def wanted(self) -> ScanWanted:
+        """What for; with the box that was chosen since."""
+        return self._wanted
 
     @property
     def pairs(self) -> tuple[ScannedPair, ...]:

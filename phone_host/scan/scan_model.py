@@ -10,6 +10,7 @@ from phone_host.scan.blocks import SIDE, Blocks
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.closing import Floor, closed
+from phone_host.scan.ground import Ground
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import areas_m2, only, without_crumbs, without_loose_bodies
 from phone_host.scan.surface_noise import surface_noise_m
@@ -67,7 +68,7 @@ def open_model(volume: Volume) -> ScanModel:
     return ScanModel(mesh, noise_m, np.ones(len(mesh.points_m), np.bool_))
 
 
-def closed_model(volume: Volume, carving: Carving, box: Box, floor: Floor | None) -> ScanModel:
+def closed_model(volume: Volume, carving: Carving, box: Box, floor: Floor | Ground | None) -> ScanModel:
     """Return the closed surface of what is in a box, without loose bodies.
 
     Args:

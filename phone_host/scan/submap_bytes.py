@@ -1,13 +1,7 @@
-"""A submap as bytes, and back. Pure.
+"""A submap as bytes, and back: its part of the field, and what became of its pairs. Pure."""
 
-A head line, then a deflated npz of arrays: nothing in it is code, and whatever the bytes are, they are read or refused in one line.
-"""
-
-import io
 import math
-import zipfile
-import zlib
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,24 +9,15 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.scan.blocks import VOXELS
-from phone_host.scan.carving import Carved
-from phone_host.scan.cells import Cells
+from phone_host.scan.field_bytes import Arrays, KeptField, arrays_of, field_in, packed, unpacked
 from phone_host.scan.mat_pose import MatSaid, MatScale
 from phone_host.scan.places import Place
 from phone_host.scan.scan import ScannedPair, Submap
 from phone_host.scan.tracker import TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
-from phone_host.scan.volume import BlockValues
-from phone_host.scan.volume_settings import VolumeSettings
 
 _HEAD: Final = b"tandemscan submap 2\n"
-_LEVEL: Final = 1
-"""Ten times as fast as the usual 6, for a tenth more bytes."""
-
-_MOST_BYTES: Final = 4 << 30
 _MAT_VALUES: Final = 6
-Arrays = dict[str, NDArray[Any]]
 
 
 def submap_bytes(submap: Submap) -> bytes:
@@ -41,44 +26,27 @@ def submap_bytes(submap: Submap) -> bytes:
     Args:
         submap: any.
     """
-    file = io.BytesIO()
-    pairs, places, of, carved = submap.pairs, submap.tracker.places, submap.geometry, submap.carved
-    np.savez(
-        file,
-        is_whole=np.array(submap.is_whole),
-        names=np.array([pair.name for pair in pairs], np.str_),
-        states=np.array([pair.state.value for pair in pairs], np.str_),
-        weaknesses=np.array([pair.weakness.value for pair in pairs], np.str_),
-        numbers=np.array(
+    pairs, places, of = submap.pairs, submap.tracker.places, submap.geometry
+    own = {
+        "is_whole": np.array(submap.is_whole),
+        "names": np.array([pair.name for pair in pairs], np.str_),
+        "states": np.array([pair.state.value for pair in pairs], np.str_),
+        "weaknesses": np.array([pair.weakness.value for pair in pairs], np.str_),
+        "numbers": np.array(
             [(pair.stamp_s, pair.density, pair.corners, pair.overlap, pair.off_m) for pair in pairs], np.float64
         ),
-        poses=_rows([pair.world_camera for pair in pairs]),
-        mats=np.array([_mat_row(pair.mat) for pair in pairs], np.float64).reshape(-1, _MAT_VALUES),
-        model=np.array(
-            [
-                submap.settings.voxel_m,
-                submap.settings.far_m,
-                submap.settings.most_bytes,
-                submap.settings.truncation_voxels,
-            ],
-            np.float64,
-        ),
-        geometry=np.array([of.focal_px, of.baseline_m, of.cx_px, of.cy_px, of.doffs_px], np.float64),
-        size_px=np.array(submap.size_px),
-        block_places=submap.blocks.places,
-        field=submap.blocks.field,
-        weights=submap.blocks.weights,
-        colours=submap.blocks.colours,
-        pose=_rows([submap.tracker.pose]),
-        usual_off_m=np.array(submap.tracker.usual_off_m),
-        place_poses=_rows([place.world_camera for place in places]),
-        place_sizes=np.array([len(place.points_m) for place in places], np.int64),
-        place_points=np.concatenate([np.zeros((0, 3)), *(place.points_m for place in places)]),
-        descriptors=np.concatenate([np.zeros((0, 32), np.uint8), *(place.descriptors for place in places)]),
-        carved=np.zeros((3, 0, 0, 0), np.uint8) if carved is None else carved.counts,
-        cells=np.zeros(6) if carved is None else _numbers(carved),
-    )
-    return _HEAD + zlib.compress(file.getvalue(), _LEVEL)
+        "poses": _rows([pair.world_camera for pair in pairs]),
+        "mats": np.array([_mat_row(pair.mat) for pair in pairs], np.float64).reshape(-1, _MAT_VALUES),
+        "geometry": np.array([of.focal_px, of.baseline_m, of.cx_px, of.cy_px, of.doffs_px], np.float64),
+        "size_px": np.array(submap.size_px),
+        "pose": _rows([submap.tracker.pose]),
+        "usual_off_m": np.array(submap.tracker.usual_off_m),
+        "place_poses": _rows([place.world_camera for place in places]),
+        "place_sizes": np.array([len(place.points_m) for place in places], np.int64),
+        "place_points": np.concatenate([np.zeros((0, 3)), *(place.points_m for place in places)]),
+        "descriptors": np.concatenate([np.zeros((0, 32), np.uint8), *(place.descriptors for place in places)]),
+    }
+    return packed(_HEAD, arrays_of(KeptField(submap.settings, submap.blocks, submap.carved)) | own)
 
 
 def submap_of(content: bytes, name: str) -> Submap:
@@ -91,28 +59,15 @@ def submap_of(content: bytes, name: str) -> Submap:
     Raises:
         DataError: it is damaged, or no submap.
     """
-    try:
-        return _read(content)
-    except (ValueError, KeyError, IndexError, EOFError, OSError, zlib.error, zipfile.BadZipFile) as error:
-        raise DataError(
-            f"{name} is damaged, or no submap of this version",
-            "remove it and those with higher numbers, to go on from the one before; without any, begin a new scan",
-        ) from error
-
-
-def _read(content: bytes) -> Submap:
-    if not content.startswith(_HEAD):
-        raise ValueError("another head")
-    inflater = zlib.decompressobj()
-    plain = inflater.decompress(content[len(_HEAD) :], _MOST_BYTES)
-    if not inflater.eof:
-        raise EOFError
-    with np.load(io.BytesIO(plain), allow_pickle=False) as found:
-        held = dict(found)
-    model, count = held["model"], len(held["names"])
-    settings = VolumeSettings(
-        voxel_m=float(model[0]), far_m=float(model[1]), most_bytes=int(model[2]), truncation_voxels=float(model[3])
+    refusal = DataError(
+        f"{name} is damaged, or no submap of this version",
+        "remove it and those with higher numbers, to go on from the one before; without any, begin a new scan",
     )
+    return unpacked(content, _HEAD, _read, refusal)
+
+
+def _read(held: Arrays) -> Submap:
+    field, count = field_in(held), len(held["names"])
     focal_px, baseline_m, cx_px, cy_px, doffs_px = held["geometry"].tolist()
     width_px, height_px = held["size_px"].tolist()
     numbers = held["numbers"].reshape(count, 5).tolist()
@@ -136,39 +91,12 @@ def _read(content: bytes) -> Submap:
     return Submap(
         is_whole=bool(held["is_whole"]),
         pairs=pairs,
-        settings=settings,
+        settings=field.settings,
         geometry=StereoGeometry(focal_px=focal_px, baseline_m=baseline_m, cx_px=cx_px, cy_px=cy_px, doffs_px=doffs_px),
         size_px=(width_px, height_px),
-        blocks=_blocks(held),
+        blocks=field.blocks,
         tracker=TrackerState(_poses(held["pose"])[0], float(held["usual_off_m"]), _places(held)),
-        carved=_carved(held),
-    )
-
-
-def _numbers(carved: Carved) -> NDArray[np.float64]:
-    cells = carved.cells
-    return np.array([*cells.low, cells.voxels, carved.views, cells.voxel_m])
-
-
-def _carved(held: Arrays) -> Carved | None:
-    counts = held["carved"].astype(np.uint8)
-    kinds, tall, deep, wide = counts.shape
-    if kinds != 3:
-        raise ValueError("cells")
-    if not counts.size:
-        return None
-    x, y, z, voxels, views = held["cells"][:5].astype(np.int64).tolist()
-    cells = Cells((x, y, z), (wide, deep, tall), voxels, float(held["cells"][5]))
-    return Carved(cells, counts, views)
-
-
-def _blocks(held: Arrays) -> BlockValues:
-    count = len(held["block_places"])
-    return BlockValues(
-        held["block_places"].astype(np.int32).reshape(count, 3),
-        held["field"].astype(np.int16).reshape(count, VOXELS),
-        held["weights"].astype(np.uint16).reshape(count, VOXELS),
-        held["colours"].astype(np.uint8).reshape(count, VOXELS, 3),
+        carved=field.carved,
     )
 
 

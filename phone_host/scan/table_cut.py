@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import StereoGeometry
+from phone_host.scan.ground import Ground
 from phone_host.scan.turn_axis import TurnAxis
 from phone_host.scan.view import Depth, View
 
@@ -23,6 +24,24 @@ _LEAST_SHARE: Final = 0.3
 
 _CUT_VOXELS: Final = 1.5
 _BAND_VOXELS: Final = 1.0
+
+
+def ground_of(axis: TurnAxis, height_m: float, thing_m: Floats) -> Ground | None:
+    """Return what a thing stands on; where no table was found, what is as high as its lowest point.
+
+    Args:
+        axis: about which it turns.
+        height_m: of the table, from `table_height_m`.
+        thing_m: (N, 3) points of its surface, m.
+
+    Returns:
+        The plane; None: it turns about a line of sight, and nobody knows what is below.
+    """
+    up = up_of(axis)
+    if up is None or not len(thing_m):
+        return None
+    lowest_m = float(((thing_m - axis.point_m) @ up).min()) if height_m == -np.inf else height_m
+    return Ground(up, axis.point_m + lowest_m * up)
 
 
 def points_of(depth_m: Depth, geometry: StereoGeometry) -> Floats:

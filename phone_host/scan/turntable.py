@@ -1,7 +1,8 @@
 """A scan of a thing that turns before cameras that stand still, on a turntable or by hand, without a mat. Pure.
 
 While pairs come, the thing is told from the background and tracked like any scene: in its own axes the cameras go around it. The views are kept. In the
-end one axis and all angles are fitted to them (`full_turn`), the background is learnt from all of them, and the model is made again from the start.
+end one axis and all angles are fitted to them (`full_turn`), the background is learnt from all of them, and the model is made again from the start. A box
+around it is carved by all views, those of an earlier pass, too, and closed; what is below the table is empty.
 
 Views are kept in memory, cropped to the thing, one every two degrees, some 0.3 MB each, and never more than `_MOST_BYTES`; folders are not read twice.
 """
@@ -10,23 +11,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Processed
-from phone_host.scan.carving import Carving
+from phone_host.scan.box import Box
+from phone_host.scan.carving import Carved, Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
+from phone_host.scan.ground import Ground
 from phone_host.scan.merged_field import merged
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
-from phone_host.scan.scan_model import ScanModel
+from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan_model import ScanModel, closed_model, open_model
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
-from phone_host.scan.table_cut import above, points_of, table_height_m
-from phone_host.scan.table_scan import TableScan
+from phone_host.scan.table_cut import above, ground_of, points_of, table_height_m
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -43,6 +47,12 @@ _MOST_TURN: Final = 2 * np.pi + 0.6
 """rad after which no more views are kept: a whole turn, and enough to see that it is closed."""
 
 _MOST_BYTES: Final = 200_000_000
+
+_RIM_PX: Final = 5
+"""Across which the background beside the thing may be the thing."""
+
+_MARGIN_VOXELS: Final = 4.0
+"""Around the thing, as around one on a table."""
 
 _WORDS: Final = {
     Turning.NOTHING: Weakness.NOTHING_TURNS,
@@ -69,23 +79,25 @@ class _Station:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Finished:
-    """The end of a scan: how many pairs were taken, the turn, the volume made again, and how it lies on that of an earlier pass."""
+    """The end of a scan: how many pairs were taken, the turn, the background, the volume made again, what the thing stands on, and how it lies on that of an earlier pass."""
 
     taken: int
-    turn: FullTurn | None
-    volume: Volume | None
+    turn: FullTurn | None = None
+    background: Background | None = None
+    volume: Volume | None = None
+    ground: Ground | None = None
     match: SurfaceMatch | None = None
 
+    @property
+    def model_own(self) -> SE3:
+        """Takes the axes of this pass to those of the model: to the earlier pass's, if it lies on that."""
+        is_laid = self.match is not None and self.match.match is Match.FOUND
+        return self.match.first_second if self.match is not None and is_laid else SE3.identity()
 
-def scan_for(wanted: ScanWanted) -> Scan:
-    """Return what takes the pairs of a scan: of cameras that move, also around a thing on a table, or of an object that turns.
-
-    Args:
-        wanted: what for.
-    """
-    if wanted.on_table:
-        return TableScan(wanted)
-    return TurntableScan(wanted) if wanted.turntable else Scan(wanted)
+    @property
+    def model_ground(self) -> Ground | None:
+        """What the thing stood on, in the axes of the model."""
+        return None if self.ground is None else self.ground.moved(self.model_own)
 
 
 class TurntableScan(Scan):
@@ -128,6 +140,21 @@ class TurntableScan(Scan):
     def match(self) -> SurfaceMatch | None:
         """How this pass lies on the earlier one, once the model was asked for; None: there is none, or no turn."""
         return None if self._finished is None else self._finished.match
+
+    @property
+    def pairs(self) -> tuple[ScannedPair, ...]:
+        """What became of each pair, in order; in the axes of the model."""
+        if self._finished is None or self._finished.match is None:
+            return tuple(self._pairs)
+        move = self._finished.model_own
+        return tuple(
+            replace(pair, world_camera=move @ pair.world_camera) if pair.is_fused else pair for pair in self._pairs
+        )
+
+    @property
+    def carved(self) -> Carved | None:
+        """What the views told of the box around the thing, once the model was asked for; None: there is none."""
+        return None if self._carving is None else self._carving.carved
 
     @property
     def views(self) -> int:
@@ -179,24 +206,47 @@ class TurntableScan(Scan):
         Args:
             pair: as it was told when it was taken.
         """
-        return next((each for each in self._pairs if each.name == pair.name), pair)
+        return next((each for each in self.pairs if each.name == pair.name), pair)
 
     def model(self) -> ScanModel:
         """Return the surface so far, made from all views together once there are enough of them."""
         if self._finished is None or self._finished.taken != len(self._pairs):
             self._finished = self._end()
-        self._carve()
-        return super().model()
+        volume, box = self.volume, self._wanted.box or self._box_around()
+        if volume is None or box is None:
+            return super().model()
+        self._carving = self._carved_by_all(Cells.of(box, volume.settings.voxel_m), self._finished)
+        return closed_model(volume, self._carving, box, self._finished.model_ground)
 
-    def _carve(self) -> None:
-        """Let the views carve the box, from where they are known to lie in the end."""
-        box, settings = self._wanted.model_box, self.settings
-        if box is None or settings is None:
-            return
-        self._carving = Carving(Cells.of(box, settings.voxel_m), self._wanted.threads)
+    def _box_around(self) -> Box | None:
+        """Return a box around the thing; None: it is not known how it has turned."""
+        volume = None if self._finished is None else self._finished.volume
+        points = np.zeros((0, 3)) if volume is None else open_model(volume).mesh.points_m.astype(np.float64)
+        if volume is None or not len(points):
+            return None
+        margin_m = _MARGIN_VOXELS * volume.settings.voxel_m
+        (x, y, z), (far_x, far_y, far_z) = (
+            (points.min(axis=0) - margin_m).tolist(),
+            (points.max(axis=0) + margin_m).tolist(),
+        )
+        return Box((x, y, z), (far_x, far_y, far_z))
+
+    def _carved_by_all(self, cells: Cells, finished: _Finished) -> Carving:
+        """Let the views carve, from where they are known to lie in the end, and those of an earlier pass."""
+        carving, pairs, onto = Carving(cells, self._wanted.threads), self.pairs, self._wanted.onto
         for station in self._stations:
-            if self._pairs[station.pair].is_fused:
-                self._carving.see(station.view, self._pairs[station.pair].world_camera)
+            if pairs[station.pair].is_fused:
+                carving.see(_seen_through(station.view, finished.background), pairs[station.pair].world_camera)
+        if finished.model_ground is not None:
+            carving.take_empty(finished.model_ground.below(cells))
+        if (
+            onto is not None
+            and onto.carved is not None
+            and finished.match is not None
+            and finished.match.match is Match.FOUND
+        ):
+            carving.take_in(onto.carved)
+        return carving
 
     def _tracked(
         self, number: int, view: View, mask: NDArray[np.bool_], told_of: tuple[str, float, float]
@@ -270,7 +320,7 @@ class TurntableScan(Scan):
         """Fit the turn, and make the model again."""
         taken = len(self._pairs)
         if self.tracker is None or len(self._stations) < LEAST_VIEWS:
-            return _Finished(taken, None, None)
+            return _Finished(taken)
         settings = self.tracker.volume.settings
         background = Background(
             [each.view.grey for each in self._stations], [each.view.depth_m for each in self._stations]
@@ -284,7 +334,7 @@ class TurntableScan(Scan):
         ]
         turn = full_turn(given, settings, self._wanted.threads)
         if turn is None:
-            return _Finished(taken, None, None)
+            return _Finished(taken)
         volume = Volume(settings, self._wanted.threads)
         still = points_of(background.depth_m, self._stations[0].view.geometry)
         seen = np.concatenate([points_of(thing.depth_m, thing.geometry) for thing in things[:LEAST_VIEWS]])
@@ -297,17 +347,16 @@ class TurntableScan(Scan):
                 if not station.is_sure:  # the others have shown where it belongs
                     pair = replace(pair, state=Tracking.RELOCALISED, weakness=Weakness.NONE)
                 self._pairs[station.pair] = pair
+        ground = ground_of(turn.axis, height_m, open_model(volume).mesh.points_m.astype(np.float64))
+        if ground is not None:
+            ground.forget_below(volume.blocks, settings.voxel_m)
         if self._wanted.onto is None:
-            return _Finished(taken, turn, volume)
+            return _Finished(taken, turn, background, volume, ground)
         first = self._wanted.onto.volume(self._wanted.threads)
         match = matched_surfaces(first, volume)
         if match.match is Match.FOUND:
             volume = merged(first, volume, match.first_second, self._wanted.threads)
-            self._pairs = [
-                replace(pair, world_camera=match.first_second @ pair.world_camera) if pair.is_fused else pair
-                for pair in self._pairs
-            ]
-        return _Finished(taken, turn, volume, match)
+        return _Finished(taken, turn, background, volume, ground, match)
 
 
 def _with_axis(state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
@@ -332,6 +381,15 @@ def _cropped(view: View, rows: slice, columns: slice) -> View:
         depth_m=view.depth_m[rows, columns].copy(),
         geometry=replace(geometry, cx_px=geometry.cx_px - columns.start, cy_px=geometry.cy_px - rows.start),
     )
+
+
+def _seen_through(view: View, background: Background | None) -> View:
+    """Return a view with infinite depths where it shows the background: nothing of the thing is there, however near the table is."""
+    if background is None:
+        return view
+    still = background.is_seen(view.grey, view.depth_m).astype(np.uint8)
+    sure = cv2.erode(still, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
+    return replace(view, depth_m=np.where(sure, np.float32(np.inf), view.depth_m))
 
 
 def _masked(view: View, mask: NDArray[np.bool_]) -> View:

@@ -175,7 +175,7 @@ class Volume:
         chosen, back = np.zeros(self.blocks.count, np.uint8), into_of.inverse()
         chosen[numbers[numbers >= 0]] = 1
         rows = np.column_stack([back.R, back.t_m / voxel_m])
-        if self._library is None or not self._library.can_absorb:
+        if self._library is None:
             self._noted(absorbed(self.blocks, held, chosen, rows))
             return
         into, other = self._arrays(), _arrays_of(held, of.settings)

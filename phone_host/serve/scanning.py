@@ -41,7 +41,7 @@ class Scanning:
             begun: number of its activity.
         """
         self._live, self._begun, self._over, self._patches = live, begun, None, None
-        self._axes = (Axes.MAT if live.is_upright else Axes.CAMERA).value
+        self._axes = (Axes.CAMERA if live.axes is None else Axes.MAT).value
         try:
             yield
         finally:

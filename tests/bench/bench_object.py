@@ -30,7 +30,8 @@ from phone_host.scan.box import Box
 from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatScale, fit_mat
 from phone_host.scan.mesh import Mesh
-from phone_host.scan.scan import Scan, ScanWanted
+from phone_host.scan.scan import Scan
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scene.object_scene import ObjectScene, Setting, Size, object_scene
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted

@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.turntable import TurntableScan
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
@@ -49,7 +49,7 @@ def turntable_verdicts(step_deg: float = 5.0) -> list[Verdict]:
         scan.take(str(number), float(number), processed)
         took += time.process_time() - began
     began = time.process_time()
-    points = scan.model().mesh.points_m.astype(np.float64)
+    points = scan.model().seen_mesh.points_m.astype(np.float64)
     ended, turn = time.process_time() - began, scan.turn
     off_mm = 1e3 * np.abs(off_thing_m(points))
     mean, far = (float(off_mm.mean()), float(np.percentile(off_mm, 95))) if len(off_mm) else (math.nan, math.nan)

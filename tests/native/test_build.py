@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import SettingsError
+from phone_host.doctor.host_checks import check_native
 from phone_host.stereo.native import build_library
 from phone_host.stereo.native.build_library import (
     LIBRARY_FILE,
@@ -20,7 +21,7 @@ from phone_host.stereo.native.build_library import (
     build_or_explain,
     sources_digest,
 )
-from phone_host.stereo.native.library import IsaState, Library, Missing, Simd, fallback_note, load
+from phone_host.stereo.native.library import IsaState, Library, Missing, Simd, fallback_note, load, model_note
 
 ROOT = Path(__file__).resolve().parents[2]
 NATIVE = "phone_host/stereo/native"
@@ -117,6 +118,22 @@ def test_a_library_that_cannot_be_loaded_or_is_of_another_version(tmp_path: Path
     source.write_text("int tandem_abi(void) { return 0; }\n")
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / LIBRARY_FILE, source], check=True)
     assert isinstance(load(tmp_path), Missing)
+
+
+def test_a_library_of_an_older_build_is_told_and_not_used(native_library: Library, tmp_path: Path) -> None:
+    """One of the same ABI that lacks a function of today: matcher, doctor and scan name it, and say how to build it anew."""
+    content = native_library.path.read_bytes()
+    assert b"\0tandem_absorb\0" in content
+    (tmp_path / LIBRARY_FILE).write_bytes(content.replace(b"\0tandem_absorb\0", b"\0tandem_abszzz\0"))
+    found = load(tmp_path)
+    assert found == Missing(
+        reason="of an older build, without tandem_absorb", remedy="reinstall; in a checkout: make native"
+    )
+    assert "of an older build, without tandem_absorb" in check_native(found).text
+    for note in (model_note(found), fallback_note(found)):
+        assert "of an older build, without tandem_absorb; " in note
+        assert note.endswith("make native")
+    assert model_note(native_library) == ""
 
 
 def test_the_instruction_set_can_be_chosen(native_library: Library) -> None:

@@ -19,7 +19,8 @@ from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.full_turn import TurnView, full_turn
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import without_loose_bodies
-from phone_host.scan.scan import Scan, ScanWanted
+from phone_host.scan.scan import Scan
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.table_cut import above, table_height_m
 from phone_host.scan.turn_axis import TurnAxis

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.scan_job import ScanJob, run_scan
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
@@ -154,10 +154,10 @@ def test_the_example_scans_the_same(walk: Path, tmp_path: Path) -> None:
     """examples/scan_object.py tells the state of each pair, and leaves the model that the command makes of the same pictures."""
     link = f"ipc://{tmp_path}/link"
     with board(["run", "--camera", f"replay:{walk / 'left'}", "--link", link], tmp_path):
-        words = [EXAMPLE, link, f"replay:{walk / 'right'}", walk / "rig.yaml", "5"]
+        words = [EXAMPLE, link, f"replay:{walk / 'right'}", walk / "rig.yaml", "around", "5"]
         command = [sys.executable, *map(str, words)]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=100)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[:2] == ["pair 0: tracking", "pair 1: tracking"]
     scan_here(walk, tmp_path / "files")
-    assert (tmp_path / "model.ply").read_bytes() == (tmp_path / "files" / "model.ply").read_bytes()
+    assert (tmp_path / "scan" / "model.ply").read_bytes() == (tmp_path / "files" / "model.ply").read_bytes()

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from common import now
-from common.errors import SettingsError
+from common.errors import DataError, SettingsError
+from phone_host.api import save_scan
 from phone_host.cli import main
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Image, Processed
@@ -23,9 +24,11 @@ from phone_host.scan.mat import USUAL_MAT, MatCorners, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
 from phone_host.scan.mat_tracker import ABOVE_M
 from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan, ScannedPair, ScanWanted
+from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.ways import scan_for
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
@@ -130,7 +133,7 @@ def walked(degrees: float) -> Processed:
 
 
 def scanned(degrees: list[float], wanted: ScanWanted) -> tuple[Scan, list[ScannedPair]]:
-    scan = Scan(wanted)
+    scan = scan_for(wanted)
     return scan, [scan.take(str(at), float(at), walked(at)) for at in degrees]
 
 
@@ -152,6 +155,18 @@ def test_what_stands_on_the_mat_becomes_a_model_in_the_mats_axes() -> None:
     assert off[points[:, 2] > 0.02].mean() < 0.0015
     again = scanned([0, 60, 120, 180, 240, 300], replace(WANTED, threads=2))[0].model().mesh
     assert mesh.points_m.tobytes() == again.points_m.tobytes()
+
+
+def test_the_python_api_saves_it_in_the_mats_axes(tmp_path: Path) -> None:
+    """A scan begun with the mat says in its files on what the model stands; one of which nothing came is refused with the reason."""
+    save_scan(tmp_path / "ball", scanned([0, 60, 180, 240], WANTED)[0], matcher="tandem")
+    report = json.loads((tmp_path / "ball" / "report.json").read_text())
+    assert (report["in_model"], report["model"]["axes"], report["matcher"]) == (4, Axes.MAT.text, "tandem")
+    unseen = scan_for(WANTED)
+    unseen.take("0", 0.0, without_marks(0))
+    with pytest.raises(DataError, match="is not seen in any of 1 pair"):
+        save_scan(tmp_path / "none", unseen)
+    assert not (tmp_path / "none").exists()
 
 
 def test_a_pair_without_the_mat_is_lost_with_a_reason_or_followed_by_what_stands_on_it() -> None:

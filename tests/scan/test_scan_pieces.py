@@ -13,7 +13,8 @@ from phone_host.scan.cells import Cells
 from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Pieces
-from phone_host.scan.scan import Scan, ScanWanted
+from phone_host.scan.scan import Scan
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracker import Tracked, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View

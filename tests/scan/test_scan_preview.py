@@ -12,7 +12,7 @@ from phone_host.live.scan import LiveScan
 from phone_host.live.scan_view import ScanPicture
 from phone_host.model import Side
 from phone_host.scan.mesh import Mesh
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.small_view import small_view
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.volume_settings import VolumeSettings

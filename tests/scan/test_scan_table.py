@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,15 +18,16 @@ from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.scan.box import Box
-from phone_host.scan.scan import ScanWanted
 from phone_host.scan.scan_model import UNSEEN_RGB
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.table import Table, find_table
 from phone_host.scan.table_box import thing_box
 from phone_host.scan.tracking_words import Weakness
-from phone_host.scan.turntable import scan_for
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.scan.ways import scan_for
+from tests.support.programs import board
 from tests.support.solid_views import Thing, around, thing_view
 from tests.support.table_things import Slope, bare_scene, computed, small_scene, true_camera, write_pictures
 
@@ -140,6 +143,21 @@ def test_a_figure_on_a_table_becomes_a_closed_model_that_stands_on_it(scan_of_it
     report = json.loads((scan_of_it / "report.json").read_text())
     assert report["model"]["axes"] == Axes.TABLE.text
     assert "the axes are the table" in (scan_of_it / "index.html").read_text()
+
+
+def test_the_python_api_scans_it_as_the_command_does(pictures: Path, tmp_path: Path) -> None:
+    """examples/scan_object.py, told `table`, leaves the folder that the command makes of the same pictures: the same model, in the same axes."""
+    link, example = f"ipc://{tmp_path}/link", Path(__file__).parents[2] / "examples" / "scan_object.py"
+    with board(["run", "--camera", f"replay:{pictures / 'left'}", "--link", link], tmp_path):
+        words = [example, link, f"replay:{pictures / 'right'}", pictures / "rig.yaml", "table", str(PAIRS)]
+        command = [sys.executable, *map(str, words)]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 0, done.stderr
+    given = [str(pictures / "left"), str(pictures / "right"), "--calibration", str(pictures / "rig.yaml")]
+    assert main(["scan", *given, "--object", "--out", str(tmp_path / "command")]) == 0
+    assert (tmp_path / "scan" / "model.ply").read_bytes() == (tmp_path / "command" / "model.ply").read_bytes()
+    api, command_s = (json.loads((tmp_path / out / "report.json").read_text()) for out in ("scan", "command"))
+    assert (api["model"], api["files"], api["in_model"]) == (command_s["model"], command_s["files"], PAIRS)
 
 
 def test_equal_pairs_give_equal_bytes_and_a_box_overrides(pictures: Path, scan_of_it: Path, tmp_path: Path) -> None:

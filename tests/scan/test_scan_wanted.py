@@ -5,8 +5,14 @@ from pathlib import Path
 import pytest
 
 from common.errors import SettingsError
+from phone_host import api
 from phone_host.cli import main
+from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.mat import USUAL_MAT, parse_mat
+from phone_host.scan.table_scan import TableScan
+from phone_host.scan.turntable import TurntableScan
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.verbs.serve.page_scan import asked_scan
 
 
@@ -18,6 +24,23 @@ def test_the_page_wants_what_the_command_wants() -> None:
     assert (turned.turntable, turned.voxel_m, turned.box is not None) == (True, 0.002, True)
     with pytest.raises(SettingsError, match="--turntable beside --mat"):
         asked_scan({"turntable": "1", "mat": USUAL_MAT})
+
+
+def test_the_python_api_takes_one_way_and_begins_it() -> None:
+    """What contradicts itself is refused, and so is the class that would pass over what was asked for; `scan_for` begins each."""
+    for wrong in ({"turntable": True, "on_table": True}, {"mat": parse_mat(USUAL_MAT), "turntable": True}):
+        with pytest.raises(SettingsError, match="ask for one of"):
+            api.ScanWanted(**wrong)
+    empty = Volume(VolumeSettings(voxel_m=0.01, far_m=1.0))
+    with pytest.raises(SettingsError, match="onto without turntable"):
+        api.ScanWanted(onto=field_of(field_bytes(empty), "field.bin"))
+    kinds = []
+    for wanted in (api.ScanWanted(turntable=True), api.ScanWanted(on_table=True)):
+        with pytest.raises(SettingsError, match="scan_for"):
+            api.Scan(wanted)
+        kinds.append(type(api.scan_for(wanted)))
+    assert kinds == [TurntableScan, TableScan]
+    assert type(api.scan_for(api.ScanWanted(mat=parse_mat(USUAL_MAT)))) is api.Scan
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ VARIABLE: Final = "TANDEMSCAN_SIMD"
 _ABI: Final = 4  # TANDEM_ABI of tandem.h
 _HERE: Final = Path(__file__).resolve().parent
 _INSTALL: Final = "install gcc or clang and reinstall; in a checkout: make native"
-_REINSTALL: Final = "reinstall"
+_REINSTALL: Final = "reinstall; in a checkout: make native"
 
 
 class Simd(Enum):
@@ -233,11 +233,6 @@ class Library:
         """Show a volume's surface as a camera sees it; see cast_kernel.c."""
         _require_done(self.handle.tandem_cast(self.isa, ctypes.byref(job)))
 
-    @property
-    def can_absorb(self) -> bool:
-        """Whether it has `absorb`: a library of the same ABI that was built earlier has not, and numpy does it."""
-        return hasattr(self.handle, "tandem_absorb")
-
     def absorb(self, job: AbsorbJob) -> None:
         """Take a field into another; see absorb.c."""
         _require_done(self.handle.tandem_absorb(ctypes.byref(job)))
@@ -284,11 +279,15 @@ def load(folder: Path, wanted: str = "") -> Library | Missing:
     path = folder / LIBRARY_FILE
     try:
         handle = ctypes.CDLL(str(path))
-        _declare(handle)
-    except (OSError, AttributeError) as error:
+    except OSError as error:
         return _missing(folder, error)
+    try:
+        _declare(handle)
+    except AttributeError as error:  # a checkout went on, and its library did not
+        lacking = str(error).rpartition(" ")[2]
+        return Missing(reason=f"of an older build, without {lacking}", remedy=_REINSTALL)
     if handle.tandem_abi() != _ABI:
-        return Missing(reason=f"{path} belongs to another version", remedy=_REINSTALL)
+        return Missing(reason=f"of another version ({path})", remedy=_REINSTALL)
     best = next(simd for simd, number in _NUMBERS.items() if number == handle.tandem_isa_best())
     library = Library(handle=handle, simd=best, path=path)
     if not wanted:
@@ -308,7 +307,14 @@ def fallback_note(found: Library | Missing) -> str:
     return f"own matcher {found.reason}; sgbm is used; {found.remedy}"
 
 
-def _missing(folder: Path, error: Exception) -> Missing:
+def model_note(found: Library | Missing) -> str:
+    """Return what a scan says where numpy has to make the model; empty where the library is there."""
+    if isinstance(found, Library):
+        return ""
+    return f"the model is made by numpy, which is slower: the native library is {found.reason}; {found.remedy}"
+
+
+def _missing(folder: Path, error: OSError) -> Missing:
     path = folder / LIBRARY_FILE
     if path.exists():
         detail = " ".join(str(error).split())

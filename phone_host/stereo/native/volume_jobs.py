@@ -145,8 +145,6 @@ def declare(handle: ctypes.CDLL) -> None:
     handle.tandem_cast.argtypes = [_INT, ctypes.POINTER(CastJob)]
     handle.tandem_touch.argtypes = [ctypes.POINTER(TouchJob)]
     handle.tandem_register.argtypes = [ctypes.POINTER(RegisterJob)]
-    for name in ("fuse", "carve", "cast", "touch", "register"):
+    handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
+    for name in ("fuse", "carve", "cast", "touch", "register", "absorb"):
         getattr(handle, f"tandem_{name}").restype = _INT
-    if hasattr(handle, "tandem_absorb"):
-        handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
-        handle.tandem_absorb.restype = _INT

@@ -1,6 +1,7 @@
 """phone-host scan: put pairs from several places together to one model."""
 
 import argparse
+import sys
 from typing import Final
 
 from common.errors import SettingsError
@@ -14,6 +15,7 @@ from phone_host.run.scan_files import NAMES
 from phone_host.run.scan_job import ScanJob, run_scan
 from phone_host.settings import most_pixels
 from phone_host.stereo.default_matcher import default_matcher, default_note
+from phone_host.stereo.native.library import model_note, native
 from phone_host.stereo.view_files import pair_files
 from phone_host.verbs.given_pictures import given_pictures
 from phone_host.verbs.orientation_arguments import orientations
@@ -27,6 +29,8 @@ _CHECK_FAILED: Final = 4
 
 def run(options: argparse.Namespace) -> int:
     """Scan pictures, or what two cameras give, and print what came of it."""
+    if note := model_note(native()):
+        say(f"phone-host: {note}", sys.stderr)
     if options.images:
         report, code = _scan_pictures(options), 0
     else:

@@ -13,10 +13,12 @@ from common.words import counted
 from phone_host.output.axes import Axes
 from phone_host.run.kept_field import read_field
 from phone_host.run.kept_submaps import read_submaps
+from phone_host.run.scan_result import own_axes
 from phone_host.scan.box import Box
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.mat import USUAL_MAT, parse_mat
-from phone_host.scan.scan import ScanWanted, Submap
+from phone_host.scan.scan import Submap
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.stereo_options import output_options
 from phone_host.verbs.units import length_mm
@@ -129,10 +131,10 @@ def axes_of(options: argparse.Namespace, wanted: ScanWanted) -> Axes:
     Raises:
         SettingsError: --axes beside a mat, or beside an object on a table.
     """
-    asked = output_options(options).axes
-    if wanted.mat is None and not wanted.on_table:
+    asked, own = output_options(options).axes, own_axes(wanted)
+    if own is None:
         return asked
-    own, option = (Axes.TABLE, "--object") if wanted.on_table else (Axes.MAT, "--mat")
+    option = "--mat" if own is Axes.MAT else "--object"
     if asked is not Axes.CAMERA:
         raise SettingsError(
             f"--axes {asked.value} beside {option}", f"leave --axes out: the model stands on the {own.value}, z up"

@@ -21,7 +21,7 @@ from phone_host.run.host_settings import EndReason
 from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.scan.box import Box
-from phone_host.scan.scan import ScanWanted
+from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.run.prepared import PreparedRun, checked, open_run

@@ -26,12 +26,83 @@ static int is_seen(const struct tandem_fuse_job *job, const float *centre, float
            job->focal_px * centre[1] - ((float)job->height - job->cy_px) * z < 2 * wide;
 }
 
-static inline int32_t weight_of(const struct tandem_fuse_job *job, float depth)
+enum { SLICE = BLOCK_SIDE * BLOCK_SIDE };
+
+/* What a slice of a block gets from the depth image. Loops over it are long enough to be vectorised, and no branch leaves them. */
+struct slice {
+    int32_t pixel[SLICE];  /* that shows the voxel; 0 where none does */
+    int32_t weight[SLICE]; /* 0: the voxel gets nothing */
+    int32_t held[SLICE];   /* its weight before */
+    float depth[SLICE];    /* of the voxel, m */
+    float seen[SLICE];     /* of the pixel, m; 0: none */
+    float share[SLICE];    /* how far it lies before the surface, in truncations */
+};
+
+/* Which pixels show the voxels, and how deep they are. */
+static inline void project(const struct tandem_fuse_job *job, const float *first, const float *in_slice, struct slice *to)
 {
-    const float sure = job->sure_m / (job->noise_per_m * depth * depth);
-    const float share = sure < 1 ? sure * sure : 1;
-    const int32_t weight = (int32_t)(job->weight_one * share + 0.5f);
-    return weight < 1 ? 1 : weight;
+    const float *pose = job->camera_world, voxel = job->volume->voxel_m; /* copied: what is stored might alias them */
+    const float down_x = pose[1], down_y = pose[5], down_z = pose[9];
+    const float right_x = pose[0] * voxel, right_y = pose[4] * voxel, right_z = pose[8] * voxel;
+    const float first_x = first[0], first_y = first[1], first_z = first[2];
+    const float in_x = in_slice[0], in_y = in_slice[1], in_z = in_slice[2];
+    const float focal = job->focal_px, cx = job->cx_px, cy = job->cy_px;
+    const float width = (float)job->width, height = (float)job->height;
+    const int32_t stride = job->width;
+    for (int i = 0; i < SLICE; i++) {
+        const float across = (float)(i & (BLOCK_SIDE - 1)), down = (float)(i / BLOCK_SIDE) * voxel;
+        const float x = first_x + (down_x * down + in_x) + right_x * across;
+        const float y = first_y + (down_y * down + in_y) + right_y * across;
+        const float z = first_z + (down_z * down + in_z) + right_z * across, safe = z > 1e-3f ? z : 1e-3f;
+        const float u = focal * x / safe + cx + 0.5f, v = focal * y / safe + cy + 0.5f;
+        const int inside = (z > 1e-3f) & (u >= 0) & (v >= 0) & (u < width) & (v < height);
+        const float column = inside ? u : 0, line = inside ? v : 0;
+        to->pixel[i] = (int32_t)line * stride + (int32_t)column;
+        to->seen[i] = inside ? 1 : 0;
+        to->depth[i] = z;
+    }
+    for (int i = 0; i < SLICE; i++) {
+        to->seen[i] *= job->depth_m[to->pixel[i]]; /* not known stays so: NaN */
+    }
+}
+
+/* How much each voxel gets: nothing, where no depth is known or the surface hides it. Returns whether any gets something. */
+static inline int weigh(const struct tandem_fuse_job *job, struct slice *to)
+{
+    const float truncation = job->volume->truncation_m, far = job->far_m, one = (float)job->weight_one;
+    const float sure_m = job->sure_m, noise_per_m = job->noise_per_m;
+    int32_t any = 0;
+    for (int i = 0; i < SLICE; i++) {
+        const float seen = to->seen[i], distance = seen - to->depth[i];
+        const int gets = (seen > 0) & (seen <= far) & (distance >= -truncation);
+        const float known = gets ? seen : 1, sure = sure_m / (noise_per_m * known * known);
+        const float share = sure < 1 ? sure * sure : 1;
+        const int32_t weight = (int32_t)(one * share + 0.5f), least = weight < 1 ? 1 : weight;
+        to->weight[i] = gets ? least : 0;
+        to->share[i] = gets ? distance / truncation : 1;
+        any |= gets;
+    }
+    return any;
+}
+
+/* Running means of the distances. Returns whether any voxel is near the surface, and gets colour. */
+static inline int average(int16_t *field, uint16_t *weights, int32_t most_weight, struct slice *by)
+{
+    int32_t near = 0;
+    for (int i = 0; i < SLICE; i++) {
+        const float share = by->share[i] < 1 ? by->share[i] : 1;
+        const int32_t weight = by->weight[i], before = field[i], held = weights[i], total = held + weight;
+        const int32_t value = (int32_t)floorf(share * FIELD_ONE + 0.5f), parts = total > 0 ? total : 1;
+        const int32_t rounded = (int32_t)floorf((float)(before * held + value * weight) / (float)parts + 0.5f);
+        const int32_t other = rounded != 0 ? rounded : 1; /* a node exactly on the surface would give empty triangles */
+        const int same = (weight == 0) | ((by->share[i] >= 1) & (before == FIELD_ONE)); /* empty before and now: most voxels */
+        const int32_t most = weight == 0 ? total : most_weight;
+        by->held[i] = held;
+        weights[i] = (uint16_t)(total < most ? total : most);
+        field[i] = (int16_t)(same ? before : other);
+        near |= by->share[i] < 1;
+    }
+    return near;
 }
 
 static inline void add_colour(uint8_t *colour, const uint8_t *seen, int32_t held, int32_t weight)
@@ -42,44 +113,22 @@ static inline void add_colour(uint8_t *colour, const uint8_t *seen, int32_t held
     }
 }
 
-static int32_t one_row(const struct tandem_fuse_job *job, const float *start, const float *step, int64_t at)
+static int32_t one_slice(const struct tandem_fuse_job *job, const float *first, const float *in_slice, int64_t at)
 {
     const struct tandem_volume *volume = job->volume;
-    int32_t place[BLOCK_SIDE];
-    float depth[BLOCK_SIDE];
-    for (int i = 0; i < BLOCK_SIDE; i++) { /* vectorised: no branch leaves the loop */
-        const float x = start[0] + step[0] * (float)i, y = start[1] + step[1] * (float)i;
-        const float z = start[2] + step[2] * (float)i, safe = z > 1e-3f ? z : 1e-3f;
-        const float u = job->focal_px * x / safe + job->cx_px + 0.5f, v = job->focal_px * y / safe + job->cy_px + 0.5f;
-        const int inside = z > 1e-3f && u >= 0 && v >= 0 && u < (float)job->width && v < (float)job->height;
-        place[i] = inside ? (int32_t)v * job->width + (int32_t)u : -1;
-        depth[i] = z;
+    struct slice slice;
+    project(job, first, in_slice, &slice);
+    if (!weigh(job, &slice)) {
+        return 0;
     }
-    int32_t changed = 0;
-    for (int i = 0; i < BLOCK_SIDE; i++) {
-        if (place[i] < 0) {
-            continue;
-        }
-        const float seen = job->depth_m[place[i]], distance = seen - depth[i];
-        if (!(seen > 0 && seen <= job->far_m && distance >= -volume->truncation_m)) {
-            continue;
-        }
-        const float share = distance / volume->truncation_m;
-        const int32_t held = volume->weights[at + i], weight = weight_of(job, seen), total = held + weight;
-        changed = 1;
-        volume->weights[at + i] = (uint16_t)(total < job->most_weight ? total : job->most_weight);
-        if (share >= 1 && volume->field[at + i] == FIELD_ONE) {
-            continue; /* empty before and now: most voxels */
-        }
-        const int32_t value = (int32_t)floorf((share < 1 ? share : 1) * FIELD_ONE + 0.5f);
-        const float mean = (float)(volume->field[at + i] * held + value * weight) / (float)total;
-        const int32_t rounded = (int32_t)floorf(mean + 0.5f);
-        volume->field[at + i] = (int16_t)(rounded != 0 ? rounded : 1); /* a node exactly on the surface would give empty triangles */
-        if (share < 1) {
-            add_colour(volume->colours + 3 * (at + i), job->colours + 3 * (int64_t)place[i], held, weight);
+    if (average(volume->field + at, volume->weights + at, job->most_weight, &slice)) {
+        for (int i = 0; i < SLICE; i++) {
+            if (slice.share[i] < 1) {
+                add_colour(volume->colours + 3 * (at + i), job->colours + 3 * (int64_t)slice.pixel[i], slice.held[i], slice.weight[i]);
+            }
         }
     }
-    return changed;
+    return 1;
 }
 
 void ISA_NAME(fuse_blocks)(const struct tandem_fuse_job *job, int32_t from, int32_t to)
@@ -102,14 +151,9 @@ void ISA_NAME(fuse_blocks)(const struct tandem_fuse_job *job, int32_t from, int3
         if (!is_seen(job, centre, radius)) {
             continue;
         }
-        const float step[3] = {pose[0] * voxel, pose[4] * voxel, pose[8] * voxel};
-        for (int line = 0; line < BLOCK_SIDE * BLOCK_SIDE; line++) {
-            const float y = (float)(line % BLOCK_SIDE) * voxel, z = (float)(line / BLOCK_SIDE) * voxel;
-            float start[3];
-            for (int axis = 0; axis < 3; axis++) {
-                start[axis] = first[axis] + (pose[4 * axis + 1] * y + pose[4 * axis + 2] * z);
-            }
-            job->changed[number] |= (uint8_t)one_row(job, start, step, (int64_t)number * BLOCK_VOXELS + BLOCK_SIDE * line);
+        for (int line = 0; line < BLOCK_SIDE; line++) {
+            const float z = (float)line * voxel, in_slice[3] = {pose[2] * z, pose[6] * z, pose[10] * z};
+            job->changed[number] |= (uint8_t)one_slice(job, first, in_slice, (int64_t)number * BLOCK_VOXELS + SLICE * line);
         }
     }
 }

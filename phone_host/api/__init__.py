@@ -1,0 +1,72 @@
+"""The Python API of tandemscan: open two cameras and iterate over the results.
+
+    from phone_host.api import open_scanner
+
+    with open_scanner(link="tcp://192.168.7.2:5555", camera="v4l2:/dev/video0", rig="rig.yaml") as scanner:
+        for result in scanner:
+            print(result.number, result.ledger.end_to_end_ns, result.processed.cloud.shape)
+
+A result holds the rectified images, the disparity, the point cloud in metres and the pair's delays
+(`phone_host.model.Result`). A program that is slower than the cameras gets the newest results; `scanner.snapshot()`
+counts those it missed. With `lossless=True`, or if the host camera gives images on demand, the scanner waits for the
+program and skips no result.
+
+`scan_for` begins a model of such results, of any of the ways that `phone-host scan` knows; `save_scan` writes its folder.
+
+This door stays backward compatible. The modules below it may change.
+"""
+
+from phone_host.api.opening import open_scanner
+from phone_host.api.scanner import Scanner
+from phone_host.api.scans import save_scan, write_model
+from phone_host.geometry.se3 import SE3
+from phone_host.geometry.triangulate import Intersections, triangulate
+from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.model import Result, StereoGeometry
+from phone_host.output.meshes.printable import Printer, Problem
+from phone_host.output.rig_files.imported import Imported, import_rig
+from phone_host.printers.door import Wishes
+from phone_host.printers.progress import Ended, Phase, Progress
+from phone_host.run.kept_field import read_field
+from phone_host.run.model_job import check_model, export_model, print_model
+from phone_host.scan.box import Box
+from phone_host.scan.field_bytes import KeptField
+from phone_host.scan.mat import Mat, parse_mat
+from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan_model import ScanModel
+from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.ways import scan_for
+
+__all__ = [
+    "SE3",
+    "Box",
+    "Ended",
+    "Imported",
+    "Intersections",
+    "KeptField",
+    "Mat",
+    "Phase",
+    "Printer",
+    "Problem",
+    "Progress",
+    "Result",
+    "RunSnapshot",
+    "Scan",
+    "ScanModel",
+    "ScanWanted",
+    "ScannedPair",
+    "Scanner",
+    "StereoGeometry",
+    "Wishes",
+    "check_model",
+    "export_model",
+    "import_rig",
+    "open_scanner",
+    "parse_mat",
+    "print_model",
+    "read_field",
+    "save_scan",
+    "scan_for",
+    "triangulate",
+    "write_model",
+]

@@ -1,0 +1,46 @@
+"""Writes what a scan has come to: its surface alone, or the folder that `phone-host scan` leaves."""
+
+from pathlib import Path
+
+from phone_host.output.axes import Axes
+from phone_host.output.ply import PointCloud, write_surface
+from phone_host.run.scan_files import FinishedScan
+from phone_host.run.scan_files import write_scan as write_files
+from phone_host.run.scan_result import own_axes, report_of, require_something
+from phone_host.run.turn_remarks import field_of_turn, turn_remarks
+from phone_host.scan.scan import Scan
+from phone_host.scan.scan_model import ScanModel
+
+
+def save_scan(folder: str | Path, scan: Scan, *, matcher: str = "unknown") -> None:
+    """Write model.ply, trajectory.txt, report.json and index.html as `phone-host scan` does; of a turn also field.bin, for another pass.
+
+    Args:
+        folder: created if missing; the files of an earlier scan in it are replaced.
+        scan: with all its pairs.
+        matcher: the name of what matched them, for the report.
+
+    Raises:
+        DataError: no pair has depth, or none shows what was asked for: the mat, a table with an object, something that turns.
+        UnavailableError: a file in the folder was not written by this program.
+        OSError: it cannot be written.
+    """
+    model, axes = scan.model(), own_axes(scan.wanted) or Axes.CAMERA
+    report = report_of(scan, model, scan.pairs, turn_remarks(scan), matcher=matcher, axes=axes)
+    require_something(report)
+    write_files(Path(folder), FinishedScan(report, model, field=field_of_turn(scan)))
+
+
+def write_model(path: str | Path, model: ScanModel) -> None:
+    """Write the surface of a scan as PLY: metres, in the axes of the rectified left camera at the first pair that has depth, or of the mat or table.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        model: from `Scan.model()`.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    mesh = model.mesh
+    seen = model.seen if model.is_closed else None
+    write_surface(Path(path), PointCloud(mesh.points_m, mesh.colours), mesh.triangles, seen=seen)
