@@ -4,6 +4,7 @@ Their memory is bounded: when they are too many, every second one goes, and from
 a surface may be seen by none of them, none is kept any more.
 """
 
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -21,14 +22,17 @@ _WIDTH_PX: Final = 320
 _QUALITY: Final = 90
 """Of the colours' JPEG: a tenth of their bytes, and its errors are less than a sensor's noise."""
 
+_LEVEL: Final = 1
+"""Of the depths' deflation: a room's become a quarter in 1 ms."""
+
 _MOST_EVERY: Final = 8
 """Of so many views one is kept at least: neighbours share more than half of what they show after 8 views of a walk, seldom after 16."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Kept:
-    number: int
-    depth_m: NDArray[np.float16]
+    depth: bytes  # float16, m, deflated
+    shape: tuple[int, ...]
     colours: NDArray[np.uint8]  # as JPEG
     geometry: StereoGeometry
     noise_px: float
@@ -36,11 +40,12 @@ class _Kept:
 
     @property
     def bytes(self) -> int:
-        return self.depth_m.nbytes + self.colours.nbytes
+        return len(self.depth) + self.colours.nbytes
 
     @property
     def view(self) -> View:
-        depth, colours = self.depth_m.astype(np.float32), cv2.imdecode(self.colours, cv2.IMREAD_COLOR)
+        depth = np.frombuffer(zlib.decompress(self.depth), np.float16).reshape(self.shape).astype(np.float32)
+        colours = cv2.imdecode(self.colours, cv2.IMREAD_COLOR)
         return View(
             grey=np.zeros(depth.shape, np.uint8),
             colours=np.asarray(colours, np.uint8),
@@ -88,7 +93,7 @@ class KeptViews:
         self._seen += 1
         if not self.are_enough or (self._seen - 1) % self._every:
             return
-        self._kept[number] = _small(number, view)
+        self._kept[number] = _small(view)
         self._bytes += self._kept[number].bytes
         self.bound(self._most_bytes)
 
@@ -111,7 +116,7 @@ class KeptViews:
             yield number, self._kept[number].view
 
 
-def _small(number: int, view: View) -> _Kept:
+def _small(view: View) -> _Kept:
     depth, geometry, noise_px, patch_px, step = view.depth_m, view.geometry, view.noise_px, view.patch_px, 1
     while depth.shape[1] > _WIDTH_PX:
         (depth, geometry), noise_px, patch_px, step = halved(depth, geometry), noise_px / 2, patch_px / 2, 2 * step
@@ -119,4 +124,5 @@ def _small(number: int, view: View) -> _Kept:
         ".jpg", np.ascontiguousarray(view.colours[::step, ::step]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
     )
     with np.errstate(over="ignore"):
-        return _Kept(number, depth.astype(np.float16), np.asarray(colours, np.uint8), geometry, noise_px, patch_px)
+        deflated = zlib.compress(depth.astype(np.float16).tobytes(), _LEVEL)
+    return _Kept(deflated, depth.shape, np.asarray(colours, np.uint8), geometry, noise_px, patch_px)
