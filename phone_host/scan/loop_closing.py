@@ -32,6 +32,7 @@ class LoopSettings:
         most_bytes: of the kept views.
         compared: places that a new one is compared with in full: those that most of its features vote for.
         every: views after which one is compared that was taken near an older stretch's place; one that becomes a place itself always is.
+        at_once: views of which the model is built while the camera goes on; in the end it is built of all.
         least_voxels: the model is built again if a stretch moves by more.
         least_turn: or turns by more, rad.
     """
@@ -39,6 +40,7 @@ class LoopSettings:
     most_bytes: int = 60_000_000
     compared: int = 3
     every: int = 4
+    at_once: int = 256
     least_voxels: float = 0.5
     least_turn: float = 0.003
 
@@ -64,6 +66,7 @@ class LoopCloser:
         self._compared = self._moved = 0  # numbers of the last views that were compared, and that moved the model
         self._newest: View | None = None
         self._is_open = False  # whether there are loops that have not been looked at together
+        self._is_coarse = False  # whether the model was built of some of the kept views only
 
     def keep(self, number: int, view: View, room_bytes: int) -> None:
         """Keep a small copy of a view that is in the model, or in a piece that may become part of it.
@@ -104,7 +107,7 @@ class LoopCloser:
             self._is_open |= self._is_loop(view, world_camera)
         if number - self._moved < _WAIT_SHARE * self._kept.count:
             return ()
-        moved = self.settled()
+        moved = self._put(max(1, -(-self._kept.count // self._settings.at_once))) if self._is_open else ()
         self._moved = number if moved else self._moved
         return moved
 
@@ -114,17 +117,23 @@ class LoopCloser:
         Returns:
             Where all views of the model were taken, in order within a stretch; none: nothing has moved.
         """
-        if not self._is_open or self._newest is None or not self._kept.are_enough:
+        return self._put(1) if self._is_open or self._is_coarse else ()
+
+    def _put(self, step: int) -> tuple[Placed, ...]:
+        """Put the stretches where they belong, and build the model again from every second, third ... kept view; see `settled`."""
+        if self._newest is None or not self._kept.are_enough:
             return ()
         self._is_open, by, model = False, self._stretches.settled(), self._model
         turn, shift_m = self._stretches.farthest(by)
-        if turn < self._settings.least_turn and shift_m < self._settings.least_voxels * model.volume.settings.voxel_m:
+        is_little = shift_m < self._settings.least_voxels * model.volume.settings.voxel_m
+        if is_little and turn < self._settings.least_turn and not (self._is_coarse and step == 1):
             return ()
+        self._is_coarse = step > 1
         self._stretches.move(by)
         model.places.move([by[stretch] for stretch in self._stretch_of])
         model.volume.emptied()
         placed = [each for stretch in range(self._stretches.count) for each in self._stretches.views(stretch)]
-        self._fuse(model, placed[:-1])
+        self._fuse(model, placed[:-1], step)
         model.volume.fuse(self._newest, placed[-1].world_camera)  # whole: the next view follows it
         return tuple(placed)
 
