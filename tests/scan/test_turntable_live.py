@@ -11,7 +11,7 @@ import numpy as np
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.scan.scan_model import UNSEEN_RGB
 from tests.support.programs import board, host, until
-from tests.support.turning_things import Size, off_thing_m, photographed, turned_scene
+from tests.support.turning_things import Size, photographed, turned_scene
 
 SIZE = Size(320, 240, 420.0, 0.06)
 TURNS_DEG = (0, 11, 22, 33, 44, 55, 44, 33, 22, 11)
