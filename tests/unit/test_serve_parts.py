@@ -1,4 +1,4 @@
-"""The parts of the page's root: shelf, activities, steps, choices and what is kept of them."""
+"""The parts of the page's root: shelf, activities, steps and memory."""
 
 import io
 import threading
@@ -31,10 +31,6 @@ from phone_host.serve.scanning import Scanning
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.steps import Facts, steps
-from phone_host.verbs.serve.choices import choices_of, run_options, run_words, shown_words, with_changes, without_depth
-from phone_host.verbs.serve.kept_choices import keep, kept
-from phone_host.verbs.serve.page import address_of, page_settings
-from phone_host.verbs.serve.program import Commands
 from phone_host.verbs.serve.status import Status, told
 from phone_host.web.source import Activity, PageState, ScanState, StepName, Surface
 from tests.support.run_snapshots import run
@@ -233,102 +229,6 @@ def test_the_steps_lead_from_nothing_to_a_run_and_a_scan() -> None:
     assert (scanned.done, scanned.words) == (True, "3 of 3 pairs are in the model")
     assert steps(Facts(choices={**both, "rectified": "yes"}, is_running=True))[3].done
     assert steps(Facts(choices=both, is_running=True))[4].words == "it runs"
-
-
-def test_choices_are_a_command_line_and_back() -> None:
-    """Values, switches and several links become words, which the command's own parser reads; and its options become choices."""
-    made = with_changes({"far": "5m"}, {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "far": "", "near": " 300 "})
-    assert made == {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "near": "300"}
-    assert run_words(made) == ["--link", "tcp://a:1", "--link", "tcp://b:2", "--rectified", "--near", "300"]
-    options = run_options(run_words(made))
-    assert (options.link, options.rectified, options.near) == (["tcp://a:1", "tcp://b:2"], True, "300")
-    assert choices_of(options) == made
-    assert shown_words(made) == run_words(made)
-    assert shown_words({"camera": "browser:"}) == ["--camera", "browser:", "--serve"]
-    assert with_changes(made, {"rectified": "no"}) == {"link": "tcp://a:1 tcp://b:2", "near": "300"}
-    assert run_words({"crop": "-1,0,2,2"}) == ["--crop=-1,0,2,2"]
-    assert without_depth(made) == {"link": "tcp://a:1 tcp://b:2"}
-    home = str(Path.home())
-    assert with_changes({}, {"calibration": "~/r.yaml", "out": " scan "}) == {
-        "calibration": f"{home}/r.yaml",
-        "out": str(Path("scan").absolute()),
-    }
-
-
-@pytest.mark.parametrize(
-    "changes", [{"colour": "red"}, {"config": "x"}, {"json": "yes"}, {"serve": ":1"}, {"rectified": "perhaps"}]
-)
-def test_what_is_no_option_of_a_run_cannot_be_set(changes: dict[str, str]) -> None:
-    """Unknown names, options of the program itself, and a switch that is neither on nor off."""
-    with pytest.raises(SettingsError):
-        with_changes({}, changes)
-
-
-def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
-    """Settings become keys that `run --config` reads, other options a table of the page; keys of the program are not the page's."""
-    file = tmp_path / "new" / "host.toml"
-    assert kept(file) == ({}, [])
-    choices = {"link": "tcp://a:1", "tolerance": "5ms", "temporal": "yes", "near": "300"}
-    keep(file, choices)
-    assert file.stat().st_mode & 0o777 == 0o600
-    file.write_text('keys = "k"  # mine\n' + file.read_text())
-    assert kept(file) == ({**choices, "tolerance": "5.0"}, ["--keys", "k"])
-    keep(file, {"near": "200"})
-    assert file.read_text() == 'keys = "k"  # mine\n\n[page]\nnear = "200"\n'
-    keep(file, {"near": "200"})
-    (tmp_path / "folder").touch()
-    with pytest.raises(SettingsError):
-        keep(tmp_path / "folder" / "host.toml", choices)
-
-
-def test_what_is_set_is_checked_as_on_the_command_line(tmp_path: Path) -> None:
-    """A bad number, a rig that is none, contradicting limits and limits without depth are refused; a password is not shown, and its place holder changes nothing."""
-    commands = Commands(tmp_path / "host.toml", str(tmp_path / "keys"), lambda _: None)
-    refused: tuple[dict[str, str], ...] = (
-        {"pairs": "many"},
-        {"calibration": str(tmp_path)},
-        {"near": "9m", "far": "1m", "rectified": "yes"},
-        {"link": "x:y"},
-        {"near": "300"},
-    )
-    for changes in refused:
-        with pytest.raises((SettingsError, DataError)):
-            commands.changed({}, changes)
-    secret = {"camera": "http://me:secret@10.0.0.2:8080/video"}
-    shown = commands.shown(secret)
-    assert "secret" not in shown["camera"] + commands.command(secret)
-    assert commands.changed(secret, {**shown, "pairs": "300"}) == {**secret, "pairs": "300"}
-    assert commands.command({"near": "300"}).endswith(f"run --keys {tmp_path}/keys --near 300")
-    assert commands.snapshots({"out": "scan", "axes": "y-up"}) == (Path("scan/snapshots"), Axes.Y_UP)
-
-
-@pytest.mark.parametrize(
-    ("text", "there"),
-    [
-        (None, ("127.0.0.1", 8765)),
-        ("", ("127.0.0.1", 8765)),
-        ("localhost:9000", ("localhost", 9000)),
-        (":9000", ("127.0.0.1", 9000)),
-        ("9000", ("127.0.0.1", 9000)),
-        ("localhost", ("localhost", 8765)),
-        ("[::1]:80", ("::1", 80)),
-        ("[::1]", ("::1", 8765)),
-    ],
-)
-def test_an_address_may_leave_out_what_is_usual(text: str | None, there: tuple[str, int]) -> None:
-    """Host, port or both."""
-    assert address_of(text) == there
-
-
-def test_an_address_that_is_none_or_that_others_reach_is_refused(tmp_path: Path) -> None:
-    """A port beyond all ports, and anything but loopback without https."""
-    for text in ("localhost:99999", "localhost:x"):
-        with pytest.raises(SettingsError, match="address"):
-            address_of(text)
-    with pytest.raises(SettingsError) as refused:
-        page_settings("0.0.0.0:8765", tmp_path)
-    assert "--lan" in refused.value.remedy
-    assert not (tmp_path / "page-token").exists()
 
 
 def test_a_board_across_the_network_needs_its_code_once() -> None:
