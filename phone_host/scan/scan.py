@@ -212,6 +212,8 @@ class Scan:
             elif isinstance(self.tracker, Tracker):  # its piece may be joined later
                 self._depths.keep_apart(len(self._pairs), view)
             state, weakness = self._judged(told.state, told.weakness)
+            if state is Tracking.TRACKING and told.moved.others:
+                state, weakness = Tracking.WEAK, Weakness.RESTLESS
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
