@@ -56,10 +56,10 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
         folder.add(MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else []))
         seen = scan.model.seen if scan.model.is_closed else None
         write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
-        if scan.field:
-            write_bytes(out / FIELD, scan.field)
         write_text(out / TRAJECTORY, trajectory_of(report))
         write_text(out / "report.json", json_text(scan_json(report), indent=2) + "\n")
+        if scan.field:
+            write_bytes(out / FIELD, scan.field)
         voxel_m = report.settings.voxel_m if report.settings else 1.0
         shown = ShownModel(mesh, scan.model.noise_m, voxel_m, upright=report.axes if report.axes.is_upright else None)
         write_text(out / "index.html", scan_page(report, shown, scan.commands))

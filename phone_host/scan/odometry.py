@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Image
-from phone_host.scan.camera_pose import located
+from phone_host.scan.camera_pose import CameraPose, located
 from phone_host.scan.corners import followed, new_corners
 from phone_host.scan.observation import Observer
 from phone_host.scan.view import View
@@ -20,6 +20,10 @@ from phone_host.scan.window import WINDOW, Keyframe, fitted
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.int64]
+
+_OTHERS_SHARE, _OTHERS_TOGETHER, _OTHERS_PX = 0.2, 0.6, 2.0
+"""Of the followed corners, and of those that do not agree, how many move together, and how far off they are, px of the image that odometry takes: then
+something moves against the rest. In real rooms and streets, where nothing does, up to 0.17 and 0.45; before a column that goes by, 0.2 to 0.44 and 0.7 or more."""
 
 _HELD_STILL: Final = 2
 """Keyframes of a full window that stay where they are."""
@@ -66,6 +70,7 @@ class Moved:
         followed: corners that were followed into the view.
         inliers: those that agree on the motion.
         shift_px: median way of a followed corner since the last view, px of the image that odometry takes; NaN: none was followed.
+        others: corners that agree on another motion, if they are many: something moves against the rest.
     """
 
     world_camera: SE3
@@ -74,6 +79,21 @@ class Moved:
     followed: int
     inliers: int
     shift_px: float = float("nan")
+    others: int = 0
+
+
+def _others(held: _Held, found: CameraPose, observer: Observer) -> int:
+    """Return how many corners agree on another motion than most, if they are a good part of all; else 0."""
+    left = held.only(~found.inliers)
+    least = max(_OTHERS_SHARE * len(held.ids), _OTHERS_TOGETHER * len(left.ids))
+    if len(left.ids) < least:
+        return 0
+    second = located(left.points_m, left.observed_px, observer)
+    if second is None or np.count_nonzero(second.inliers) < least:
+        return 0
+    together = left.only(second.inliers)
+    off_px = (observer.projected(found.camera_world.apply(together.points_m)) - together.observed_px)[:, :2]
+    return len(together.ids) if np.median(np.linalg.norm(off_px, axis=1)) >= _OTHERS_PX else 0
 
 
 class Odometry:
@@ -119,13 +139,14 @@ class Odometry:
             self._window = []
             self._keyframe(view, observer)
             return self._told(last, is_known=False, followed_count=count)
+        others = _others(self._held, found, observer)
         self._held, self._pose = self._held.only(found.inliers), found.camera_world.inverse()
         inliers = len(self._held.ids)
         if self._is_keyframe():
             self._keyframe(view, observer)
         else:
             self._note()
-        return replace(self._told(last, is_known=True, followed_count=count), inliers=inliers)
+        return replace(self._told(last, is_known=True, followed_count=count), inliers=inliers, others=others)
 
     def poses(self) -> tuple[SE3, ...]:
         """Return where the camera was at each view, as the newest keyframes have it."""

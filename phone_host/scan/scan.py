@@ -213,12 +213,15 @@ class Scan:
                     self._carving.see(view, told.world_camera)
             elif isinstance(self.tracker, Tracker):  # its piece may be joined later
                 self._depths.keep_apart(len(self._pairs), view)
+            state, weakness = self._judged(told.state, told.weakness)
+            if state is Tracking.TRACKING and told.moved.others:
+                state, weakness = Tracking.WEAK, Weakness.RESTLESS
             pair = ScannedPair(
                 name=name,
                 stamp_s=stamp_s,
                 world_camera=told.world_camera,
-                state=told.state,
-                weakness=told.weakness,
+                state=state,
+                weakness=weakness,
                 density=density,
                 corners=told.moved.inliers,
                 overlap=math.nan if told.fit is None else told.fit.overlap,
@@ -232,9 +235,8 @@ class Scan:
         """Note that pairs that were lost have become part of the model; what they saw carves, too."""
         for view in views:
             at = self._untracked + view.number - 1
-            self._pairs[at] = replace(
-                self._pairs[at], world_camera=view.world_camera, state=view.state, weakness=view.weakness
-            )
+            state, weakness = self._judged(view.state, view.weakness)
+            self._pairs[at] = replace(self._pairs[at], world_camera=view.world_camera, state=state, weakness=weakness)
             self._later[self._pairs[at].name] = self._pairs[at]
             self._is_changed = self._is_changed or at < self._closed.pairs
             seen = self._depths.joined(at, view.world_camera)
@@ -254,6 +256,10 @@ class Scan:
         if self._carving is not None:
             self._carving = Carving(self._carving.cells, self._wanted.threads)
             self._depths.carve(self._carving)
+
+    def _judged(self, state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
+        """Return what is told of a pair that the tracker judges so."""
+        return state, weakness
 
     def _begun(self, view: View) -> Tracker | MatTracker | None:
         """Begin with a view that has depth; None: mat or table are not seen in it."""

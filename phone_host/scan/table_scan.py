@@ -21,6 +21,7 @@ from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.table import ABOVE_M, Table, find_table
 from phone_host.scan.table_box import thing_box
 from phone_host.scan.tracker import Tracker
+from phone_host.scan.tracking_words import Tracking, Weakness, unless_flat
 from phone_host.scan.view import View
 
 _LEAST_VOXELS: Final = 1.5
@@ -48,6 +49,10 @@ class TableScan(Scan):
         settings = fineness_for(view, wanted.voxel_m, wanted.most_bytes)
         self._room, self._cells = found.room, Cells.of(found.room, settings.voxel_m)
         return Tracker(settings, wanted.threads, start=found.world_camera)
+
+    def _judged(self, state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
+        """Return what is told of a pair. The table is always flat; corners on it tell what its plane does not, or the pair is weak for want of them."""
+        return unless_flat(state, weakness)
 
     def _carving_of(self, box: Box | None) -> Carving | None:
         """Return what the room is carved by, or the box that was asked for."""

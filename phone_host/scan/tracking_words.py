@@ -26,6 +26,7 @@ class Weakness(Enum):
     LITTLE_OVERLAP = "little overlap"
     POOR_FIT = "poor fit"
     FLAT = "flat"
+    RESTLESS = "something moves"
     APART = "apart"
     NO_MAT = "mat not seen"
     NO_TABLE = "no table"
@@ -48,11 +49,24 @@ class Weakness(Enum):
             Weakness.NO_MAT: "too little of the mat is seen: show more of it to both cameras, sharp and without glare",
             Weakness.NO_TABLE: "no table is found: show more of it around the object, from above, and give it some texture",
             Weakness.BARE_TABLE: "nothing stands on the table in the middle of the picture: aim at the object, and show where it stands",
+            Weakness.RESTLESS: "something moves against the rest: keep the scene still, or wait until it has gone by",
             Weakness.FLAT: "only a plane is in view: show something with depth beside it",
             Weakness.NOTHING_TURNS: "nothing has turned since the last pair: turn the object by 3 to 15 degrees between the pairs",
             Weakness.ALL_TURNS: "the background moves, too: the cameras must stand still, or leave --turntable out",
             Weakness.OUTSIDE: "what turns reaches out of the picture: move the cameras back, or the object to the middle",
         }[self]
+
+
+def unless_flat(state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
+    """Return what tracking says where something else tells what a flat or round thing does not: the axis of a turn, the corners on a table.
+
+    Args:
+        state: as the tracker told it.
+        weakness: as the tracker told it.
+    """
+    if weakness is not Weakness.FLAT:
+        return state, weakness
+    return Tracking.TRACKING if state is Tracking.WEAK else state, Weakness.NONE
 
 
 OF_TURNING: Final = (Weakness.NOTHING_TURNS, Weakness.ALL_TURNS, Weakness.OUTSIDE)

@@ -33,7 +33,7 @@ from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, ground_of, points_of, table_height_m
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker
-from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.tracking_words import Tracking, Weakness, unless_flat
 from phone_host.scan.turning_background import Background
 from phone_host.scan.turning_mask import Turning, TurningMask
 from phone_host.scan.view import View
@@ -263,7 +263,7 @@ class TurntableScan(Scan):
         self._tracked_pairs.append(number)
         told = self.tracker.track(thing)
         self._joined(told.joined)
-        state, weakness = _with_axis(told.state, told.weakness)
+        state, weakness = unless_flat(told.state, told.weakness)
         if told.is_fused or told.moved.is_known:
             self._keep(_Station(number, cropped, own, told.world_camera, told.is_fused))
         name, stamp_s, density = told_of
@@ -283,7 +283,7 @@ class TurntableScan(Scan):
         """Note that pairs that were lost have become part of the model, and where they were taken."""
         for view in views:
             at = self._tracked_pairs[view.number - 1]
-            state, weakness = _with_axis(view.state, view.weakness)
+            state, weakness = unless_flat(view.state, view.weakness)
             self._pairs[at] = replace(self._pairs[at], world_camera=view.world_camera, state=state, weakness=weakness)
             self._stations = [
                 replace(each, world_camera=view.world_camera, is_sure=True) if each.pair == at else each
@@ -357,13 +357,6 @@ class TurntableScan(Scan):
         if match.match is Match.FOUND:
             volume = merged(first, volume, match.first_second, self._wanted.threads)
         return _Finished(taken, turn, background, volume, ground, match)
-
-
-def _with_axis(state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
-    """Return what tracking says of a view of a thing that turns: the axis tells what a small or round thing does not."""
-    if weakness is not Weakness.FLAT:
-        return state, weakness
-    return Tracking.TRACKING if state is Tracking.WEAK else state, Weakness.NONE
 
 
 def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPair:

@@ -31,6 +31,7 @@ from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatScale, fit_mat
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.scan import Scan
+from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scene.object_scene import ObjectScene, Setting, Size, object_scene
 from phone_host.stereo.core import StereoCore
@@ -72,7 +73,7 @@ class PoseRow:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceRow:
-    """How far a model is from the truth, mm, and what a view took."""
+    """How far a model is from the truth, mm, by how much of its volume it is too large, in all and where its surface was seen, and what a view took."""
 
     name: str
     size: str
@@ -82,6 +83,8 @@ class SurfaceRow:
     rms_mm: float
     p95_mm: float
     outward_mm: float
+    seen_percent: float
+    volume_percent: float
     voxel_mm: float
     pose_p95_mm: float
     cpu_ms: float
@@ -139,7 +142,9 @@ def surface_row(name: str, size: Size, views: int) -> tuple[SurfaceRow, list[Pro
         took.append(time.process_time() - began)
         if told.is_fused:
             off.append(_pose_error_mm(told.world_camera, view.T_mat_left, rectifier))
-    away = distances_mm(scan.model().mesh, scene)
+    model = scan.model()
+    away = distances_mm(model.mesh, scene)
+    where_seen, whole = too_large_percent(model, scene)
     settings_made = scan.settings
     return (
         SurfaceRow(
@@ -151,6 +156,8 @@ def surface_row(name: str, size: Size, views: int) -> tuple[SurfaceRow, list[Pro
             rms_mm=float(np.sqrt((away**2).mean())),
             p95_mm=float(np.percentile(np.abs(away), 95)),
             outward_mm=float(away.mean()),
+            seen_percent=where_seen,
+            volume_percent=whole,
             voxel_mm=math.nan if settings_made is None else 1e3 * settings_made.voxel_m,
             pose_p95_mm=float(np.percentile(off, 95)),
             cpu_ms=1e3 * float(np.median(took)),
@@ -173,6 +180,18 @@ def distances_mm(mesh: Mesh, scene: ObjectScene) -> NDArray[np.float64]:
     shares = random.dirichlet([1, 1, 1], _POINTS)
     spread = a[chosen] * shares[:, :1] + b[chosen] * shares[:, 1:2] + c[chosen] * shares[:, 2:]
     return 1e3 * scene.solid.signed_distance(spread)
+
+
+def too_large_percent(model: ScanModel, scene: ObjectScene) -> tuple[float, float]:
+    """Return by how much of the true volume the thing is too large where its surface was seen, and in all, percent."""
+    corners = model.mesh.points_m.astype(np.float64)[model.mesh.triangles]
+    a, b, c = np.moveaxis(corners, 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    seen = model.seen[model.mesh.triangles].all(axis=1)
+    off_m3 = float((areas * scene.solid.signed_distance(corners.mean(axis=1)))[seen].sum())
+    true_m3 = scene.solid.volume_m3()
+    whole_m3 = float((a * np.cross(b, c)).sum() / 6)
+    return 100 * off_m3 / true_m3, 100 * (whole_m3 / true_m3 - 1)
 
 
 def box_verdict(seen: Sequence[Processed], threads: int) -> Verdict:
@@ -216,6 +235,9 @@ def main() -> int:
             most = _MOST_MEAN_MM.get((name, shown))
             if most is not None:
                 verdicts.append(_below(f"{name} at {shown.name}: surface, mean", row.mean_mm, most, "mm"))
+            if name == "speckled":
+                large = f"{name} at {shown.name}: volume, where the surface was seen"
+                verdicts.append(_below(large, abs(row.seen_percent), 1.0, "% off"))
             verdicts.append(_below(f"{name} at {shown.name}: lost", float(row.lost), 0, "views"))
             if (name, shown) == ("speckled", Size.VGA):
                 verdicts.append(box_verdict(seen, options.threads))

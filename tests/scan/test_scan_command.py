@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from phone_host.report.scan_lines import scan_lines
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.scan_job import ScanJob, run_scan
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.tracking_words import Weakness
+from phone_host.scene.scene_model import Body, Box, Scene, Texture
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
@@ -113,6 +117,26 @@ def test_what_somebody_moved_meanwhile_does_not_spoil_the_rest(walk: Path, tmp_p
     assert {pair.name for pair in report.scanned if not pair.is_fused} <= {"2"}
     off = off_surfaces_m(left_axes(surface_of(tmp_path / "out" / "model.ply")[0]))
     assert max(off[name].mean() for name in ("table", "cube")) < 0.002
+
+
+def test_somebody_who_walks_by_is_told_and_stays_out_of_the_model(tmp_path: Path) -> None:
+    """A column of the size of a leg goes past behind the still life: the pairs say so, and ball, cube and table are as without it."""
+    folder = photographed(tmp_path, TURNS_DEG, [with_column(number) for number in range(len(TURNS_DEG))])
+    report = scan_here(folder, tmp_path / "out")
+    assert report.fused == len(TURNS_DEG)
+    told = [pair.weakness for pair in report.scanned]
+    assert told.count(Weakness.RESTLESS) >= 3
+    assert any("something moves against the rest" in line for line in scan_lines(report, "out"))
+    off = off_surfaces_m(left_axes(surface_of(tmp_path / "out" / "model.ply")[0]))
+    assert max(each.mean() for each in off.values()) < 0.002
+    assert max(each.max() for each in off.values()) < 0.03
+
+
+def with_column(number: int) -> Scene:
+    """The still life, and a striped column at a place of its own."""
+    stripes = Texture(seed=77, light_bgr=(0.7, 0.3, 0.3), dark_bgr=(0.2, 0.1, 0.4), shortest_m=0.01)
+    column = Body("column", Box((0.15, 0.6, 0.1)), (-0.35 + 0.07 * number, -0.08, 1.0), stripes)
+    return replace(still_life(), bodies=(*still_life().bodies, column))
 
 
 def test_a_full_disk_keeps_the_model(walk: Path, tmp_path: Path) -> None:
