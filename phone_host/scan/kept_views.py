@@ -74,6 +74,11 @@ class KeptViews:
         return self._every <= _MOST_EVERY
 
     @property
+    def every(self) -> int:
+        """Of how many views one is kept now."""
+        return self._every
+
+    @property
     def count(self) -> int:
         """How many there are."""
         return len(self._kept)

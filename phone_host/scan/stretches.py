@@ -4,7 +4,9 @@ A stretch is some views that follow each other. Within it tracking is believed; 
 says where one stretch is as seen from another that was seen long before. All ties together put the stretches (`graph`); none is ever warped.
 """
 
+import heapq
 import math
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -13,8 +15,11 @@ import numpy as np
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.graph import Loop, settled
 
-_VIEWS: Final = 10
-"""Of a stretch: two seconds at five pairs a second. On a room's clip the drift within so many is 3 mm; with 20 a third of the loops were found."""
+_VIEWS: Final = 5
+"""Of a stretch: one second at five pairs a second. With ten, every third view of a room's clip had steps of 10 mm between its stretches."""
+
+_LONGER: Final = 50
+"""After so many stretches the next ones are twice as long, so that twelve minutes have 200: to put 400 takes 12 s of processor time."""
 
 _WAY_SHARE, _TURN_SHARE = 0.06, 0.02
 _LEAST_VOXELS, _LEAST_TURN = 0.1, 0.0005
@@ -50,12 +55,10 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """How far the camera has gone and turned, m and rad, and the variances of tracking along that."""
+    """How far the camera has gone and turned, m and rad."""
 
     length_m: float = 0.0
     turned: float = 0.0
-    shift_variance: float = 0.0
-    turn_variance: float = 0.0
 
 
 class _Stretch:
@@ -91,15 +94,25 @@ class Stretches:
         of = self._all[number]
         return [Placed(view.number, (of.world_stretch @ view.world_camera).exact()) for view in of.views]
 
-    def add(self, view: Placed, beside: int | None = None) -> None:
+    def around(self, number: int) -> list[Placed]:
+        """Return the views of a stretch and of those before and after it, but not of the last one."""
+        near = range(max(number - 1, 0), min(number + 2, self.count - 1))
+        return [view for each in near for view in self.views(each)]
+
+    def add(self, view: Placed, beside: int | None = None, kept_of: int = 1) -> None:
         """Take the next view, into the last stretch or a new one.
 
         Args:
             view: where it was taken.
             beside: the stretch by which it was found again after the camera was lost; None: it was not lost.
+            kept_of: one of so many views is kept; a stretch has at least five of these.
         """
         self._go(view.world_camera)
-        if not self._all or beside is not None or len(self._all[-1].views) >= _VIEWS:
+        if (
+            not self._all
+            or beside is not None
+            or len(self._all[-1].views) >= _VIEWS * max(kept_of, 2 ** (self.count // _LONGER))
+        ):
             self._begin(view.world_camera, self.count - 1 if beside is None else beside, is_loop=beside is not None)
         of = self._all[-1]
         of.views.append(Placed(view.number, of.world_stretch.inverse() @ view.world_camera))
@@ -115,18 +128,19 @@ class Stretches:
         of = self._all[-1]
         of.views = [Placed(view.number, of.world_stretch.inverse() @ view.world_camera) for view in views]
 
-    def older(self) -> list[int]:
-        """Return the stretches with which the last one may close a loop: not its neighbour; tracking since them and the last loop is less sure than two loops."""
+    def older(self) -> tuple[list[int], list[int]]:
+        """Return the stretches with which the last one may close a loop, those first of which ties and loops are least sure.
+
+        Not its neighbour, and none of which they are surer than two loops would be.
+        """
         last = self.count - 1
         if sum(loop.there == last for loop in self._loops) >= _LOOPS:
-            return []
-        known = max((loop.there for loop in self._loops if loop.there < last), default=0)
-        return [number for number in range(last - 1) if self._is_unsure(self._all[max(number, known)].way)]
-
-    def _is_unsure(self, since: _Way) -> bool:
-        now = self._all[-1].way
-        shift, turn = now.shift_variance - since.shift_variance, now.turn_variance - since.turn_variance
-        return shift > _UNSURE * self._loop_shift_m**2 or turn > _UNSURE * _LOOP_TURN**2
+            return [], []
+        unsure = self._unsure_of_last()
+        asked = [number for number in range(last - 1) if unsure[number] > _UNSURE]
+        most = max((unsure[number] for number in asked), default=0.0)
+        far = [number for number in asked if unsure[number] > most / 2]
+        return far, [number for number in asked if unsure[number] <= most / 2]
 
     def close(self, here: int, tracked: SE3, found: SE3) -> bool:
         """Note a loop between an older stretch and the last one.
@@ -137,7 +151,7 @@ class Stretches:
             found: where it was taken as seen from the older one.
 
         Returns:
-            Whether it is believed: tracking cannot be so far off that a place which looks alike would be another one.
+            Whether it counts now: it is believed, for tracking may be so far off, and another loop of the same stretch or the one before stands beside it.
         """
         of, last = self._all[here], self._all[-1]
         off = (tracked.inverse() @ found).pose()
@@ -149,12 +163,12 @@ class Stretches:
         self._loops.append(
             Loop(here=here, there=self.count - 1, here_there=measured, turn=_LOOP_TURN, shift_m=self._loop_shift_m)
         )
-        return True
+        return self._is_confirmed(self._loops[-1])
 
     def settled(self) -> list[SE3]:
-        """Return by which motion of the world each stretch comes to where all ties agree best; the first one stays."""
+        """Return by which motion of the world each stretch comes to where ties and loops agree best; the first one stays."""
         now = {number: of.world_stretch for number, of in enumerate(self._all)}
-        found = settled(now, [*self._ties, *self._loops], 0)
+        found = settled(now, [*self._ties, *filter(self._is_confirmed, self._loops)], 0)
         return [(found[number] @ now[number].inverse()).exact() for number in now]
 
     def farthest(self, by: list[SE3]) -> tuple[float, float]:
@@ -171,10 +185,34 @@ class Stretches:
         if self._last is not None:
             self._last = by[-1] @ self._last
 
+    def _is_confirmed(self, loop: Loop) -> bool:
+        """Return whether a loop is not the only one thereabouts: one view may err by some centimetres."""
+        return sum(abs(other.there - loop.there) <= 1 for other in self._loops) > 1
+
+    def _unsure_of_last(self) -> list[float]:
+        """Return, for each stretch, the variance of where the last one is as seen from it, by the surest way of ties and loops, in that of a loop."""
+        ways: dict[int, list[tuple[int, float]]] = {number: [] for number in range(self.count)}
+        loops = Counter((loop.here, loop.there) for loop in filter(self._is_confirmed, self._loops))
+        told = [(tie.here, tie.there, self._in_loops(tie)) for tie in self._ties]
+        for here, there, variance in (*told, *((here, there, 1 / count) for (here, there), count in loops.items())):
+            ways[here].append((there, variance))
+            ways[there].append((here, variance))
+        found, waiting = [math.inf] * self.count, [(0.0, self.count - 1)]
+        while waiting:
+            variance, at = heapq.heappop(waiting)
+            if variance < found[at]:
+                found[at] = variance
+                for other, more in ways[at]:
+                    heapq.heappush(waiting, (variance + more, other))
+        return found
+
+    def _in_loops(self, tie: Loop) -> float:
+        return max((tie.shift_m / self._loop_shift_m) ** 2, (tie.turn / _LOOP_TURN) ** 2)
+
     def _begin(self, world_stretch: SE3, beside: int, *, is_loop: bool) -> None:
         """Begin a stretch, tied to one before it by tracking, or by the place that both show."""
         if self._all:
-            of, last = self._all[beside], self._all[-1].way
+            of = self._all[beside]
             shift_m, turn = self._loop_shift_m, _LOOP_TURN
             if not is_loop:
                 shift_m = math.hypot(self._least_shift_m, _WAY_SHARE * (self._way.length_m - of.way.length_m))
@@ -189,11 +227,6 @@ class Stretches:
                 is_tracked=not is_loop,
             )
             self._ties.append(tie)
-            self._way = replace(
-                self._way,
-                shift_variance=last.shift_variance + shift_m**2,
-                turn_variance=last.turn_variance + turn**2,
-            )
         self._all.append(_Stretch(world_stretch, self._way))
 
     def _go(self, world_camera: SE3) -> None:
