@@ -75,8 +75,13 @@ def test_the_surface_grows_until_it_is_saved(
     for name in FILES:
         (tmp_path / name).write_bytes(name.encode())
     over = ScanState(words="5 of 9 pairs are in the model", level="good", pairs=9, fused=5, folder=str(tmp_path), files=FILES)  # fmt: skip
+    page.click("#scan-go")
+    page.wait_for_function("() => document.getElementById('scan-answer').textContent !== ''")
+    program.change(activity=Activity.ENDING)
+    page.wait_for_function("() => document.getElementById('activity').textContent.includes('ending')")
     program.change(scan=over, activity=Activity.IDLE)
     page.wait_for_selector("#scan-saved:not([hidden])")
+    assert page.text_content("#scan-answer") == ""
     assert [link.text_content() for link in page.query_selector_all("#scan-files a")] == list(FILES)
     with page.expect_download() as saved:
         page.click("#scan-files a >> nth=0")
@@ -105,6 +110,37 @@ def test_a_surface_is_drawn_and_turned_by_keys(program: Played, opened: Opener, 
     page.check("input[name=scan-paint][value=shape]", force=True)
     page.wait_for_timeout(300)
     assert _roughness(page) < coloured / 2
+    assert complaints == []
+
+
+_HORNED = """async () => {
+  const { Model } = await import('/static/model.js');
+  const [canvas, over] = [0, 1].map(() => document.body.appendChild(document.createElement('canvas')));
+  for (const each of [canvas, over]) each.style.cssText = 'position: fixed; left: 0; top: 0; width: 900px; height: 450px';
+  const points = [];
+  for (let at = 0; at < 3000; at++) points.push(30 * (at % 2), 30 * ((at >> 1) % 2), (at * 7) % 101);
+  for (let at = 0; at < 5; at++) points.push(15, 15, 106);
+  const model = new Model(canvas, over);
+  const [low, step] = [[0, 0, 0], 0.001];
+  const colours = new Uint8Array(points.length), noise = new Uint8Array(points.length / 3);
+  model.stands('mat');
+  model.show({ low, step, points: new Uint16Array(points), triangles: new Uint16Array([0, 1, 2]), colours, noise });
+  while (!canvas.dataset.drawn) await new Promise(requestAnimationFrame);
+  const mesh = model.parts.get('');
+  mesh.updateWorldMatrix(true, false);
+  const seen = points.flatMap((_, at) => {
+    if (at % 3) return [];
+    const place = mesh.localToWorld(mesh.position.clone().set(...points.slice(at, at + 3))).project(model.camera);
+    return [Math.abs(place.x), Math.abs(place.y)];
+  });
+  return Math.max(...seen);
+}"""
+"""Shows a column of 100 mm with a horn of 6 mm that has one point in 600; returns how far its points lie from the middle, 1: at the edge."""
+
+
+def test_a_thing_is_seen_whole_with_its_horn(opened: Opener, complaints: Complaints) -> None:
+    """What is small and sticks out is in the first picture, too, with a margin; the picture is well filled."""
+    assert 0.8 < opened("scan").evaluate(_HORNED) < 0.99
     assert complaints == []
 
 

@@ -27,6 +27,9 @@ const NOWHERE = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 /** Turn and tilt from which a thing on a mat is looked at first, rad. @type {[number, number]} */
 const FROM_ABOVE = [0, 0.3];
 
+/** Half of what a picture shows across or down, as a tangent; 0.5 would leave no margin. */
+const FILLED = 0.46;
+
 /** Points that decide from where all fits in. */
 const LOOKED_AT = 3000;
 
@@ -192,7 +195,7 @@ export class Model extends Viewer {
     const ends = [0, 1, 2].map((axis) => [Math.min(...points.map((place) => place[axis])), Math.max(...points.map((place) => place[axis]))]);
     const middle = ends.map(([least, most]) => (least + most) / 2);
     const scale = Math.hypot(...ends.map(([least, most]) => most - least));
-    const stand = { middle, front: null, points, reach: /** @type {[number, number]} */ ([0.5, 0.5]), scale };
-    return this.legend.kind === 'mat' ? { ...stand, way: FROM_ABOVE } : stand;
+    const stand = { middle, front: null, points, reach: /** @type {[number, number]} */ ([FILLED, FILLED]), scale };
+    return this.legend.kind === 'mat' ? { ...stand, way: FROM_ABOVE, stray: 0 } : stand;
   }
 }
