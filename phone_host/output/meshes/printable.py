@@ -100,7 +100,9 @@ def problems(points_mm: Points, triangles: Triangles, printer: Printer, tell: Ca
     if grid.is_crowded:
         words = "too many triangles lie in one place to look for crossings and thin walls"
         everywhere = np.ones(len(triangles), np.bool_)
-        found.append(_problem(Flaw.CROWDED, words, "remesh it in a mesh editor, or scan again", everywhere, blocks=False))
+        found.append(
+            _problem(Flaw.CROWDED, words, "remesh it in a mesh editor, or scan again", everywhere, blocks=False)
+        )
     else:
         found += _crossings(grid, triangles, lambda: tell("crossings"))
         tell("walls")
