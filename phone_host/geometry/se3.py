@@ -131,6 +131,10 @@ class SE3:
         """Return the motion back."""
         return SE3(self.R.T, -self.R.T @ self.t_m)
 
+    def exact(self) -> "SE3":
+        """Return the motion with an exact rotation: products of many drift away from one."""
+        return SE3(rotations_of(vectors_of(self.R)), self.t_m)
+
     def apply(self, points_m: Floats) -> Floats:
         """Return moved points, (..., 3), m."""
         return np.asarray(points_m @ self.R.T + self.t_m, np.float64)

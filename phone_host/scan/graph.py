@@ -1,7 +1,7 @@
-"""Where pieces of a scan stand against each other, from the loops between them: a pose graph. Pure.
+"""Where parts of a scan stand against each other, from the loops between them: a pose graph. Pure.
 
-Each loop says where one piece is as seen from another. Errors are weighed as Cauchy would have it, so that one wrong loop among right ones moves
-next to nothing.
+Each loop says where one part, a piece or a stretch, is as seen from another. Errors are weighed as Cauchy would have it, so that one wrong loop among
+right ones moves next to nothing. What tracking says of two parts cannot be wrong, only inexact: there errors are weighed as they are, and shared out.
 
 Source: G. Grisetti et al., "A Tutorial on Graph-Based SLAM", 2010; P. Agarwal et al., "Robust Map Optimization using Dynamic Covariance
 Scaling", 2013 (why a loop must be able to lose its say).
@@ -25,7 +25,7 @@ _CAUCHY_SIGMAS: Final = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Loop:
-    """Where a piece is, as seen from another.
+    """Where a part is, as seen from another.
 
     Attributes:
         here: number of the one.
@@ -33,6 +33,7 @@ class Loop:
         here_there: takes the other's points to the one.
         turn: standard deviation of its turn, rad, > 0.
         shift_m: and of its shift, m, > 0.
+        is_tracked: whether tracking says it, and not a view that was recognised, which may have been taken for another.
     """
 
     here: int
@@ -40,6 +41,7 @@ class Loop:
     here_there: SE3
     turn: float
     shift_m: float
+    is_tracked: bool = False
 
 
 def connected(loops: Sequence[Loop], first: int) -> set[int]:
@@ -77,6 +79,7 @@ def settled(poses: dict[int, SE3], loops: Sequence[Loop], still: int) -> dict[in
         np.array([at[loop.here] for loop in used]),
         np.array([at[loop.there] for loop in used]),
         np.array([np.repeat([1 / loop.turn, 1 / loop.shift_m], 3) for loop in used]),
+        np.array([loop.is_tracked for loop in used]),
     )
     start = tuple(poses[number] for number in numbers)
     free = np.repeat([number != still for number in numbers], 6)
@@ -86,24 +89,25 @@ def settled(poses: dict[int, SE3], loops: Sequence[Loop], still: int) -> dict[in
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Problem:
-    """See `geometry.schur.Problem`: poses are the shared parameters, there are no blocks. (L,) pieces, (L, 6) 1 / standard deviations."""
+    """See `geometry.schur.Problem`: poses are the shared parameters, there are no blocks. (L,) pieces, (L, 6) 1 / standard deviations, (L,) flags."""
 
     loops: tuple[Loop, ...]
     here: NDArray[np.int64]
     there: NDArray[np.int64]
     roots: Floats
+    tracked: NDArray[np.bool_]
 
     def cost(self, state: tuple[SE3, ...]) -> float:
-        """Return Cauchy's cost of all loops."""
+        """Return Cauchy's cost of all loops, and the squares of what tracking says."""
         square = (self._errors(state) ** 2).sum(axis=1) / _CAUCHY_SIGMAS**2
-        total = float((_CAUCHY_SIGMAS**2 * np.log1p(square)).sum())
+        total = float((_CAUCHY_SIGMAS**2 * np.where(self.tracked, square, np.log1p(square))).sum())
         return total if np.isfinite(total) else float("inf")
 
     def linearised(self, state: tuple[SE3, ...]) -> NormalEquations:
         """Linearise at a state: a small motion of a piece, in its own axes, moves the loop's error by as much."""
         size, errors = 6 * len(state), self._errors(state)
         matrix, right = np.zeros((size, size)), np.zeros(size)
-        weights = 1 / (1 + (errors**2).sum(axis=1) / _CAUCHY_SIGMAS**2)
+        weights = np.where(self.tracked, 1, 1 / (1 + (errors**2).sum(axis=1) / _CAUCHY_SIGMAS**2))
         for number in range(len(self.loops)):
             # error = log(measured^-1 here^-1 there); by the other's motion I, by the one's -Ad(there^-1 here), to first order.
             seen = state[self.there[number]].inverse() @ state[self.here[number]]

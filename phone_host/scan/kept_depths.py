@@ -1,5 +1,6 @@
 """Small depth images of the views in a model, and where they were taken: for a box that is chosen when they have passed. Pure."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -20,6 +21,7 @@ _MOST: Final = 512
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Kept:
+    number: int
     depth_m: NDArray[np.float16]
     geometry: StereoGeometry
     noise_px: float
@@ -43,15 +45,16 @@ class KeptDepths:
         self._apart: dict[int, _Kept] = {}
         self._seen, self._every = 0, 1
 
-    def remember(self, view: View, world_camera: SE3) -> None:
+    def remember(self, number: int, view: View, world_camera: SE3) -> None:
         """Keep a view's depths, or pass over them.
 
         Args:
+            number: of the view.
             view: what the camera saw.
             world_camera: where it was.
         """
         if self._is_next():
-            self._keep(_small(view, world_camera))
+            self._keep(_small(number, view, world_camera))
 
     def keep_apart(self, number: int, view: View) -> None:
         """Keep the depths of a view whose place in the model is not known; of too many, the oldest go.
@@ -60,7 +63,7 @@ class KeptDepths:
             number: of the view.
             view: what the camera saw.
         """
-        self._apart[number] = _small(view, SE3.identity())
+        self._apart[number] = _small(number, view, SE3.identity())
         if len(self._apart) > _MOST:
             del self._apart[min(self._apart)]
 
@@ -81,6 +84,16 @@ class KeptDepths:
             self._keep(replace(found, world_camera=world_camera))
         return found.view
 
+    def move(self, world_cameras: Mapping[int, SE3]) -> None:
+        """Put views where they were taken.
+
+        Args:
+            world_cameras: by the view's number; the others stay.
+        """
+        self._kept = [
+            replace(each, world_camera=world_cameras.get(each.number, each.world_camera)) for each in self._kept
+        ]
+
     def _is_next(self) -> bool:
         self._seen += 1
         return not (self._seen - 1) % self._every
@@ -100,9 +113,9 @@ class KeptDepths:
             carving.see(each.view, each.world_camera)
 
 
-def _small(view: View, world_camera: SE3) -> _Kept:
+def _small(number: int, view: View, world_camera: SE3) -> _Kept:
     depth, geometry, noise_px = view.depth_m, view.geometry, view.noise_px
     while depth.shape[1] > _WIDTH_PX:
         (depth, geometry), noise_px = halved(depth, geometry), noise_px / 2
     with np.errstate(over="ignore"):
-        return _Kept(depth.astype(np.float16), geometry, noise_px, world_camera)
+        return _Kept(number, depth.astype(np.float16), geometry, noise_px, world_camera)

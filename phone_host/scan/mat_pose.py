@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
+from phone_host.geometry.se3 import SE3
 from phone_host.model import Epipolar, StereoGeometry
 from phone_host.scan.mat import MatCorners
 
@@ -251,4 +251,4 @@ def _equations(
 
 def _moved(pose: SE3, step: Floats) -> SE3:
     moved = SE3.of(step[:6]) @ pose
-    return SE3(rotations_of(vectors_of(moved.R)), moved.t_m)
+    return moved.exact()

@@ -9,11 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
+from phone_host.geometry.se3 import SE3
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.graph import Loop, connected, settled
-from phone_host.scan.odometry import Moved
-from phone_host.scan.piece import Piece, PoseGate
+from phone_host.scan.piece import STANDING, Piece, PoseGate
 from phone_host.scan.registration import Registered
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view
@@ -31,12 +30,6 @@ _ALSO: Final = 8
 """Views of a piece that are laid against the model before it is joined."""
 
 _SMALL_PX: Final = 320
-_BY_PLACE: Final = 2.0
-"""Times as much as odometry, a place's pose may be corrected: of a room's places, 88 mm and 2.3 degrees."""
-
-_STANDING: Final = Moved(world_camera=SE3.identity(), before_now=SE3.identity(), is_known=True, followed=0, inliers=0)
-"""What odometry says of a view that is compared with a place: nothing that lets it pass more easily."""
-
 _LOOP_SHIFT_M: Final = 0.01
 _LOOP_TURN: Final = 0.006
 """Standard deviations of a loop, m and rad: two registrations, each some 5 mm and 0.2 degrees off on real rooms."""
@@ -107,6 +100,12 @@ class Pieces:
         """The piece that is tracked."""
         return self.model if self._active == _MODEL else self._apart[self._active].piece
 
+    @property
+    def held_bytes(self) -> int:
+        """Memory of all fields."""
+        volumes = [self.model.volume, *(of.piece.volume for of in self._apart.values())]
+        return sum(volume.blocks.room for volume in volumes) * BLOCK_BYTES
+
     def in_world(self, pose: SE3) -> SE3:
         """Return a pose in the axes of the piece that is tracked, in the world's; where that is not known, as far as odometry tells."""
         return pose if self._active == _MODEL else self._apart[self._active].world_piece @ pose
@@ -126,7 +125,7 @@ class Pieces:
         world = self.in_world(believed)
         while len(self._apart) >= _MOST_APART:
             self._give_up_one()
-        room = self._settings.most_bytes - self._held_bytes()
+        room = self._settings.most_bytes - self.held_bytes
         if room < _LEAST_SHARE * self._settings.most_bytes:
             if self._active in {_MODEL, *self._apart}:
                 return None
@@ -161,7 +160,7 @@ class Pieces:
             fit: how it lay there before; None: it is the first.
         """
         self.model.fuse(view, pose, fit)
-        while self._apart and self._held_bytes() > self._settings.most_bytes:
+        while self._apart and self.held_bytes > self._settings.most_bytes:
             self._give_up_one()
 
     def go_on_in(self, piece: Piece) -> None:
@@ -238,7 +237,7 @@ class Pieces:
             fit = self.model.laid(shown, start, 0)
             if fit.overlap < self._gate.least_overlap:
                 continue
-            if self.model.doubt(_STANDING, fit) is Weakness.NONE:
+            if self.model.doubt(STANDING, fit) is Weakness.NONE:
                 loops.append(self._loop(_MODEL, start @ fit.start_now @ seen.pose.inverse()))
             else:
                 refused += 1
@@ -268,8 +267,7 @@ class Pieces:
         self.model.places.add(of.piece.places.moved(world_piece))
         result = []
         for view in of.views:
-            pose = world_piece @ view.pose
-            exact = SE3(rotations_of(vectors_of(pose.R)), pose.t_m)
+            exact = (world_piece @ view.pose).exact()
             state = Tracking.TRACKING if view.weakness is Weakness.NONE else Tracking.WEAK
             result.append(Joined(view.number, exact, state, view.weakness))
         return result
@@ -278,20 +276,8 @@ class Pieces:
         place = piece.places.recognised(view)
         if place is None:
             return None
-        # A place tells the pose to some centimetres: the surface is cast a second time from where the first one puts the view.
-        first = piece.laid(view, place.world_camera, 0)
-        start = place.world_camera @ first.start_now
-        if not np.isfinite(start.pose()).all():
-            return None
-        fit = piece.laid(view, start, 0)
-        whole = (first.start_now @ fit.start_now).pose()
-        most_shift_m, most_turn = (_BY_PLACE * most for most in (self._gate.most_shift_m, self._gate.most_turn))
-        if np.linalg.norm(whole[3:]) > most_shift_m or np.linalg.norm(whole[:3]) > most_turn:
-            return None
-        if piece.doubt(_STANDING, fit) is not Weakness.NONE:
-            return None
-        pose = start @ fit.start_now
-        return Found(piece, SE3(rotations_of(vectors_of(pose.R)), pose.t_m), fit)
+        lying = piece.confirmed(view, place.world_camera)
+        return None if lying is None else Found(piece, lying.pose, lying.fit)
 
     def _give_up_one(self) -> None:
         self._give_up(min(self._apart, key=lambda each: (len(self._apart[each].views), each)))
@@ -299,7 +285,3 @@ class Pieces:
     def _give_up(self, number: int) -> None:
         del self._apart[number]
         self._loops = [loop for loop in self._loops if number not in (loop.here, loop.there)]
-
-    def _held_bytes(self) -> int:
-        volumes = [self.model.volume, *(of.piece.volume for of in self._apart.values())]
-        return sum(volume.blocks.room for volume in volumes) * BLOCK_BYTES

@@ -4,7 +4,8 @@ Source: E. Rublee et al., "ORB: an efficient alternative to SIFT or SURF", 2011;
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
@@ -49,6 +50,10 @@ _APART_DEG: Final = 4.0
 _APART_SHARE: Final = 0.05
 """Of the median depth: as far apart as this, or turned by so much, a view is a place of its own."""
 
+_BY_DEG: Final = 15.0
+_BY_SHARE: Final = 0.2
+"""Of the median depth: views no farther apart share most of their features."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Features:
@@ -72,6 +77,10 @@ class Place:
     points_m: Floats
     descriptors: NDArray[np.uint8]
 
+    def moved(self, by: SE3) -> "Place":
+        """Return the place, in the axes to which a motion takes it."""
+        return replace(self, world_camera=by @ self.world_camera, points_m=by.apply(self.points_m))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recognised:
@@ -80,10 +89,12 @@ class Recognised:
     Attributes:
         world_camera: where the view was taken.
         inliers: features that agree on it.
+        number: of the place, in the order in which they were remembered.
     """
 
     world_camera: SE3
     inliers: int
+    number: int
 
 
 class Places:
@@ -104,7 +115,7 @@ class Places:
             view: fused.
             world_camera: where it was taken.
         """
-        apart_m = _APART_SHARE * float(np.nanmedian(view.depth_m))
+        apart_m = _APART_SHARE * _typical_m(view)
         if any(_is_near(place.world_camera, world_camera, apart_m) for place in self._places):
             return
         seen, observer = _features(view), Observer(view.geometry, view.noise_px)
@@ -122,9 +133,25 @@ class Places:
 
     def moved(self, by: SE3) -> tuple[Place, ...]:
         """Return all places, in the axes to which a motion takes them."""
-        return tuple(
-            Place(by @ place.world_camera, by.apply(place.points_m), place.descriptors) for place in self._places
-        )
+        return tuple(place.moved(by) for place in self._places)
+
+    def move(self, by: Sequence[SE3]) -> None:
+        """Put the places elsewhere, each by a motion of its own.
+
+        Args:
+            by: a motion for each, in the order in which they were remembered.
+        """
+        self._places = [place.moved(motion) for place, motion in zip(self._places, by, strict=True)]
+
+    def nearest(self, world_camera: SE3, first: int) -> int:
+        """Return the number of the place, of the first ones, that was seen from nearest by.
+
+        Args:
+            world_camera: from where.
+            first: how many, >= 1.
+        """
+        away_m = [float(np.linalg.norm(place.world_camera.t_m - world_camera.t_m)) for place in self._places[:first]]
+        return int(np.argmin(away_m))
 
     def recognised(self, view: View) -> Recognised | None:
         """Find the place on which most of a view's features agree; None: none has enough.
@@ -132,36 +159,67 @@ class Places:
         Args:
             view: with depth.
         """
-        seen = _features(view)
+        return self._agreed(_features(view), view, range(self.count), _SHORT)
+
+    def again(self, view: View, among: Sequence[int], most: int) -> Recognised | None:
+        """Find which of some places a view shows; None: no one.
+
+        Args:
+            view: with depth.
+            among: numbers of places.
+            most: of them are compared in full.
+        """
+        return self._agreed(_features(view), view, among, most)
+
+    def is_by(self, view: View, world_camera: SE3, among: Sequence[int]) -> bool:
+        """Return whether a view was taken near one of some places: it shows it, if they are where they are believed to be.
+
+        Args:
+            view: with depth.
+            world_camera: where it was taken.
+            among: numbers of places.
+        """
+        apart_m = _BY_SHARE * _typical_m(view)
+        places = [self._places[number].world_camera for number in among]
+        return any(_is_near(place, world_camera, apart_m, _BY_DEG) for place in places)
+
+    def _agreed(self, seen: _Features, view: View, among: Sequence[int], most: int) -> Recognised | None:
+        """Return the place among some on which most of a view's features agree."""
         observer = Observer(view.geometry, max(view.noise_px, _DISPARITY_PX), pixel_px=_PIXEL_PX)
         best: Recognised | None = None
-        for place in self._shortlist(seen.descriptors):
+        for number in self._shortlist(seen.descriptors, among, most):
+            place = self._places[number]
             here, there = _matched(seen.descriptors, place.descriptors)
             if len(here) < LEAST_INLIERS:
                 continue
             found = located(place.points_m[there], seen.observed_px[here], observer, _DRAWS)
             inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
             if found is not None and inliers >= LEAST_INLIERS and (best is None or inliers > best.inliers):
-                best = Recognised(found.camera_world.inverse(), inliers)
+                best = Recognised(found.camera_world.inverse(), inliers, number)
         return best
 
-    def _shortlist(self, descriptors: NDArray[np.uint8]) -> list[Place]:
+    def _shortlist(self, descriptors: NDArray[np.uint8], among: Sequence[int], most: int) -> list[int]:
         """Return the places that most of a view's features vote for, in the order in which they were seen."""
-        if len(self._places) <= _SHORT or len(descriptors) == 0:
-            return self._places
-        voted = [place.descriptors[:_VOTED] for place in self._places]
+        if len(among) <= most or len(descriptors) == 0:
+            return list(among)
+        voted = [self._places[number].descriptors[:_VOTED] for number in among]
         whose = np.repeat(np.arange(len(voted)), [len(each) for each in voted])
         found = cv2.BFMatcher(cv2.NORM_HAMMING).match(descriptors[:_VOTERS], np.concatenate(voted))
         votes = np.bincount(
             [whose[each.trainIdx] for each in found if each.distance <= _ALIKE_BITS], minlength=len(voted)
         )
-        return [self._places[at] for at in sorted(np.argsort(-votes, kind="stable")[:_SHORT].tolist())]
+        return [among[at] for at in sorted(np.argsort(-votes, kind="stable")[:most].tolist())]
 
 
-def _is_near(one: SE3, other: SE3, apart_m: float) -> bool:
+def _typical_m(view: View) -> float:
+    """Return the median depth, m, of every fourth row and column: of all of them it takes 2 ms, a thirtieth of a view."""
+    return float(np.nanmedian(view.depth_m[::4, ::4]))
+
+
+def _is_near(one: SE3, other: SE3, apart_m: float, apart_deg: float = _APART_DEG) -> bool:
     between = (one.inverse() @ other).pose()
     turn_deg = math.degrees(float(np.linalg.norm(between[:3])))
-    return turn_deg < _APART_DEG and float(np.linalg.norm(between[3:])) < apart_m
+    return turn_deg < apart_deg and float(np.linalg.norm(between[3:])) < apart_m
 
 
 def _features(view: View) -> _Features:

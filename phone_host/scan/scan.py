@@ -24,6 +24,7 @@ from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.stretches import Placed
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -205,8 +206,9 @@ class Scan:
             require_size(name, view, self.size_px)
             told = self.tracker.track(view)
             self._joined(told.joined)
+            self._moved(told.moved_views)
             if told.is_fused:
-                self._depths.remember(view, told.world_camera)
+                self._depths.remember(len(self._pairs), view, told.world_camera)
                 if self._carving is not None:
                     self._carving.see(view, told.world_camera)
             elif isinstance(self.tracker, Tracker):  # its piece may be joined later
@@ -241,6 +243,20 @@ class Scan:
             if seen is not None and self._carving is not None:
                 self._carving.see(seen, view.world_camera)
 
+    def _moved(self, views: Sequence[Placed]) -> None:
+        """Note where pairs were taken after a loop has moved them; they carve from there."""
+        if not views:
+            return
+        poses = {self._untracked + view.number - 1: view.world_camera for view in views}
+        for at in poses.keys() - {len(self._pairs)}:  # this pair is told so itself
+            self._pairs[at] = replace(self._pairs[at], world_camera=poses[at])
+            self._later[self._pairs[at].name] = self._pairs[at]
+        self._is_changed = True
+        self._depths.move(poses)
+        if self._carving is not None:
+            self._carving = Carving(self._carving.cells, self._wanted.threads)
+            self._depths.carve(self._carving)
+
     def _judged(self, state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
         """Return what is told of a pair that the tracker judges so."""
         return state, weakness
@@ -256,7 +272,8 @@ class Scan:
                 lambda inside: fineness_for(inside, wanted.voxel_m, wanted.most_bytes),
                 wanted.threads,
             )
-        return Tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes), wanted.threads)
+        settings = fineness_for(view, wanted.voxel_m, wanted.most_bytes)
+        return Tracker(settings, wanted.threads, loops=wanted.loops)
 
     def final(self, pair: ScannedPair) -> ScannedPair:
         """Return what has become of a pair since it was taken.
@@ -362,6 +379,8 @@ class Scan:
         volume, wanted = self.volume, self._wanted
         if volume is None:
             return ScanModel.empty()
+        if isinstance(self.tracker, Tracker):
+            self._moved(self.tracker.settled())
         box = wanted.model_box
         if box is None:
             return open_model(volume)

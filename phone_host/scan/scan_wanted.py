@@ -1,12 +1,13 @@
 """What the user asks of a scan. Pure."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from common.errors import SettingsError
 from phone_host.scan.box import Box
 from phone_host.scan.closing import Floor
 from phone_host.scan.field_bytes import KeptField
+from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.mat import Mat
 from phone_host.scan.mat_tracker import ABOVE_M, box_of_mat
 
@@ -24,6 +25,7 @@ class ScanWanted:
         turntable: whether the cameras stand still and an object turns before them.
         on_table: whether a thing is scanned that stands on a table, without a mat.
         onto: the field of an earlier pass, to which this one is added; None: this one is alone.
+        loops: how loops are closed where nothing but the camera's way tells where it is; None: they are not.
     """
 
     voxel_m: float = math.nan
@@ -34,6 +36,7 @@ class ScanWanted:
     turntable: bool = False
     on_table: bool = False
     onto: KeptField | None = None
+    loops: LoopSettings | None = field(default_factory=LoopSettings)
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself.

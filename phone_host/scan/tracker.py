@@ -12,13 +12,15 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
+from phone_host.geometry.se3 import SE3
+from phone_host.scan.loop_closing import LoopCloser, LoopSettings
 from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Joined, Pieces
 from phone_host.scan.places import Place
 from phone_host.scan.registration import Registered
+from phone_host.scan.stretches import Placed
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View, reduced
 from phone_host.scan.volume import Volume
@@ -47,6 +49,7 @@ class Tracked:
         moved: what odometry says.
         fit: how the depth lies against the model; None where it was not compared.
         joined: earlier views that were lost, and have become part of the model with this one.
+        moved_views: where the views in the model were taken, this one too, if a loop has moved them; else none.
         mat: what a mat told; None: there is none, or it was not seen.
     """
 
@@ -56,6 +59,7 @@ class Tracked:
     moved: Moved
     fit: Registered | None
     joined: tuple[Joined, ...] = ()
+    moved_views: tuple[Placed, ...] = ()
     mat: MatSaid | None = None
 
     @property
@@ -88,6 +92,7 @@ class Tracker:
         start: where the first view is taken; None: in the origin.
         gate: what is believed; None: what usually is.
         library: computes; None: that of this installation.
+        loops: how loops of a camera that is not lost are closed; None: they are not.
     """
 
     def __init__(
@@ -97,11 +102,14 @@ class Tracker:
         start: SE3 | None = None,
         gate: PoseGate | None = None,
         library: Library | Missing | None = None,
+        *,
+        loops: LoopSettings | None = None,
     ) -> None:
         found = native() if library is None else library
         self._gate = PoseGate() if gate is None else gate
         self._pieces = Pieces(settings, threads, self._gate, found)
-        self._odometry = Odometry(_ODOMETRY)
+        self._loops = None if loops is None else LoopCloser(loops, self._pieces.model, threads, self._gate, found)
+        self._settings, self._odometry = settings, Odometry(_ODOMETRY)
         self._pose = SE3.identity() if start is None else start  # in the axes of the piece that is tracked
         self._was_lost = False
         self._count = 0
@@ -126,7 +134,7 @@ class Tracker:
         small = reduced(view)
         moved = self._odometry.step(small)
         view = self._as_sure_as_timed(view, moved.shift_px * view.grey.shape[1] / small.grey.shape[1])
-        believed = orthonormal(self._pose @ moved.before_now)
+        believed = (self._pose @ moved.before_now).exact()
         if not np.isfinite(view.depth_m).mean() >= self._gate.least_depths:
             return self._lost(believed, moved, Weakness.NO_DEPTH, None)
         if self.volume.blocks.count == 0:
@@ -135,11 +143,20 @@ class Tracker:
         fit = active.laid(view, believed, moved.inliers if moved.is_known else 0)
         doubt = active.doubt(moved, fit)
         if doubt is Weakness.NONE:
-            pose, weakness = orthonormal(believed @ fit.start_now), self._weakness(moved, fit)
+            pose, weakness = (believed @ fit.start_now).exact(), self._weakness(moved, fit)
             if active is self._model:
                 return self._fused(view, pose, moved, weakness, fit)
             return self._apart(view, pose, moved, weakness, fit)
         return self._found_again(view, believed, moved) or self._begun(view, believed, moved, doubt, fit)
+
+    def settled(self) -> tuple[Placed, ...]:
+        """Move the model to where its loops agree best, before it is looked at; return where all views in it were taken then, none: nothing moved."""
+        if self._loops is None:
+            return ()
+        placed = self._loops.settled()
+        if placed and self._pieces.active is self._model:
+            self._pose = placed[-1].world_camera
+        return placed
 
     def kept(self, places_before: int) -> TrackerState:
         """Return what a later tracker needs to go on, beside the model's blocks.
@@ -156,6 +173,7 @@ class Tracker:
         Args:
             state: of the other one; its places are added to those that are known.
         """
+        self._loops = None  # of what came before there are no copies to build the field again
         self._pose, self._was_lost = state.pose, True
         self._model.usual_off_m = state.usual_off_m
         self._model.places.add(state.places)
@@ -172,7 +190,7 @@ class Tracker:
             joined = self._pieces.join(view, believed, found, least=_CONFIRMED) if is_followed else ()
             self._pieces.go_on_in(found.piece)
             self._was_lost = True
-            return replace(self._fused(view, found.pose, moved, weakness, found.fit), joined=joined)
+            return self._fused(view, found.pose, moved, weakness, found.fit, joined=joined)
         self._pieces.go_on_in(found.piece)
         return self._apart(view, found.pose, moved, weakness, found.fit)
 
@@ -185,15 +203,17 @@ class Tracker:
         if not joined:
             return self._still_apart(view, pose, moved, weakness, fit)
         self._was_lost = True
-        return replace(self._fused(view, met.pose, moved, weakness, met.fit), joined=joined)
+        return self._fused(view, met.pose, moved, weakness, met.fit, joined=joined)
 
     def _still_apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
+        self._keep(view)
         return self._lost(pose, moved, Weakness.APART, fit)
 
     def _begun(self, view: View, believed: SE3, moved: Moved, why: Weakness, fit: Registered) -> Tracked:
         """Begin a piece with a view that belongs to none."""
         pose = self._pieces.begin(self._count, view, believed, why)
+        self._keep(view)
         return self._lost(believed if pose is None else pose, moved, why, fit)
 
     def _as_sure_as_timed(self, view: View, shift_px: float) -> View:
@@ -216,16 +236,41 @@ class Tracker:
         world = self._pieces.in_world(pose)
         return Tracked(world_camera=world, state=Tracking.LOST, weakness=why, moved=moved, fit=fit)
 
-    def _fused(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered | None) -> Tracked:
-        self._pose = pose
+    def _fused(
+        self,
+        view: View,
+        pose: SE3,
+        moved: Moved,
+        weakness: Weakness,
+        fit: Registered | None,
+        *,
+        joined: tuple[Joined, ...] = (),
+    ) -> Tracked:
         self._pieces.fuse(view, pose, fit)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
         if self._was_lost and fit is not None:
             state = Tracking.RELOCALISED
-        self._was_lost = False
-        return Tracked(world_camera=pose, state=state, weakness=weakness, moved=moved, fit=fit)
+        placed = self._looped(view, pose, joined)
+        self._was_lost, self._pose = False, placed[-1].world_camera if placed else pose
+        return Tracked(
+            world_camera=self._pose,
+            state=state,
+            weakness=weakness,
+            moved=moved,
+            fit=fit,
+            joined=joined,
+            moved_views=placed,
+        )
 
+    def _looped(self, view: View, pose: SE3, joined: tuple[Joined, ...]) -> tuple[Placed, ...]:
+        """Look whether a view in the model closes a loop; return where all views are then, if that has moved them."""
+        if self._loops is None:
+            return ()
+        if joined:
+            self._loops.joined([Placed(each.number, each.world_camera) for each in joined])
+        self._keep(view)
+        return self._loops.fused(self._count, view, pose, was_lost=self._was_lost)
 
-def orthonormal(pose: SE3) -> SE3:
-    """Return the pose with an exact rotation: products of many drift away from one."""
-    return SE3(rotations_of(vectors_of(pose.R)), pose.t_m)
+    def _keep(self, view: View) -> None:
+        if self._loops is not None:
+            self._loops.keep(self._count, view, self._settings.most_bytes - self._pieces.held_bytes)

@@ -16,7 +16,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan import volume_numpy
 from phone_host.scan.absorbed import absorbed, reached
-from phone_host.scan.blocks import BLOCK_BYTES, SIDE, VOXELS, Blocks
+from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
 from phone_host.scan.exposure import gains_of, multiplied
 from phone_host.scan.jobs import aim, rows_of
 from phone_host.scan.view import Camera, Depth, View
@@ -155,6 +155,13 @@ class Volume:
         changed[numbers[there]] = 1
         self._noted(changed)
         self._copied = self._fused  # whoever puts them has them
+
+    def emptied(self) -> None:
+        """Forget all that went in; the blocks stay, so that whoever has their values learns that these have changed."""
+        of = self.blocks
+        of.field[: of.count], of.weights[: of.count], of.colours[: of.count] = ONE, 0, 0
+        self.left_out = 0
+        self._noted(np.ones(of.count, np.uint8))
 
     def take_in(self, of: "Volume", into_of: SE3) -> None:
         """Average another field into this one; what finds no memory is added to `left_out`.

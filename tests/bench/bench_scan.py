@@ -4,7 +4,8 @@ Uses the sequences of $SCAN_DATA. street: odometry alone on 24 rectified pairs o
 camera in a mirror; "left against right" needs no truth. room: a clip of 7-Scenes through the tracker's depth input, the given depths in place of
 a matcher's; whole, every 2nd to 6th view, and with a tenth dropped at random (20 seeds). rest: 12 pairs of EuRoC's rig, matched by `tandem`, 50 times back and forth. kidnapped: 30 of the room's views cut out, or 15 of them (1 s) black; the camera has returned when half of
 what it shows was fused before. self: every second view is fused, the others are
-only compared, at the pose that tracking gives them.
+only compared, at the pose that tracking gives them. with loops: the room through the tracker that closes loops; surface: distance of the model of its
+poses, fused as for self, from that of the given poses, after registration of the two.
 
 ATE: root mean square after rigid alignment. step: median error of a motion from view to view. end: error of the last pose. The room's
 poses come from another depth tracker and are no better than some 15 mm. ms and CPU ms: median a view, odometry, registration and fusion, the median of
@@ -28,7 +29,9 @@ from rich.progress import Progress
 from rich.table import Table
 
 from phone_host.geometry.se3 import SE3
+from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.odometry import Odometry
+from phone_host.scan.stretches import Placed
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking
 from phone_host.scan.view import Camera, View, halved
@@ -37,6 +40,7 @@ from phone_host.scan.volume_settings import VolumeSettings
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.scan_clips import Clip, Street, at_rest, room, street, unmirrored
+from tests.bench.surface_errors import surface_errors
 from tests.bench.trajectory_errors import TrajectoryErrors, trajectory_errors
 
 ROOM: Final = VolumeSettings(voxel_m=0.01, far_m=3.2, truncation_voxels=6.0)
@@ -87,15 +91,39 @@ def follow(name: str, clip: Clip) -> tuple[Row, tuple[SE3, ...]]:
     return _row(name, clip, odometry.poses(), lost, took), odometry.poses()
 
 
-def track(name: str, clip: Clip, threads: int) -> tuple[Row, tuple[SE3, ...]]:
-    """Odometry, registration and fusion."""
-    tracker, took, told = Tracker(ROOM, threads), [], []
+def track(name: str, clip: Clip, threads: int, loops: LoopSettings | None = None) -> tuple[Row, tuple[SE3, ...]]:
+    """Odometry, registration and fusion; with loops the poses are those that the views have in the end."""
+    tracker, took, told, poses = Tracker(ROOM, threads, loops=loops), [], [], list[SE3]()
     for view in clip.views:
         began = time.perf_counter(), time.process_time()
         told.append(tracker.track(view))
         took.append((time.perf_counter() - began[0], time.process_time() - began[1]))
-    poses = tuple(each.world_camera for each in told)
-    return _row(name, clip, poses, sum(each.state is Tracking.LOST for each in told), took), poses
+        poses.append(told[-1].world_camera)
+        _put(poses, told[-1].moved_views)
+    _put(poses, tracker.settled())
+    return _row(name, clip, poses, sum(each.state is Tracking.LOST for each in told), took), tuple(poses)
+
+
+def _put(poses: list[SE3], placed: Sequence[Placed]) -> None:
+    for each in placed:
+        poses[each.number - 1] = each.world_camera
+
+
+def loop_verdicts(clip: Clip, rows: list[Row], threads: int) -> list[Verdict]:
+    """The whole room with loops."""
+    (row, poses), (_, again) = (track("room, with loops", clip, threads, LoopSettings()) for _ in range(2))
+    rows.append(row)
+    off_mm, _ = self_consistency(clip, poses, threads)
+    mean_mm, far_mm = surface_errors(clip, poses, FINE, threads)
+    same = all(np.array_equal(one.pose(), other.pose()) for one, other in zip(poses, again, strict=True))
+    return [
+        _below("room, with loops: ATE", row.errors.ate_mm, 18.5, "mm"),
+        _below("room, with loops: end", row.errors.end_mm, 28, "mm"),
+        _below("room, with loops: self, median", off_mm, 10, "mm"),
+        _below("room, with loops: surface, mean", mean_mm, 6.5, "mm"),
+        _below("room, with loops: surface, 95 %", far_mm, 16, "mm"),
+        Verdict("room, with loops: the same poses in 2 runs", same, "yes" if same else "no", "yes"),
+    ]
 
 
 def _row(name: str, clip: Clip, poses: Sequence[SE3], lost: int, took: Sequence[tuple[float, float]]) -> Row:
@@ -155,6 +183,7 @@ def room_verdicts(clip: Clip, rows: list[Row], options: Options) -> list[Verdict
     off_mm, far = self_consistency(clip, poses, options.threads)
     return [
         *kidnap_verdicts(clip, poses, options.threads),
+        *loop_verdicts(clip, rows, options.threads),
         _below("room: ATE", whole.errors.ate_mm, 19, "mm"),
         _below("room: end", whole.errors.end_mm, 28, "mm"),
         _below("room: self, median", off_mm, 10.5, "mm"),

@@ -179,9 +179,9 @@ def test_the_library_and_numpy_carve_the_same() -> None:
 def test_a_box_may_be_chosen_when_the_views_have_passed() -> None:
     """Small copies of their depths carve nearly the same; of 1200 views at most 512 are kept, from first to last."""
     poses, kept, carving = around(12), KeptDepths(), Carving(Cells.of(BOX, 0.004))
-    for pose in poses:
+    for number, pose in enumerate(poses):
         view = thing_view(THING, pose)
-        kept.remember(view, pose)
+        kept.remember(number, view, pose)
         carving.see(view, pose)
     later = Carving(carving.cells)
     kept.carve(later)
@@ -189,8 +189,8 @@ def test_a_box_may_be_chosen_when_the_views_have_passed() -> None:
     assert (later.empty != carving.empty).mean() < 0.03
     many, whole = KeptDepths(), thing_view(THING, poses[0])
     small = replace(whole, depth_m=whole.depth_m[:4, :4])
-    for _ in range(1200):
-        many.remember(small, poses[0])
+    for number in range(1200):
+        many.remember(number, small, poses[0])
     few = Carving(Cells((0, 0, 0), (1, 1, 1), 1, 0.01))
     many.carve(few)
     assert few.views == 300

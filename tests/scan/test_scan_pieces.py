@@ -11,6 +11,7 @@ from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.kept_depths import KeptDepths
+from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Pieces
 from phone_host.scan.scan import Scan
@@ -42,9 +43,10 @@ def run(tracker: Tracker) -> list[Tracked]:
     return [tracker.track(view) for view in film([*SEEN, *BACK])]
 
 
-def test_a_piece_is_joined_where_a_view_shows_the_model() -> None:
+@pytest.mark.parametrize("loops", [None, LoopSettings()])
+def test_a_piece_is_joined_where_a_view_shows_the_model(loops: LoopSettings | None) -> None:
     """Lost at first, followed apart, relocalised; the views between are in the model then, within 6 mm and 0.4 degrees of the truth."""
-    told = run(Tracker(SETTINGS))
+    told = run(Tracker(SETTINGS, loops=loops))
     at = next(number for number, each in enumerate(told) if each.joined)
     assert [each.state for each in told[3:at]] == [Tracking.LOST] * (at - 3)
     assert told[4].weakness is Weakness.APART

@@ -27,18 +27,19 @@ class Plane:
     axes: Floats
 
 
-def _plane(through_m: list[float], turn: list[float]) -> Plane:
+def plane_at(through_m: list[float], turn: list[float]) -> Plane:
+    """A plane through a point, m, that faces -z until it is turned, rad."""
     toward = np.array([[0, 0, -1.0], [1, 0, 0], [0, 1, 0]])
     return Plane(np.array(through_m), toward @ rotations_of(np.array(turn)).T)
 
 
-WALL = (_plane([0, 0, 1.0], [0.1, 0.2, 0.0]),)
+WALL = (plane_at([0, 0, 1.0], [0.1, 0.2, 0.0]),)
 """One plane, 1 m away."""
 
 CORNER = (
-    _plane([-0.35, 0, 1.0], [0.0, -0.8, 0.0]),
-    _plane([0.35, 0, 1.0], [0.0, 0.8, 0.0]),
-    _plane([0, 0.1, 1.0], [0.9, 0.0, 0.0]),
+    plane_at([-0.35, 0, 1.0], [0.0, -0.8, 0.0]),
+    plane_at([0.35, 0, 1.0], [0.0, 0.8, 0.0]),
+    plane_at([0, 0.1, 1.0], [0.9, 0.0, 0.0]),
 )
 """Three planes: every direction can be told."""
 

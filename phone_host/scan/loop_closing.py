@@ -1,0 +1,189 @@
+"""Loops of a camera that is never lost: where it comes back to what it saw long before, the drift of the way between is taken out of the model. Pure.
+
+Each view that becomes a place, or comes near one of an older stretch, is compared with the places of older stretches. Where enough features agree, its depth is laid against the surface
+of that older stretch alone, built again from its kept views: what was fused since cannot mislead. If it lies there, that is a loop. The ties then
+put the stretches; each moves as a whole, and the field is built again from the kept views. If in doubt, nothing is moved.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from phone_host.geometry.se3 import SE3
+from phone_host.scan.kept_views import KeptViews
+from phone_host.scan.piece import Piece, PoseGate
+from phone_host.scan.stretches import Placed, Stretches
+from phone_host.scan.view import View
+from phone_host.stereo.native.library import Library, Missing
+
+_ALL_DIRECTIONS: Final = 6
+_ALONE: Final = 2
+"""Of a stretch's kept views every second one shows its surface: neighbours see the same."""
+
+_WAIT_SHARE: Final = 0.25
+"""Of the kept views: so many come in between before the model is built again. So a view costs four more on average at most, however long the scan."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopSettings:
+    """How loops are looked for, and when they move the model.
+
+    Attributes:
+        most_bytes: of the kept views.
+        compared: places that a new one is compared with in full: those that most of its features vote for.
+        every: views after which one is compared that was taken near an older stretch's place; one that becomes a place itself always is.
+        at_once: views of which the model is built while the camera goes on; in the end it is built of all.
+        least_voxels: the model is built again if a stretch moves by more.
+        least_turn: or turns by more, rad.
+    """
+
+    most_bytes: int = 60_000_000
+    compared: int = 3
+    every: int = 4
+    at_once: int = 256
+    least_voxels: float = 0.5
+    least_turn: float = 0.003
+
+
+class LoopCloser:
+    """Knows the stretches of a model, and closes loops between them.
+
+    Args:
+        settings: how.
+        model: that is tracked; its field and places change where a loop moves it.
+        threads: that compute, >= 1; results do not depend on them.
+        gate: what is believed.
+        library: computes.
+    """
+
+    def __init__(
+        self, settings: LoopSettings, model: Piece, threads: int, gate: PoseGate, library: Library | Missing
+    ) -> None:
+        self._settings, self._model = settings, model
+        self._threads, self._gate, self._library = threads, gate, library
+        self._kept, self._stretches = KeptViews(settings.most_bytes), Stretches(model.volume.settings.voxel_m)
+        self._stretch_of: list[int] = []  # of each place
+        self._compared = self._moved = 0  # numbers of the last views that were compared, and that moved the model
+        self._newest: View | None = None
+        self._is_open = False  # whether there are loops that have not been looked at together
+        self._is_coarse = False  # whether the model was built of some of the kept views only
+
+    def keep(self, number: int, view: View, room_bytes: int) -> None:
+        """Keep a small copy of a view that is in the model, or in a piece that may become part of it.
+
+        Args:
+            number: of the view; it grows.
+            view: with depth.
+            room_bytes: memory that the fields leave.
+        """
+        self._kept.remember(number, view)
+        self._kept.bound(max(room_bytes, 0))
+
+    def joined(self, views: Sequence[Placed]) -> None:
+        """Note that a piece has become part of the model.
+
+        Args:
+            views: of the piece.
+        """
+        self._stretches.add_piece(list(views), self._beside(views[0].world_camera))
+        self._note_places()
+
+    def fused(self, number: int, view: View, world_camera: SE3, *, was_lost: bool) -> tuple[Placed, ...]:
+        """Note that a view is in the model; look for a loop, and move the model where loops say so.
+
+        Args:
+            number: of the view.
+            view: with depth.
+            world_camera: where it was taken.
+            was_lost: whether the camera was lost before it.
+
+        Returns:
+            Where all views of the model were taken, this one last; none: nothing has moved.
+        """
+        beside = self._beside(world_camera) if was_lost and self._stretches.count else None
+        self._stretches.add(Placed(number, world_camera), beside)
+        self._newest = view
+        if self._is_compared(number, view, world_camera):
+            self._is_open |= self._is_loop(view, world_camera)
+        if number - self._moved < _WAIT_SHARE * self._kept.count:
+            return ()
+        moved = self._put(max(1, -(-self._kept.count // self._settings.at_once))) if self._is_open else ()
+        self._moved = number if moved else self._moved
+        return moved
+
+    def settled(self) -> tuple[Placed, ...]:
+        """Move the model to where all loops so far agree best, if it is worth it.
+
+        Returns:
+            Where all views of the model were taken, in order within a stretch; none: nothing has moved.
+        """
+        return self._put(1) if self._is_open or self._is_coarse else ()
+
+    def _put(self, step: int) -> tuple[Placed, ...]:
+        """Put the stretches where they belong, and build the model again from every second, third ... kept view; see `settled`."""
+        if self._newest is None or not self._kept.are_enough:
+            return ()
+        self._is_open, by, model = False, self._stretches.settled(), self._model
+        turn, shift_m = self._stretches.farthest(by)
+        is_little = shift_m < self._settings.least_voxels * model.volume.settings.voxel_m
+        if is_little and turn < self._settings.least_turn and not (self._is_coarse and step == 1):
+            return ()
+        self._is_coarse = step > 1
+        self._stretches.move(by)
+        model.places.move([by[stretch] for stretch in self._stretch_of])
+        model.volume.emptied()
+        placed = [each for stretch in range(self._stretches.count) for each in self._stretches.views(stretch)]
+        self._fuse(model, placed[:-1], step)
+        model.volume.fuse(self._newest, placed[-1].world_camera)  # whole: the next view follows it
+        return tuple(placed)
+
+    def _is_compared(self, number: int, view: View, world_camera: SE3) -> bool:
+        """Return whether a view is to be compared with places of older stretches: it is a place itself, or near one of them."""
+        is_place, among = self._note_places(), self._older_places()
+        if not among or not self._kept.are_enough:
+            return False
+        is_due = number - self._compared >= self._settings.every
+        if not is_place and not (is_due and self._model.places.is_by(view, world_camera, among)):
+            return False
+        self._compared = number
+        return True
+
+    def _older_places(self) -> list[int]:
+        older = set(self._stretches.older())
+        return [place for place, stretch in enumerate(self._stretch_of) if stretch in older]
+
+    def _is_loop(self, view: View, world_camera: SE3) -> bool:
+        """Look whether a view shows a place of an older stretch, and lies on its surface."""
+        found = self._model.places.again(view, self._older_places(), self._settings.compared)
+        if found is None:
+            return False
+        stretch = self._stretch_of[found.number]
+        piece = self._piece(stretch)
+        # The corners' pose may be farther off than tracking is.
+        lying = piece.confirmed(view, found.world_camera) or piece.confirmed(view, world_camera)
+        if lying is None or lying.fit.told < _ALL_DIRECTIONS:
+            return False
+        return self._stretches.close(stretch, world_camera, lying.pose)
+
+    def _piece(self, stretch: int) -> Piece:
+        """Build a stretch alone, from every second of its kept views."""
+        piece = Piece(self._model.volume.settings, self._threads, self._gate, self._library)
+        piece.usual_off_m = self._model.usual_off_m
+        self._fuse(piece, self._stretches.views(stretch), _ALONE)
+        return piece
+
+    def _fuse(self, piece: Piece, placed: Sequence[Placed], step: int = 1) -> None:
+        """Fuse every view that is kept of some, or every second, third ..."""
+        poses = {each.number: each.world_camera for each in placed}
+        for number, view in self._kept.of(list(poses), step):
+            piece.volume.fuse(view, poses[number])
+
+    def _beside(self, world_camera: SE3) -> int:
+        """Return the stretch of the place that was seen from nearest by."""
+        return self._stretch_of[self._model.places.nearest(world_camera, len(self._stretch_of))]
+
+    def _note_places(self) -> bool:
+        """Note to which stretch new places belong: the last one; return whether there are any."""
+        new = self._model.places.count - len(self._stretch_of)
+        self._stretch_of += [self._stretches.count - 1] * new
+        return new > 0
