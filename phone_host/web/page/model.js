@@ -70,6 +70,24 @@ void main() {
   shown = vec4(own * light * (gl_FrontFacing ? 1.0 : 0.45) * (isOutside ? 0.3 : 1.0), 1.0);
 }`;
 
+/** What is higher above the mat than its paper and the noise of its depths stands on it, m; and so many points make a thing. */
+const STANDS_M = 0.005;
+const LEAST_STANDING = 20;
+
+/**
+ * The box around places.
+ * @param {number[][]} places @param {number} share - of them that may lie beyond each side @param {number} margin - share of its sides
+ * @returns {import('./crop_box.js').Box}
+ */
+function within(places, share, margin) {
+  const ends = [0, 1, 2].map((axis) => {
+    const values = places.map((place) => place[axis]).sort((a, b) => a - b);
+    const [low, high] = [share, 1 - share].map((each) => values[Math.round(each * (values.length - 1))]);
+    return [low - margin * (high - low), high + margin * (high - low)];
+  });
+  return { low: ends.map(([low]) => low), high: ends.map(([, high]) => high) };
+}
+
 /** A scan that can be turned. */
 export class Model extends Viewer {
   /** @param {HTMLCanvasElement} canvas @param {HTMLCanvasElement} over @throws {Error} where there is no WebGL 2 */
@@ -179,13 +197,14 @@ export class Model extends Viewer {
     return some;
   }
 
-  /** The box in which most of it lies, for somebody to begin with. @returns {?import('./crop_box.js').Box} null: there is nothing */
+  /** The box in which most of it lies, or all that stands on a mat, for somebody to begin with. @returns {?import('./crop_box.js').Box} null: there is nothing */
   middle() {
     const some = this.some();
     if (!some.length) return null;
-    const sorted = [0, 1, 2].map((axis) => some.map((place) => place[axis]).sort((a, b) => a - b));
-    const at = (/** @type {number[]} */ values, /** @type {number} */ share) => values[Math.round(share * (values.length - 1))];
-    return { low: sorted.map((values) => at(values, 0.1)), high: sorted.map((values) => at(values, 0.9)) };
+    const standing = this.legend.kind === 'mat' ? some.filter((place) => place[2] > STANDS_M) : [];
+    if (standing.length < LEAST_STANDING) return within(some, 0.1, 0);
+    const box = within(standing, 0.01, 0.05);
+    return { low: [box.low[0], box.low[1], 0], high: box.high };
   }
 
   /** @returns {?import('./viewer.js').Stand} */
