@@ -7,7 +7,7 @@ program=$(pwd)/.venv/bin/phone-host
 [ -x "$program" ] || { echo "error: phone-host is not installed here: run sh deploy/host/termux-install.sh" >&2; exit 3; }
 command -v termux-wake-lock >/dev/null || { echo "error: this is not Termux: run phone-host serve --open" >&2; exit 3; }
 
-patience=180 # an old phone takes a minute for its first start
+patience=600 # s; the first start of an old phone takes a minute or more
 log=$PREFIX/var/log/sv/phone-host-page/current
 if [ $# = 0 ] && SVDIR=$PREFIX/var/service sv status phone-host-page 2>/dev/null | grep -q '^run:'; then
     seconds=0
