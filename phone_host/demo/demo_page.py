@@ -99,8 +99,8 @@ def _figures(run: RunSnapshot, errors: DepthErrors) -> tuple[Figure, ...]:
         Figure(
             label="time skew",
             value=f"{skew.p50_ns / 1e3:.0f}",
-            unit="us",
-            note=f"median; 99 % below {skew.p99_ns / 1e3:.0f} us",
+            unit="\u00b5s",
+            note=f"median; 99 % below {skew.p99_ns / 1e3:.0f} \u00b5s",
         ),
         clock_figure(run),
     )

@@ -13,10 +13,14 @@ from phone_host.output.axes import Axes
 from phone_host.output.meshes.formats import OURS_MM, read_mesh
 from phone_host.output.meshes.solid import Solid
 
-_MODEL, _REPORT = "model.ply", "report.json"
+_MODEL = "model.ply"
+_REPORTS: Final = ("report.json", "report-scan.json")
+"""The second one is the first, moved aside by another command that has written its own beside the model."""
+
 _MOST_BYTES: Final = 2 << 30
 _MOST_REPORT_BYTES: Final = 16 << 20
 _HEAD: Final = 256
+_STL_HEAD: Final = 80
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -60,15 +64,22 @@ def read_model(path: Path, unit_m: float) -> Model:
         content = read_whole(file, _MOST_BYTES)
     except OSError as error:
         raise UnavailableError(f"{file} cannot be read ({error.strerror})", "check its permissions") from None
-    report = _report(path / _REPORT) if is_scan else {}
+    reports = [_report(path / name) for name in _REPORTS] if is_scan else []
+    report = next((told for told in reports if told), {})
     if is_scan or math.isnan(unit_m):
         unit_m = 0.001 if OURS_MM in content[:_HEAD] else 1.0
     solid = read_mesh(content, file.name, unit_m)
     stem = (path.resolve().name or "model") if is_scan else path.stem
-    axes = next((axes for axes in Axes if axes.text == report.get("axes")), None)
+    axes = next((axes for axes in Axes if axes.text == report.get("axes") or _says(content[:_HEAD], axes)), None)
     voxel = report.get("voxel_m")
     voxel_m = float(voxel) if isinstance(voxel, int | float) and 0 < voxel < 1 else math.nan
     return Model(path=file, stem=stem, solid=solid, axes=axes, voxel_m=voxel_m)
+
+
+def _says(head: bytes, axes: Axes) -> bool:
+    """Return whether a file of ours says that it has these axes; an STL says them as far as they fit."""
+    said = f"; {axes.text}".encode()
+    return said + b"\n" in head or head[:_STL_HEAD].rstrip() == (OURS_MM + said)[:_STL_HEAD].rstrip()
 
 
 def _report(path: Path) -> dict[str, object]:

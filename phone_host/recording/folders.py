@@ -134,6 +134,8 @@ def _folders(paths: Sequence[Path], times: Path | None) -> tuple[tuple[Path, Pat
         return (paths[0], paths[1]), times
     if len(paths) != 1:
         raise SettingsError(f"{len(paths)} folders", "give the folder of a data set, or the left and the right one")
+    if not paths[0].is_dir():
+        raise UnavailableError(f"{paths[0]} is no folder", "give the folder of a data set, or a recording, FILE.mcap")
     for left, right in _PAIRS:
         if (paths[0] / left).is_dir() and (paths[0] / right).is_dir():
             usual = paths[0] / "times.txt"

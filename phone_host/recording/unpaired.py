@@ -2,6 +2,7 @@
 
 from common.frame import Frame
 from common.protocol.message import CameraDescription
+from phone_host.measure.recording_account import RecordingAccount
 from phone_host.model import BoardFrame
 from phone_host.recording.recorder import Recorder
 from phone_host.sync.clock import ClockEstimate
@@ -17,6 +18,11 @@ class UnpairedFrames:
     def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder
         self.begun_ns: int | None = None
+
+    @property
+    def account(self) -> RecordingAccount:
+        """What became of the frames so far."""
+        return self._recorder.account
 
     @property
     def is_full(self) -> bool:

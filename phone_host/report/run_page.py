@@ -274,7 +274,7 @@ def clock_figure(run: RunSnapshot) -> Figure:
     """How well the host knew the board's clock."""
     spread = run.delays.spread("uncertainty")
     return Figure(
-        label="clock uncertainty", value=f"{spread.p50_ns / 1e3:.0f}", unit="us", note="median over the pairs"
+        label="clock uncertainty", value=f"{spread.p50_ns / 1e3:.0f}", unit="\u00b5s", note="median over the pairs"
     )
 
 

@@ -92,7 +92,6 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
         return ()
     area, unit = area_text(model.size.area_m2).split(" ")
     width, height, depth = (f"{length * 1e3:.0f}" for length in model.size.extent_m)
-    off = f"{report.off_m * 1e3:.2g}" if math.isfinite(report.off_m) else "\u2013"
     return (
         Figure(label="pairs in the model", value=f"{report.fused}", unit=f"of {len(report.pairs)}"),
         Figure(
@@ -101,7 +100,7 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
             unit="mm",
             note=f"median; 19 in 20 points to \u00b1 {model.noise_p95_m * 1e3:.2g} mm, if the pairs err independently",
         ),
-        Figure(label="pairs off the model", value=off, unit="mm", note="mean; median of the pairs"),
+        *_off(report.off_m),
         Figure(label="surface", value=area, unit=unit, note=f"{width} x {height} x {depth} mm"),
         _border(model),
         Figure(
@@ -110,6 +109,15 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
             unit="mm",
             note=f"depths to {distance_text(settings.far_m)}, {model.memory_bytes / 1e6:.0f} MB",
         ),
+    )
+
+
+def _off(off_m: float) -> tuple[Figure, ...]:
+    """Show how far the depths of a pair lie off the model; a mat tells where a pair was taken, and nothing is compared then."""
+    if not math.isfinite(off_m):
+        return ()
+    return (
+        Figure(label="pairs off the model", value=f"{off_m * 1e3:.2g}", unit="mm", note="mean; median of the pairs"),
     )
 
 

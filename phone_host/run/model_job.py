@@ -1,7 +1,7 @@
 """What is done with a model: checked, saved for other programs, printed. The verbs, the API and the page do it by these functions."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Final
@@ -75,6 +75,20 @@ def check_model(
     return problems(upright.points_mm, upright.model.solid.triangles, printer or Printer(), lambda _: None)
 
 
+def spare_model(model: Model, paths: Iterable[Path]) -> None:
+    """Refuse to replace a model by what is made of it.
+
+    Args:
+        model: that was read.
+        paths: files that will be written.
+
+    Raises:
+        SettingsError: one of them is the model's own.
+    """
+    if model.path.resolve() in {path.resolve() for path in paths}:
+        raise SettingsError(f"{model.path} would be replaced by its own export", "give another folder")
+
+
 def export_model(
     model: str | Path,
     to: Sequence[str],
@@ -96,7 +110,7 @@ def export_model(
         The files, in the order of the formats.
 
     Raises:
-        SettingsError: there is no such format.
+        SettingsError: there is no such format, or the model itself would be replaced.
         UnavailableError: the model cannot be read.
         DataError: it is none.
         OSError: a file cannot be written.
@@ -106,6 +120,7 @@ def export_model(
     read = read_model(Path(model), _UNITS_M.get(unit or "", math.nan))
     solid, _ = fewer_triangles(read.solid, usual_tolerance_m(read) if tolerance_mm is None else tolerance_mm / 1000)
     paths = {Path(out) / f"{read.stem}.{kind}": kind for kind in to}
+    spare_model(read, paths)
     for path, kind in paths.items():
         write_bytes(path, mesh_bytes(solid, kind, read.axes))
     return list(paths)

@@ -19,6 +19,11 @@ from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 
+_EMPTY_BOX = Remark(
+    "nothing of what the pairs show lies in the box",
+    "move or enlarge --box, or leave it out to see where the thing lies",
+)
+
 
 def own_axes(wanted: ScanWanted) -> Axes | None:
     """Return the axes that a model has from what the thing stands on; None: it has those of the camera.
@@ -58,12 +63,18 @@ def report_of(
         rectified_px=scan.size_px,
         matcher=matcher,
         axes=axes,
-        remarks=(*remarks, *memory_remarks(scan)),
+        remarks=(*remarks, *memory_remarks(scan), *_box_remarks(scan, model)),
         keeps_field=keeps_field(scan),
         mat=scan.wanted.mat,
     )
     on_mat = report.on_mat
     return report if on_mat is None else replace(report, remarks=(*report.remarks, *on_mat.remarks))
+
+
+def _box_remarks(scan: Scan, model: ScanModel) -> tuple[Remark, ...]:
+    """Say that the box that was asked for may be elsewhere, where there is no surface."""
+    is_empty = scan.wanted.box is not None and not len(model.mesh.triangles)
+    return (_EMPTY_BOX,) if is_empty else ()
 
 
 def require_something(report: ScanReport) -> None:
@@ -79,8 +90,14 @@ def require_something(report: ScanReport) -> None:
         and report.mat is not None
         and any(pair.weakness is Weakness.NO_MAT for pair in report.scanned)
     ):
+        pairs = counted(len(report.scanned), "pair")
+        if _EMPTY_BOX in report.remarks:
+            raise DataError(
+                f"the mat {report.mat.name} is not seen in any of {pairs}, or nothing of what they show lies in the box",
+                "move or enlarge --box, or leave it out; show more of the mat, sharp and without glare",
+            )
         raise DataError(
-            f"the mat {report.mat.name} is not seen in any of {len(report.scanned)} pairs",
+            f"the mat {report.mat.name} is not seen in any of {pairs}",
             "show more of it, sharp and without glare; if another one lies there, name it, as in --mat 8x6:28mm:20mm:5x5",
         )
     if report.settings is None:

@@ -1,6 +1,7 @@
 """How fine a model is made, from how exact its first view's depths are. Pure."""
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -40,6 +41,16 @@ def fineness_for(view: View, voxel_m: float, most_bytes: int) -> VolumeSettings:
     truncation = min(max(_TRUNCATION_VOXELS, _SIGMAS * noise_m / voxel_m), _MOST_TRUNCATION_VOXELS)
     far_m = max(math.sqrt(truncation * voxel_m / view.noise_per_m), near_m)
     return VolumeSettings(voxel_m=voxel_m, far_m=far_m, most_bytes=most_bytes, truncation_voxels=truncation)
+
+
+def thinner(settings: VolumeSettings, share: float) -> VolumeSettings:
+    """Return settings of a field that tells the surface over a share of the distance: for a thing whose poses need no wide bridge, and that would be fattened.
+
+    Args:
+        settings: from `fineness_for`.
+        share: of its truncation, 0.5 to 1.
+    """
+    return replace(settings, truncation_voxels=share * settings.truncation_voxels)
 
 
 def _rounded(length_m: float) -> float:

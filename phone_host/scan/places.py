@@ -115,7 +115,7 @@ class Places:
             view: fused.
             world_camera: where it was taken.
         """
-        apart_m = _APART_SHARE * float(np.nanmedian(view.depth_m))
+        apart_m = _APART_SHARE * _typical_m(view)
         if any(_is_near(place.world_camera, world_camera, apart_m) for place in self._places):
             return
         seen, observer = _features(view), Observer(view.geometry, view.noise_px)
@@ -179,7 +179,7 @@ class Places:
             world_camera: where it was taken.
             among: numbers of places.
         """
-        apart_m = _BY_SHARE * float(np.nanmedian(view.depth_m))
+        apart_m = _BY_SHARE * _typical_m(view)
         places = [self._places[number].world_camera for number in among]
         return any(_is_near(place, world_camera, apart_m, _BY_DEG) for place in places)
 
@@ -209,6 +209,11 @@ class Places:
             [whose[each.trainIdx] for each in found if each.distance <= _ALIKE_BITS], minlength=len(voted)
         )
         return [among[at] for at in sorted(np.argsort(-votes, kind="stable")[:most].tolist())]
+
+
+def _typical_m(view: View) -> float:
+    """Return the median depth, m, of every fourth row and column: of all of them it takes 2 ms, a thirtieth of a view."""
+    return float(np.nanmedian(view.depth_m[::4, ::4]))
 
 
 def _is_near(one: SE3, other: SE3, apart_m: float, apart_deg: float = _APART_DEG) -> bool:

@@ -14,7 +14,7 @@ from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor
-from phone_host.scan.fineness import fineness_for
+from phone_host.scan.fineness import fineness_for, thinner
 from phone_host.scan.scan import Scan, Submap
 from phone_host.scan.scan_model import ScanModel, closed_model
 from phone_host.scan.scan_wanted import ScanWanted
@@ -23,6 +23,10 @@ from phone_host.scan.table_box import thing_box
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness, unless_flat
 from phone_host.scan.view import View
+
+_TRUNCATION_SHARE: Final = 2 / 3
+"""Of the usual truncation: a rendered figure then lies 0.59 mm off in place of 0.68, and is 3.7 % too large in place of 5.3. Half of it gives 0.56 mm and
+2.7 %, but a table that is seen at a slant would find too little of the surface that it is laid against."""
 
 _LEAST_VOXELS: Final = 1.5
 """Above the table: what is lower may be its surface."""
@@ -46,7 +50,7 @@ class TableScan(Scan):
         if not isinstance(found, Table):
             self._missing = found
             return None
-        settings = fineness_for(view, wanted.voxel_m, wanted.most_bytes)
+        settings = thinner(fineness_for(view, wanted.voxel_m, wanted.most_bytes), _TRUNCATION_SHARE)
         self._room, self._cells = found.room, Cells.of(found.room, settings.voxel_m)
         return Tracker(settings, wanted.threads, start=found.world_camera)
 

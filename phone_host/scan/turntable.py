@@ -20,7 +20,7 @@ from phone_host.model import Processed
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carved, Carving
 from phone_host.scan.cells import Cells
-from phone_host.scan.fineness import fineness_for
+from phone_host.scan.fineness import fineness_for, thinner
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.ground import Ground
 from phone_host.scan.merged_field import merged
@@ -47,6 +47,10 @@ _MOST_TURN: Final = 2 * np.pi + 0.6
 """rad after which no more views are kept: a whole turn, and enough to see that it is closed."""
 
 _MOST_BYTES: Final = 200_000_000
+
+_TRUNCATION_SHARE: Final = 2 / 3
+"""Of the truncation with which the thing is tracked: in the end the poses are exact. A rendered thing then lies 0.44 mm off on average in place of 0.48, and
+is 1.0 % too large in place of 2.5; with half, 0.45 mm, and where it was seen 1.8 % too small in place of 1.0."""
 
 _RIM_PX: Final = 5
 """Across which the background beside the thing may be the thing."""
@@ -321,7 +325,8 @@ class TurntableScan(Scan):
         taken = len(self._pairs)
         if self.tracker is None or len(self._stations) < LEAST_VIEWS:
             return _Finished(taken)
-        settings = self.tracker.volume.settings
+        tracked = self.tracker.volume.settings
+        settings = thinner(tracked, _TRUNCATION_SHARE)
         background = Background(
             [each.view.grey for each in self._stations], [each.view.depth_m for each in self._stations]
         )
@@ -332,7 +337,7 @@ class TurntableScan(Scan):
         given = [
             TurnView(thing, each.world_camera, each.is_sure) for thing, each in zip(things, self._stations, strict=True)
         ]
-        turn = full_turn(given, settings, self._wanted.threads)
+        turn = full_turn(given, tracked, self._wanted.threads)
         if turn is None:
             return _Finished(taken)
         volume = Volume(settings, self._wanted.threads)

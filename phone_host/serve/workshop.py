@@ -17,6 +17,7 @@ from phone_host.output.meshes.formats import FORMATS
 from phone_host.output.meshes.printable import Printer
 from phone_host.printers.door import Job
 from phone_host.printers.preparing import job_of
+from phone_host.printers.printer_uri import FileUri
 from phone_host.printers.printing import Place, RunningPrint
 from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.run.model_job import check_model, export_model
@@ -221,7 +222,11 @@ class Workshop:
             self._job = job
             asks = f"{job.name} on {wanted.text}"
             minutes = "" if math.isnan(job.facts.seconds) else f", {max(1, round(job.facts.seconds / 60))} min"
-            words = f"print {asks} ({counted(job.facts.lines, 'line')}{minutes})? See that the bed is empty"
+            facts = f"({counted(job.facts.lines, 'line')}{minutes})"
+            if isinstance(wanted.uri, FileUri):
+                words = f"write {job.name} to {wanted.uri.path} {facts}?"
+            else:
+                words = f"print {asks} {facts}? See that the bed is empty"
             self._show(PrintStage.ASKS, words, asks=asks)
 
     def _not_prepared(self, words: str) -> None:
@@ -261,7 +266,9 @@ class Workshop:
         elif outcome.phase is Phase.CANCELLED:
             words, level = f"{name}: cancelled; heaters are off", "warning"
         else:
-            words, level = "; ".join((f"{name}: printed", *outcome.notes)), "good"
+            uri = None if self._wanted is None else self._wanted.uri
+            done = f"{name}: written to {uri.path}" if isinstance(uri, FileUri) else f"{name}: printed"
+            words, level = "; ".join((done, *outcome.notes)), "good"
         with self._lock:
             self._put_away(words, level=level)
 

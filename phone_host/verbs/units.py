@@ -36,6 +36,28 @@ def length_mm(text: str, option: str, example: str) -> float:
     return value
 
 
+def bounded_mm(text: str, option: str, example: str, bounds_mm: tuple[float, float]) -> float:
+    """Read a length like `length_mm`, of something that has a least and a greatest size.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+        example: a value that would be right, for errors.
+        bounds_mm: the least and the greatest, mm.
+
+    Returns:
+        mm.
+
+    Raises:
+        SettingsError: it is no length, or beyond the bounds.
+    """
+    value = length_mm(text, option, example)
+    least, most = bounds_mm
+    if not least <= value <= most:
+        raise SettingsError(f"{option} is {value:g} mm", f"give {least:g} to {most:g} mm, for example {example}")
+    return value
+
+
 _LEAST_BARE_SQUARE_MM: Final = 0.5
 _LEAST_BARE_BASELINE_MM: Final = 5.0
 _LEAST_BASELINE_MM: Final = 1.0

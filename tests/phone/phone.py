@@ -89,9 +89,10 @@ class Phone:
         try:
             yield process
         finally:
-            # The child that `unshare --kill-child` is to take along has changed its user since, which ends that promise (prctl(2)).
-            for child in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
-                os.kill(int(child), signal.SIGKILL)
+            if process.poll() is None:
+                # The child that `unshare --kill-child` is to take along has changed its user since, which ends that promise (prctl(2)).
+                for child in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
+                    os.kill(int(child), signal.SIGKILL)
             process.kill()
             process.wait()
 

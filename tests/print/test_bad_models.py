@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from common.errors import SettingsError
+from phone_host.api import export_model
 from tests.print.test_print_verb import _cube_file, environment
 
 NAN_PLY = (
@@ -96,3 +98,18 @@ def test_a_pipe_as_gcode_and_a_profile_that_is_not_there_are_refused_at_once(mod
     assert ended.returncode == 2
     assert "--profile none.ini is no file" in ended.stderr
     assert len(ended.stderr.splitlines()) == 1
+
+
+def test_a_model_is_not_replaced_by_its_own_export(models: Path) -> None:
+    """Neither under another spelling of its folder nor through the API's door; another format beside it is written."""
+    assert said(models, "export", "cube.stl", "--unit", "mm", "--to", "ply", "--out", "made").returncode == 0
+    made = models / "made" / "cube.ply"
+    before = made.read_bytes()
+    ended = said(models, "export", "made/cube.ply", "--to", "stl,ply", "--tolerance", "1mm", "--out", "./made/../made")
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert "made/cube.ply would be replaced by its own export: give another folder" in ended.stderr
+    with pytest.raises(SettingsError, match="its own export"):
+        export_model(made, ["ply"], models / "made")
+    assert made.read_bytes() == before
+    assert not (models / "made" / "cube.stl").exists()
+    assert said(models, "export", "made/cube.ply", "--to", "stl", "--out", "made").returncode == 0

@@ -172,3 +172,18 @@ def test_what_was_prepared_is_not_started_after_the_end(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="nothing is ready"):
         workshop.start(asks)
     assert not (tmp_path / "out.gcode").exists()
+
+
+@needs_slicer
+def test_a_file_is_written_and_nothing_is_said_of_a_bed(tmp_path: Path) -> None:
+    """G-code for a card: the question and the end name the file; no printer prints."""
+    workshop, folder, out = Workshop(lambda: None), scan(tmp_path / "cube", 0.006), tmp_path / "out.gcode"
+    workshop.prepare(folder, asked_print({"printer": f"file:{out}"}, None))
+    until(lambda: state(workshop).stage is PrintStage.ASKS, "it asks")
+    assert state(workshop).words.startswith("write cube.gcode to ")
+    assert "bed" not in state(workshop).words
+    workshop.start(state(workshop).asks)
+    until(lambda: state(workshop).stage is PrintStage.OVER, "it is over")
+    assert state(workshop).words.startswith(f"cube.gcode: written to {out}")
+    assert out.stat().st_size > 1000
+    workshop.close()

@@ -198,7 +198,7 @@ def without_marks(degrees: float) -> Processed:
 
 
 def test_the_command_scans_pictures_of_an_object_on_a_mat(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Four photographs a quarter turn apart become a model that stands upright; the report tells the squares; a mat that is not there is told."""
+    """Four photographs a quarter turn apart become a model that stands upright; the report tells the squares; a mat that is not there is told, and a box in which nothing is."""
     write_rig(tmp_path / "rig.yaml", RIG, rectify_rig(RIG))
     for side in ("left", "right"):
         (tmp_path / side).mkdir()
@@ -216,6 +216,14 @@ def test_the_command_scans_pictures_of_an_object_on_a_mat(tmp_path: Path, capsys
     assert report["model"]["extent_m"][2] == pytest.approx(2 * BALL_M, abs=0.006)
     assert "its squares measure 25.0" in capsys.readouterr().out
     assert "The mat" in (tmp_path / "ball" / "index.html").read_text()
+    elsewhere = ["--mat", "--box", "100x100x100@9000,0,0", "--out", str(tmp_path / "elsewhere")]
+    capsys.readouterr()
+    assert main([*given, *wanted, *elsewhere]) == 4
+    assert "or nothing of what they show lies in the box: move or enlarge --box" in capsys.readouterr().err
+    assert not (tmp_path / "elsewhere").exists()
+    above = ["--mat", "--box", "100x100x100@0,0,200", "--out", str(tmp_path / "above")]
+    assert main([*given, *wanted, *above]) == 4
+    assert "warning: nothing of what the pairs show lies in the box: move or enlarge --box" in capsys.readouterr().out
     assert main([*given, *wanted, "--mat", "8x6:28mm:20mm:4x4", "--out", str(tmp_path / "none")]) == 4
     assert "the mat 8x6:28mm:20mm:4x4 is not seen in any of 4 pairs" in capsys.readouterr().err
 

@@ -159,6 +159,9 @@ def test_the_page_shows_the_model_and_what_went_wrong() -> None:
     assert "dim: give light" in page.words
     assert [one for one in page.elements if one[1].get("class") == "clouds modelview"]
     assert {attributes["href"] for tag, attributes in page.elements if tag == "a"} >= {"model.ply", "trajectory.txt"}
+    assert "pairs off the model" in page.words
+    on_mat = replace(GOOD, pairs=tuple(replace(each, off_m=math.nan) for each in GOOD.scanned))
+    assert "pairs off the model" not in Page(scan_page(on_mat, shown)).words
     empty = replace(report(pair(0)), model=ModelFigures())
     bare = Page(scan_page(empty, ShownModel(Mesh.empty(), np.zeros(0, np.float32), 1.0)))
     assert "modelview" not in str(bare.elements)

@@ -309,7 +309,7 @@ def test_a_pass_is_laid_onto_an_earlier_one_or_stays_alone(jerky: tuple[list[Vie
 
 
 def test_a_pass_turned_over_closes_what_the_first_stood_on(whole_turn: TurntableScan) -> None:
-    """Both passes carve: no edge is open, hardly anything was not seen, the content is right to 1 %, and the second pass saw the thing, as it stood first, from below."""
+    """Both passes carve: no edge is open, hardly anything was not seen, the content is right to 4 %, and the second pass saw the thing, as it stood first, from below."""
     first = whole_turn
     assert first.model().unseen_share > 0.1
     assert first.volume is not None
@@ -323,7 +323,7 @@ def test_a_pass_turned_over_closes_what_the_first_stood_on(whole_turn: Turntable
     points = model.mesh.points_m.astype(np.float64)
     assert np.abs(off_thing_m(points)).mean() < 0.0008
     assert np.abs(off_thing_m(points)).max() < 0.006
-    assert content_m3(model.mesh) == pytest.approx(content_of_thing_m3(), rel=0.01)
+    assert content_m3(model.mesh) == pytest.approx(content_of_thing_m3(), rel=0.04)
     assert max((pair.world_camera.t_m - FOOT_M) @ UP for pair in scan.pairs if pair.is_fused) < 0
 
 

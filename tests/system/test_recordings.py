@@ -71,6 +71,15 @@ def _pairs(out: Path) -> list[tuple[int, int]]:
     return [(line["sequence"], line["host_sequence"]) for line in ledgers(out)]
 
 
+def test_a_board_that_never_comes_leaves_no_recording(film: Path, tmp_path: Path) -> None:
+    """The same command can be given again: what this machine's camera gave while it waited is no recording of both."""
+    words = ["record", "--camera", _uri(film, "right"), "--link", f"ipc://{tmp_path}/nobody", "--wait", "0.5"]
+    with host([*words, "--out", str(tmp_path / "s.mcap")], tmp_path) as running:
+        assert running.wait() == 3
+        assert "no board within 0.5 s" in running.stderr
+    assert not list(tmp_path.glob("s.mcap*"))
+
+
 def test_a_run_s_recording_holds_all_that_came(live: Path) -> None:
     """Both cameras' images, as many as the report counts, the delays of each pair and the settings; no harm done to the run."""
     report = json.loads((live / "out" / "report.json").read_text())["recording"]

@@ -52,10 +52,12 @@ def test_files_of_others_are_not_replaced(tmp_path: Path) -> None:
 
 
 def test_the_next_command_is_told(tmp_path: Path) -> None:
-    """For a screen the size of a pixel follows from its diagonal, and the next command has it."""
+    """For a screen the size of a pixel follows from its diagonal, and the next command has it; a mat is for scans, too."""
     done = _phone_host("chessboard", "--screen", "1920x1080", "--diagonal", "15.6in", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert "--square '120px*0.1799mm'" in done.stdout
+    mat = _phone_host("mat", "--out", tmp_path)
+    assert "phone-host scan left/ right/ --mat 10x8:25mm:18mm:5x5" in mat.stdout
 
 
 @pytest.mark.parametrize(

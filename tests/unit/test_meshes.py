@@ -328,6 +328,24 @@ def test_a_model_that_is_not_there_is_told(tmp_path: Path, name: str) -> None:
         read_model(tmp_path / name, math.nan)
 
 
+def test_a_scan_says_its_fineness_when_another_report_has_taken_its_name(tmp_path: Path) -> None:
+    """Another command that writes into the folder moves the scan's report aside."""
+    (tmp_path / "model.ply").write_bytes(mesh_bytes(ball(1), "ply", None))
+    (tmp_path / "report.json").write_text(json.dumps({"command": "quality", "model": "a phone"}))
+    (tmp_path / "report-scan.json").write_text(json.dumps({"model": {"voxel_m": 0.002, "axes": Axes.Y_UP.text}}))
+    model = read_model(tmp_path, math.nan)
+    assert model.voxel_m == 0.002
+    assert model.axes is Axes.Y_UP
+
+
+@pytest.mark.parametrize("axes", [None, *Axes])
+@pytest.mark.parametrize("kind", ["ply", "obj", "stl"])
+def test_a_file_of_ours_says_its_axes(tmp_path: Path, kind: str, axes: Axes | None) -> None:
+    """Alone, without its scan's folder: what is made of it stands as the scan did."""
+    (tmp_path / f"cup.{kind}").write_bytes(mesh_bytes(ball(1), kind, axes))
+    assert read_model(tmp_path / f"cup.{kind}", math.nan).axes is axes
+
+
 @pytest.mark.parametrize(
     ("report", "voxel_m", "axes"),
     [

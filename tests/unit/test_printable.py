@@ -175,6 +175,25 @@ def test_all_boxes_that_meet_are_pairs() -> None:
     assert set(pairs) == expected
 
 
+def test_a_heap_of_triangles_is_told_and_not_searched() -> None:
+    """Five thousand times the same triangle are 12 million pairs in one place: that is said, and neither crossings nor walls are looked for."""
+    one = np.array([[0, 0, 0], [50, 0, 0], [0, 50, 0]], np.float64)
+    assert Grid(np.repeat(one[np.newaxis], 5000, axis=0)).is_crowded
+    heap = trimesh.Trimesh(one, np.repeat([[0, 1, 2]], 5000, axis=0), process=False)
+    found = checked(heap)
+    assert "too many triangles" in found[Flaw.CROWDED].sentence
+    assert not found[Flaw.CROWDED].blocks
+    assert not {Flaw.CROSSING, Flaw.THIN} & found.keys()
+    assert not Grid(np.asarray(box(30, 20, 10).triangles, np.float64)).is_crowded
+
+
+@pytest.mark.parametrize(("side", "wall"), [(1e-6, 0.8), (20.0, 1e7)])
+def test_walls_are_looked_for_no_farther_than_the_thing_is_long(side: float, wall: float) -> None:
+    """A nanometre against a usual wall, and a usual box against a wall of ten kilometres: all of it is thin, and that is soon told."""
+    found = checked(box(side, side, side), Printer(least_wall_mm=wall))
+    assert found[Flaw.THIN].triangles.all()
+
+
 @pytest.fixture
 def mess() -> trimesh.Trimesh:
     """A large ball inside out, with a crumb."""

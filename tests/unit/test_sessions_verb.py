@@ -12,9 +12,9 @@ from tests.support.recorded import recording, recording_file
 _CHAT = Topic("/chat", "cdr", "std_msgs/msg/String", "ros2msg", b"string data")
 
 
-def _error(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """Return the one line of an error, which is one of bad data."""
-    assert main(["sessions", *words]) == 4
+def _error(words: list[str], capsys: pytest.CaptureFixture[str], code: int = 4) -> str:
+    """Return the one line of an error, which is one of bad data if nothing else is said."""
+    assert main(["sessions", *words]) == code
     printed = capsys.readouterr()
     assert not printed.out
     [line] = printed.err.splitlines()
@@ -73,3 +73,10 @@ def test_a_new_recording_has_a_name_of_its_own(tmp_path: Path, capsys: pytest.Ca
         assert f"{path} exists already" in capsys.readouterr().err
         assert main([*words, str(tmp_path / "new.bag")]) == 2
         assert f"{option} {tmp_path}/new.bag does not end in .mcap: give FILE.mcap" in capsys.readouterr().err
+
+
+def test_a_folder_that_is_not_there_is_told_as_such(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A mistyped name is no data set of another form; nothing is written."""
+    out = tmp_path / "out.mcap"
+    assert "kiti is no folder" in _error(["import", str(tmp_path / "kiti"), "--out", str(out)], capsys, 3)
+    assert not out.exists()

@@ -3,7 +3,7 @@
 import pytest
 
 from common.errors import SettingsError
-from phone_host.verbs.units import baseline_mm, length_mm, limit_mm
+from phone_host.verbs.units import baseline_mm, bounded_mm, length_mm, limit_mm
 
 
 @pytest.mark.parametrize(
@@ -19,6 +19,15 @@ def test_anything_else_is_refused_with_the_option_and_an_example(text: str) -> N
     with pytest.raises(SettingsError, match="--x") as caught:
         length_mm(text, "--x", "25mm")
     assert "25mm" in caught.value.remedy
+
+
+@pytest.mark.parametrize("text", ["0.001mm", "1e9mm", "2.001m"])
+def test_a_size_that_nothing_has_is_refused_with_both_bounds(text: str) -> None:
+    """From 10 mm to 2 m, ends included."""
+    with pytest.raises(SettingsError, match="--width is ") as caught:
+        bounded_mm(text, "--width", "100mm", (10, 2000))
+    assert caught.value.remedy == "give 10 to 2000 mm, for example 100mm"
+    assert [bounded_mm(text, "--width", "100mm", (10, 2000)) for text in ("1cm", "2m")] == [10, 2000]
 
 
 def test_a_number_alone_that_can_only_mean_metres_is_refused_with_both_readings() -> None:

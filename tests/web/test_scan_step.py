@@ -75,8 +75,13 @@ def test_the_surface_grows_until_it_is_saved(
     for name in FILES:
         (tmp_path / name).write_bytes(name.encode())
     over = ScanState(words="5 of 9 pairs are in the model", level="good", pairs=9, fused=5, folder=str(tmp_path), files=FILES)  # fmt: skip
+    page.click("#scan-go")
+    page.wait_for_function("() => document.getElementById('scan-answer').textContent !== ''")
+    program.change(activity=Activity.ENDING)
+    page.wait_for_function("() => document.getElementById('activity').textContent.includes('ending')")
     program.change(scan=over, activity=Activity.IDLE)
     page.wait_for_selector("#scan-saved:not([hidden])")
+    assert page.text_content("#scan-answer") == ""
     assert [link.text_content() for link in page.query_selector_all("#scan-files a")] == list(FILES)
     with page.expect_download() as saved:
         page.click("#scan-files a >> nth=0")
@@ -105,6 +110,60 @@ def test_a_surface_is_drawn_and_turned_by_keys(program: Played, opened: Opener, 
     page.check("input[name=scan-paint][value=shape]", force=True)
     page.wait_for_timeout(300)
     assert _roughness(page) < coloured / 2
+    assert complaints == []
+
+
+_HORNED = """async () => {
+  const { Model } = await import('/static/model.js');
+  const [canvas, over] = [0, 1].map(() => document.body.appendChild(document.createElement('canvas')));
+  for (const each of [canvas, over]) each.style.cssText = 'position: fixed; left: 0; top: 0; width: 900px; height: 450px';
+  const points = [];
+  for (let at = 0; at < 3000; at++) points.push(30 * (at % 2), 30 * ((at >> 1) % 2), (at * 7) % 101);
+  for (let at = 0; at < 5; at++) points.push(15, 15, 106);
+  const model = new Model(canvas, over);
+  const [low, step] = [[0, 0, 0], 0.001];
+  const colours = new Uint8Array(points.length), noise = new Uint8Array(points.length / 3);
+  model.stands('mat');
+  model.show({ low, step, points: new Uint16Array(points), triangles: new Uint16Array([0, 1, 2]), colours, noise });
+  while (!canvas.dataset.drawn) await new Promise(requestAnimationFrame);
+  const mesh = model.parts.get('');
+  mesh.updateWorldMatrix(true, false);
+  const seen = points.flatMap((_, at) => {
+    if (at % 3) return [];
+    const place = mesh.localToWorld(mesh.position.clone().set(...points.slice(at, at + 3))).project(model.camera);
+    return [Math.abs(place.x), Math.abs(place.y)];
+  });
+  return Math.max(...seen);
+}"""
+"""Shows a column of 100 mm with a horn of 6 mm that has one point in 600; returns how far its points lie from the middle, 1: at the edge."""
+
+
+_ON_MAT = """async () => {
+  const { Model } = await import('/static/model.js');
+  const [canvas, over] = [0, 1].map(() => document.body.appendChild(document.createElement('canvas')));
+  const points = [];
+  for (let at = 0; at < 2500; at++) points.push((at * 7) % 201, (at * 13) % 161, 10);
+  for (let at = 0; at < 500; at++) points.push(80 + 40 * (at % 2), 60 + 40 * ((at >> 1) % 2), 10 + ((at * 7) % 101));
+  const model = new Model(canvas, over);
+  const [colours, noise] = [new Uint8Array(points.length), new Uint8Array(points.length / 3)];
+  model.stands('mat');
+  model.show({ low: [0, 0, -0.01], step: 0.001, points: new Uint16Array(points), triangles: new Uint16Array([0, 1, 2]), colours, noise });
+  return model.middle();
+}"""
+"""Shows a mat of 200 x 160 mm with a column of 40 x 40 x 100 mm on it, whose foot begins at 80, 60 mm; returns the first box."""
+
+
+def test_the_first_box_holds_all_that_stands_on_the_mat(opened: Opener) -> None:
+    """From the mat to the top, with a small margin, and little of the bare mat."""
+    box = opened("scan").evaluate(_ON_MAT)
+    for axis, (low, high) in enumerate(((0.08, 0.12), (0.06, 0.10), (0.0, 0.10))):
+        assert low - 0.007 <= box["low"][axis] <= low
+        assert high - 0.001 <= box["high"][axis] <= high + 0.007
+
+
+def test_a_thing_is_seen_whole_with_its_horn(opened: Opener, complaints: Complaints) -> None:
+    """What is small and sticks out is in the first picture, too, with a margin; the picture is well filled."""
+    assert 0.8 < opened("scan").evaluate(_HORNED) < 0.99
     assert complaints == []
 
 

@@ -67,7 +67,8 @@ def decimated(solid: Solid, tolerance_m: float) -> Decimated:
 
 def _crosses(solid: Solid) -> bool:
     corners = solid.points_mm[solid.triangles].astype(np.float64)
-    return bool(crossing(Grid(corners), solid.triangles).any())
+    grid = Grid(corners)
+    return grid.is_crowded or bool(crossing(grid, solid.triangles).any())
 
 
 def _solid(mesh: "manifold3d.Mesh", *, has_colours: bool) -> Solid:

@@ -11,6 +11,10 @@ Indices = NDArray[np.int64]
 _CELLS_A_TRIANGLE, _CELLS = 8, 2_000_000
 """On average, and beside that: a floor of two large triangles may meet many cells, a mesh of nothing but long ones gets wider cells."""
 
+_CROWD, _PAIRS_A_TRIANGLE, _PAIRS = 2000, 100, 5_000_000
+"""Triangles in one cell, and pairs in one cell on average and beside that. A scan, a relief and what decimation leaves of them have at most 115
+in one and 24 to 45 pairs a triangle; a heap in one place has the square of its triangles."""
+
 _BITS: Final = 20
 _EPSILON: Final = 1e-9
 
@@ -41,6 +45,13 @@ class Grid:
         self._triangles = triangle[order]
         self._keys, self._starts = np.unique(keys[order], return_index=True)
         self._ends = np.append(self._starts[1:], len(order))
+
+    @property
+    def is_crowded(self) -> bool:
+        """Whether so many triangles lie in one place that `pairs` and `near` would take hours, and all memory."""
+        sizes = self._ends - self._starts
+        pairs = int((sizes * (sizes - 1) // 2).sum())
+        return int(sizes.max(initial=0)) > _CROWD or pairs > _PAIRS_A_TRIANGLE * len(self.corners) + _PAIRS
 
     def _cells(self, low: Points, high: Points) -> tuple[Indices, Indices, Indices]:
         """Return each triangle's first cell, its cells along each axis, and their number."""

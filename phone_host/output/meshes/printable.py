@@ -38,6 +38,7 @@ class Flaw(Enum):
     TANGLED = "tangled"
     INSIDE_OUT = "inside out"
     CROSSING = "crossing itself"
+    CROWDED = "crowded"
     CRUMBS = "several bodies"
     THIN = "thin"
     OVERHANG = "overhanging"
@@ -96,12 +97,16 @@ def problems(points_mm: Points, triangles: Triangles, printer: Printer, tell: Ca
     found = [*_edges(triangles), *_turned(corners), *_bodies(points_mm, triangles)]
     tell("crossings")
     grid = Grid(corners)
-    crossed = crossing(grid, triangles, lambda: tell("crossings"))
-    if count := int(crossed.sum()):
-        remedy = "export it with --tolerance 0, or scan with a smaller --voxel"
-        found.append(_problem(Flaw.CROSSING, f"{count} triangles cross others", remedy, crossed))
-    tell("walls")
-    found += _walls(grid, normals, areas, printer.least_wall_mm, lambda: tell("walls"))
+    if grid.is_crowded:
+        words = "too many triangles lie in one place to look for crossings and thin walls"
+        everywhere = np.ones(len(triangles), np.bool_)
+        found.append(
+            _problem(Flaw.CROWDED, words, "remesh it in a mesh editor, or scan again", everywhere, blocks=False)
+        )
+    else:
+        found += _crossings(grid, triangles, lambda: tell("crossings"))
+        tell("walls")
+        found += _walls(grid, normals, areas, printer.least_wall_mm, lambda: tell("walls"))
     return [*found, *_overhangs(corners, areas, up, printer), *_base(corners, areas, up), *_size(corners, printer)]
 
 
@@ -171,11 +176,18 @@ def _bodies(points_mm: Points, triangles: Triangles) -> list[Problem]:
     return [_problem(Flaw.CRUMBS, words, "--fix keeps the largest", body != sizes.argmax(), blocks=False)]
 
 
+def _crossings(grid: Grid, triangles: Triangles, tell: Callable[[], None]) -> list[Problem]:
+    crossed = crossing(grid, triangles, tell)
+    count = int(crossed.sum())
+    remedy = "export it with --tolerance 0, or scan with a smaller --voxel"
+    return [_problem(Flaw.CROSSING, f"{count} triangles cross others", remedy, crossed)] if count else []
+
+
 def crossing(grid: Grid, triangles: Triangles, tell: Callable[[], None] = lambda: None) -> NDArray[np.bool_]:
     """Return (T,) bool: the triangles that cross another one without a common corner.
 
     Args:
-        grid: of the triangles.
+        grid: of the triangles; not crowded.
         triangles: (T, 3).
         tell: called now and then.
     """
@@ -201,9 +213,11 @@ def _walls(
 ) -> list[Problem]:
     """Find triangles behind which the surface comes again sooner than a printer can lay two lines."""
     middles = grid.corners.mean(axis=1)
-    way = -normals / np.where(areas > 0, 2 * areas, 1)[:, np.newaxis] * least_mm
+    longest_mm = float(np.linalg.norm(np.ptp(grid.corners.reshape(-1, 3), axis=0)))
+    reach_mm = min(least_mm, 1.01 * longest_mm)  # there is nothing farther behind any of it
+    way = -normals / np.where(areas > 0, 2 * areas, 1)[:, np.newaxis] * reach_mm
     thin = np.zeros(len(middles), np.bool_)
-    steps = int(np.ceil(2 * least_mm / grid.cell)) + 1
+    steps = int(np.ceil(2 * reach_mm / grid.cell)) + 1
     for first in range(0, len(middles), _CHUNK // 8):
         tell()
         rows = np.arange(first, min(len(middles), first + _CHUNK // 8))

@@ -13,7 +13,7 @@ from phone_host.output.json_text import json_text
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
-from phone_host.run.model_job import fewer_triangles, usual_tolerance_m
+from phone_host.run.model_job import fewer_triangles, spare_model, usual_tolerance_m
 from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
 from phone_host.verbs.units import length_mm
 
@@ -28,8 +28,9 @@ def run(options: argparse.Namespace) -> int:
     require_folder(options.out)
     model = read_model(Path(options.model), _UNITS_M.get(options.unit, math.nan))
     tolerance_m = _tolerance_m(options.tolerance, model)
-    solid, notes = fewer_triangles(model.solid, tolerance_m)
     files = {f"{model.stem}.{kind}": kind for kind in kinds}
+    spare_model(model, (options.out / name for name in files))
+    solid, notes = fewer_triangles(model.solid, tolerance_m)
     try:
         make_folder(options.out)
         claim_names(options.out, options.out, *files)

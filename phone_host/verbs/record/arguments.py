@@ -9,7 +9,7 @@ from phone_host.verbs.source_arguments import add_source_arguments
 SUMMARY = "record what both cameras give, without computing anything, to replay it later"
 
 EXAMPLES = """  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --out session.mcap
-  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --seconds 60 --out session.mcap    # run --replay computes depth from it
+  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --seconds 60 --out session.mcap    # run --replay with the same rig computes depth from it
   phone-host record --alone --camera v4l2:/dev/video0 --out host.mcap    # the board runs board-agent record; then sessions join
 """
 

@@ -3,6 +3,7 @@
 import argparse
 import math
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +11,9 @@ from pathlib import Path
 from rich.console import Console
 
 from common import now
-from common.errors import SettingsError
+from common.camera.base import Camera
+from common.errors import SettingsError, TandemError
+from common.link.base import Link
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.settings import log_level, with_origins
@@ -64,22 +67,38 @@ def run(options: argparse.Namespace) -> int:
             opened.enter_context(closing(link))
         recorder = begin_recording(options.out, camera.description, side, rig, attached)
         opened.pop_all()
-    wait_ns = None if options.wait is None else round(options.wait * 1e9)
+    frames, is_vain = UnpairedFrames(recorder), False
     try:
-        with step_bar("recording" if options.alone else "waiting for the board", None, Console(stderr=True)) as bar:
-
-            def advance(_: float) -> None:
-                bar.say(recorder.account.words)
-
-            seconds = options.seconds or math.inf
-            frames = UnpairedFrames(recorder)
-            if options.alone:
-                take_alone(camera, frames, seconds, stop=lambda: signals.stop, advance=advance)
-            else:
-                take_frames(links, camera, frames, seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
+        _film(options, camera, links, frames, signals)
+    except TandemError:
+        is_vain = frames.begun_ns is None and not options.alone
+        raise
     finally:
         account = recorder.finish()
+        if is_vain:
+            options.out.unlink(missing_ok=True)  # the board gave nothing: the next try may use the name again
     return _tell(account, as_json=options.json, is_interrupted=signals.interrupted)
+
+
+def _film(
+    options: argparse.Namespace,
+    camera: Camera,
+    links: Sequence[Link],
+    frames: UnpairedFrames,
+    signals: StopSignals,
+) -> None:
+    """Take frames, and show how many there are, until it is over."""
+    wait_ns = None if options.wait is None else round(options.wait * 1e9)
+    seconds = options.seconds or math.inf
+    with step_bar("recording" if options.alone else "waiting for the board", None, Console(stderr=True)) as bar:
+
+        def advance(_: float) -> None:
+            bar.say(frames.account.words)
+
+        if options.alone:
+            take_alone(camera, frames, seconds, stop=lambda: signals.stop, advance=advance)
+        else:
+            take_frames(links, camera, frames, seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
 
 
 def _tell(account: RecordingAccount, *, as_json: bool, is_interrupted: bool) -> int:

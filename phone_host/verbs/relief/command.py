@@ -20,18 +20,23 @@ from phone_host.stereo.default_matcher import default_matcher
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
 from phone_host.verbs.stereo_options import build_core, overlay_of
-from phone_host.verbs.units import length_mm
+from phone_host.verbs.units import bounded_mm
 
 _NAMES: Final = ("relief.stl", "relief.3mf")
 _TOLERANCE_M: Final = 0.00005
 """0.05 mm: a quarter of a layer."""
 
+_WIDTH_MM: Final = (10.0, 2000.0)
+_THICK_MM: Final = (0.1, 1000.0)
+"""What printers and mills make: a smaller plaque shows nothing at the tolerance, a larger one is a unit misread."""
+
 
 def run(options: argparse.Namespace) -> int:
     """Match the pair, raise its depth out of a plate, write it for a slicer."""
-    width_m = length_mm(options.width, "--width", "100mm") / 1000
-    height_m = length_mm(options.height, "--height", "30mm") / 1000 if options.height else width_m / 3
-    sizes = Sizes(width_m=width_m, height_m=height_m, base_m=length_mm(options.base, "--base", "2mm") / 1000)
+    width_m = bounded_mm(options.width, "--width", "100mm", _WIDTH_MM) / 1000
+    height_m = bounded_mm(options.height, "--height", "30mm", _THICK_MM) / 1000 if options.height else width_m / 3
+    base_m = bounded_mm(options.base, "--base", "2mm", _THICK_MM) / 1000
+    sizes = Sizes(width_m=width_m, height_m=height_m, base_m=base_m)
     require_folder(options.out)
     job = PairJob(
         left=Path(options.left),

@@ -4,6 +4,7 @@ import argparse
 import math
 import re
 import sys
+from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError, UnavailableError
@@ -16,7 +17,7 @@ from phone_host.run.kept_submaps import read_submaps
 from phone_host.run.scan_result import own_axes
 from phone_host.scan.box import Box
 from phone_host.scan.field_bytes import KeptField
-from phone_host.scan.mat import USUAL_MAT, parse_mat
+from phone_host.scan.mat import USUAL_MAT, Mat, parse_mat
 from phone_host.scan.scan import Submap
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.stereo.match_tandem import matching_threads
@@ -57,11 +58,22 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
         most_bytes=int(options.memory),
         box=None if options.box is None else box_of(options.box),
         threads=matching_threads(),
-        mat=None if options.mat is None else parse_mat(USUAL_MAT if options.mat == _USUAL else options.mat),
+        mat=None if options.mat is None else _mat_of(options.mat),
         turntable=options.turntable,
         on_table=options.object,
         onto=onto,
     )
+
+
+def _mat_of(text: str) -> Mat:
+    if text == _USUAL:
+        return parse_mat(USUAL_MAT)
+    if Path(text).exists():
+        raise SettingsError(
+            f"--mat takes {text!r} for the name of a sheet",
+            "write --mat behind LEFT and RIGHT, or before another option",
+        )
+    return parse_mat(text)
 
 
 def _onto_of(options: argparse.Namespace) -> KeptField | None:

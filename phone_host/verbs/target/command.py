@@ -101,6 +101,7 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
     if options.diagonal:
         raise SettingsError("--diagonal is of a screen", "give --screen, such as --screen 1920x1080, or leave it out")
     paper = Paper[options.paper]
+    thing: tuple[str, ...] = ()
     if options.kind == "chessboard":
         side = _side_mm(options, paper, columns + 1, rows + 1)
         if options.mark:
@@ -118,6 +119,8 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
         size = f"{columns}x{rows}"
         name = f"{size}:{side:g}mm:{mark:g}mm:{options.family}"
         board = f"--board charuco:{name} "
+        if options.kind == "mat":
+            thing = (f"then    phone-host scan left/ right/ --mat {name} --calibration rig.yaml --out cup",)
         use = f"phone-host calibrate left right {board}--out rig.yaml"
         what = f"{options.kind}, {size} squares of {side:g} mm, marks {mark:g} mm, ArUco {options.family}"
         sheet = marked_sheet(
@@ -125,7 +128,7 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
         )
     marks = "" if options.kind == "chessboard" else f"-{mark:g}mm-{options.family}"
     stem = f"{options.kind}-{size}-{side:g}mm{marks}-{paper.name.lower()}"
-    return _Made(_files(stem, sheet), side, _paper_lines(board, side, sheet.check))
+    return _Made(_files(stem, sheet), side, (*_paper_lines(board, side, sheet.check), *thing))
 
 
 def _usual_mark_mm(side: float) -> float:

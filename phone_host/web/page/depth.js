@@ -171,13 +171,14 @@ const STRAY = 0.005;
 /**
  * Where a camera has to stand to see all points, along one axis of its picture.
  * @param {{across: number, away: number}[]} points - beside the view's axis, and along it @param {number} reach - tangent of half its angle
+ * @param {number} stray - the share of them that may lie beyond each edge
  * @returns {{aside: number, back: number}} how far it stands aside and back
  */
-export function fitted(points, reach) {
+export function fitted(points, reach, stray = STRAY) {
   const edge = (/** @type {number} */ sign, /** @type {number} */ share) => {
     const all = points.map(({ across, away }) => across + sign * reach * away).sort((a, b) => a - b);
     return all[Math.round(share * (all.length - 1))];
   };
-  const [low, high] = [edge(1, STRAY), edge(-1, 1 - STRAY)];
+  const [low, high] = [edge(1, stray), edge(-1, 1 - stray)];
   return { aside: (low + high) / 2, back: (high - low) / (2 * reach) };
 }

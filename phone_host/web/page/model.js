@@ -27,6 +27,9 @@ const NOWHERE = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 /** Turn and tilt from which a thing on a mat is looked at first, rad. @type {[number, number]} */
 const FROM_ABOVE = [0, 0.3];
 
+/** Half of what a picture shows across or down, as a tangent; 0.5 would leave no margin. */
+const FILLED = 0.46;
+
 /** Points that decide from where all fits in. */
 const LOOKED_AT = 3000;
 
@@ -66,6 +69,24 @@ void main() {
   bool isOutside = any(lessThan(place, low)) || any(greaterThan(place, high));
   shown = vec4(own * light * (gl_FrontFacing ? 1.0 : 0.45) * (isOutside ? 0.3 : 1.0), 1.0);
 }`;
+
+/** What is higher above the mat than its paper and the noise of its depths stands on it, m; and so many points make a thing. */
+const STANDS_M = 0.005;
+const LEAST_STANDING = 20;
+
+/**
+ * The box around places.
+ * @param {number[][]} places @param {number} share - of them that may lie beyond each side @param {number} margin - share of its sides
+ * @returns {import('./crop_box.js').Box}
+ */
+function within(places, share, margin) {
+  const ends = [0, 1, 2].map((axis) => {
+    const values = places.map((place) => place[axis]).sort((a, b) => a - b);
+    const [low, high] = [share, 1 - share].map((each) => values[Math.round(each * (values.length - 1))]);
+    return [low - margin * (high - low), high + margin * (high - low)];
+  });
+  return { low: ends.map(([low]) => low), high: ends.map(([, high]) => high) };
+}
 
 /** A scan that can be turned. */
 export class Model extends Viewer {
@@ -176,13 +197,14 @@ export class Model extends Viewer {
     return some;
   }
 
-  /** The box in which most of it lies, for somebody to begin with. @returns {?import('./crop_box.js').Box} null: there is nothing */
+  /** The box in which most of it lies, or all that stands on a mat, for somebody to begin with. @returns {?import('./crop_box.js').Box} null: there is nothing */
   middle() {
     const some = this.some();
     if (!some.length) return null;
-    const sorted = [0, 1, 2].map((axis) => some.map((place) => place[axis]).sort((a, b) => a - b));
-    const at = (/** @type {number[]} */ values, /** @type {number} */ share) => values[Math.round(share * (values.length - 1))];
-    return { low: sorted.map((values) => at(values, 0.1)), high: sorted.map((values) => at(values, 0.9)) };
+    const standing = this.legend.kind === 'mat' ? some.filter((place) => place[2] > STANDS_M) : [];
+    if (standing.length < LEAST_STANDING) return within(some, 0.1, 0);
+    const box = within(standing, 0.01, 0.05);
+    return { low: [box.low[0], box.low[1], 0], high: box.high };
   }
 
   /** @returns {?import('./viewer.js').Stand} */
@@ -192,7 +214,7 @@ export class Model extends Viewer {
     const ends = [0, 1, 2].map((axis) => [Math.min(...points.map((place) => place[axis])), Math.max(...points.map((place) => place[axis]))]);
     const middle = ends.map(([least, most]) => (least + most) / 2);
     const scale = Math.hypot(...ends.map(([least, most]) => most - least));
-    const stand = { middle, front: null, points, reach: /** @type {[number, number]} */ ([0.5, 0.5]), scale };
-    return this.legend.kind === 'mat' ? { ...stand, way: FROM_ABOVE } : stand;
+    const stand = { middle, front: null, points, reach: /** @type {[number, number]} */ ([FILLED, FILLED]), scale };
+    return this.legend.kind === 'mat' ? { ...stand, way: FROM_ABOVE, stray: 0 } : stand;
   }
 }

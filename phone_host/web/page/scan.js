@@ -26,6 +26,7 @@ export class ScanPanel {
     this.hasAskedForModel = false;
     /** Whether the person looks at it in a way of his own. */
     this.isHeld = false;
+    this.wasEnding = false;
     this.field = /** @type {HTMLInputElement} */ (byId('scan-box'));
     this.surface = new GrowingSurface((name, part, axes) => {
       this.model?.stands(axes);
@@ -93,6 +94,9 @@ export class ScanPanel {
     const step = state.steps.find((/** @type {any} */ each) => each.name === 'scan');
     const isOn = this.isScanning();
     text(byId('scan-go'), isOn ? 'Stop' : 'Start');
+    const isEnding = state.activity === 'ending';
+    if (this.wasEnding && !isEnding) tell(byId('scan-answer'), {}); // it said that it ends
+    this.wasEnding = isEnding;
     data(byId('scan-state'), 'level', scan.level);
     text(byId('scan-words'), sentence(isOn || scan.folder ? scan.words : (step?.words ?? '')));
     text(byId('scan-pairs'), scan.pairs && !scan.folder ? `${scan.fused} of ${scan.pairs} pairs are in the model` : '');

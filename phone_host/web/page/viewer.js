@@ -19,6 +19,7 @@ const VIEWS = { turned: [-0.28, 0.2], front: [0, 0], side: [-1.25, 0.1], above: 
  * @property {number[][]} points - that have to fit in
  * @property {[number, number]} reach - tangents of half the angles across and down that a picture shows at least
  * @property {number} scale - a typical length
+ * @property {number} [stray] - share of the points that may lie beyond each edge; missing: as of a pair's
  * @property {[number, number]} [way] - turn and tilt of the front view, rad; missing: as from the places' origin
  */
 
@@ -90,8 +91,8 @@ export class Viewer {
     if (name !== 'front' || stand.front === null) {
       const points = stand.points.map(([px, py, pz]) => [px - x, -(py - y), -(pz - z)]);
       const seen = (/** @type {number[]} */ axis) => points.map((point) => ({ across: dot(point, axis), away: -dot(point, back) }));
-      const wide = fitted(seen(right), stand.reach[0]);
-      const high = fitted(seen(up), stand.reach[1]);
+      const wide = fitted(seen(right), stand.reach[0], stand.stray);
+      const high = fitted(seen(up), stand.reach[1], stand.stray);
       stands = [wide.aside, high.aside, Math.max(wide.back, high.back)];
     }
     const target = [x, -y, -z].map((v, k) => v + stands[0] * right[k] + stands[1] * up[k]);
