@@ -158,10 +158,10 @@ NARROW = LoopSettings(least_voxels=0.01, least_turn=1e-5)
 
 @pytest.fixture(scope="module")
 def scans() -> tuple[Scan, Scan]:
-    """A round and three pairs, scanned with loops and without them, in a box."""
+    """A round and three pairs, scanned with loops, in a box, and without them."""
     box, both = Box((-2.0, -1.0, -2.0), (2.0, 1.0, 2.0)), []
     for loops in (NARROW, None):
-        scan = Scan(ScanWanted(voxel_m=0.04, box=box, loops=loops))
+        scan = Scan(ScanWanted(voxel_m=0.04, box=box if loops else None, loops=loops))
         for number in range(ONCE + 3):
             scan.take(str(number), float(number), processed_of(seen(number, PAPERS)))
         both.append(scan)
