@@ -111,7 +111,7 @@ class Stretches:
         if (
             not self._all
             or beside is not None
-            or len(self._all[-1].views) >= _VIEWS * max(kept_of, 2 ** (self.count // _LONGER))
+            or len(self._all[-1].views) >= _VIEWS * max(kept_of, 2 ** ((self.count - 1) // _LONGER))
         ):
             self._begin(view.world_camera, self.count - 1 if beside is None else beside, is_loop=beside is not None)
         of = self._all[-1]
