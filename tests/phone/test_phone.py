@@ -159,8 +159,8 @@ def test_the_service_serves_the_page_and_starts_with_the_phone(phone: Phone, tmp
     assert "sv-enable phone-host-page" in calls
     assert not (phone.prefix / "var" / "service" / "phone-host-page").exists()
     with phone.running(f"{INSTALL} --no-compiler --service; {wait}", log):
-        until_long(lambda: "Installed." in log.read_text(), "the service is back", log)
-    (phone.prefix / "var" / "runsvdir").unlink()
+        until_long(lambda: re.search(r"Installed\.|error:", log.read_text()), "the service is back", log)
+        assert "error:" not in log.read_text(), log.read_text()
     before = len(phone.calls())
     with phone.running(f"~/.termux/boot/tandemscan; {wait}", log):
         until_long(_answers, "the page answers after a boot", log)

@@ -2,7 +2,10 @@
 export SVDIR="$PREFIX/var/service"
 export LOGDIR="$PREFIX/var/log"
 echo "start-services" >>"$PREFIX/var/calls"
-if [ ! -e "$PREFIX/var/runsvdir" ]; then
-    : >"$PREFIX/var/runsvdir"
-    (runsvdir "$SVDIR" >/dev/null 2>&1 &)
+pid=$(cat "$PREFIX/var/runsvdir" 2>/dev/null) || pid=
+if ! grep -q runsvdir "/proc/${pid:-none}/cmdline" 2>/dev/null; then # it may have ended with an earlier life of the phone
+    (
+        runsvdir "$SVDIR" >/dev/null 2>&1 &
+        echo "$!" >"$PREFIX/var/runsvdir"
+    )
 fi
