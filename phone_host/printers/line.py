@@ -58,13 +58,17 @@ def open_line(uri: LineUri) -> Line:
     return _SocketLine(uri)
 
 
-def require_allowed(uri: LineUri) -> None:
+def require_allowed(uri: LineUri, *, on_android: bool | None = None) -> None:
     """Refuse a line that this machine never gives to a program.
+
+    Args:
+        uri: where the printer is.
+        on_android: whether the machine runs Android; None: whether this one does.
 
     Raises:
         UnavailableError: it does not.
     """
-    if uri.kind is not LineKind.SOCKET and is_android():
+    if uri.kind is not LineKind.SOCKET and (is_android() if on_android is None else on_android):
         raise UnavailableError(
             f"{uri.text}: Android lets no program in Termux use USB or Bluetooth",
             "take a printer in the network (octoprint://, moonraker://, prusalink://), or socket://HOST:PORT of an app or of ser2net"

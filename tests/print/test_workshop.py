@@ -1,8 +1,8 @@
 """What the page makes of a scan, by the station's own parts: checked, saved, printed on a simulated printer."""
 
 import os
+import re
 import shutil
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -123,23 +123,23 @@ def test_what_is_wrong_with_a_printer_is_said(tmp_path: Path) -> None:
 
 @pytest.fixture
 def slow_slicer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A slicer that never ends is the first one on the path; the file tells its process."""
+    """A slicer that never ends is the first one on the path; the file tells its process and its arguments."""
     program, told = tmp_path / "bin" / "prusa-slicer", tmp_path / "slicer.pid"
     program.parent.mkdir()
-    program.write_text(f"#!/bin/sh\necho $$ > {told}\nexec sleep 1000\n")
+    program.write_text(f'#!/bin/sh\necho "$$ $*" > {told}\nexec sleep 1000\n')
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(program.parent), prepend=os.pathsep)
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    monkeypatch.setattr(tempfile, "tempdir", None)
     return told
 
 
-def _is_there(told: Path) -> bool:
-    return Path(f"/proc/{told.read_text().strip()}").exists()
+def _is_there(process: str) -> bool:
+    return Path(f"/proc/{process}").exists()
 
 
-def _sliced_files(folder: Path) -> list[Path]:
-    return list(folder.glob("tandemscan-*"))
+def _sliced_folders(arguments: list[str]) -> set[Path]:
+    """The folders of ours that a slicer's arguments name."""
+    found = (re.search(r"/\S*/tandemscan-[^/]+", argument) for argument in arguments)
+    return {Path(each[0]) for each in found if each is not None}
 
 
 def test_cancelling_while_it_is_sliced_ends_the_slicer(tmp_path: Path, slow_slicer: Path) -> None:
@@ -150,11 +150,15 @@ def test_cancelling_while_it_is_sliced_ends_the_slicer(tmp_path: Path, slow_slic
         workshop.prepare(folder, wanted)
         until(lambda: slow_slicer.exists() and bool(slow_slicer.read_text().strip()), "it is sliced")
         assert state(workshop).words == "slicing"
+        process, *arguments = slow_slicer.read_text().split()
+        folders = _sliced_folders(arguments)
+        assert folders
+        assert all(folder.is_dir() for folder in folders)
         end()
         until(lambda: state(workshop).stage is PrintStage.OVER, "it is given up")
         assert state(workshop).words == "not printed"
-        assert not _is_there(slow_slicer)
-        assert _sliced_files(tmp_path) == []
+        assert not _is_there(process)
+        assert not any(folder.exists() for folder in folders)
         slow_slicer.unlink()
     with pytest.raises(SettingsError, match="the program ends"):
         workshop.prepare(folder, wanted)

@@ -8,7 +8,7 @@ import pytest
 from common.errors import DataError, SettingsError, UnavailableError
 from phone_host.printers.gcode import GcodeFacts, Line, examine, lines_of, name_of
 from phone_host.printers.journal import Entry, Journal
-from phone_host.printers.line import open_line
+from phone_host.printers.line import require_allowed
 from phone_host.printers.marlin import MarlinSender, framed
 from phone_host.printers.printer_uri import FileUri, LineKind, LineUri, ServerKind, ServerUri, read_uri
 from phone_host.printers.progress import Phase
@@ -223,13 +223,14 @@ def test_a_cancelled_line_is_never_sent_again() -> None:
     assert talk.sent() == framed(3, "M104 S0")
 
 
-def test_on_android_only_the_network_works(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Serial ports and Bluetooth end with the ways that work."""
-    monkeypatch.setattr("sys.platform", "android")
+def test_on_android_only_the_network_works() -> None:
+    """Serial ports and Bluetooth end with the ways that work; a socket may be had."""
     for uri in ("serial:/dev/ttyUSB0", "rfcomm://00:11:22:33:44:55"):
         with pytest.raises(UnavailableError) as refused:
-            open_line(line_uri(uri))
+            require_allowed(line_uri(uri), on_android=True)
         assert "socket://HOST:PORT" in refused.value.remedy
+        require_allowed(line_uri(uri), on_android=False)
+    require_allowed(line_uri("socket://127.0.0.1:9"), on_android=True)
 
 
 def facts(*lines: str) -> GcodeFacts:
