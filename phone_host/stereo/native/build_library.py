@@ -92,8 +92,8 @@ class Isa:
 
 
 _SCALAR: Final = Isa("scalar")
-_SCALAR_LEVEL: Final = ("-O2",)
-"""Registers of 16 bytes become loops there; -O3 unrolls them all: four times as long to compile, and slower."""
+_SCALAR_LEVEL: Final = ("-O2", "-fno-unroll-loops")
+"""Registers of 16 bytes become loops there. -O3 unrolls them all, as clang does with -O2: up to four times as long to compile, and slower."""
 _X86: Final = (
     _SCALAR,
     Isa("sse41", ("-mssse3", "-msse4.1")),
