@@ -3,6 +3,7 @@
 A scan is one piece as long as the camera is tracked. A camera that was lost goes on in another, whose place against the others is not known yet.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,9 +18,6 @@ from phone_host.scan.view import Camera, View, halved
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing
-
-_ODOMETRY_PX: Final = 1.0
-"""How far off a view's pixels are after odometry, px: 3 mm at 2 m, as measured on real rooms and streets."""
 
 _ALIGNED_PX: Final = 240
 """Width up to which depth is laid against the model. Twice that costs 11 of 49 ms of processor time at VGA, and gives the same poses."""
@@ -91,13 +89,13 @@ class Piece:
         self._library = library if isinstance(library, Library) else None
         self._threads, self._gate = threads, gate
 
-    def laid(self, view: View, believed: SE3, inliers: int) -> Registered:
+    def laid(self, view: View, believed: SE3, sure_px: float = math.inf) -> Registered:
         """Lay a view's depth against the field as seen from where the camera is believed to be.
 
         Args:
             view: with depth.
             believed: where the camera is, in the piece's axes.
-            inliers: corners that agree on it.
+            sure_px: standard deviation of the view's pixels there, px; infinite: nothing is known of it.
         """
         depth, geometry, step = view.depth_m, view.geometry, 1
         while depth.shape[1] > _ALIGNED_PX:
@@ -107,7 +105,7 @@ class Piece:
         depth, voxel_m = np.where(depth <= of.far_m, depth, np.float32(np.nan)), of.voxel_m
         within = depth[np.isfinite(depth)]
         surface = self.volume.cast(Camera(geometry, depth.shape, believed), depth)
-        turn = _ODOMETRY_PX / view.geometry.focal_px if inliers >= self._gate.weak_inliers else float("inf")
+        turn = sure_px / view.geometry.focal_px
         settings = RegistrationSettings(
             most_m=_PARTNER_VOXELS * voxel_m,
             floor_m=_FLOOR_VOXELS * voxel_m,
@@ -149,11 +147,11 @@ class Piece:
             view: with depth.
             believed: where the place says that it was taken, in the piece's axes.
         """
-        first = self.laid(view, believed, 0)
+        first = self.laid(view, believed)
         start = believed @ first.start_now
         if not np.isfinite(start.pose()).all():
             return None
-        fit = self.laid(view, start, 0)
+        fit = self.laid(view, start)
         whole = (first.start_now @ fit.start_now).pose()
         most_shift_m, most_turn = (_BY_PLACE * most for most in (self._gate.most_shift_m, self._gate.most_turn))
         if np.linalg.norm(whole[3:]) > most_shift_m or np.linalg.norm(whole[:3]) > most_turn:

@@ -234,7 +234,7 @@ class Pieces:
             if not np.isfinite(shown.depth_m).mean() >= self._gate.least_depths:
                 continue
             start = loop.here_there @ seen.pose
-            fit = self.model.laid(shown, start, 0)
+            fit = self.model.laid(shown, start)
             if fit.overlap < self._gate.least_overlap:
                 continue
             if self.model.doubt(STANDING, fit) is Weakness.NONE:

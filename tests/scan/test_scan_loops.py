@@ -110,7 +110,7 @@ def test_a_loop_takes_out_the_drift(looped: Walk) -> None:
 
 def test_the_field_is_that_of_the_moved_views(looped: Walk) -> None:
     """A view lies on the surface where it is believed to be; places have moved with it; there are no two surfaces any more."""
-    seen = looped.model.laid(looped.view(ONCE + 2), looped.poses[ONCE + 2], 0)
+    seen = looped.model.laid(looped.view(ONCE + 2), looped.poses[ONCE + 2])
     assert seen.overlap > 0.8
     assert seen.near > 0.9
     at = looped.model.places.recognised(looped.view(ONCE + 1))

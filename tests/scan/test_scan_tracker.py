@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.piece import PoseGate
+from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.tracker import Tracked, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
@@ -131,3 +131,22 @@ def test_images_of_two_moments_count_for_less(skew_s: float, share: float) -> No
         weights.append(grown)
     assert weights[1] <= share * weights[0]
     assert share < 1 or weights[1] == weights[0]
+
+
+def test_at_rest_the_corners_are_believed_more() -> None:
+    """Where the corners stayed, the depth moves the camera as little as if they were 0.25 px off, half as far as with 1 px; where they went 20 px, as far as that."""
+    view, moved = film([POSES[0], SE3.of(np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0]))])
+    for seen, sure_px in ((view, 0.25), (moved, 1.0)):
+        tracker, model = Tracker(SETTINGS), Piece(SETTINGS, 1, PoseGate(), native())
+        deeper = replace(seen, depth_m=seen.depth_m + np.float32(0.01))
+        model.fuse(view, SE3.identity(), None)
+        told = run([view, deeper], tracker)[1]
+        assert told.fit is not None
+        believed = (told.world_camera @ told.fit.start_now.inverse()).exact()
+        laid = {px: _shift_m(model.laid(deeper, believed, px).start_now) for px in (0.25, 1.0)}
+        assert _shift_m(told.fit.start_now) == pytest.approx(laid[sure_px], rel=1e-6)
+        assert laid[0.25] < 0.5 * laid[1.0]
+
+
+def _shift_m(motion: SE3) -> float:
+    return float(np.linalg.norm(motion.t_m))
