@@ -53,8 +53,7 @@ def recorded_run(file: Path) -> RecordedRun:
         file: the recording.
 
     Raises:
-        UnavailableError: it cannot be read.
-        DataError: it is no recording of two cameras, or holds no delays of pairs.
+        DataError: it cannot be read, or is no recording of two cameras, or holds no delays of pairs.
     """
     playback = Playback(file, Pacing.CLOCK)
     ledgers = sorted(playback.ledgers(), key=lambda ledger: ledger.done_ns)
