@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, SettingsError
+from common.imagesize.head import MOST_SIDE_PX
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import AS_CALIBRATED, Departure, Rig, Side, StereoGeometry
 from phone_host.output.axes import Axes
@@ -156,11 +157,16 @@ def overlay_of(options: argparse.Namespace, core: StereoCore | None) -> Departur
 
 
 def depth_wanted(options: argparse.Namespace) -> DepthWanted:
-    """Read --near, --far, --crop and --scale.
+    """Read --near, --far, --crop and --scale, and check --disparities.
 
     Raises:
         SettingsError: one of them is invalid, or nothing is left between the two limits.
     """
+    if options.disparities is not None and options.disparities > MOST_SIDE_PX:
+        raise SettingsError(
+            f"--disparities {options.disparities} is more than any image is wide",
+            f"give 1 to {MOST_SIDE_PX} (64 suits most 640 px wide pairs)",
+        )
     near_m = 0.0 if options.near is None else limit_mm(options.near, "--near", "300mm") / 1000
     far_m = math.nan if options.far is None else limit_mm(options.far, "--far", "5m") / 1000
     if near_m >= far_m:

@@ -45,6 +45,7 @@ def run(black: Path, out: Path, *words: str) -> int:
         (["left", "right"], (2, "neither --calibration nor --rectified is given")),
         (["left", "right", "--calibration", "rig.yaml", "--camera", "replay:right"], (2, "--camera beside pictures")),
         (["left", "right", "--calibration", "rig.yaml", "--record", "x.mcap"], (2, "--record beside pictures")),
+        (["left", "right", "--calibration", "rig.yaml", "--pairs", "0"], (2, "--pairs beside pictures")),
         (["--calibration", "rig.yaml"], (2, "neither pictures nor cameras are given")),
         (["--camera", "replay:right"], (2, "no --calibration is given, so there are no metres")),
         (["--camera", "replay:right", "--calibration", "rig.yaml", "--flip-left", "h"], (2, "turn pictures in files")),

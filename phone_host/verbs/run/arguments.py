@@ -91,9 +91,8 @@ def _add_ends(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pairs",
         type=int,
-        default=0,
         metavar="N",
-        help="end after N pairs; exit with code 4 if the stream ends before that",
+        help="end after N pairs; exit with code 4 if the stream ends before that (default: no limit)",
     )
     parser.add_argument(
         "--seconds",

@@ -351,7 +351,7 @@ def _host_settings(opened: Opened, words: Sequence[str]) -> HostSettings:
         board_side=opened.board_side,
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=FifoSettings.parse(settings.fifo),
-        pairs=options.pairs,
+        pairs=options.pairs or 0,
         seconds_ns=round(options.seconds * 1e9),
         wait_ns=None if wait_s is None else round(wait_s * 1e9),
         out=options.out,
@@ -385,9 +385,10 @@ def computed_wanted(options: argparse.Namespace) -> frozenset[Computed]:
 
 
 def _check_numbers(options: argparse.Namespace) -> None:
-    for name, value in (("--pairs", options.pairs), ("--save-every", options.save_every)):
-        if value < 0:
-            raise SettingsError(f"{name} {value}", "give 0 or more")
+    if options.pairs is not None and options.pairs < 1:
+        raise SettingsError(f"--pairs is {options.pairs}", "give 1 or more, or leave it out for no limit")
+    if options.save_every < 0:
+        raise SettingsError(f"--save-every is {options.save_every}", "give 0 or more")
     if options.budget == 0:
         raise SettingsError("--budget is 0 ms", "give the time for each pair, for example 30ms, or leave it out")
     if not 0 <= options.seconds <= _MOST_SECONDS:
