@@ -50,16 +50,17 @@ class RigReader:
 
     Args:
         path: the file.
+        content: what is in it; None: it is read.
 
     Raises:
         DataError: it cannot be read, or is no FileStorage YAML. The methods raise it for keys that are missing or not valid.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, content: bytes | None = None) -> None:
         self._path = path
         self.version = 1
         try:
-            text = read_whole(path, _MOST_BYTES).decode("utf-8")
+            text = (read_whole(path, _MOST_BYTES) if content is None else content).decode("utf-8")
         except OSError as error:
             raise DataError(
                 f"{path} cannot be read ({error.strerror})", "give the rig.yaml of `phone-host calibrate`"

@@ -52,6 +52,7 @@ def build_core(
     size_px: tuple[int, int],
     images: Path | None = None,
     *,
+    rig: Rig | None = None,
     temporal: bool = False,
 ) -> tuple[StereoCore | None, Side | None]:
     """Build the stereo core from the options.
@@ -63,6 +64,7 @@ def build_core(
         size_px: width and height of images that arrive rectified, px.
         images: an image file of either side, or its folder; None: not from files. KITTI's calib.txt holds two pairs of
             cameras, and only the folder's name tells which of them took the images.
+        rig: what the calibration holds, if it is known already; None: it is read.
         temporal: whether pairs are searched where the last one found something.
 
     Returns: The core (None if neither a rig nor rectified images are given), and the side of the board's camera in the
@@ -74,7 +76,7 @@ def build_core(
     """
     chosen = matcher_named(matcher)
     wanted = depth_wanted(options)
-    of_rectified = bool(calibration) and is_calib_txt(Path(calibration))
+    of_rectified = bool(calibration) and rig is None and is_calib_txt(Path(calibration))
     if calibration and options.rectified and not of_rectified:
         raise SettingsError("--calibration and --rectified contradict each other", "give only one of the two")
     _refuse_idle_geometry(options, calibration)
@@ -84,7 +86,7 @@ def build_core(
         )
         return core, None
     if calibration:
-        rig = read_own_rig(Path(calibration))
+        rig = rig or read_own_rig(Path(calibration))
         refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
         return StereoCore(
             _matcher(chosen, options.disparities, temporal=temporal), Rectifier(rig), None, wanted

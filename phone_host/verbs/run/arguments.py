@@ -118,7 +118,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--replay",
         metavar="FILE.mcap[?pace=clock]",
-        help="play a recording in place of --link and --camera: every frame with the same partner each time; with pace=clock at the times of then",
+        help="play a recording in place of --link and --camera: every frame with the same partner each time; with pace=clock at the times of then; without --calibration the rig.yaml in it counts",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json, index.html and saved pairs"

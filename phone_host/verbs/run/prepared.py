@@ -25,7 +25,7 @@ from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
-from phone_host.model import Side, TimeOffset
+from phone_host.model import Rig, Side, TimeOffset
 from phone_host.output.json_text import json_text
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.opened import open_playback
@@ -46,6 +46,7 @@ from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
 from phone_host.verbs.run.budget import budget_wanted
+from phone_host.verbs.run.own_rig import with_own_rig
 from phone_host.verbs.stereo_options import build_core, depth_wanted, output_options, overlay_of
 
 _MOST_SECONDS: Final = 10_000_000
@@ -249,16 +250,16 @@ def _open_replay(
     options: argparse.Namespace, found: Resolved[PhoneHostSettings], tell: Callable[[str], None]
 ) -> Opened:
     """Open the recording that a run plays, and the core."""
-    settings = found.values
     for name in ("link", "camera", "record", "record_topics", "align_phase"):
         if getattr(options, name, None) is not None:
             raise SettingsError(f"--{name.replace('_', '-')} beside --replay", "leave one of them out")
     playback = open_playback(options.replay, options.board_side)
     if options.out is not None:
-        spare(options.out, "", settings.calibration, options.overlay)
+        spare(options.out, "", found.values.calibration, options.overlay)
         spare_inputs(options.out, NAMES, {"--replay": playback.file})
-    size_px = playback.description.upright_px
-    core, board_side = _core(options, replace(settings, camera=""), size_px, tell, playback.board_side)
+    found, rig = with_own_rig(options, found, playback, tell)
+    settings, size_px = replace(found.values, camera=""), playback.description.upright_px
+    core, board_side = _core(options, settings, size_px, tell, playback.board_side, rig=rig)
     overlay_of(options, core)
     budget_wanted(options, found, core)
     return Opened(options, found, playback, (), (str(playback.file),), key_folder(settings.keys).path, core, board_side)
@@ -309,6 +310,8 @@ def _core(
     size_px: tuple[int, int],
     tell: Callable[[str], None],
     usual: Side = Side.LEFT,
+    *,
+    rig: Rig | None = None,
 ) -> tuple[StereoCore | None, Side]:
     """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else the usual one."""
     images = replayed(settings.camera)
@@ -318,6 +321,7 @@ def _core(
         settings.matcher,
         size_px,
         Path(images) if images else None,
+        rig=rig,
         temporal=settings.temporal,
     )
     board_side = Side(options.board_side) if options.board_side else rig_side or usual

@@ -67,7 +67,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--replay",
         metavar="FILE.mcap",
-        help="play a recording in place of --link and --camera: all of its pairs, the same each time",
+        help="play a recording in place of --link and --camera: all of its pairs, the same each time; without --calibration the rig.yaml in it counts",
     )
     parser.add_argument(
         "--record",
