@@ -11,6 +11,7 @@ from common.camera_identity import RememberedCamera
 from common.errors import DataError
 from common.files import read_whole
 from common.versions import RIG_FORMAT
+from common.words import counted
 from phone_host.model import CameraModel, TimeOffset, Verdict
 from phone_host.output.rig_agreement import KeptRectification
 from phone_host.output.rig_cameras import read_camera
@@ -216,7 +217,7 @@ class RigReader:
         """Read a translation between two cameras, m."""
         matrix = self.matrix(key)
         if matrix.size != 3:
-            raise self.problem(key, f"has {matrix.size} values", "it must have 3")
+            raise self.problem(key, f"has {counted(matrix.size, 'value')}", "it must have 3")
         length_m = float(np.linalg.norm(matrix))
         if length_m == 0:
             raise self.problem(key, "is 0: both cameras at one place", "calibrate again")

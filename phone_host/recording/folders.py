@@ -21,6 +21,7 @@ from common.recording.recorded import Recorded
 from common.recording.recording_file import written
 from common.recording.ros_messages import RecordedImage, image_message, image_type
 from common.versions import all_versions
+from common.words import counted
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.preview import write_png
 from phone_host.recording.both_sides import encoded
@@ -168,7 +169,8 @@ def _times(paths: Sequence[Path], times: Path | None, folder: Path) -> list[int]
     found = [_time_ns(line.split()[0], times) for line in _lines(times)]
     if len(found) != len(paths):
         raise DataError(
-            f"{times} has {len(found)} times, {folder} has {len(paths)} images", "give one time for each image"
+            f"{times} has {counted(len(found), 'time')}, {folder} has {counted(len(paths), 'image')}",
+            "give one time for each image",
         )
     return found
 
