@@ -225,7 +225,6 @@ def test_bad_options_of_the_board_end_with_one_line(
         (["--fifo", "0"], 2, "--fifo"),
         (["--fifo", "2:sometimes"], 2, "--fifo"),
         (["--pairs", "-1"], 2, "--pairs"),
-        (["--pairs", "0"], 2, "--pairs"),
         (["--rectified"], 2, "--disparities"),
         (["--rectified", "--disparities", "16", "--focal", "500"], 2, "--baseline"),
         (["--calibration", "{film}/rig.yaml"], 4, "rig.yaml"),

@@ -92,7 +92,7 @@ def _add_ends(parser: argparse.ArgumentParser) -> None:
         "--pairs",
         type=int,
         metavar="N",
-        help="end after N pairs; exit with code 4 if the stream ends before that (default: no limit)",
+        help="end after N pairs; exit with code 4 if the stream ends before that (default 0: no limit)",
     )
     parser.add_argument(
         "--seconds",

@@ -389,8 +389,8 @@ def computed_wanted(options: argparse.Namespace) -> frozenset[Computed]:
 
 
 def _check_numbers(options: argparse.Namespace) -> None:
-    if options.pairs is not None and options.pairs < 1:
-        raise SettingsError(f"--pairs is {options.pairs}", "give 1 or more, or leave it out for no limit")
+    if options.pairs is not None and options.pairs < 0:
+        raise SettingsError(f"--pairs is {options.pairs}", "give 1 or more, or 0 for no limit")
     if options.save_every < 0:
         raise SettingsError(f"--save-every is {options.save_every}", "give 0 or more")
     if options.budget == 0:

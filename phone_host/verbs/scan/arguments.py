@@ -75,7 +75,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.mcap",
         help="live: also keep what both cameras give, to scan it again with --replay: finer, or after a crash",
     )
-    parser.add_argument("--pairs", type=int, metavar="N", help="live: end after N pairs (default: no limit)")
+    parser.add_argument("--pairs", type=int, metavar="N", help="live: end after N pairs (default 0: no limit)")
     parser.add_argument(
         "--seconds",
         type=reading(seconds, "--seconds"),
