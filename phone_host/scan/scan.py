@@ -292,6 +292,11 @@ class Scan:
         """Whether enough pairs were fused since the last submap was closed that losing them would hurt."""
         return self.fused - self._closed.fused >= _SUBMAP_PAIRS
 
+    @property
+    def is_submap_open(self) -> bool:
+        """Whether pairs were fused since the last submap was closed."""
+        return self.fused > self._closed.fused
+
     def close_submap(self, *, whole: bool = False) -> Submap:
         """Close a submap: give what was learnt since the last one. Some pair had depth.
 

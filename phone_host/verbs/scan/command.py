@@ -67,6 +67,7 @@ def _scan_pictures(options: argparse.Namespace) -> ScanReport:
         most_pixels=limit,
         mounted=orientations(options),
         resumed=resumed_of(options),
+        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
     )
     try:
         with step_bar("reading", len(files.pairs)) as watcher:
