@@ -40,12 +40,15 @@ class RecordedSettings:
     clock: str = "host"
 
 
-def _opened(path: str) -> Recorded:
-    """Read a recording. As a camera, one that is missing is as one that is not plugged in."""
+def require_recording(path: str) -> None:
+    """Refuse a recording that is not there. As a camera, it is as one that is not plugged in.
+
+    Raises:
+        UnavailableError: so it is.
+    """
     with suppress(OSError):  # whoever opens it will say why
         if kind_of(path) is Kind.MISSING:
             raise UnavailableError(f"replay {path!r} does not exist", "give a recording, or a folder of images")
-    return open_recorded(Path(path))
 
 
 def _topic(settings: RecordedSettings, found: Recorded) -> str:
@@ -65,7 +68,8 @@ class _Shower:
 
     def __init__(self, settings: RecordedSettings) -> None:
         self._settings = settings
-        self._found = _opened(settings.path)
+        require_recording(settings.path)
+        self._found = open_recorded(Path(settings.path))
         self._topic = _topic(settings, self._found)
         self._shown = self._found.images[self._topic]
         camera = self._found.camera(self._topic)

@@ -1,5 +1,6 @@
 """An input that is not there: one line, and exit code 4 whichever command was to read it. A camera that is not there is none of these: 3."""
 
+import logging
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,7 @@ def test_what_is_missing_has_one_exit_code(
 ) -> None:
     """The line names the missing file, and nothing is left behind."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(logging.root, "handlers", logging.root.handlers[:])  # a run sets up its own
     assert main(words) == code
     printed = capsys.readouterr()
     assert not printed.out
