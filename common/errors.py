@@ -2,7 +2,7 @@
 
 Every message is one line that names the culprit (option, key, file, device, peer) and the remedy.
 Exit codes are part of the commands' contract: 0 done, 2 wrong usage or settings, 3 a device or link cannot be had, 4 the data are bad
-or a check failed, 130 interrupted.
+or missing, or a check failed, 130 interrupted.
 """
 
 from typing import ClassVar
@@ -62,7 +62,7 @@ class OtherVersionError(UnavailableError):
 
 
 class DataError(TandemError):
-    """Raised when a file, image or result is bad, or a check failed. The input's fault."""
+    """Raised when a file, image or result is bad or missing, or a check failed. The input's fault."""
 
     exit_code = 4
 

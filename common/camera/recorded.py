@@ -1,14 +1,16 @@
 """A camera that shows what another one gave: one stream of a recording, with the bytes, and where it has a clock the times, of then."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from common.camera.base import CameraHealth, Ended, Grab, Mode, Offers, Spoiled
 from common.camera.image_numbers import ImageNumbers, with_numbers
-from common.errors import DataError
+from common.errors import DataError, UnavailableError
 from common.frame import Frame, SpoiledImageError, find_fault
 from common.orientation import UPRIGHT
+from common.places import Kind, kind_of
 from common.protocol.message import Pacing, Steering
 from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
@@ -38,6 +40,17 @@ class RecordedSettings:
     clock: str = "host"
 
 
+def require_recording(path: str) -> None:
+    """Refuse a recording that is not there. As a camera, it is as one that is not plugged in.
+
+    Raises:
+        UnavailableError: so it is.
+    """
+    with suppress(OSError):  # whoever opens it will say why
+        if kind_of(path) is Kind.MISSING:
+            raise UnavailableError(f"replay {path!r} does not exist", "give a recording, or a folder of images")
+
+
 def _topic(settings: RecordedSettings, found: Recorded) -> str:
     held = sorted(found.images)
     if settings.topic in held or (not settings.topic and len(held) == 1):
@@ -55,6 +68,7 @@ class _Shower:
 
     def __init__(self, settings: RecordedSettings) -> None:
         self._settings = settings
+        require_recording(settings.path)
         self._found = open_recorded(Path(settings.path))
         self._topic = _topic(settings, self._found)
         self._shown = self._found.images[self._topic]

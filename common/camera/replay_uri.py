@@ -5,8 +5,8 @@ from fractions import Fraction
 from typing import Final
 
 from common.camera.options import TRUTHS, OptionReader, exact, rate
-from common.camera.recorded import RecordedFilm, RecordedSettings, RecordedStills
-from common.camera.replay import ReplayCamera, ReplaySettings
+from common.camera.recorded import RecordedFilm, RecordedSettings, RecordedStills, require_recording
+from common.camera.replay import ReplayCamera, ReplaySettings, find_images
 from common.errors import SettingsError
 from common.protocol.message import Pacing
 from common.recording.opened import is_recording
@@ -64,6 +64,22 @@ def _recorded_settings(uri: str, path: str, options: Mapping[str, str], clock: s
     loop = read("loop", TRUTHS.__getitem__, _ONCE)
     pacing = read("pace", _PACINGS.__getitem__, Pacing.DEMAND)
     return RecordedSettings(path=path, topic=topic, pacing=pacing, loop=loop, clock=clock)
+
+
+def require_replayed(settings: object) -> None:
+    """Refuse a replay of images that are not there; any other camera may come later.
+
+    Args:
+        settings: of a camera, as its address says.
+
+    Raises:
+        UnavailableError: there is no such folder or file.
+        DataError: there is no image in it.
+    """
+    if isinstance(settings, ReplaySettings):
+        find_images(settings.path)
+    elif isinstance(settings, RecordedSettings):
+        require_recording(settings.path)
 
 
 def open_replay(

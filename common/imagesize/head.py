@@ -16,7 +16,7 @@ MOST_PIXELS: Final = 64 * MEGAPIXEL
 _BYTES_A_PIXEL: Final = 6
 """Three colours of 16 bit: what an image of the largest size may take once it is decoded. With an alpha channel or floating point it takes more."""
 
-_MOST_SIDE_PX: Final = 32_766
+MOST_SIDE_PX: Final = 32_766
 """OpenCV's `remap` has coordinates of 16 bit with a sign."""
 
 COPY_AGAIN: Final = "copy or record the image again"
@@ -101,10 +101,10 @@ def require_believable(head: ImageHead, most_pixels: int, name: str) -> None:
         ImageSizeError: it has more pixels, takes more memory, or has a side that is too long.
     """
     require_pixels(head.size_px, most_pixels, name)
-    if max(head.size_px) > _MOST_SIDE_PX:
+    if max(head.size_px) > MOST_SIDE_PX:
         raise ImageSizeError(
             FrameFault.TOO_LARGE,
-            f"{name} is {size_text(head.size_px)} px, the longest side may have {_MOST_SIDE_PX} px",
+            f"{name} is {size_text(head.size_px)} px, the longest side may have {MOST_SIDE_PX} px",
             "scale it down, or cut it",
         )
     taken, most = head.width_px * head.height_px * head.pixel_bytes, most_pixels * _BYTES_A_PIXEL

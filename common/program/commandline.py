@@ -6,6 +6,7 @@ import errno
 import itertools
 import os
 import re
+import signal
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -236,11 +237,14 @@ def _ran(
             raise
         _say(f"{parser.prog}: error: {error}")
         return error.exit_code
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
+        is_term = isinstance(error, interrupts.Terminated)
         if not interrupts.is_heard():
-            interrupts.leave()  # saying so would block, and the interpreter's end too
-        _say(f"{parser.prog}: interrupted")
-        return INTERRUPTED
+            interrupts.leave(
+                signal.SIGTERM if is_term else signal.SIGINT
+            )  # saying so would block, and the interpreter's end too
+        _say(f"{parser.prog}: {'terminated' if is_term else 'interrupted'}")
+        return interrupts.TERMINATED if is_term else INTERRUPTED
 
 
 def _say(line: str) -> None:

@@ -6,6 +6,7 @@ compute for a minute. So under `interruptible(native=True)` a thread waits for t
 the main thread has not left within `_GRACE_S`. Once the command is done, its results count and Ctrl-C is ignored.
 
 SIGTERM ends a command that computes in the same way, at once: nothing of it is of use yet, so its exit code is not 0.
+One that keeps what it has come to takes it as Ctrl-C (`terminable`), and is given the time to write it (`answering`).
 
 Commands that end in their own way (StopSignals) replace the handler while they run. Light: a command's first import.
 """
@@ -29,11 +30,18 @@ _SAID: Final = {signal.SIGINT: (b"interrupted\n", INTERRUPTED), signal.SIGTERM: 
 
 _STDERR: Final = 2
 
+_ANSWERING: Final = threading.Event()
+"""Set while the main thread writes what it has come to."""
+
 _CLEAR_LINE: Final = b"\r\x1b[K\x1b[?25h"
 """Empties the line of a progress bar and shows the cursor, which a bar hides (ECMA-48: EL; DEC private mode 25)."""
 
 _GRACE_S: Final = 0.5
 """Python code ends within milliseconds of a signal; the other half of the second is for a busy machine."""
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM came where it is taken as Ctrl-C."""
 
 
 def leave_at_once() -> None:
@@ -52,13 +60,19 @@ def interruptible(*, native: bool = False) -> Iterator[None]:
             whose child processes, if any, need no goodbye.
     """
     handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or handler not in {_leave, signal.default_int_handler}:
+    is_ours = handler in {
+        _leave,
+        signal.default_int_handler,
+        signal.SIG_IGN,
+    }  # a script's job in the background ignores it
+    if threading.current_thread() is not threading.main_thread() or not is_ours:
         yield
         return
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if handler is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     is_default = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     if is_default:
-        signal.signal(signal.SIGTERM, lambda number, _: leave(number))
+        signal.signal(signal.SIGTERM, _end)
     watcher = _Watcher() if native else None
     try:
         yield
@@ -69,6 +83,29 @@ def interruptible(*, native: bool = False) -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.SIG_IGN if handler is _leave else handler)
         if is_default:
             signal.signal(signal.SIGTERM, signal.SIG_IGN if handler is _leave else signal.SIG_DFL)
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Raise `Terminated` on SIGTERM while the block runs, where `interruptible` would end the process at once."""
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) is not _end:
+        yield
+        return
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, _end)
+
+
+@contextmanager
+def answering() -> Iterator[None]:
+    """Let the main thread write what it has come to, however long that takes; another Ctrl-C or SIGTERM ends the process at once."""
+    _ANSWERING.set()
+    try:
+        yield
+    finally:
+        _ANSWERING.clear()
 
 
 def leave(number: int = signal.SIGINT) -> NoReturn:
@@ -96,6 +133,16 @@ def _say_so(number: int) -> None:
     if is_heard():
         with suppress(OSError):  # closed: the exit code must suffice
             os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + _SAID[signal.Signals(number)][0])
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    del frame
+    leave(number)
+
+
+def _terminate(number: int, frame: FrameType | None) -> NoReturn:
+    del number, frame
+    raise Terminated
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
@@ -130,4 +177,14 @@ class _Watcher:
                 break
         if not number or self._stopped.wait(_GRACE_S):
             return
-        leave(number[0])
+        while _ANSWERING.is_set() and not self._is_told_again():
+            pass
+        if not self._stopped.wait(_GRACE_S):
+            leave(number[0])
+
+    def _is_told_again(self) -> bool:
+        """Wait a moment; return whether another signal that ends the process came, or the watching ended."""
+        if not select.select([self._reader], [], [], _GRACE_S)[0]:
+            return False
+        number = os.read(self._reader, 1)
+        return not number or number[0] in _SAID

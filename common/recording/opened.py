@@ -4,7 +4,7 @@ import mmap
 from pathlib import Path
 from typing import Final
 
-from common.errors import DataError, UnavailableError
+from common.errors import DataError
 from common.recording.recorded import Recorded, read_recorded
 from common.recording.salvage import is_mcap
 
@@ -20,8 +20,7 @@ def mapped(path: Path) -> memoryview:
     """Return the bytes of a file.
 
     Raises:
-        UnavailableError: it cannot be read.
-        DataError: it is no MCAP file.
+        DataError: it cannot be read, or is no MCAP file.
     """
     try:
         with path.open("rb") as file:
@@ -29,7 +28,7 @@ def mapped(path: Path) -> memoryview:
     except ValueError:
         raise DataError(f"{path} is empty", "give a recording") from None
     except OSError as error:
-        raise UnavailableError(f"{path} cannot be read ({error.strerror})", "name a recording, FILE.mcap") from None
+        raise DataError(f"{path} cannot be read ({error.strerror})", "name a recording, FILE.mcap") from None
     if not is_mcap(data):
         raise DataError(f"{path} is no MCAP file", "give a recording of phone-host record, or another MCAP file")
     return data
@@ -39,8 +38,7 @@ def open_recorded(path: Path) -> Recorded:
     """Read all that is whole in a recording.
 
     Raises:
-        UnavailableError: it cannot be read.
-        DataError: it is no MCAP file, or holds no images.
+        DataError: it cannot be read, is no MCAP file, or holds no images.
     """
     found = read_recorded(mapped(path), inflate)
     if not found.images:

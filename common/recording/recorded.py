@@ -17,6 +17,7 @@ from common.recording.cdr import BrokenMessageError
 from common.recording.layout import ABOUT, CAPTURE, COMPUTED, SIDES, About, about_of, camera_name, camera_of, side_of
 from common.recording.ros_messages import COMPRESSED_IMAGE, IMAGE, RecordedImage, read_image
 from common.recording.salvage import Attachment, Damage, Inflate, Message, Metadata, Salvage
+from common.words import counted
 
 _NEVER_NS: Final = 33_333_333
 """The time between images of a camera that gave only one."""
@@ -139,7 +140,9 @@ def read_recorded(data: memoryview, inflate: Inflate) -> Recorded:
             case _:
                 assert_never(record)
     for count in lost.values():
-        found.damages.append(Damage(0, 0, f"{count} messages are of an unknown topic or spoiled"))
+        found.damages.append(
+            Damage(0, 0, f"{counted(count, 'message is', 'messages are')} of an unknown topic or spoiled")
+        )
     found.is_complete = salvage.is_complete
     found.is_ours = ABOUT in found.metadata
     found.about = about_of(found.metadata.get(ABOUT, {}))

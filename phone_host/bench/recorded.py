@@ -16,6 +16,7 @@ from common.ledger import PairLedger
 from common.protocol.message import BoardCounts, Pacing
 from common.recording.numbering import pairs_of_two
 from common.recording.recorded import Recorded
+from common.words import counted
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up
 from phone_host.children.board_process import BoardAccount
@@ -53,15 +54,14 @@ def recorded_run(file: Path) -> RecordedRun:
         file: the recording.
 
     Raises:
-        UnavailableError: it cannot be read.
-        DataError: it is no recording of two cameras, or holds no delays of pairs.
+        DataError: it cannot be read, or is no recording of two cameras, or holds no delays of pairs.
     """
     playback = Playback(file, Pacing.CLOCK)
     ledgers = sorted(playback.ledgers(), key=lambda ledger: ledger.done_ns)
     kept, measured_s = after_warm_up(ledgers)
     if len(kept) < _LEAST:
         raise DataError(
-            f"{file} holds the delays of {len(kept)} pairs after its first {WARM_UP_S:g} s, at least {_LEAST} are needed",
+            f"{file} holds the delays of {counted(len(kept), 'pair')} after its first {WARM_UP_S:g} s, at least {_LEAST} are needed",
             "record longer, beside a run: phone-host run --record FILE.mcap",
         )
     camera, recorded = playback.board, playback.recorded

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, TandemError
 from common.imagesize.head import MOST_PIXELS
+from common.words import counted
 from phone_host.calibration.board_fits import ENOUGH, Fits, Inner
 from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
 from phone_host.calibration.small_picture import shrunk
@@ -305,7 +306,7 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Inner:
     if not result.sizes:
         _require_an_image(list(_sample(files))[:_SAMPLE], most_pixels)
         raise DataError(
-            f"no chessboard is seen in {result.asked} images",
+            f"no chessboard is seen in {counted(result.asked, 'image')}",
             "take pictures with the whole board sharp and evenly lit, with a white margin around it",
         )
     likely = result.ranked[:3]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.words import counted
 from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
 from phone_host.calibration.next_view import DEPTH_M, Kind
 from phone_host.model import Rig, Verdict
@@ -140,7 +141,7 @@ def _remedy(calibration: Calibration, rejected: tuple[Rejected, ...], worst: _Me
         reason, count = Counter(each.reason for each in rejected).most_common(1)[0]
         return f"{count} of {len(rejected) + used} pairs were rejected: {reason.value}: {_CURES[reason]}"
     if used < _FEW_PAIRS and worst.of_usable <= 1:
-        return f"{used} pairs are few: take {_WANTED_PAIRS}"
+        return f"{counted(used, 'pair')} {'is' if used == 1 else 'are'} few: take {_WANTED_PAIRS}"
     return worst.remedy
 
 

@@ -18,6 +18,7 @@ from phone_host.camera.http_uri import http_settings, is_http, without_orientati
 _HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
 """Named, not imported: TLS and its dependencies are loaded only if a server is asked for."""
 
+_REPLAYED: Final = "common.camera.replay_uri:require_replayed"
 _BROWSER: Final = "phone_host.camera.browser:BrowserCamera"
 
 
@@ -90,6 +91,18 @@ def check_camera(uri: str) -> None:
         browser_settings(without_orientation(uri)[0], "")
     else:
         common_factory.parse_camera(uri, "", EXAMPLE)
+
+
+def require_replayed(uri: str) -> None:
+    """Refuse a camera that replays what is not there. Any other camera may be plugged in, or begin to answer, later.
+
+    Raises:
+        SettingsError: the URI is invalid.
+        UnavailableError: there is no such folder or file.
+        DataError: there is no image in it.
+    """
+    if not is_http(uri) and not is_browser(uri):
+        named(_REPLAYED)(common_factory.parse_camera(uri, "", EXAMPLE))
 
 
 def camera_orientation(uri: str) -> Orientation:

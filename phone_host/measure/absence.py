@@ -7,6 +7,8 @@ nor against the rate of pairs.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from common.words import times
+
 _MOST_TOLD = 5
 
 
@@ -65,7 +67,7 @@ def away_words(away: Sequence[Away]) -> str:
     if not away:
         return ""
     each = [f"for {item.seconds:.1f} s from {item.at_s:.0f} s on" for item in away[:_MOST_TOLD]]
-    more = f" and {len(away) - _MOST_TOLD} times more" if len(away) > _MOST_TOLD else ""
-    often = "once" if len(away) == 1 else f"{len(away)} times"
+    more = f" and {times(len(away) - _MOST_TOLD)} more" if len(away) > _MOST_TOLD else ""
+    often = times(len(away))
     back = "and came back" if away[-1].is_over else "and has not come back"
     return f"the board went away {often} {back} ({', '.join(each)}{more}); rates leave this time out"

@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from common.words import times
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, Drift, DriftState
 
@@ -118,10 +119,10 @@ def drift_lines(drift: Drift | None) -> list[str]:
     away = [change for change in drift.changes if change.kind is ChangeKind.RETURNED]
     if not away:
         return [_drift_line(drift)]
-    times = "once" if len(away) == 1 else f"{len(away)} times"
+    often = times(len(away))
     return [
         _drift_line(drift),
-        f"a camera or the board was away {times}, last for {away[-1].away_s:.1f} s: drift was measured afresh",
+        f"a camera or the board was away {often}, last for {away[-1].away_s:.1f} s: drift was measured afresh",
     ]
 
 

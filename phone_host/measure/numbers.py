@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
 from common.camera.image_numbers import ImageNumbers
+from common.words import counted
 from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import Arrangement
 from phone_host.sync.stills import PairedBy, WhyOrder
@@ -194,7 +195,7 @@ def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) ->
     if evidence.apart:
         found = Concern(
             Doubt.IMAGE_NUMBERS,
-            f"{evidence.apart} of {evidence.pairs} pairs are of different images: first of image {there} of the board"
+            f"{evidence.apart} of {counted(evidence.pairs, 'pair')} are of different images: first of image {there} of the board"
             f" and image {here} of this machine, counted from 0",
             "give both films loop=1; or, for photographs, leave fps=, loop=, phase_ms= and pace= out on both sides",
         )

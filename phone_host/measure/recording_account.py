@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from common.words import counted
 from phone_host.measure.trouble import Trouble
 
 
@@ -45,7 +46,7 @@ class RecordingAccount:
         minutes, seconds = divmod(int(self.seconds), 60)
         dropped = f", {self.dropped} dropped: the disk is too slow" if self.dropped else ""
         left = "" if self.left_bytes is None else f", {self.left_bytes / 1e9:.1f} GB left"
-        told = f"{minutes}:{seconds:02d}, {self.frames} images, {self.size_bytes / 1e6:.0f} MB"
+        told = f"{minutes}:{seconds:02d}, {counted(self.frames, 'image')}, {self.size_bytes / 1e6:.0f} MB"
         return f"recording: {told}{left}{dropped}"
 
     def _ended(self) -> str:
@@ -56,4 +57,4 @@ class RecordingAccount:
         ]
         told = f"; not in it: {', '.join(missing)}" if missing else ""
         ended = "" if self.failure is None else f"; {self.failure.problem}: {self.failure.remedy}"
-        return f"recorded: {self.frames} images, {self.size_bytes / 1e6:.1f} MB in {self.file}{told}{ended}"
+        return f"recorded: {counted(self.frames, 'image')}, {self.size_bytes / 1e6:.1f} MB in {self.file}{told}{ended}"

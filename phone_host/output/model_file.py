@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from common.errors import DataError, UnavailableError
+from common.errors import DataError
 from common.files import read_whole
 from common.places import Kind, kind_of
 from phone_host.output.axes import Axes
@@ -50,12 +50,11 @@ def read_model(path: Path, unit_m: float) -> Model:
         unit_m: unit of a mesh file, m; NaN: what the file says if we wrote it, or else the metre. A scan's is the metre.
 
     Raises:
-        UnavailableError: there is none.
-        DataError: it is no mesh, or a spoiled one.
+        DataError: there is none, it is no mesh, or a spoiled one.
     """
     kind = kind_of(path)
     if kind is Kind.MISSING:
-        raise UnavailableError(f"{path} does not exist", "give the folder of a scan, or a mesh file")
+        raise DataError(f"{path} does not exist", "give the folder of a scan, or a mesh file")
     is_scan = kind is Kind.FOLDER
     file = path / _MODEL if is_scan else path
     if is_scan and kind_of(file) is Kind.MISSING:
@@ -63,7 +62,7 @@ def read_model(path: Path, unit_m: float) -> Model:
     try:
         content = read_whole(file, _MOST_BYTES)
     except OSError as error:
-        raise UnavailableError(f"{file} cannot be read ({error.strerror})", "check its permissions") from None
+        raise DataError(f"{file} cannot be read ({error.strerror})", "check its permissions") from None
     reports = [_report(path / name) for name in _REPORTS] if is_scan else []
     report = next((told for told in reports if told), {})
     if is_scan or math.isnan(unit_m):

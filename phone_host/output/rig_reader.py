@@ -11,6 +11,7 @@ from common.camera_identity import RememberedCamera
 from common.errors import DataError
 from common.files import read_whole
 from common.versions import RIG_FORMAT
+from common.words import counted
 from phone_host.model import CameraModel, TimeOffset, Verdict
 from phone_host.output.rig_agreement import KeptRectification
 from phone_host.output.rig_cameras import read_camera
@@ -50,16 +51,17 @@ class RigReader:
 
     Args:
         path: the file.
+        content: what is in it; None: it is read.
 
     Raises:
         DataError: it cannot be read, or is no FileStorage YAML. The methods raise it for keys that are missing or not valid.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, content: bytes | None = None) -> None:
         self._path = path
         self.version = 1
         try:
-            text = read_whole(path, _MOST_BYTES).decode("utf-8")
+            text = (read_whole(path, _MOST_BYTES) if content is None else content).decode("utf-8")
         except OSError as error:
             raise DataError(
                 f"{path} cannot be read ({error.strerror})", "give the rig.yaml of `phone-host calibrate`"
@@ -215,7 +217,7 @@ class RigReader:
         """Read a translation between two cameras, m."""
         matrix = self.matrix(key)
         if matrix.size != 3:
-            raise self.problem(key, f"has {matrix.size} values", "it must have 3")
+            raise self.problem(key, f"has {counted(matrix.size, 'value')}", "it must have 3")
         length_m = float(np.linalg.norm(matrix))
         if length_m == 0:
             raise self.problem(key, "is 0: both cameras at one place", "calibrate again")

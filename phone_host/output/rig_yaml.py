@@ -103,11 +103,12 @@ def write_time_offset(path: Path, offset: TimeOffset) -> None:
     write_text(path, "\n".join([*kept, *values]) + "\n")
 
 
-def read_rig(path: Path) -> Rig:
+def read_rig(path: Path, content: bytes | None = None) -> Rig:
     """Read a rig and check it.
 
     Args:
         path: a rig.yaml of this program, or any FileStorage file with the same keys.
+        content: what is in it, if it lies in another file; then the path only names it in errors.
 
     Returns:
         The rig.
@@ -115,7 +116,7 @@ def read_rig(path: Path) -> Rig:
     Raises:
         DataError: the file is missing or not FileStorage YAML, or a key is missing or not valid; names file and key.
     """
-    reader = _opened(path)
+    reader = _opened(path, content)
     reader.require_all_keys()
     baseline_m = reader.baseline("T")
     left = reader.camera_model("left", "1")
@@ -161,8 +162,8 @@ def read_rig_views(path: Path) -> RigViews | None:
     return _opened(path).views()
 
 
-def _opened(path: Path) -> RigReader:
-    reader = RigReader(path)
+def _opened(path: Path, content: bytes | None = None) -> RigReader:
+    reader = RigReader(path, content)
     reader.require_known_format()
     return reader
 

@@ -40,8 +40,7 @@ def upright_model(path: Path, unit: str | None, up: str | None) -> Upright:
         up: the axis that points up: z, y or -y; None: as its axes say.
 
     Raises:
-        DataError: it is none.
-        UnavailableError: it cannot be read.
+        DataError: it is none, or cannot be read.
     """
     model = read_model(path, _UNITS_M.get(unit or "", math.nan))
     turn = np.array(_UP[up or _UP_OF[model.axes]], np.float64)

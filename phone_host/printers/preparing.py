@@ -55,8 +55,8 @@ def job_of(what: Path, wanted: Wanted, uri: PrinterUri, tell: Callable[[str], No
 
     Raises:
         SettingsError: G-code is given, and what only a model has.
-        DataError: it cannot be printed, or leaves the bed.
-        UnavailableError: it cannot be read, or there is no slicer.
+        DataError: it cannot be read or printed, or leaves the bed.
+        UnavailableError: there is no slicer.
     """
     most = MOST_FOR_LINES if isinstance(uri, LineUri) else MOST_FOR_SERVERS
     bed_mm = wanted.slicing.bed_mm

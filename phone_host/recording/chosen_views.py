@@ -79,8 +79,8 @@ def choose_views(
         advance: called with the share that is done, 0 to 1.
 
     Raises:
-        UnavailableError: the recording cannot be read, or the folders hold other pictures.
-        DataError: it is no recording of two cameras, or has no two images of one moment.
+        UnavailableError: the folders hold other pictures.
+        DataError: the recording cannot be read, is no recording of two cameras, or has no two images of one moment.
         OSError: the folders cannot be written to.
     """
     recorded = open_recorded(file)

@@ -41,8 +41,8 @@ def copy_recording(
         with_captions: whether metadata and attachments are.
 
     Raises:
-        UnavailableError: a file cannot be read or made, or the disk is full.
-        DataError: the source is no MCAP file.
+        UnavailableError: the file cannot be made, or the disk is full.
+        DataError: the source cannot be read, or is no MCAP file.
     """
     data = mapped(source)
     channels = {topic.name: topic for topic in topics()}

@@ -21,6 +21,7 @@ from common.recording.recorded import Recorded
 from common.recording.recording_file import written
 from common.recording.ros_messages import RecordedImage, image_message, image_type
 from common.versions import all_versions
+from common.words import counted
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.preview import write_png
 from phone_host.recording.both_sides import encoded
@@ -104,7 +105,7 @@ def import_folders(paths: Sequence[Path], times: Path | None, out: Path) -> dict
 
     Raises:
         SettingsError: the folders are none of those known.
-        DataError: images have no times.
+        DataError: a folder is missing, or images have no times.
         UnavailableError: a folder cannot be read, or the file not be made.
     """
     folders, times = _folders(paths, times)
@@ -130,12 +131,15 @@ def _in_order(sides: Sequence[list[_Timed]]) -> Iterator[tuple[str, int, _Timed]
 
 def _folders(paths: Sequence[Path], times: Path | None) -> tuple[tuple[Path, Path], Path | None]:
     """Return the left and the right folder, and the file with their times, if there is one."""
+    if len(paths) > 2:
+        raise SettingsError(f"{len(paths)} folders", "give the folder of a data set, or the left and the right one")
+    for path in paths:
+        if not path.is_dir():
+            raise DataError(
+                f"{path} is no folder", "give the folder of a data set, two folders, or a recording, FILE.mcap"
+            )
     if len(paths) == 2:
         return (paths[0], paths[1]), times
-    if len(paths) != 1:
-        raise SettingsError(f"{len(paths)} folders", "give the folder of a data set, or the left and the right one")
-    if not paths[0].is_dir():
-        raise UnavailableError(f"{paths[0]} is no folder", "give the folder of a data set, or a recording, FILE.mcap")
     for left, right in _PAIRS:
         if (paths[0] / left).is_dir() and (paths[0] / right).is_dir():
             usual = paths[0] / "times.txt"
@@ -165,7 +169,8 @@ def _times(paths: Sequence[Path], times: Path | None, folder: Path) -> list[int]
     found = [_time_ns(line.split()[0], times) for line in _lines(times)]
     if len(found) != len(paths):
         raise DataError(
-            f"{times} has {len(found)} times, {folder} has {len(paths)} images", "give one time for each image"
+            f"{times} has {counted(len(found), 'time')}, {folder} has {counted(len(paths), 'image')}",
+            "give one time for each image",
         )
     return found
 
@@ -174,7 +179,7 @@ def _lines(path: Path) -> list[str]:
     try:
         text = read_whole(path, _MOST_TIMES_BYTES).decode("utf-8", "replace")
     except OSError as error:
-        raise UnavailableError(f"{path} cannot be read ({error.strerror})", "check its name") from None
+        raise DataError(f"{path} cannot be read ({error.strerror})", "check its name") from None
     return [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#")]
 
 

@@ -211,8 +211,7 @@ def read_recording(file: Path) -> Footage:
     """Read the frames of a recording. Their bytes stay on the disk; spoiled ones are left out.
 
     Raises:
-        UnavailableError: the file cannot be read.
-        DataError: it is no recording of two cameras.
+        DataError: it cannot be read, or is no recording of two cameras.
     """
     recorded = open_recorded(file)
     topics, board = topics_of(recorded, file), Side(recorded.about.board_side)

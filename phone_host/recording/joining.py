@@ -70,8 +70,8 @@ def join_recordings(
 
     Raises:
         SettingsError: these are not one recording of a host and one of a board.
-        DataError: nothing tells how their clocks relate.
-        UnavailableError: a file cannot be read or made, or the disk is full.
+        DataError: one cannot be read, or nothing tells how their clocks relate.
+        UnavailableError: the file cannot be made, or the disk is full.
     """
     opened, empty = _opened(paths)
     parts, host = sorted_out(opened)

@@ -20,8 +20,7 @@ def open_playback(text: str, board_side: str | None = None) -> Playback:
 
     Raises:
         SettingsError: the option is none.
-        UnavailableError: the file cannot be read.
-        DataError: it is no recording of two cameras.
+        DataError: it cannot be read, or is no recording of two cameras.
     """
     path, mark, query = text.partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))

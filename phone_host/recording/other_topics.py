@@ -26,8 +26,8 @@ def import_topics(source: Path, names: Sequence[str] | None, out: Path) -> dict[
         How many images each side has.
 
     Raises:
-        DataError: there are no such topics, or no two at all.
-        UnavailableError: a file cannot be read or made, or the disk is full.
+        DataError: the source cannot be read, there are no such topics, or no two at all.
+        UnavailableError: the file cannot be made, or the disk is full.
     """
     found = open_recorded(source)
     chosen = list(names or topics_of(found, source).values())

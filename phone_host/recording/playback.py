@@ -66,8 +66,7 @@ class Playback:
         board_side: which images came over the link; None: as the recording says.
 
     Raises:
-        UnavailableError: the file cannot be read.
-        DataError: it is no recording of two cameras.
+        DataError: it cannot be read, or is no recording of two cameras.
     """
 
     def __init__(self, file: Path, pacing: Pacing, board_side: Side | None = None) -> None:

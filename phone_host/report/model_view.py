@@ -4,6 +4,7 @@ It holds a coarser mesh if the whole one would make the page heavy; model.ply ha
 """
 
 import json
+import math
 from dataclasses import dataclass
 from html import escape
 from typing import Final
@@ -55,7 +56,8 @@ def model_view(shown: ShownModel, file: str) -> str:
         return ""
     mesh, stands_for = thinned(shown.mesh, MOST_TRIANGLES, shown.voxel_m)
     noise_m = np.nan_to_num(shown.noise_m[stands_for], nan=np.inf)
-    best, worst = (float(np.nanpercentile(shown.noise_m, share)) for share in (2, 98))
+    known_m = shown.noise_m[np.isfinite(shown.noise_m)]  # none, where each point was seen once
+    best, worst = np.percentile(known_m, (2, 98)).tolist() if len(known_m) else (math.nan, math.nan)
     worst = max(worst, best * 1.01)
     low = mesh.points_m.min(axis=0)
     size = mesh.points_m.max(axis=0) - low
@@ -67,7 +69,7 @@ def model_view(shown: ShownModel, file: str) -> str:
         "axes": "camera" if shown.upright is None else "mat",
     }
     points = np.rint((mesh.points_m - low) / step).astype(np.uint16)
-    levels = np.clip((noise_m - best) / (worst - best), 0, 1) * 255
+    levels = np.clip((noise_m - best) / (worst - best), 0, 1) * 255 if len(known_m) else np.full(len(noise_m), 255.0)
     data = {
         "points": text_of(points),
         "triangles": text_of(mesh.triangles.astype(np.uint32)),
@@ -94,7 +96,8 @@ def _buttons(model: ShownModel) -> str:
 
 def _paints(best_m: float, worst_m: float) -> str:
     known = f"how exactly it is known: bright \u00b1 {best_m * 1e3:.2g} mm, dark \u00b1 {worst_m * 1e3:.2g} mm"
-    choices = (("colour", "colours"), ("shape", "shape alone"), ("noise", known))
+    told = (("noise", known),) if math.isfinite(best_m) else ()
+    choices = (("colour", "colours"), ("shape", "shape alone"), *told)
     return "".join(
         f'<label class="check"><input type="radio" name="paint" data-paint="{name}"{" checked" if name == "colour" else ""}> {words}</label>'
         for name, words in choices

@@ -152,8 +152,13 @@ class FailedPair:
 
     def none_of(self, pairs: int) -> DataError:
         """Return the error if this is the first of so many pairs, and none could be computed."""
+        which = (
+            "the only pair cannot be computed"
+            if pairs == 1
+            else f"none of the {pairs} pairs can be computed; the first"
+        )
         return DataError(
-            f"none of the {pairs} pairs can be computed; the first: {self.problem} ({self.remedy})",
+            f"{which}: {self.problem} ({self.remedy})",
             "mend what this names, then try again",
         )
 

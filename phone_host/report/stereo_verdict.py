@@ -36,8 +36,11 @@ def set_verdict(report: SetReport) -> tuple[Headline, str]:
     count, good = len(report.pairs), verdicts.count(Headline.GOOD)
     bad = verdicts.count(Headline.BAD) + len(report.failed)
     if good == count:
-        return Headline.GOOD, f"Nothing speaks against the depth of any of the {count} pairs."
-    words = [f"{good} of {count} pairs {'looks' if good == 1 else 'look'} right"]
+        return (
+            Headline.GOOD,
+            f"Nothing speaks against the depth of {'the pair' if count == 1 else f'any of the {count} pairs'}.",
+        )
+    words = [f"{good} of {counted(count, 'pair')} {'looks' if good == 1 else 'look'} right"]
     if bad:
         words.append(f"{bad} gave no depth or cannot be right")
     if doubtful := count - good - bad:

@@ -1,22 +1,36 @@
-"""What was computed so far is kept when Ctrl-C ends a long work."""
+"""What was computed so far is kept when Ctrl-C or SIGTERM ends a long work."""
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
+from common.program.interrupts import answering, terminable
 from common.unfinished import unfinished
 
 
 @contextmanager
 def kept_if_interrupted(write: Callable[[], None]) -> Iterator[None]:
-    """Write what there is if Ctrl-C ends the block, in Python or out of native code.
+    """Write what there is if Ctrl-C or SIGTERM ends the block, in Python or out of native code.
 
     Args:
         write: writes it; what cannot be written (OSError) is left out.
     """
-    try:
-        with unfinished(write):
+    last = _Once(write)
+    with terminable(), unfinished(last):
+        try:
             yield
-    except KeyboardInterrupt:
-        with suppress(OSError):
-            write()
-        raise
+        except KeyboardInterrupt:
+            with answering(), suppress(OSError):
+                last()
+            raise
+
+
+class _Once:
+    """Does something at its first call, from whatever thread. A later one does not wait for it: whoever leaves in a hurry must not."""
+
+    def __init__(self, do: Callable[[], None]) -> None:
+        self._do, self._begun = do, threading.Lock()
+
+    def __call__(self) -> None:
+        if self._begun.acquire(blocking=False):
+            self._do()

@@ -77,7 +77,14 @@ class KeptSubmaps:
 
     def after_pair(self) -> None:
         """Write a submap if one is due."""
-        if self._scan.is_submap_due and not self._problem:
+        self._keep_if(self._scan.is_submap_due)
+
+    def before_end(self) -> None:
+        """Write what came since the last submap: the scan is stopped before its end, and may be gone on with."""
+        self._keep_if(self._scan.is_submap_open)
+
+    def _keep_if(self, is_wanted: bool) -> None:  # noqa: FBT001 - the question itself
+        if is_wanted and not self._problem:
             try:
                 self._write(self._scan.close_submap(whole=self._must_be_whole))
             except OSError as error:

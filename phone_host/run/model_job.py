@@ -68,8 +68,7 @@ def check_model(
         What is wrong; those whose `blocks` is true stop a print.
 
     Raises:
-        UnavailableError: the model cannot be read.
-        DataError: it is none.
+        DataError: the model cannot be read, or is none.
     """
     upright = upright_model(Path(model), unit, up)
     return problems(upright.points_mm, upright.model.solid.triangles, printer or Printer(), lambda _: None)
@@ -111,8 +110,7 @@ def export_model(
 
     Raises:
         SettingsError: there is no such format, or the model itself would be replaced.
-        UnavailableError: the model cannot be read.
-        DataError: it is none.
+        DataError: the model cannot be read, or is none.
         OSError: a file cannot be written.
     """
     if unknown := set(to) - set(FORMATS):

@@ -1,6 +1,6 @@
 """Scans pairs of image files, one after another. The root of `scan` for files.
 
-A pair that cannot be computed is named, and the others go on. After Ctrl-C the model of the pairs so far is written.
+A pair that cannot be computed is named, and the others go on. After Ctrl-C or SIGTERM the model of the pairs so far is written.
 """
 
 from collections.abc import Callable
@@ -11,6 +11,7 @@ from common import now
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
+from common.words import counted
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
 from phone_host.output.axes import Axes
@@ -50,6 +51,7 @@ class ScanJob:
         mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
         commands: what to do next, for the page.
         resumed: submaps of a scan that was killed, to go on from; their pairs are not computed again.
+        tell: takes a line that the user should know.
     """
 
     files: ViewFiles
@@ -63,10 +65,11 @@ class ScanJob:
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
     commands: tuple[NextCommand, ...] = ()
     resumed: tuple[Submap, ...] = ()
+    tell: Callable[[str], None] = lambda _: None
 
 
 def run_scan(job: ScanJob, watcher: Watcher) -> ScanReport:
-    """Scan all pairs, and write what came of them; after Ctrl-C that of the pairs so far.
+    """Scan all pairs, and write what came of them; after Ctrl-C or SIGTERM that of the pairs so far.
 
     Args:
         job: what to do.
@@ -92,6 +95,9 @@ def run_scan(job: ScanJob, watcher: Watcher) -> ScanReport:
 
     def write_so_far() -> None:
         if work.scan.fused:
+            work.kept.before_end()
+            goes_on = "" if job.wanted.turntable else f"; --resume {job.out} goes on with it"
+            job.tell(f"stopped after {work.taken} of {counted(count, 'pair')}: writing their model{goes_on}")
             finished = work.finished()
             write_scan(job.out, replace(finished, report=replace(finished.report, interrupted_of=count)))
 
@@ -120,6 +126,11 @@ class _Work:
         self._is_judged = False
         self._pairs: list[ScannedPair | FailedPair] = []
         self._doubts: dict[str, Remark] = {}
+
+    @property
+    def taken(self) -> int:
+        """Pairs that were tried so far."""
+        return len(self._pairs)
 
     def is_known(self, name: str) -> bool:
         """Note a pair that is in the submaps; return whether it is."""

@@ -83,29 +83,35 @@ def require_something(report: ScanReport) -> None:
     Raises:
         DataError: none was computed, none has depth, or none shows the mat, or a table with an object.
     """
+    if not report.pairs:
+        raise DataError(
+            "not one pair came, so there is no model",
+            "try phone-host run: it tells which frames find no partner, and why",
+        )
     if report.failed and not report.scanned:
         raise report.failed[0].none_of(len(report.pairs))
+    if any(pair.weakness is Weakness.EMPTY_BOX for pair in report.scanned) and report.settings is None:
+        raise DataError(
+            "the mat is seen, but nothing of what the pairs show lies in the box",
+            "move or enlarge --box, the middle of which counts from the sheet's middle, z up; or leave it out",
+        )
     if (
         report.settings is None
         and report.mat is not None
         and any(pair.weakness is Weakness.NO_MAT for pair in report.scanned)
     ):
-        pairs = counted(len(report.scanned), "pair")
-        if _EMPTY_BOX in report.remarks:
-            raise DataError(
-                f"the mat {report.mat.name} is not seen in any of {pairs}, or nothing of what they show lies in the box",
-                "move or enlarge --box, or leave it out; show more of the mat, sharp and without glare",
-            )
         raise DataError(
-            f"the mat {report.mat.name} is not seen in any of {pairs}",
+            f"the mat {report.mat.name} is not seen in any of {counted(len(report.scanned), 'pair')}",
             "show more of it, sharp and without glare; if another one lies there, name it, as in --mat 8x6:28mm:20mm:5x5",
         )
     if report.settings is None:
         _require_table(report)
         require_turning(report)
+        count = len(report.scanned)
+        which = f"none of the {count} pairs" if count > 1 else "not even the only pair"
         why = next((remark for remark in report.remarks if not remark.is_note), None)
         raise DataError(
-            f"none of the {len(report.scanned)} pairs has depth{f': {why.problem}' if why else ''}",
+            f"{which} has depth{f': {why.problem}' if why else ''}",
             (why.remedy if why else "")
             or "check that the pictures are sharp and bright, and that --calibration fits them",
         )

@@ -199,7 +199,7 @@ class MatTracker:
 
 def begun_on_mat(
     view: View, mat: Mat, box: Box, fineness: Callable[[View], VolumeSettings], threads: int
-) -> MatTracker | None:
+) -> MatTracker | Weakness:
     """Begin with a view of a mat.
 
     Args:
@@ -210,14 +210,14 @@ def begun_on_mat(
         threads: that compute.
 
     Returns:
-        A tracker that has not taken the view yet; None: too little of the mat is seen, or nothing in the box has a depth.
+        A tracker that has not taken the view yet; or why not: too little of the mat is seen, or nothing in the box has a depth.
     """
     found = MatFinder(mat).find(view)
     if found is None:
-        return None
+        return Weakness.NO_MAT
     inside = depths_inside(view, found.camera_mat.inverse(), room_of(box, ABOVE_M))
     if not np.isfinite(inside).any():
-        return None
+        return Weakness.EMPTY_BOX
     usual = fineness(replace(view, depth_m=inside))
     return MatTracker(mat, box, replace(thinner(usual, _TRUNCATION_SHARE), far_m=_FAR_M), threads)
 

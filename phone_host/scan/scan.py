@@ -265,13 +265,17 @@ class Scan:
         """Begin with a view that has depth; None: mat or table are not seen in it."""
         wanted = self._wanted
         if wanted.mat is not None and wanted.model_box is not None:
-            return begun_on_mat(
+            begun = begun_on_mat(
                 view,
                 wanted.mat,
                 wanted.model_box,
                 lambda inside: fineness_for(inside, wanted.voxel_m, wanted.most_bytes),
                 wanted.threads,
             )
+            if isinstance(begun, Weakness):
+                self._missing = begun
+                return None
+            return begun
         settings = fineness_for(view, wanted.voxel_m, wanted.most_bytes)
         return Tracker(settings, wanted.threads, loops=wanted.loops)
 
@@ -287,6 +291,11 @@ class Scan:
     def is_submap_due(self) -> bool:
         """Whether enough pairs were fused since the last submap was closed that losing them would hurt."""
         return self.fused - self._closed.fused >= _SUBMAP_PAIRS
+
+    @property
+    def is_submap_open(self) -> bool:
+        """Whether pairs were fused since the last submap was closed."""
+        return self.fused > self._closed.fused
 
     def close_submap(self, *, whole: bool = False) -> Submap:
         """Close a submap: give what was learnt since the last one. Some pair had depth.

@@ -29,6 +29,7 @@ class Weakness(Enum):
     RESTLESS = "something moves"
     APART = "apart"
     NO_MAT = "mat not seen"
+    EMPTY_BOX = "nothing in the box"
     NO_TABLE = "no table"
     BARE_TABLE = "nothing on the table"
     NOTHING_TURNS = "nothing turns"
@@ -47,6 +48,7 @@ class Weakness(Enum):
             Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
             Weakness.APART: "followed again, but apart from the model: move back to where it was",
             Weakness.NO_MAT: "too little of the mat is seen: show more of it to both cameras, sharp and without glare",
+            Weakness.EMPTY_BOX: "nothing that is seen lies in the box: move or enlarge --box, or leave it out",
             Weakness.NO_TABLE: "no table is found: show more of it around the object, from above, and give it some texture",
             Weakness.BARE_TABLE: "nothing stands on the table in the middle of the picture: aim at the object, and show where it stands",
             Weakness.RESTLESS: "something moves against the rest: keep the scene still, or wait until it has gone by",

@@ -130,6 +130,11 @@ class TurntableScan(Scan):
         return False
 
     @property
+    def is_submap_open(self) -> bool:
+        """Never, likewise."""
+        return False
+
+    @property
     def volume(self) -> Volume | None:
         """The model; in the end the one that was made again."""
         finished = self._finished

@@ -3,6 +3,7 @@
 import numpy as np
 
 from common.errors import DataError, TandemError
+from common.words import counted
 from phone_host.model import Disparity, RectifiedPair
 from phone_host.stereo.matcher_protocol import Matcher
 
@@ -43,6 +44,7 @@ class CheckedMatcher:
         outside = int(np.count_nonzero((found < 0) | (found >= self._disparities)))
         if outside:
             raise DataError(
-                f"matcher {self._name} gave {outside} disparities outside 0 to {self._disparities - 1}", _REMEDY
+                f"matcher {self._name} gave {counted(outside, 'disparity', 'disparities')} outside 0 to {self._disparities - 1}",
+                _REMEDY,
             )
         return found

@@ -42,8 +42,8 @@ def given_pictures(words: Sequence[str], place: Path, most_pixels: int) -> Given
 
     Raises:
         SettingsError: there is one side only, or something beside a recording.
-        UnavailableError: a recording cannot be read, or the folders cannot be had.
-        DataError: it is no recording of two cameras.
+        UnavailableError: the folders cannot be had.
+        DataError: the recording cannot be read, or is no recording of two cameras.
     """
     recordings = [word for word in words if is_recording(word)]
     if not recordings:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, SettingsError
+from common.imagesize.head import MOST_SIDE_PX
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import AS_CALIBRATED, Departure, Rig, Side, StereoGeometry
 from phone_host.output.axes import Axes
@@ -51,6 +52,7 @@ def build_core(
     size_px: tuple[int, int],
     images: Path | None = None,
     *,
+    rig: Rig | None = None,
     temporal: bool = False,
 ) -> tuple[StereoCore | None, Side | None]:
     """Build the stereo core from the options.
@@ -62,6 +64,7 @@ def build_core(
         size_px: width and height of images that arrive rectified, px.
         images: an image file of either side, or its folder; None: not from files. KITTI's calib.txt holds two pairs of
             cameras, and only the folder's name tells which of them took the images.
+        rig: what the calibration holds, if it is known already; None: it is read.
         temporal: whether pairs are searched where the last one found something.
 
     Returns: The core (None if neither a rig nor rectified images are given), and the side of the board's camera in the
@@ -73,7 +76,7 @@ def build_core(
     """
     chosen = matcher_named(matcher)
     wanted = depth_wanted(options)
-    of_rectified = bool(calibration) and is_calib_txt(Path(calibration))
+    of_rectified = bool(calibration) and rig is None and is_calib_txt(Path(calibration))
     if calibration and options.rectified and not of_rectified:
         raise SettingsError("--calibration and --rectified contradict each other", "give only one of the two")
     _refuse_idle_geometry(options, calibration)
@@ -83,7 +86,7 @@ def build_core(
         )
         return core, None
     if calibration:
-        rig = read_own_rig(Path(calibration))
+        rig = rig or read_own_rig(Path(calibration))
         refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
         return StereoCore(
             _matcher(chosen, options.disparities, temporal=temporal), Rectifier(rig), None, wanted
@@ -156,11 +159,16 @@ def overlay_of(options: argparse.Namespace, core: StereoCore | None) -> Departur
 
 
 def depth_wanted(options: argparse.Namespace) -> DepthWanted:
-    """Read --near, --far, --crop and --scale.
+    """Read --near, --far, --crop and --scale, and check --disparities.
 
     Raises:
         SettingsError: one of them is invalid, or nothing is left between the two limits.
     """
+    if options.disparities is not None and options.disparities > MOST_SIDE_PX:
+        raise SettingsError(
+            f"--disparities {options.disparities} is more than any image is wide",
+            f"give 1 to {MOST_SIDE_PX} (64 suits most 640 px wide pairs)",
+        )
     near_m = 0.0 if options.near is None else limit_mm(options.near, "--near", "300mm") / 1000
     far_m = math.nan if options.far is None else limit_mm(options.far, "--far", "5m") / 1000
     if near_m >= far_m:

@@ -65,7 +65,7 @@ the right ones.
 | 0 | done |
 | 2 | wrong usage or settings; nothing was started |
 | 3 | a device, link or folder cannot be had now; trying again may help |
-| 4 | the data are bad, or a check failed |
+| 4 | the data are bad or missing, or a check failed |
 | 130 | ended by Ctrl-C |
 """
 

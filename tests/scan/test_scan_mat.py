@@ -219,7 +219,7 @@ def test_the_command_scans_pictures_of_an_object_on_a_mat(tmp_path: Path, capsys
     elsewhere = ["--mat", "--box", "100x100x100@9000,0,0", "--out", str(tmp_path / "elsewhere")]
     capsys.readouterr()
     assert main([*given, *wanted, *elsewhere]) == 4
-    assert "or nothing of what they show lies in the box: move or enlarge --box" in capsys.readouterr().err
+    assert "nothing of what the pairs show lies in the box: move or enlarge --box" in capsys.readouterr().err
     assert not (tmp_path / "elsewhere").exists()
     above = ["--mat", "--box", "100x100x100@0,0,200", "--out", str(tmp_path / "above")]
     assert main([*given, *wanted, *above]) == 4

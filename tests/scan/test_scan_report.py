@@ -185,6 +185,9 @@ def test_the_model_in_the_page_is_the_surface() -> None:
     assert list(_bytes(attributes["data-colours"])) == [1, 2, 3, 4, 5, 6, 7, 8, 9]
     assert list(_bytes(attributes["data-noise"])) == [0, 255, 255]
     assert "3 triangles" not in page.words
+    assert "known: bright" in text
+    once = model_view(ShownModel(MESH, np.full(3, np.nan, np.float32), 0.004), "model.ply")
+    assert "known: bright" not in once  # each point was seen once: how exactly it is known, nobody knows
     assert model_view(ShownModel(Mesh.empty(), np.zeros(0, np.float32), 1.0), "model.ply") == ""
 
 

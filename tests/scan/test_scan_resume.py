@@ -33,20 +33,21 @@ def command(walk: Path, out: Path, *words: str) -> list[str]:
     return [sys.executable, "-m", "phone_host.cli", *map(str, given)]
 
 
-def until_killed(walk: Path, out: Path) -> None:
-    """Scan until the first submap is there, then kill."""
-    with subprocess.Popen(command(walk, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as scan:
+def until_killed(walk: Path, out: Path, number: signal.Signals = signal.SIGKILL) -> tuple[int, str]:
+    """Scan until the first submap is there, then send a signal; return the exit code, and what was told."""
+    with subprocess.Popen(command(walk, out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as scan:
         end = time.monotonic() + WAIT_S
         while not list(out.glob("submap-*.bin")) and time.monotonic() < end and scan.poll() is None:
             time.sleep(0.005)
-        scan.send_signal(signal.SIGKILL)
-    assert scan.returncode == -signal.SIGKILL
+        scan.send_signal(number)
+        told = scan.communicate(timeout=WAIT_S)[1]
+    return scan.returncode, told
 
 
 def test_a_killed_scan_is_resumed(walk: Path, tmp_path: Path) -> None:
     """All 30 pairs are in the model, those of the submap are not computed again, what is lost is told, and no submap stays."""
     out = tmp_path / "out"
-    until_killed(walk, out)
+    assert until_killed(walk, out)[0] == -signal.SIGKILL
     assert not (out / "model.ply").exists()
     again = subprocess.run(
         command(walk, out, "--resume", str(out)), capture_output=True, text=True, check=False, timeout=WAIT_S
@@ -59,6 +60,29 @@ def test_a_killed_scan_is_resumed(walk: Path, tmp_path: Path) -> None:
     assert stations[:, 0].tolist() == list(range(30))
     # The camera was at the same place at pairs 0, 4, 8 ... 28.
     assert np.ptp(stations[::4, 1:4], axis=0).max() < 0.003
+    assert not list(out.glob("submap-*.bin"))
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_scan_that_is_stopped_keeps_its_model_and_is_resumed(
+    walk: Path, tmp_path: Path, number: signal.Signals, code: int
+) -> None:
+    """The model of the pairs so far is there, and it is said how to go on: from the last pair, to the whole model."""
+    out = tmp_path / "out"
+    ended, told = until_killed(walk, out, number)
+    assert ended == code
+    assert f"--resume {out} goes on with it" in told
+    assert told.splitlines()[-1].endswith("terminated" if number is signal.SIGTERM else "interrupted")
+    report = json.loads((out / "report.json").read_text())
+    assert report["interrupted_of"] == 30
+    assert 20 <= report["in_model"] < 30
+    assert (out / "model.ply").exists()
+    again = subprocess.run(
+        command(walk, out, "--resume", str(out)), capture_output=True, text=True, check=False, timeout=WAIT_S
+    )
+    assert again.returncode == 0, again.stderr
+    assert f"with {report['in_model']} pairs" in again.stderr
+    assert json.loads(again.stdout)["in_model"] == 30
     assert not list(out.glob("submap-*.bin"))
 
 

@@ -33,6 +33,7 @@ def recording(
     chunk_each: int = 4,
     image: Callable[[str, int], bytes] = lambda _, number: payload(number),
     cameras: Mapping[str, CameraDescription] = MappingProxyType({}),
+    rig: bytes = b"a: 1\n" * 50,
 ) -> bytes:
     """A recording of so many pairs, the left images of which come from the board; some left images are missing.
 
@@ -42,11 +43,12 @@ def recording(
         chunk_each: pairs in a chunk.
         image: the image of a side and a number, as JPEG.
         cameras: what is told of the camera of a side.
+        rig: content of the rig.yaml in it.
     """
     data = bytearray()
     writer = McapWriter(data.extend, "a test", topics())
     writer.tell(ABOUT, About(unix_ns=ZERO_NS, board_side="left").values())
-    writer.attach("rig.yaml", "text/yaml", b"a: 1\n" * 50, ZERO_NS)
+    writer.attach("rig.yaml", "text/yaml", rig, ZERO_NS)
     for side, camera in cameras.items():
         writer.tell(camera_name(side), camera_values(camera))
     for number in range(pairs):

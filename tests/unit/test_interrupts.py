@@ -41,6 +41,25 @@ raise SystemExit(run_command(ExamplesFirstParser("sample"), [], command))
 """
 
 
+_KEEPS = """
+import argparse, os, sys, time
+from common.program.commandline import ExamplesFirstParser, run_command
+from common.program.interrupts import interruptible, leave_at_once
+from phone_host.run.kept import kept_if_interrupted
+leave_at_once()
+def write():
+    os.write(1, b"writing")
+    time.sleep(float(sys.argv[1]))
+    os.write(1, b" written")
+def command(options):
+    with interruptible(native=True), kept_if_interrupted(write):
+        os.write(1, b"begun")
+        time.sleep(60)
+raise SystemExit(run_command(ExamplesFirstParser("sample"), [], command))
+"""
+"""A command that writes, in so many seconds, what it has come to."""
+
+
 def test_the_cursor_comes_back_and_the_line_stands_alone(tmp_path: Path) -> None:
     """A bar has hidden the cursor and stands in its line; after Ctrl-C the bar is gone, the cursor is there, and one line says why."""
     code = _STUCK.format(begun=2, said=b"\x1b[?25lmatching 40%")
@@ -83,3 +102,21 @@ def test_sigterm_ends_a_computation_with_one_line(code: str) -> None:
         process.send_signal(signal.SIGTERM)
         assert process.communicate(timeout=20)[1] == b"terminated\n"
         assert process.returncode == 143
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_what_was_computed_is_written_however_long_it_takes(number: signal.Signals, code: int) -> None:
+    """Longer than a command may take to leave; a second signal ends that, too."""
+    for seconds, again, written in ((2, False, b" written"), (60, True, b"")):
+        command = [sys.executable, "-P", "-c", _KEEPS, str(seconds)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            assert os.read(process.stdout.fileno(), 5) == b"begun"
+            process.send_signal(number)
+            assert os.read(process.stdout.fileno(), 7) == b"writing"
+            if again:
+                process.send_signal(number)
+            out, told = process.communicate(timeout=30)
+        assert out == written
+        assert told.endswith(b"terminated\n" if number is signal.SIGTERM else b"interrupted\n")
+        assert process.returncode == code

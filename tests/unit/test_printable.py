@@ -61,6 +61,10 @@ def test_a_triangle_turned_round_and_a_third_one_at_an_edge_are_found() -> None:
     assert Flaw.TANGLED in checked(trimesh.Trimesh(shape.vertices, turned, process=False))
     more = np.vstack([shape.faces, [0, 1, 7]])
     assert Flaw.TANGLED in checked(trimesh.Trimesh(shape.vertices, more, process=False))
+    corners = [[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]]
+    two = checked(trimesh.Trimesh(corners, [[0, 1, 2], [0, 1, 3]], process=False))
+    assert two[Flaw.TANGLED].sentence.startswith("1 edge joins more than two triangles")
+    assert two[Flaw.OPEN].sentence.startswith("4 edges end in nothing")
 
 
 def test_what_is_inside_out_is_told() -> None:

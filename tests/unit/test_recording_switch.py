@@ -114,4 +114,4 @@ def test_what_is_said_while_it_grows_and_then() -> None:
     failed = RecordingAccount(
         file="s", frames=1, dropped=0, lost=3, size_bytes=9, failure=Trouble("it is full", "make room")
     )
-    assert failed.words == "recorded: 1 images, 0.0 MB in s; not in it: 3 came after its end; it is full: make room"
+    assert failed.words == "recorded: 1 image, 0.0 MB in s; not in it: 3 came after its end; it is full: make room"

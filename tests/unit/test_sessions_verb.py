@@ -78,5 +78,5 @@ def test_a_new_recording_has_a_name_of_its_own(tmp_path: Path, capsys: pytest.Ca
 def test_a_folder_that_is_not_there_is_told_as_such(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A mistyped name is no data set of another form; nothing is written."""
     out = tmp_path / "out.mcap"
-    assert "kiti is no folder" in _error(["import", str(tmp_path / "kiti"), "--out", str(out)], capsys, 3)
+    assert "kiti is no folder" in _error(["import", str(tmp_path / "kiti"), "--out", str(out)], capsys)
     assert not out.exists()

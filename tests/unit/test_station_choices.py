@@ -11,6 +11,7 @@ from phone_host.serve.station import Station
 from phone_host.verbs.serve.kept_choices import kept
 from phone_host.verbs.serve.program import Commands
 from phone_host.web.source import Command, Do
+from tests.support.pictures import jpeg
 
 
 def test_what_the_file_says_is_checked_at_the_start(tmp_path: Path) -> None:
@@ -26,9 +27,15 @@ def test_what_the_file_says_is_checked_at_the_start(tmp_path: Path) -> None:
     )
     refused = station.command(Command(do=Do.SET, values={"pairs": "3"})).trouble
     assert refused == station.state().trouble
-    assert station.command(Command(do=Do.SET, values={"camera": "replay:frames"})).trouble is None
+    missing = station.command(Command(do=Do.SET, values={"camera": f"replay:{tmp_path}/nope"})).trouble
+    assert missing == Trouble(
+        f"replay '{tmp_path}/nope' does not exist", "give a folder of images, an image or a quoted glob"
+    )
+    (tmp_path / "frames").mkdir()
+    (tmp_path / "frames" / "0.jpg").write_bytes(jpeg(32, 24, seed=1))
+    assert station.command(Command(do=Do.SET, values={"camera": f"replay:{tmp_path}/frames"})).trouble is None
     assert station.state().trouble is None
-    assert 'camera = "replay:frames"' in file.read_text()
+    assert f'camera = "replay:{tmp_path}/frames"' in file.read_text()
 
 
 def test_what_is_set_at_the_same_moment_is_all_kept(tmp_path: Path) -> None:

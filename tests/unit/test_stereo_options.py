@@ -183,6 +183,7 @@ def test_a_rejected_rig_is_refused_unless_it_is_asked_for() -> None:
     ("words", "problem"),
     [
         (("--rectified",), "--rectified without --disparities"),
+        (("--rectified", "--disparities", "1000000000"), "--disparities 1000000000 is more than any image is wide"),
         (("--rectified", "--disparities", "16", "--far", "5m"), "--far without --focal and --baseline"),
         (("--rectified", "--disparities", "16", "--near", "5m"), "--near without --focal and --baseline"),
         (("--far", "5m"), "--far without --calibration"),

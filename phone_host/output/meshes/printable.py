@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.words import counted
 from phone_host.output.meshes.nearby import Grid, hits
 
 Points = NDArray[np.float64]
@@ -123,13 +124,21 @@ def _edges(triangles: Triangles) -> list[Problem]:
     lone = counts == 1
     tangled = ~lone & ((counts != 2) | (ahead != 1))
     found = []
-    for flaw, bad, word, remedy in (
-        (Flaw.OPEN, lone, "edges end in nothing: the surface has holes", "scan what is missing, or make a relief of one pair"),
-        (Flaw.TANGLED, tangled, "edges join more than two triangles, or two that face different ways", "scan again, or mend it in a mesh editor"),
-    ):  # fmt: skip
+    for flaw, bad, one, several, remedy in (
+        (Flaw.OPEN, lone, "edge ends", "edges end", "scan what is missing, or make a relief of one pair"),
+        (Flaw.TANGLED, tangled, "edge joins", "edges join", "scan again, or mend it in a mesh editor"),
+    ):
         if number := int(bad.sum()):
-            found.append(_problem(flaw, f"{number} {word}", remedy, bad[edge].reshape(-1, 3).any(axis=1)))
+            words = f"{counted(number, one, several)} {_EDGES[flaw]}"
+            found.append(_problem(flaw, words, remedy, bad[edge].reshape(-1, 3).any(axis=1)))
     return found
+
+
+_EDGES: Final = {
+    Flaw.OPEN: "in nothing: the surface has holes",
+    Flaw.TANGLED: "more than two triangles, or two that face different ways",
+}
+"""What they end in, or join."""
 
 
 def volume_mm3(corners: Points) -> float:

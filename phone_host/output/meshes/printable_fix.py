@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from common.words import counted
 from phone_host.output.meshes.decimated import NoLibraryError
 from phone_host.output.meshes.printable import Points, Printer, Triangles, bodies, fit_of, volume_mm3
 
@@ -58,7 +59,7 @@ def fixed(points_mm: Points, triangles: Triangles, printer: Printer, *, needs_ba
     sizes = np.bincount(body)
     if len(sizes) > 1:
         triangles = triangles[body == sizes.argmax()]
-        said.append(f"dropped {len(sizes) - 1} bodies beside the largest")
+        said.append(f"dropped {counted(len(sizes) - 1, 'body', 'bodies')} beside the largest")
     if volume_mm3(points_mm[triangles]) < 0:
         triangles = triangles[:, ::-1]
         said.append("turned the triangles outwards")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.words import counted
 from phone_host.output.meshes.solid import Solid, sound_solid, welded
 
 _TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -58,7 +59,7 @@ def read_stl(content: bytes, name: str, unit_m: float) -> Solid:
             return _soup(corners.astype(np.float64), name, unit_m)
         if not content.startswith(b"solid"):
             raise DataError(
-                f"{name} is cut short: its header names {count} triangles, {max(0, len(content) - _HEADER - 4) // _TRIANGLE.itemsize} are there",
+                f"{name} is cut short: its header names {counted(count, 'triangle')}, {max(0, len(content) - _HEADER - 4) // _TRIANGLE.itemsize} are there",
                 "copy the file again",
             )
     if not content.lstrip().startswith(b"solid") or b"endsolid" not in content:

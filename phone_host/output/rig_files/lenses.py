@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.errors import DataError
+from common.words import counted
 from phone_host.model import Lens
 from phone_host.output.rig_files.stated import StatedCamera
 from phone_host.output.rig_files.tree import Node
@@ -64,7 +65,7 @@ def lens_of(name: Node, coefficients: Node, names: Names) -> tuple[Lens, tuple[f
         raise name.problem(f"is {word!r}", f"read are {', '.join(each.name for each in names)}")
     values = coefficients.values()
     if len(values) not in known.counts:
-        said = f"has {len(values)} values"
+        said = f"has {counted(len(values), 'value')}"
         raise coefficients.problem(said, f"{word} has {' or '.join(map(str, known.counts))}")
     if word == "none" and any(values):
         raise coefficients.problem("bends rays", f"but {name.key} is none; name the model")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.words import counted
 from phone_host.model import Lens, Rectification, Rig
 from phone_host.output.rig_files.stated import StatedCamera, StatedRig, rotation_of, stated_of
 from phone_host.output.rig_files.texts import RigText, number
@@ -88,7 +89,9 @@ def _camera(node: Node, n: str, side: str) -> StatedCamera:
     values = distortion.values()
     lens = _LENSES.get(len(values))
     if lens is None:
-        raise distortion.problem(f"has {len(values)} values", f"OpenCV's models have {', '.join(map(str, _LENSES))}")
+        raise distortion.problem(
+            f"has {counted(len(values), 'value')}", f"OpenCV's models have {', '.join(map(str, _LENSES))}"
+        )
     if node.has("fisheye_model") and node.child("fisheye_model").word() in {"1", "true"}:
         lens = Lens.FISHEYE
     width_px, height_px = _size_px(node, n, side)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.words import counted
 
 Tree = str | list["Tree"] | dict[str, "Tree"]
 """A scalar as it is written, a list, or a map."""
@@ -85,7 +86,7 @@ class Node:
         if not isinstance(found, list) or any(not isinstance(each, str) for each in found):
             raise self.problem("is no list of numbers", "write it as [1.0, 2.0]")
         if counts and len(found) not in counts:
-            raise self.problem(f"has {len(found)} values", f"it must have {' or '.join(map(str, counts))}")
+            raise self.problem(f"has {counted(len(found), 'value')}", f"it must have {' or '.join(map(str, counts))}")
         return tuple(self._number(str(each)) for each in found)
 
     def number(self) -> float:

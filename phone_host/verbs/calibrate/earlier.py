@@ -7,6 +7,7 @@ from pathlib import Path
 
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
+from common.words import counted
 from phone_host.calibration.board_names import board_name, named_board
 from phone_host.calibration.board_pairs import BoardPair, Calibration
 from phone_host.calibration.board_views import Mounted
@@ -201,7 +202,9 @@ def notes(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> list[str]:
     if series.views is not None:
         fresh = len(new_ones(pairs_of(series.views), pairs))
         known = f"; {len(pairs) - fresh} were in it already" if fresh < len(pairs) else ""
-        return [f"from     {len(series.views.names)} pairs of {series.path} and {fresh} new ones{known}"]
+        return [
+            f"from     {counted(len(series.views.names), 'pair')} of {series.path} and {counted(fresh, 'new one')}{known}"
+        ]
     rows = [f"from     {series.path}: its lenses are kept, the relative pose is new"]
     for side, model, size_px in (("left", series.rig.left, sizes_px[0]), ("right", series.rig.right, sizes_px[1])):
         if size_px != _size(model):

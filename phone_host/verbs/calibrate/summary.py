@@ -43,7 +43,7 @@ def pairing_notes(files: ViewFiles) -> list[str]:
     if files.by_number or files.by_name or not (files.left_alone or files.right_alone):
         return []
     left, right = (len(files.pairs) + len(alone) for alone in (files.left_alone, files.right_alone))
-    counts = f"{left} left and {right} right pictures"
+    counts = f"{left} left and {counted(right, 'right picture')}"
     return [f"warning  {counts} were paired in the order of their names, because the names share no numbers"]
 
 

@@ -5,6 +5,7 @@ from typing import Final
 
 from common.errors import SettingsError
 from common.program.terminal import columns, say
+from common.words import counted
 from phone_host.calibration.target import Board, parse_board
 from phone_host.output.json_text import json_text
 from phone_host.report.quality_json import quality_json
@@ -94,7 +95,7 @@ def _distances_m(options: argparse.Namespace, files: ViewFiles) -> tuple[float, 
     found = tuple(limit_mm(one, "--distance", "1200mm") / 1000 for one in options.distance.split(","))
     if len(found) not in {1, len(files.pairs)}:
         raise SettingsError(
-            f"--distance has {len(found)} values, and there are {len(files.pairs)} pairs",
+            f"--distance has {counted(len(found), 'value')}, and there {'is' if len(files.pairs) == 1 else 'are'} {counted(len(files.pairs), 'pair')}",
             "give one for all, or one for each in the order of their names, such as 500mm,1m,2m",
         )
     return found

@@ -91,9 +91,8 @@ def _add_ends(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pairs",
         type=int,
-        default=0,
         metavar="N",
-        help="end after N pairs; exit with code 4 if the stream ends before that",
+        help="end after N pairs; exit with code 4 if the stream ends before that (default 0: no limit)",
     )
     parser.add_argument(
         "--seconds",
@@ -119,7 +118,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--replay",
         metavar="FILE.mcap[?pace=clock]",
-        help="play a recording in place of --link and --camera: every frame with the same partner each time; with pace=clock at the times of then",
+        help="play a recording in place of --link and --camera: every frame with the same partner each time; with pace=clock at the times of then; without --calibration the rig.yaml in it counts",
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for delays.jsonl, report.json, index.html and saved pairs"

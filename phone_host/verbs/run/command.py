@@ -73,7 +73,7 @@ def _page(
 def _watched(options: argparse.Namespace, prepared: PreparedRun, stop: Callable[[], bool]) -> EndReason:
     """Run before the user's eyes: a live table on a terminal, else a line where one is due."""
     host = prepared.host
-    live = LiveTable(host.snapshot, pairs=options.pairs, seconds=options.seconds) if sys.stderr.isatty() else None
+    live = LiveTable(host.snapshot, pairs=options.pairs or 0, seconds=options.seconds) if sys.stderr.isatty() else None
     note = WaitingNote(
         prepared.named, lambda: host.has_met_board, lambda: host.refused, lambda line: say(line, sys.stderr, flush=True)
     )

@@ -25,7 +25,7 @@ from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
-from phone_host.model import Side, TimeOffset
+from phone_host.model import Rig, Side, TimeOffset
 from phone_host.output.json_text import json_text
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.opened import open_playback
@@ -46,6 +46,7 @@ from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 from phone_host.verbs.output_folders import keep_other_report, spare_inputs
 from phone_host.verbs.run.budget import budget_wanted
+from phone_host.verbs.run.own_rig import with_own_rig
 from phone_host.verbs.stereo_options import build_core, depth_wanted, output_options, overlay_of
 
 _MOST_SECONDS: Final = 10_000_000
@@ -249,16 +250,16 @@ def _open_replay(
     options: argparse.Namespace, found: Resolved[PhoneHostSettings], tell: Callable[[str], None]
 ) -> Opened:
     """Open the recording that a run plays, and the core."""
-    settings = found.values
     for name in ("link", "camera", "record", "record_topics", "align_phase"):
         if getattr(options, name, None) is not None:
             raise SettingsError(f"--{name.replace('_', '-')} beside --replay", "leave one of them out")
     playback = open_playback(options.replay, options.board_side)
     if options.out is not None:
-        spare(options.out, "", settings.calibration, options.overlay)
+        spare(options.out, "", found.values.calibration, options.overlay)
         spare_inputs(options.out, NAMES, {"--replay": playback.file})
-    size_px = playback.description.upright_px
-    core, board_side = _core(options, replace(settings, camera=""), size_px, tell, playback.board_side)
+    found, rig = with_own_rig(options, found, playback, tell)
+    settings, size_px = replace(found.values, camera=""), playback.description.upright_px
+    core, board_side = _core(options, settings, size_px, tell, playback.board_side, rig=rig)
     overlay_of(options, core)
     budget_wanted(options, found, core)
     return Opened(options, found, playback, (), (str(playback.file),), key_folder(settings.keys).path, core, board_side)
@@ -309,6 +310,8 @@ def _core(
     size_px: tuple[int, int],
     tell: Callable[[str], None],
     usual: Side = Side.LEFT,
+    *,
+    rig: Rig | None = None,
 ) -> tuple[StereoCore | None, Side]:
     """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else the usual one."""
     images = replayed(settings.camera)
@@ -318,6 +321,7 @@ def _core(
         settings.matcher,
         size_px,
         Path(images) if images else None,
+        rig=rig,
         temporal=settings.temporal,
     )
     board_side = Side(options.board_side) if options.board_side else rig_side or usual
@@ -351,7 +355,7 @@ def _host_settings(opened: Opened, words: Sequence[str]) -> HostSettings:
         board_side=opened.board_side,
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=FifoSettings.parse(settings.fifo),
-        pairs=options.pairs,
+        pairs=options.pairs or 0,
         seconds_ns=round(options.seconds * 1e9),
         wait_ns=None if wait_s is None else round(wait_s * 1e9),
         out=options.out,
@@ -385,9 +389,10 @@ def computed_wanted(options: argparse.Namespace) -> frozenset[Computed]:
 
 
 def _check_numbers(options: argparse.Namespace) -> None:
-    for name, value in (("--pairs", options.pairs), ("--save-every", options.save_every)):
-        if value < 0:
-            raise SettingsError(f"{name} {value}", "give 0 or more")
+    if options.pairs is not None and options.pairs < 0:
+        raise SettingsError(f"--pairs is {options.pairs}", "give 1 or more, or 0 for no limit")
+    if options.save_every < 0:
+        raise SettingsError(f"--save-every is {options.save_every}", "give 0 or more")
     if options.budget == 0:
         raise SettingsError("--budget is 0 ms", "give the time for each pair, for example 30ms, or leave it out")
     if not 0 <= options.seconds <= _MOST_SECONDS:

@@ -67,7 +67,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--replay",
         metavar="FILE.mcap",
-        help="play a recording in place of --link and --camera: all of its pairs, the same each time",
+        help="play a recording in place of --link and --camera: all of its pairs, the same each time; without --calibration the rig.yaml in it counts",
     )
     parser.add_argument(
         "--record",
@@ -75,7 +75,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.mcap",
         help="live: also keep what both cameras give, to scan it again with --replay: finer, or after a crash",
     )
-    parser.add_argument("--pairs", type=int, default=0, metavar="N", help="live: end after N pairs")
+    parser.add_argument("--pairs", type=int, metavar="N", help="live: end after N pairs (default 0: no limit)")
     parser.add_argument(
         "--seconds",
         type=reading(seconds, "--seconds"),

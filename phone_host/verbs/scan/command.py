@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
 def _scan_pictures(options: argparse.Namespace) -> ScanReport:
     """Pair the files and scan them."""
     for name in ("camera", "link", "replay", "record", "pairs", "seconds"):
-        if getattr(options, name):
+        if getattr(options, name) != (0.0 if name == "seconds" else None):
             raise SettingsError(f"--{name} beside pictures", "give either pictures or cameras")
     require_metres(options)
     wanted = scan_wanted(options)
@@ -67,6 +67,7 @@ def _scan_pictures(options: argparse.Namespace) -> ScanReport:
         most_pixels=limit,
         mounted=orientations(options),
         resumed=resumed_of(options),
+        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
     )
     try:
         with step_bar("reading", len(files.pairs)) as watcher:

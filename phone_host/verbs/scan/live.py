@@ -53,6 +53,8 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     resumed = resumed_of(options)
     logs.set_up(log_level(found.values.log_level))
     opened = open_run(of_run, found, _tell)
+    if opened.core is None:
+        raise _no_metres()
     live = live_scan(opened, wanted, options.out, resumed)
     signals = StopSignals()
     prepared = opened.prepared(sys.argv, (live.sink,))
@@ -129,16 +131,21 @@ def _require(options: argparse.Namespace, settings: PhoneHostSettings) -> None:
             "neither pictures nor cameras are given",
             "give two folders, LEFT and RIGHT, or --camera and --link, or --replay FILE.mcap",
         )
-    if not settings.calibration and not (options.rectified and options.focal):
-        raise SettingsError(
-            "no --calibration is given, so there are no metres",
-            "give the rig.yaml of `phone-host calibrate`, or --rectified --focal PX --baseline MM",
-        )
+    may_hold_rig = options.replay is not None and not options.rectified
+    if not settings.calibration and not may_hold_rig and not (options.rectified and options.focal):
+        raise _no_metres()
     if orientations(options) != (UPRIGHT, UPRIGHT):
         raise SettingsError(
             "--rotate-... and --flip-... turn pictures in files",
             "put rotate= and flip= into the camera's address",
         )
+
+
+def _no_metres() -> SettingsError:
+    return SettingsError(
+        "no --calibration is given, so there are no metres",
+        "give the rig.yaml of `phone-host calibrate`, or --rectified --focal PX --baseline MM",
+    )
 
 
 def _require_place(options: argparse.Namespace) -> None:

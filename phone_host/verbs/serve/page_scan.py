@@ -10,6 +10,7 @@ from typing import Final
 
 from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
+from common.words import counted
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.live.scan import LiveScan
 from phone_host.measure.run_snapshot import RunSnapshot
@@ -162,7 +163,7 @@ def asked_box(values: Choices) -> Box | None:
 
 def _words(report: ScanReport) -> str:
     wide, high, deep = (1000 * side for side in report.model.size.extent_m)
-    return f"{report.fused} of {len(report.scanned)} pairs are in the model: {wide:.0f} x {high:.0f} x {deep:.0f} mm"
+    return f"{report.fused} of {counted(len(report.scanned), 'pair')} are in the model: {wide:.0f} x {high:.0f} x {deep:.0f} mm"
 
 
 def _new_folder(folder: Path) -> Path:

@@ -17,7 +17,7 @@ from common.stamp import HOST_CLOCK
 from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.verdict import Verdict
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.factory import open_camera
+from phone_host.camera.factory import open_camera, require_replayed
 from phone_host.camera.http_uri import without_password
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
@@ -106,6 +106,9 @@ class Commands:
         new = with_changes(choices, {name: value for name, value in changes.items() if value != shown.get(name)})
         options = self._options(new)
         checked(options)
+        camera = new.get("camera", "")
+        if camera and camera != choices.get("camera"):
+            require_replayed(camera)
         rig, is_rectified = new.get("calibration"), "rectified" in new
         if idle := [name for name in _OF_DEPTH if changes.get(name) and not (rig or is_rectified)]:
             raise SettingsError(f"--{idle[0]} without a calibration", "calibrate, or name a rig.yaml")

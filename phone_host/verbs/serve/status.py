@@ -5,6 +5,7 @@ from typing import Final, TextIO
 
 from common.plain_text import printable
 from common.program.terminal import columns, say
+from common.words import counted
 from phone_host.measure.headline import headline
 from phone_host.web.source import Activity, PageState
 
@@ -25,7 +26,7 @@ def told(state: PageState) -> str:
     words = _WORDS[state.activity]
     if state.activity is Activity.RUNNING and state.run is not None:
         run = state.run
-        words += f": {run.processed} pairs" if run.processed else ": no pair yet"
+        words += f": {counted(run.processed, 'pair')}" if run.processed else ": no pair yet"
         words += f"; {headline(run).sentence}" if run.images.wants_depth and run.images.judged else ""
     if state.activity is Activity.SCANNING and state.scan is not None:
         words += f": {state.scan.words}"

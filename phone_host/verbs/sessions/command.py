@@ -183,9 +183,7 @@ def _join(options: argparse.Namespace) -> Told:
 
 def _join_lines(out: Path, account: JoinAccount) -> list[str]:
     relation, images = account.relation, account.images
-    written = (
-        f"{images[Side.LEFT]} left and {images[Side.RIGHT]} right images of {account.seconds:.1f} s written to {out}"
-    )
+    written = f"{images[Side.LEFT]} left and {counted(images[Side.RIGHT], 'right image')} of {account.seconds:.1f} s written to {out}"
     known = f"known to +-{relation.uncertainty_ns / 1e6:.2f} ms (95 %)"
     if relation.content is None:
         how = f"joined by the clock exchange that the host stored, {known}"
@@ -199,7 +197,7 @@ def _join_lines(out: Path, account: JoinAccount) -> list[str]:
 def _export(options: argparse.Namespace) -> Told:
     recorded = open_recorded(options.paths[0])
     counts = export_folders(recorded, options.out)
-    text = f"{counts['left']} left and {counts['right']} right images written to {options.out}"
+    text = f"{counts['left']} left and {counted(counts['right'], 'right image')} written to {options.out}"
     return {"folder": str(options.out), "images": counts}, "\n  ".join(
         [text, *(f"missing: {one.text}" for one in recorded.damages)]
     )
@@ -211,5 +209,5 @@ def _import(options: argparse.Namespace) -> Told:
         counts = import_topics(first, options.topics, options.out)
     else:
         counts = import_folders(options.paths, options.times, options.out)
-    text = f"{counts['left']} left and {counts['right']} right images written to {options.out}"
+    text = f"{counts['left']} left and {counted(counts['right'], 'right image')} written to {options.out}"
     return {"file": str(options.out), "images": counts}, text

@@ -99,7 +99,7 @@ export class ScanPanel {
     this.wasEnding = isEnding;
     data(byId('scan-state'), 'level', scan.level);
     text(byId('scan-words'), sentence(isOn || scan.folder ? scan.words : (step?.words ?? '')));
-    text(byId('scan-pairs'), scan.pairs && !scan.folder ? `${scan.fused} of ${scan.pairs} pairs are in the model` : '');
+    text(byId('scan-pairs'), scan.pairs && !scan.folder ? `${scan.fused} of ${scan.pairs} ${scan.pairs === 1 ? 'pair' : 'pairs'} are in the model` : '');
     text(byId('scan-folder'), scan.folder ? `Saved in ${scan.folder}` : '');
     keep(byId('scan-files'), scan.files, (name) => name, (name) => make('li', '', link(name)), () => undefined);
     show(byId('scan-saved'), scan.files.length > 0);
