@@ -52,9 +52,8 @@ def _kinds(text: str) -> list[str]:
     kinds = [word.strip().lower() for word in text.split(",")]
     for kind in kinds:
         if kind not in FORMATS:
-            raise SettingsError(
-                f"--to {text!r} names {kind!r}, which is no format", f"give some of {','.join(FORMATS)}"
-            )
+            what = f"--to {text!r} names {kind!r}" if "," in text else f"--to is {text!r}"
+            raise SettingsError(f"{what}, which is no format", f"give some of {','.join(FORMATS)}")
     return list(dict.fromkeys(kinds))
 
 
