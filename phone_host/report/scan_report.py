@@ -177,15 +177,22 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
         return Headline.BAD, f"The model cannot be right: {blocking}."
     if not report.model.triangles:
         return Headline.BAD, f"There is no surface: {fused} of {counted(count, 'pair')} could be put together."
+    unseen = report.model.unseen_share
+    if unseen >= 1:
+        return (
+            Headline.BAD,
+            f"Nothing of the surface was seen: {fused} of {counted(count, 'pair')} could be put together.",
+        )
     told = f"{fused} of {counted(count, 'pair')} are in the model"
     if fused < max(2, _LEAST_SHARE * count):
         return Headline.BAD, f"Only {told}."
     sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
-    noise = f"its surface is known to \u00b1 {report.model.noise_m * 1e3:.2g} mm if the pairs err independently"
+    noise_m = report.model.noise_m
+    noise = f"; its surface is known to \u00b1 {noise_m * 1e3:.2g} mm if the pairs err independently"
+    known = noise if math.isfinite(noise_m) else ""
     verdict = Headline.GOOD if min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
-    unseen = report.model.unseen_share
     closed = "" if math.isnan(unseen) else f"; {share_text(unseen)} of it was not seen"
-    return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}; {noise}{closed}."
+    return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}{known}{closed}."
 
 
 def share_text(share: float) -> str:

@@ -72,8 +72,8 @@ def report_of(
 
 
 def _box_remarks(scan: Scan, model: ScanModel) -> tuple[Remark, ...]:
-    """Say that the box that was asked for may be elsewhere, where there is no surface."""
-    is_empty = scan.wanted.box is not None and not len(model.mesh.triangles)
+    """Say that the box that was asked for may be elsewhere, where there is no surface, or none of it was seen: it was closed out of nothing."""
+    is_empty = scan.wanted.box is not None and not model.seen.any()
     return (_EMPTY_BOX,) if is_empty else ()
 
 
