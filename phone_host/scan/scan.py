@@ -116,6 +116,7 @@ class Scan:
         tracker: of the pairs since the first that has depth; None before it.
         geometry: of these.
         size_px: width and height of their rectified images.
+        begun_voxel_m: distance of two values of the field when it was begun, m; greater now where the memory was full. NaN before the first pair.
 
     Args:
         wanted: what for.
@@ -141,6 +142,7 @@ class Scan:
         self._later: dict[str, ScannedPair] = {}  # pairs of which something else has become, by name
         self._missing = Weakness.NO_MAT  # why the last pair that has depth did not begin the model
         self._is_changed = False  # whether submaps that are closed do not hold any more
+        self._voxel_m = self.begun_voxel_m = math.nan  # of the field as of the last pair, and of the first
 
     @property
     def wanted(self) -> ScanWanted:
@@ -204,7 +206,9 @@ class Scan:
                     "give the same options as then, or begin a new scan",
                 )
             require_size(name, view, self.size_px)
+            self._note_fineness(self.tracker.volume.settings.voxel_m)
             told = self.tracker.track(view)
+            self._note_fineness(self.tracker.volume.settings.voxel_m)
             self._joined(told.joined)
             self._moved(told.moved_views)
             if told.is_fused:
@@ -230,6 +234,16 @@ class Scan:
             )
         self._pairs.append(pair)
         return pair
+
+    def _note_fineness(self, voxel_m: float) -> None:
+        """Note that the field has become coarser: closed submaps do not hold any more, and the box is carved in as coarse cells."""
+        if math.isnan(self._voxel_m):
+            self.begun_voxel_m = voxel_m
+        elif voxel_m != self._voxel_m:
+            self._is_changed, self._carving = True, self._carving_of(self._wanted.model_box)
+            if self._carving is not None:
+                self._depths.carve(self._carving)
+        self._voxel_m = voxel_m
 
     def _joined(self, views: Sequence[Joined]) -> None:
         """Note that pairs that were lost have become part of the model; what they saw carves, too."""
@@ -276,8 +290,12 @@ class Scan:
                 self._missing = begun
                 return None
             return begun
-        settings = fineness_for(view, wanted.voxel_m, wanted.most_bytes)
-        return Tracker(settings, wanted.threads, loops=wanted.loops)
+        return self._tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes))
+
+    def _tracker(self, settings: VolumeSettings) -> Tracker:
+        """Return one that makes the model coarser when its memory is full, unless a fineness was asked for."""
+        wanted = self._wanted
+        return Tracker(settings, wanted.threads, loops=wanted.loops, coarsens=math.isnan(wanted.voxel_m))
 
     def final(self, pair: ScannedPair) -> ScannedPair:
         """Return what has become of a pair since it was taken.
@@ -348,7 +366,7 @@ class Scan:
         self.tracker = (
             MatTracker(wanted.mat, wanted.model_box, settings, wanted.threads)
             if wanted.mat is not None and wanted.model_box is not None
-            else Tracker(settings, wanted.threads)
+            else self._tracker(settings)
         )
         places = 0
         for each in submaps:
