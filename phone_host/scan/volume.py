@@ -28,7 +28,7 @@ from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, To
 _LOOKS_A_BLOCK: Final = 3
 _NEARLY_FULL: Final = 0.97
 _CUBE: Final = (-1, SIDE, SIDE, SIDE)
-_HALF: Final = SIDE // 2
+_HALF, _EVEN = SIDE // 2, slice(None, None, 2)
 _MOST_STEP_PX: Final = 4
 """Of the pixels that make room: every fourth, or more where a block is less than 12 px wide at the farthest depth."""
 
@@ -191,7 +191,7 @@ class Volume:
         for octant in product((0, 1), repeat=3):
             chosen = np.flatnonzero((old & 1 == octant).all(axis=1))
             x, y, z = (slice(_HALF * at, _HALF * (at + 1)) for at in octant)
-            target, source = (numbers[chosen], z, y, x), (chosen, *[slice(None, None, 2)] * 3)
+            target, source = (numbers[chosen], z, y, x), (chosen, _EVEN, _EVEN, _EVEN)
             made.field.reshape(_CUBE)[target] = field[source]
             made.weights.reshape(_CUBE)[target] = of.weights[:count].reshape(_CUBE)[source]
             made.colours.reshape((*_CUBE, 3))[target] = of.colours[:count].reshape((*_CUBE, 3))[source]
