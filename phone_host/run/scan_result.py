@@ -14,9 +14,10 @@ from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.run.turn_remarks import keeps_field
 from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 
 _EMPTY_BOX = Remark(

@@ -14,22 +14,22 @@ from common.errors import SettingsError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
-from phone_host.scan.carving import Carved, Carving
+from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
-from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.mat_tracker import MatTracker, begun_on_mat
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.stretches import Placed
 from phone_host.scan.taken_view import require_size, view_of
-from phone_host.scan.tracker import Tracker, TrackerState
+from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
-from phone_host.scan.volume import BlockValues, Volume
+from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.images import size_px
 
@@ -38,65 +38,6 @@ _SUBMAP_PAIRS: Final = 20
 
 _MOST_COPIES: Final = 3
 """Submaps hold no more than this many times the model's blocks."""
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ScannedPair:
-    """What became of a pair.
-
-    Attributes:
-        name: of the pair.
-        stamp_s: when it was taken, s, from any beginning; its number where nobody knows.
-        world_camera: where the rectified left camera was; where it is lost, as far as odometry tells.
-        state: how sure that is.
-        weakness: why it is not surer.
-        density: share of the pixels that have a depth, 0..1.
-        corners: that agree on the motion since the last pair; 0 for the first.
-        overlap: share of its depths that lie on the model, 0..1; NaN: not compared.
-        off_m: mean distance of these from the model, m; NaN: not compared.
-        mat: what the mat told; None: it was not seen, or nobody looked for it.
-    """
-
-    name: str
-    stamp_s: float
-    world_camera: SE3
-    state: Tracking
-    weakness: Weakness
-    density: float
-    corners: int = 0
-    overlap: float = math.nan
-    off_m: float = math.nan
-    mat: MatSaid | None = None
-
-    @property
-    def is_fused(self) -> bool:
-        """Whether it became part of the model."""
-        return self.state is not Tracking.LOST
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Submap:
-    """What a scan has learnt since its last submap was closed; all of them together are the scan.
-
-    Attributes:
-        is_whole: whether it holds everything since the beginning; what was closed before is not needed any more.
-        pairs: since then, in order.
-        settings: of the model.
-        geometry: of the pairs.
-        size_px: width and height of their rectified images.
-        blocks: those that got something since then, with all that they hold.
-        tracker: where it stood at the end, and the places since then.
-        carved: what all views since the beginning told of the box; None: there is none.
-    """
-
-    is_whole: bool
-    pairs: tuple[ScannedPair, ...]
-    settings: VolumeSettings
-    geometry: StereoGeometry
-    size_px: tuple[int, int]
-    blocks: BlockValues
-    tracker: TrackerState
-    carved: Carved | None = None
 
 
 @dataclass(frozen=True, slots=True)
