@@ -25,7 +25,7 @@ from phone_host.report.scan_report import (
     share_text,
     stretches,
 )
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_parts import legend
 

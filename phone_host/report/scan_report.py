@@ -19,7 +19,7 @@ from phone_host.report.report_page import Headline
 from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
 from phone_host.scan.mat import Mat
 from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.box import Box
+from phone_host.scan.exact_depths import with_exact_depths
 from phone_host.scan.fineness import thinner
 from phone_host.scan.mat import Mat, mat_corners
 from phone_host.scan.mat_pose import MatPose, MatScale, fit_mat
@@ -156,6 +157,7 @@ class MatTracker:
 
     def _fused(self, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
         self._pose = pose
+        view = with_exact_depths(view, depths_inside(view, pose, self._room))
         inside = depths_inside(view, pose, self._room)
         self._last = reduced(replace(view, depth_m=inside))
         self.volume.fuse(view, pose, inside)

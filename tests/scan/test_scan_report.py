@@ -21,7 +21,7 @@ from phone_host.report.scan_report import ModelFigures, ScanReport, scan_verdict
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import MeshSize
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
 from tests.support.html import Page
