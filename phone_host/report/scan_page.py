@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from common.imagesize.head import size_text
-from common.words import counted, distance_text
+from common.words import counted, distance_text, two_digits
 from phone_host.output.axes import Axes
 from phone_host.report.model_view import ShownModel, model_view
 from phone_host.report.page_frame import document, section, table, two_widths
@@ -92,9 +92,9 @@ def _known(model: ModelFigures) -> tuple[Figure, ...]:
     return (
         Figure(
             label="surface known to",
-            value=f"\u00b1 {model.noise_m * 1e3:.2g}",
+            value=f"\u00b1 {two_digits(model.noise_m * 1e3)}",
             unit="mm",
-            note=f"median; 19 in 20 points to \u00b1 {model.noise_p95_m * 1e3:.2g} mm, if the pairs err independently",
+            note=f"median; 19 in 20 points to \u00b1 {two_digits(model.noise_p95_m * 1e3)} mm, if the pairs err independently",
         ),
     )
 
@@ -125,7 +125,7 @@ def _off(off_m: float) -> tuple[Figure, ...]:
     if not math.isfinite(off_m):
         return ()
     return (
-        Figure(label="pairs off the model", value=f"{off_m * 1e3:.2g}", unit="mm", note="mean; median of the pairs"),
+        Figure(label="pairs off the model", value=two_digits(off_m * 1e3), unit="mm", note="mean; median of the pairs"),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from common.words import counted
+from common.words import counted, two_digits
 from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.report.mat_figures import MatFigures, mat_figures
@@ -188,7 +188,7 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
         return Headline.BAD, f"Only {told}."
     sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
     noise_m = report.model.noise_m
-    noise = f"; its surface is known to \u00b1 {noise_m * 1e3:.2g} mm if the pairs err independently"
+    noise = f"; its surface is known to \u00b1 {two_digits(noise_m * 1e3)} mm if the pairs err independently"
     known = noise if math.isfinite(noise_m) else ""
     verdict = Headline.GOOD if min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
     closed = "" if math.isnan(unseen) else f"; {share_text(unseen)} of it was not seen"
