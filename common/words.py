@@ -27,3 +27,8 @@ def times(count: int) -> str:
 def distance_text(metres: float) -> str:
     """Write a distance with about three digits: `38 m`, `1.25 m`, `300 mm`."""
     return f"{metres * 1000:.3g} mm" if metres < 1.0 else f"{metres:.3g} m" if metres < 1000 else f"{metres:.0f} m"
+
+
+def two_digits(value: float) -> str:
+    """Return a number to two digits, without an exponent: 0.19, 91, 210."""
+    return f"{float(f'{value:.2g}'):g}"

@@ -107,7 +107,8 @@ class ExamplesFirstParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print the problem as one line on stderr, without the usage, and exit with code 2."""
-        self.exit(2, f"{self.prog}: error: {self.problem(message)}: see {self.prog} --help\n")
+        line = f"{self.prog}: error: {self.problem(message)}: see {self.prog} --help"
+        self.exit(2, f"{fitted(line, sys.stderr)}\n")
 
     def problem(self, message: str) -> str:
         """Say in one line of plain words what argparse found wrong.
@@ -151,12 +152,20 @@ _READERS: Final[dict[Any, Callable[[str], Any]]] = {Path: _path, str: _text, int
 """What reads the values of arguments that are declared with one of Python's own types."""
 
 
+def _no_choice(name: str, given: str, choices: Sequence[str]) -> str:
+    """Say that a value is none of those there are."""
+    if name == "VERB":
+        verb = given.strip("'")
+        listed = f" (the verbs are {', '.join(choices)})"
+        return f"unknown verb {verb}{_guess(verb, choices) or listed}"
+    listed = " or ".join(filter(None, (", ".join(choices[:-1]), choices[-1])))
+    return f"{name} is {given}, but must be {listed}"
+
+
 def _plain(message: str) -> str:
     """Put argparse's own messages into plain words."""
-    if found := re.fullmatch(r"argument VERB: invalid choice: '(.*)' \(choose from (.*)\)", message):
-        verbs = re.findall(r"[\w-]+", found[2])
-        listed = f" (the verbs are {', '.join(verbs)})"
-        return f"unknown verb {found[1]}{_guess(found[1], verbs) or listed}"
+    if found := re.fullmatch(r"argument (\S+): invalid choice: (.*?) \(choose from (.*)\)", message):
+        return _no_choice(found[1], found[2], re.findall(r"[^\s,']+", found[3]))
     if found := re.fullmatch(r"argument (\S+): invalid (decimal|whole)_number value: (.*)", message):
         kind = "a whole number, such as 30" if found[2] == "whole" else "a number without a unit, such as 1.5"
         return f"{found[1]} is {found[3]}, but must be {kind}"

@@ -13,10 +13,10 @@ from typing import Final, TextIO
 from common.plain_text import printable, printable_lines
 
 _COMMAND: Final = re.compile(
-    r"\s*(\S+(?: \S+)? {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)(?!\S)|(python3?|pipx?|sudo|make|\.) )"
+    r"(?!\S+(?: \S+)?: error: )\s*(\S+(?: \S+)? {2,})?((?:'[^']*/|\S*/)?(phone-host|board-agent|delay-bench)(?!\S)|(python3?|pipx?|sudo|make|\.) )"
 )
 """A line that is a command, maybe behind a label of one or two words. It stays whole, because it is there to be pasted.
-An error begins with a command's name too, but with a colon behind it."""
+An error begins with a command's name too, and maybe a verb's, but with a colon behind it."""
 
 _COLUMN: Final = re.compile(r"\S( {2,})(?=\S)")
 _FARTHEST: Final = 0.45

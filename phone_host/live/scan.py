@@ -25,8 +25,8 @@ from phone_host.run.sinks import FunctionSink
 from phone_host.run.turn_remarks import field_of_turn, turn_remarks
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
-from phone_host.scan.scan import ScannedPair, Submap
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.volume_settings import LEAST_WEIGHT
 from phone_host.scan.ways import scan_for
 

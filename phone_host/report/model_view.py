@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.words import two_digits
 from phone_host.output.axes import Axes
 from phone_host.report.depth_data import text_of
 from phone_host.report.depth_view import THIN
@@ -95,7 +96,7 @@ def _buttons(model: ShownModel) -> str:
 
 
 def _paints(best_m: float, worst_m: float) -> str:
-    known = f"how exactly it is known: bright \u00b1 {best_m * 1e3:.2g} mm, dark \u00b1 {worst_m * 1e3:.2g} mm"
+    known = f"how exactly it is known: bright \u00b1 {two_digits(best_m * 1e3)} mm, dark \u00b1 {two_digits(worst_m * 1e3)} mm"
     told = (("noise", known),) if math.isfinite(best_m) else ()
     choices = (("colour", "colours"), ("shape", "shape alone"), *told)
     return "".join(

@@ -7,7 +7,7 @@ from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
 from phone_host.report.scan_report import ScanReport, scan_verdict
 from phone_host.report.stereo_report import FailedPair
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 
 
 def scan_json(report: ScanReport) -> dict[str, Any]:

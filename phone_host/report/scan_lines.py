@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from common.imagesize.head import size_text
-from common.words import counted, distance_text
+from common.words import counted, distance_text, two_digits
 from phone_host.report.mat_figures import MatFigures
 from phone_host.report.scan_report import ScanReport, scan_verdict, stretches
 
@@ -51,7 +51,7 @@ def mat_line(mat: MatFigures) -> str:
     square = f"{mat.measured_m * 1e3:.2f} \u00b1 {mat.measured_sigma_m * 1e3:.2f} mm"
     return (
         f"the mat is seen in {counted(mat.pairs, 'pair')}, {left} and {right} of its {mat.corners} corners (median); places are known to"
-        f" \u00b1 {mat.sigma_m * 1e3:.2g} mm; its squares measure {square}"
+        f" \u00b1 {two_digits(mat.sigma_m * 1e3)} mm; its squares measure {square}"
     )
 
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from common.imagesize.head import size_text
-from common.words import counted, distance_text
+from common.words import counted, distance_text, two_digits
 from phone_host.output.axes import Axes
 from phone_host.report.model_view import ShownModel, model_view
 from phone_host.report.page_frame import document, section, table, two_widths
@@ -25,7 +25,7 @@ from phone_host.report.scan_report import (
     share_text,
     stretches,
 )
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_parts import legend
 
@@ -86,6 +86,19 @@ def _axes_words(axes: Axes) -> str:
     return axes.text if axes.is_upright else f"{axes.text} at the first pair"
 
 
+def _known(model: ModelFigures) -> tuple[Figure, ...]:
+    if not math.isfinite(model.noise_m):  # of no surface that was seen
+        return ()
+    return (
+        Figure(
+            label="surface known to",
+            value=f"\u00b1 {two_digits(model.noise_m * 1e3)}",
+            unit="mm",
+            note=f"median; 19 in 20 points to \u00b1 {two_digits(model.noise_p95_m * 1e3)} mm, if the pairs err independently",
+        ),
+    )
+
+
 def _figures(report: ScanReport) -> tuple[Figure, ...]:
     model, settings = report.model, report.settings
     if settings is None or not model.triangles:
@@ -94,12 +107,7 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
     width, height, depth = (f"{length * 1e3:.0f}" for length in model.size.extent_m)
     return (
         Figure(label="pairs in the model", value=f"{report.fused}", unit=f"of {len(report.pairs)}"),
-        Figure(
-            label="surface known to",
-            value=f"\u00b1 {model.noise_m * 1e3:.2g}",
-            unit="mm",
-            note=f"median; 19 in 20 points to \u00b1 {model.noise_p95_m * 1e3:.2g} mm, if the pairs err independently",
-        ),
+        *_known(model),
         *_off(report.off_m),
         Figure(label="surface", value=area, unit=unit, note=f"{width} x {height} x {depth} mm"),
         _border(model),
@@ -117,7 +125,7 @@ def _off(off_m: float) -> tuple[Figure, ...]:
     if not math.isfinite(off_m):
         return ()
     return (
-        Figure(label="pairs off the model", value=f"{off_m * 1e3:.2g}", unit="mm", note="mean; median of the pairs"),
+        Figure(label="pairs off the model", value=two_digits(off_m * 1e3), unit="mm", note="mean; median of the pairs"),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from common.words import counted
+from common.words import counted, two_digits
 from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.report.mat_figures import MatFigures, mat_figures
@@ -19,7 +19,7 @@ from phone_host.report.report_page import Headline
 from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
 from phone_host.scan.mat import Mat
 from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
 
@@ -177,15 +177,22 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
         return Headline.BAD, f"The model cannot be right: {blocking}."
     if not report.model.triangles:
         return Headline.BAD, f"There is no surface: {fused} of {counted(count, 'pair')} could be put together."
+    unseen = report.model.unseen_share
+    if unseen >= 1:
+        return (
+            Headline.BAD,
+            f"Nothing of the surface was seen: {fused} of {counted(count, 'pair')} could be put together.",
+        )
     told = f"{fused} of {counted(count, 'pair')} are in the model"
     if fused < max(2, _LEAST_SHARE * count):
         return Headline.BAD, f"Only {told}."
     sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
-    noise = f"its surface is known to \u00b1 {report.model.noise_m * 1e3:.2g} mm if the pairs err independently"
+    noise_m = report.model.noise_m
+    noise = f"; its surface is known to \u00b1 {two_digits(noise_m * 1e3)} mm if the pairs err independently"
+    known = noise if math.isfinite(noise_m) else ""
     verdict = Headline.GOOD if min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
-    unseen = report.model.unseen_share
     closed = "" if math.isnan(unseen) else f"; {share_text(unseen)} of it was not seen"
-    return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}; {noise}{closed}."
+    return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}{known}{closed}."
 
 
 def share_text(share: float) -> str:

@@ -12,7 +12,8 @@ from common.errors import DataError
 from phone_host.output.atomic import write_bytes
 from phone_host.output.listed import ListedFolder
 from phone_host.report.stereo_report import Remark
-from phone_host.scan.scan import Scan, Submap
+from phone_host.scan.scan import Scan
+from phone_host.scan.scanned import Submap
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 
 _NAMES: Final = r"submap-\d{4,}\.bin"

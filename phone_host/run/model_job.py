@@ -50,6 +50,10 @@ def fewer_triangles(solid: Solid, tolerance_m: float) -> tuple[Solid, list[str]]
         return solid, ["every triangle is written: manifold3d is not installed (pip install 'tandemscan[print]')"]
     if not fewer.is_closed:
         return solid, ["the mesh is not closed, so every triangle is written, and printers may refuse it"]
+    if fewer.solid is solid:
+        return solid, [
+            "every triangle is written, because fewer would cross, or enclose nothing: give a smaller --tolerance"
+        ]
     return fewer.solid, []
 
 

@@ -27,8 +27,8 @@ from phone_host.run.scan_result import report_of, require_something
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.run.turn_remarks import field_of_turn, turn_remarks
-from phone_host.scan.scan import ScannedPair, Submap
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.ways import scan_for
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image

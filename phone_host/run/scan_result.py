@@ -8,15 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from common.errors import DataError
-from common.words import counted
+from common.words import counted, distance_text
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.run.turn_remarks import keeps_field
 from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 
 _EMPTY_BOX = Remark(
@@ -72,8 +73,8 @@ def report_of(
 
 
 def _box_remarks(scan: Scan, model: ScanModel) -> tuple[Remark, ...]:
-    """Say that the box that was asked for may be elsewhere, where there is no surface."""
-    is_empty = scan.wanted.box is not None and not len(model.mesh.triangles)
+    """Say that the box that was asked for may be elsewhere, where there is no surface, or none of it was seen: it was closed out of nothing."""
+    is_empty = scan.wanted.box is not None and not model.seen.any()
     return (_EMPTY_BOX,) if is_empty else ()
 
 
@@ -178,11 +179,20 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
 
 
 def memory_remarks(scan: Scan) -> Sequence[Remark]:
-    """Say whether the model outgrew its memory.
+    """Say whether the model outgrew its memory: it has become coarser, or something is missing from it.
 
     Args:
         scan: that made it.
     """
+    settings = scan.settings
+    if settings is not None and settings.voxel_m > scan.begun_voxel_m:
+        begun, now = (distance_text(each) for each in (scan.begun_voxel_m, settings.voxel_m))
+        return (
+            Remark(
+                f"the model has reached its greatest size: its voxels became {now} wide, {begun} at first",
+                "give a greater --memory, or a nearer --far",
+            ),
+        )
     if scan.volume is None or not scan.volume.left_out:
         return ()
     return (

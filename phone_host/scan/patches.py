@@ -3,6 +3,7 @@
 A patch is the surface in a cube of 8 x 8 x 8 blocks. Neighbours meet without a gap, but share no points.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -51,6 +52,7 @@ class Patches:
         self._least_weight, self._most_points = least_weight, most_points
         self._made: dict[tuple[int, int, int], Patch] = {}
         self._seen = self._number = 0
+        self._voxel_m = math.nan
 
     def renew(self, volume: Volume) -> None:
         """Make those again whose blocks have changed.
@@ -65,6 +67,11 @@ class Patches:
         wanted = np.unique(touched // SIDE_BLOCKS, axis=0)
         if not len(wanted):
             return
+        voxel_m = volume.settings.voxel_m
+        if voxel_m != self._voxel_m:  # the field has become coarser: its cubes are others
+            for place in set(self._made) - set(map(tuple, wanted.tolist())):
+                self._put(place, SIDE * SIDE_BLOCKS * voxel_m, Mesh.empty(), voxel_m)
+        self._voxel_m = voxel_m
         cubes = blocks.places[: blocks.count] // SIDE_BLOCKS
         for place in wanted:
             self._make(volume, place, np.flatnonzero((cubes == place).all(axis=1)))

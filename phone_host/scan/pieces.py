@@ -86,10 +86,20 @@ class Pieces:
         threads: that compute, >= 1; results do not depend on them.
         gate: what is believed.
         library: computes.
+        coarsens: whether voxels become twice as wide when the memory is full; else what does not fit is left out.
     """
 
-    def __init__(self, settings: VolumeSettings, threads: int, gate: PoseGate, library: Library | Missing) -> None:
+    def __init__(
+        self,
+        settings: VolumeSettings,
+        threads: int,
+        gate: PoseGate,
+        library: Library | Missing,
+        *,
+        coarsens: bool = False,
+    ) -> None:
         self._settings, self._threads, self._gate, self._library = settings, threads, gate, library
+        self._coarsens = coarsens
         self.model = Piece(settings, threads, gate, library)
         self._apart: dict[int, _Apart] = {}
         self._loops: list[Loop] = []
@@ -159,7 +169,13 @@ class Pieces:
             pose: where it was taken.
             fit: how it lay there before; None: it is the first.
         """
+        volume, left_out = self.model.volume, self.model.volume.left_out
         self.model.fuse(view, pose, fit)
+        while self._coarsens and volume.is_nearly_full:
+            self._coarsen()
+            if volume.left_out > left_out:  # what the view showed beyond the memory has room now
+                volume.left_out = left_out
+                volume.fuse(view, pose)
         while self._apart and self.held_bytes > self._settings.most_bytes:
             self._give_up_one()
 
@@ -261,6 +277,12 @@ class Pieces:
                 self._apart[other].world_piece = there
                 known.add(other)
                 waiting.append(other)
+
+    def _coarsen(self) -> None:
+        """Make all fields coarser: a piece is averaged into the model, so their voxels are as wide."""
+        for piece in (self.model, *(of.piece for of in self._apart.values())):
+            piece.volume.coarsen()
+        self._settings = self._settings.coarser
 
     def _taken_in(self, of: _Apart, world_piece: SE3) -> list[Joined]:
         self.model.volume.take_in(of.piece.volume, world_piece)

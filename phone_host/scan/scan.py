@@ -14,22 +14,22 @@ from common.errors import SettingsError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
-from phone_host.scan.carving import Carved, Carving
+from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
-from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.mat_tracker import MatTracker, begun_on_mat
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.stretches import Placed
 from phone_host.scan.taken_view import require_size, view_of
-from phone_host.scan.tracker import Tracker, TrackerState
+from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
-from phone_host.scan.volume import BlockValues, Volume
+from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.images import size_px
 
@@ -38,65 +38,6 @@ _SUBMAP_PAIRS: Final = 20
 
 _MOST_COPIES: Final = 3
 """Submaps hold no more than this many times the model's blocks."""
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ScannedPair:
-    """What became of a pair.
-
-    Attributes:
-        name: of the pair.
-        stamp_s: when it was taken, s, from any beginning; its number where nobody knows.
-        world_camera: where the rectified left camera was; where it is lost, as far as odometry tells.
-        state: how sure that is.
-        weakness: why it is not surer.
-        density: share of the pixels that have a depth, 0..1.
-        corners: that agree on the motion since the last pair; 0 for the first.
-        overlap: share of its depths that lie on the model, 0..1; NaN: not compared.
-        off_m: mean distance of these from the model, m; NaN: not compared.
-        mat: what the mat told; None: it was not seen, or nobody looked for it.
-    """
-
-    name: str
-    stamp_s: float
-    world_camera: SE3
-    state: Tracking
-    weakness: Weakness
-    density: float
-    corners: int = 0
-    overlap: float = math.nan
-    off_m: float = math.nan
-    mat: MatSaid | None = None
-
-    @property
-    def is_fused(self) -> bool:
-        """Whether it became part of the model."""
-        return self.state is not Tracking.LOST
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Submap:
-    """What a scan has learnt since its last submap was closed; all of them together are the scan.
-
-    Attributes:
-        is_whole: whether it holds everything since the beginning; what was closed before is not needed any more.
-        pairs: since then, in order.
-        settings: of the model.
-        geometry: of the pairs.
-        size_px: width and height of their rectified images.
-        blocks: those that got something since then, with all that they hold.
-        tracker: where it stood at the end, and the places since then.
-        carved: what all views since the beginning told of the box; None: there is none.
-    """
-
-    is_whole: bool
-    pairs: tuple[ScannedPair, ...]
-    settings: VolumeSettings
-    geometry: StereoGeometry
-    size_px: tuple[int, int]
-    blocks: BlockValues
-    tracker: TrackerState
-    carved: Carved | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +57,7 @@ class Scan:
         tracker: of the pairs since the first that has depth; None before it.
         geometry: of these.
         size_px: width and height of their rectified images.
+        begun_voxel_m: distance of two values of the field when it was begun, m; greater now where the memory was full. NaN before the first pair.
 
     Args:
         wanted: what for.
@@ -141,6 +83,7 @@ class Scan:
         self._later: dict[str, ScannedPair] = {}  # pairs of which something else has become, by name
         self._missing = Weakness.NO_MAT  # why the last pair that has depth did not begin the model
         self._is_changed = False  # whether submaps that are closed do not hold any more
+        self._voxel_m = self.begun_voxel_m = math.nan  # of the field as of the last pair, and of the first
 
     @property
     def wanted(self) -> ScanWanted:
@@ -204,7 +147,9 @@ class Scan:
                     "give the same options as then, or begin a new scan",
                 )
             require_size(name, view, self.size_px)
+            self._note_fineness(self.tracker.volume.settings.voxel_m)
             told = self.tracker.track(view)
+            self._note_fineness(self.tracker.volume.settings.voxel_m)
             self._joined(told.joined)
             self._moved(told.moved_views)
             if told.is_fused:
@@ -230,6 +175,16 @@ class Scan:
             )
         self._pairs.append(pair)
         return pair
+
+    def _note_fineness(self, voxel_m: float) -> None:
+        """Note that the field has become coarser: closed submaps do not hold any more, and the box is carved in as coarse cells."""
+        if math.isnan(self._voxel_m):
+            self.begun_voxel_m = voxel_m
+        elif voxel_m != self._voxel_m:
+            self._is_changed, self._carving = True, self._carving_of(self._wanted.model_box)
+            if self._carving is not None:
+                self._depths.carve(self._carving)
+        self._voxel_m = voxel_m
 
     def _joined(self, views: Sequence[Joined]) -> None:
         """Note that pairs that were lost have become part of the model; what they saw carves, too."""
@@ -276,8 +231,12 @@ class Scan:
                 self._missing = begun
                 return None
             return begun
-        settings = fineness_for(view, wanted.voxel_m, wanted.most_bytes)
-        return Tracker(settings, wanted.threads, loops=wanted.loops)
+        return self._tracker(fineness_for(view, wanted.voxel_m, wanted.most_bytes))
+
+    def _tracker(self, settings: VolumeSettings) -> Tracker:
+        """Return one that makes the model coarser when its memory is full, unless a fineness was asked for."""
+        wanted = self._wanted
+        return Tracker(settings, wanted.threads, loops=wanted.loops, coarsens=math.isnan(wanted.voxel_m))
 
     def final(self, pair: ScannedPair) -> ScannedPair:
         """Return what has become of a pair since it was taken.
@@ -348,7 +307,7 @@ class Scan:
         self.tracker = (
             MatTracker(wanted.mat, wanted.model_box, settings, wanted.threads)
             if wanted.mat is not None and wanted.model_box is not None
-            else Tracker(settings, wanted.threads)
+            else self._tracker(settings)
         )
         places = 0
         for each in submaps:

@@ -12,7 +12,7 @@ from phone_host.model import StereoGeometry
 from phone_host.scan.field_bytes import Arrays, KeptField, arrays_of, field_in, packed, unpacked
 from phone_host.scan.mat_pose import MatSaid, MatScale
 from phone_host.scan.places import Place
-from phone_host.scan.scan import ScannedPair, Submap
+from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.tracker import TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 

@@ -15,9 +15,10 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor
 from phone_host.scan.fineness import fineness_for, thinner
-from phone_host.scan.scan import Scan, Submap
+from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel, closed_model
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import Submap
 from phone_host.scan.table import ABOVE_M, Table, find_table
 from phone_host.scan.table_box import thing_box
 from phone_host.scan.tracker import Tracker

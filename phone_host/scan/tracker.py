@@ -97,6 +97,7 @@ class Tracker:
         gate: what is believed; None: what usually is.
         library: computes; None: that of this installation.
         loops: how loops of a camera that is not lost are closed; None: they are not.
+        coarsens: whether the model becomes coarser when its memory is full; else what does not fit is left out.
     """
 
     def __init__(
@@ -108,10 +109,11 @@ class Tracker:
         library: Library | Missing | None = None,
         *,
         loops: LoopSettings | None = None,
+        coarsens: bool = False,
     ) -> None:
         found = native() if library is None else library
         self._gate = PoseGate() if gate is None else gate
-        self._pieces = Pieces(settings, threads, self._gate, found)
+        self._pieces = Pieces(settings, threads, self._gate, found, coarsens=coarsens)
         self._loops = None if loops is None else LoopCloser(loops, self._pieces.model, threads, self._gate, found)
         self._settings, self._odometry = settings, Odometry(_ODOMETRY)
         self._pose = SE3.identity() if start is None else start  # in the axes of the piece that is tracked
@@ -147,6 +149,8 @@ class Tracker:
         active = self._pieces.active
         fit = active.laid(view, believed, self._sure_px(moved, shift_px))
         doubt = active.doubt(moved, fit)
+        if doubt is Weakness.LITTLE_OVERLAP and self.volume.left_out:
+            doubt = Weakness.FULL
         if doubt is Weakness.NONE:
             pose, weakness = (believed @ fit.start_now).exact(), self._weakness(moved, fit)
             if active is self._model:

@@ -24,6 +24,7 @@ class Weakness(Enum):
     FEW_CORNERS = "few corners"
     TOO_FAST = "too fast"
     LITTLE_OVERLAP = "little overlap"
+    FULL = "memory full"
     POOR_FIT = "poor fit"
     FLAT = "flat"
     RESTLESS = "something moves"
@@ -45,6 +46,7 @@ class Weakness(Enum):
             Weakness.FEW_CORNERS: "too few features to follow: show more texture, or give more light",
             Weakness.TOO_FAST: "moved too fast: move more slowly, back to where it was",
             Weakness.LITTLE_OVERLAP: "too little of the model is in view: move back to where it was",
+            Weakness.FULL: "the model has reached its greatest size: move back to where it was, or begin anew with a greater --memory or --voxel",
             Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
             Weakness.APART: "followed again, but apart from the model: move back to where it was",
             Weakness.NO_MAT: "too little of the mat is seen: show more of it to both cameras, sharp and without glare",

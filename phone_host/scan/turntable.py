@@ -26,9 +26,10 @@ from phone_host.scan.ground import Ground
 from phone_host.scan.merged_field import merged
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pieces import Joined
-from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, ground_of, points_of, table_height_m
 from phone_host.scan.taken_view import require_size, view_of

@@ -7,6 +7,7 @@ Sources: B. Curless and M. Levoy, "A Volumetric Method for Building Complex Mode
 
 import ctypes
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,9 @@ from phone_host.stereo.native.library import Library, Missing, native
 from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, TouchJob, VolumeArrays
 
 _LOOKS_A_BLOCK: Final = 3
+_NEARLY_FULL: Final = 0.97
+_CUBE: Final = (-1, SIDE, SIDE, SIDE)
+_HALF, _EVEN = SIDE // 2, slice(None, None, 2)
 _MOST_STEP_PX: Final = 4
 """Of the pixels that make room: every fourth, or more where a block is less than 12 px wide at the farthest depth."""
 
@@ -62,6 +66,11 @@ class BlockValues:
 class Volume:
     """A distance field that grows where views show something.
 
+    Attributes:
+        settings: its fineness and limits; coarser ones after `coarsen`.
+        blocks: its values.
+        left_out: blocks for which there was no memory.
+
     Args:
         settings: its fineness and limits.
         threads: that work on it, >= 1; results do not depend on them.
@@ -86,6 +95,11 @@ class Volume:
     def memory_bytes(self) -> int:
         """Memory of the blocks in use."""
         return self.blocks.count * BLOCK_BYTES
+
+    @property
+    def is_nearly_full(self) -> bool:
+        """Whether the next views may find no memory for what they show."""
+        return self.blocks.count > _NEARLY_FULL * self.settings.most_blocks
 
     def fuse(self, view: View, world_camera: SE3, room_for: Depth | None = None) -> NDArray[np.uint8]:
         """Fuse a view.
@@ -162,6 +176,28 @@ class Volume:
         of.field[: of.count], of.weights[: of.count], of.colours[: of.count] = ONE, 0, 0
         self.left_out = 0
         self._noted(np.ones(of.count, np.uint8))
+
+    def coarsen(self) -> None:
+        """Make the voxels twice as wide: of the values every second one of each direction stays, in a quarter to a fifth of the memory."""
+        of, count = self.blocks, self.blocks.count
+        old = of.places[:count]
+        places, of_old = np.unique(old >> 1, axis=0, return_inverse=True)
+        made, numbers = Blocks(max(len(places), 1)), of_old.reshape(-1)
+        made.add(places.astype(np.int32))
+        # A truncation is twice as long now. What was empty is at least half of one before the surface: more would let rays step over it.
+        halves = np.rint(of.field[:count] / 2).astype(np.int16)
+        halves[halves == 0] = 1
+        field = np.where(of.weights[:count] > 0, halves, np.int16(ONE)).reshape(_CUBE)
+        for octant in product((0, 1), repeat=3):
+            chosen = np.flatnonzero((old & 1 == octant).all(axis=1))
+            x, y, z = (slice(_HALF * at, _HALF * (at + 1)) for at in octant)
+            target, source = (numbers[chosen], z, y, x), (chosen, _EVEN, _EVEN, _EVEN)
+            made.field.reshape(_CUBE)[target] = field[source]
+            made.weights.reshape(_CUBE)[target] = of.weights[:count].reshape(_CUBE)[source]
+            made.colours.reshape((*_CUBE, 3))[target] = of.colours[:count].reshape((*_CUBE, 3))[source]
+        self.blocks, self.settings = made, self.settings.coarser
+        self._changes = np.zeros(made.count, np.int64)
+        self._noted(np.ones(made.count, np.uint8))
 
     def take_in(self, of: "Volume", into_of: SE3) -> None:
         """Average another field into this one; what finds no memory is added to `left_out`.

@@ -1,6 +1,6 @@
 """How fine a volume is, how far it sees, and how much memory it may take. Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from phone_host.scan.blocks import BLOCK_BYTES
@@ -43,6 +43,11 @@ class VolumeSettings:
     def sure_m(self) -> float:
         """A depth whose noise is this or less, m, has the full weight."""
         return _SURE_VOXELS * self.voxel_m
+
+    @property
+    def coarser(self) -> "VolumeSettings":
+        """The same with voxels twice as wide, and a surface that is told over as many of them."""
+        return replace(self, voxel_m=2 * self.voxel_m)
 
     @property
     def most_blocks(self) -> int:

@@ -9,7 +9,7 @@ from phone_host.live.scan import LiveScan
 from phone_host.output.axes import Axes
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patches
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import Tracking
 from phone_host.serve.program import Scanned
 from phone_host.web.source import ScanState, Surface

@@ -192,6 +192,8 @@ def open_image(path: Path, most_pixels: int = MOST_PIXELS, mounted: Orientation 
     """
     try:
         content = read_whole(path, _BYTES_A_PIXEL * most_pixels + _MORE_BYTES)
+    except IsADirectoryError as error:
+        raise DataError(f"{path} is a folder", "give an image in it") from error
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", "give an image file that exists") from error
     return replace(examine(content, str(path), most_pixels), mounted=mounted)

@@ -119,20 +119,26 @@ def metric_core(options: argparse.Namespace, matcher: str, size_px: tuple[int, i
     """
     core, _ = build_core(options, options.calibration or "", matcher, size_px, images)
     if core is None or core.geometry is None:
-        raise SettingsError(
-            "the images have neither a focal length nor a baseline, so there are no distances",
-            "add --focal PX and --baseline MM, or give --calibration",
-        )
+        raise _no_metres()
     core.correct(overlay_of(options, core))
     return core
+
+
+def _no_metres() -> SettingsError:
+    return SettingsError(
+        "the images have neither a focal length nor a baseline, so there are no distances",
+        "add --focal PX and --baseline MM, or give --calibration",
+    )
 
 
 def require_metres(options: argparse.Namespace) -> None:
     """Refuse options that name no geometry at all, before anything is read.
 
     Raises:
-        SettingsError: there is neither --calibration nor --rectified.
+        SettingsError: there is neither --calibration nor --rectified, or no focal length and baseline with the latter.
     """
+    if options.rectified and not options.calibration and options.focal is None and options.baseline is None:
+        raise _no_metres()
     if not options.calibration and not options.rectified:
         raise SettingsError(
             "neither --calibration nor --rectified is given",

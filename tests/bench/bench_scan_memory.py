@@ -144,7 +144,7 @@ def main() -> int:
     assert volume is not None
     half = len(at_rest) // 2
     growth = float(np.median(at_rest[half:])) - float(np.median(at_rest[:half])) if half else 0.0
-    most, lost = max(sizes + at_rest), states["lost"]
+    most, lost = max(sizes + at_rest) - own, states["lost"]
     verdicts = [
         Verdict(
             f"memory after {options.minutes:g} minutes of new surface, at most",
@@ -158,6 +158,7 @@ def main() -> int:
     facts = {
         "before_bytes": own,
         "model_bytes": volume.memory_bytes,
+        "voxel_m": [scan.begun_voxel_m, volume.settings.voxel_m],
         "blocks_left_out": volume.left_out,
         "states": dict(states),
     }

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from phone_host.cli import main
 from phone_host.report.scan_lines import scan_lines
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.scan_job import ScanJob, run_scan
@@ -157,6 +158,15 @@ def test_ctrl_c_keeps_what_was_scanned(walk: Path, tmp_path: Path) -> None:
     report = json.loads((tmp_path / "o" / "report.json").read_text())
     assert (report["interrupted_of"], report["in_model"]) == (5, 3)
     assert len(surface_of(tmp_path / "o" / "model.ply")[1]) == report["model"]["triangles"] > 5000
+
+
+def test_a_box_behind_all_that_is_seen_is_no_model(
+    walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is closed there was seen by nobody: the command says that nothing lies in the box, with exit code 4."""
+    words = ["scan", walk / "left", walk / "right", "--calibration", walk / "rig.yaml", "--out", tmp_path / "o"]
+    assert main([*map(str, words), "--box", "100x100x100@0,0,9000"]) == 4
+    assert "warning: nothing of what the pairs show lies in the box: move or enlarge --box" in capsys.readouterr().out
 
 
 def test_two_cameras_give_the_model_of_the_files(walk: Path, tmp_path: Path) -> None:

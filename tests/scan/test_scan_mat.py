@@ -24,8 +24,9 @@ from phone_host.scan.mat import USUAL_MAT, MatCorners, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
 from phone_host.scan.mat_tracker import ABOVE_M
 from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan, ScannedPair
+from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.ways import scan_for

@@ -88,6 +88,19 @@ def test_a_surface_that_goes_away_is_told() -> None:
     assert all(len(each.mesh.triangles) == 0 for each in newer)
 
 
+def test_a_volume_that_became_coarser_is_shown_anew() -> None:
+    """The patches are the surface of the wider voxels; those of the narrow ones, which lay in other cubes, are gone."""
+    volume, patches = grown(), Patches(1)
+    patches.renew(volume)
+    before = patches.since(0, MANY)
+    volume.coarsen()
+    patches.renew(volume)
+    whole = {each.place: each for each in (*before, *patches.since(before[-1].number, MANY))}
+    shown = [each for each in whole.values() if len(each.mesh.triangles)]
+    assert {each.side_m for each in shown} == {2 * before[0].side_m}
+    assert sum(len(each.mesh.triangles) for each in shown) == len(mesh_of(volume.blocks, 0.02).triangles) > 500
+
+
 def test_a_patch_never_has_more_points_than_are_allowed() -> None:
     """A patch with too many is thinned."""
     patches = Patches(1, most_points=300)

@@ -21,7 +21,7 @@ from phone_host.report.scan_report import ModelFigures, ScanReport, scan_verdict
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import MeshSize
-from phone_host.scan.scan import ScannedPair
+from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
 from tests.support.html import Page
@@ -77,6 +77,9 @@ LOST = report(*(pair(number, L, Weakness.TOO_FAST) if number in {2, 3} else pair
         (report(pair(0), *(pair(n, W, Weakness.FLAT) for n in range(1, 5))), Headline.WARNING, "All 5 pairs"),
         (report(pair(0), *(pair(n, L) for n in range(1, 5))), Headline.BAD, "Only 1 of 5 pairs are in the model."),
         (replace(GOOD, model=ModelFigures()), Headline.BAD, "There is no surface: 5 of 5 pairs could be put together."),
+        (replace(GOOD, model=replace(MODEL, unseen_share=1.0, noise_m=math.nan)), Headline.BAD,
+         "Nothing of the surface was seen: 5 of 5 pairs could be put together."),
+        (replace(GOOD, model=replace(MODEL, noise_m=math.nan)), Headline.GOOD, "All 5 pairs are in the model."),
         (replace(GOOD, remarks=(Remark("left and right are exchanged", "x", is_blocking=True),)), Headline.BAD,
          "The model cannot be right: left and right are exchanged."),
         (replace(GOOD, interrupted_of=9), Headline.WARNING, "Interrupted after 5 of 9 pairs. All 5 pairs"),

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError
 from common.ledger import StageTimes
+from common.words import distance_text
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair
 from phone_host.run.kept_submaps import KeptSubmaps, read_submaps
+from phone_host.run.scan_result import memory_remarks
 from phone_host.scan.box import Box
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
@@ -126,6 +128,32 @@ def test_values_are_put_as_far_as_there_is_memory() -> None:
     small.put(values)
     assert small.left_out == len(values.places) - small.blocks.count
     assert np.array_equal(small.blocks.field[: small.blocks.count], values.field[: small.blocks.count])
+
+
+def test_a_model_that_fills_its_memory_becomes_coarser_and_goes_on() -> None:
+    """Nothing is left out, no pair is lost, the report says so, and a scan that goes on from the next submap has the same model; with --voxel it stays fine."""
+    box = Box((-0.5, -0.5, 0.2), (0.5, 0.5, 1.5))
+    scan = Scan(ScanWanted(most_bytes=5_000_000, box=box))
+    taken(scan, POSES[:1])
+    begun_m = scan.begun_voxel_m
+    scan.close_submap()
+    taken(scan, POSES[1:5], 1)
+    assert scan.settings is not None
+    assert scan.volume is not None
+    assert scan.settings.voxel_m == 2 * begun_m
+    assert scan.volume.left_out == 0
+    (remark,) = memory_remarks(scan)
+    assert f"its voxels became {distance_text(2 * begun_m)} wide, {distance_text(begun_m)} at first" in remark.text
+    whole = scan.close_submap()
+    assert whole.is_whole
+    again = Scan(ScanWanted(most_bytes=5_000_000, box=box))
+    again.go_on([submap_of(submap_bytes(whole), "a file")])
+    assert np.array_equal(triangles(again), triangles(scan))
+    fine = taken(Scan(ScanWanted(most_bytes=5_000_000, voxel_m=begun_m)), POSES[:5])
+    assert fine.settings is not None
+    assert fine.volume is not None
+    assert fine.volume.left_out > 0
+    assert fine.settings.voxel_m == begun_m
 
 
 def test_files_are_kept_and_removed(tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ def run(black: Path, out: Path, *words: str) -> int:
         (["--camera", "replay:right"], (2, "no --calibration is given, so there are no metres")),
         (["--camera", "replay:right", "--calibration", "rig.yaml", "--flip-left", "h"], (2, "turn pictures in files")),
         (["--replay", "nowhere.mcap", "--calibration", "rig.yaml"], (4, "nowhere.mcap")),
+        (["left", "right", "--rectified"], (2, "neither a focal length nor a baseline")),
         (["left", "right", "--rectified", "--disparities", "16"], (2, "neither a focal length nor a baseline")),
         (["left", "empty", "--calibration", "rig.yaml"], (4, "is empty")),
         (["left", "nowhere", "--calibration", "rig.yaml"], (4, "does not exist")),

@@ -26,7 +26,7 @@ def sample() -> ExamplesFirstParser:
         (["walk"], "sample: error: ", "walk"),
         (["run"], "sample run: error: ", "--count"),
         (["run", "--count", "many\nlines"], "sample run: error: ", "many"),
-        (["run", "--count", "1", "--kind", "c"], "sample run: error: ", "--kind"),
+        (["run", "--count", "1", "--kind", "c"], "sample run: error: ", "--kind is 'c', but must be a or b: see"),
         (["run", "--count", "1", "--spee\nd", "3"], "sample run: error: ", "--spee"),
     ],
 )

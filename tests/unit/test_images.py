@@ -151,7 +151,7 @@ def test_missing_and_empty_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "empty.png").touch()
     with pytest.raises(DataError, match=r"empty\.png is empty"):
         read_image(tmp_path / "empty.png")
-    with pytest.raises(DataError, match="cannot be read"):
+    with pytest.raises(DataError, match="is a folder"):
         read_image(tmp_path)
 
 

@@ -21,6 +21,7 @@ from phone_host.output.meshes.formats import FORMATS, READABLE, mesh_bytes, read
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.meshes.three_ds import MOST, three_ds_bytes
 from phone_host.output.model_file import read_model
+from phone_host.run.model_job import fewer_triangles
 
 _NONE = np.zeros((0, 3), np.uint8)
 
@@ -281,6 +282,8 @@ def test_a_closed_mesh_that_cannot_do_with_less_stays() -> None:
     gone = decimated(solid, 10.0)
     assert gone.is_closed
     assert gone.solid.size_mm == pytest.approx((20, 20, 20))
+    assert not fewer_triangles(solid, 0.0001)[1]
+    assert "give a smaller --tolerance" in fewer_triangles(solid, 10.0)[1][0]
 
 
 def test_an_open_mesh_keeps_its_triangles() -> None:

@@ -49,6 +49,7 @@ def test_folding_keeps_every_word_whole(words: list[str], width: int) -> None:
         ("          board-agent run --camera 'replay:/a/very/long/path/of/a/film?fps=15&loop=1'", 1),
         ("then    phone-host calibrate left/ right/ --board charuco:8x6:28mm:20mm:5x5 --out rig.yaml", 1),
         ("phone-host: error: LEFT 'left' does not exist: give a folder of images", 2),
+        ("phone-host export: error: nothing takes cup (put patterns in quotes): see phone-host export --help", 3),
         ("use phone-host calibrate again, with more photographs of the board than before", 2),
         ("phone-host: error: the camera has gone: plug it in again, and then start again", 2),
     ],

@@ -8,6 +8,7 @@ from typing import Any, Final
 from common.errors import SettingsError
 from common.places import make_folder
 from common.program.terminal import say
+from common.words import counted
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
@@ -52,9 +53,8 @@ def _kinds(text: str) -> list[str]:
     kinds = [word.strip().lower() for word in text.split(",")]
     for kind in kinds:
         if kind not in FORMATS:
-            raise SettingsError(
-                f"--to {text!r} names {kind!r}, which is no format", f"give some of {','.join(FORMATS)}"
-            )
+            what = f"--to {text!r} names {kind!r}" if "," in text else f"--to is {text!r}"
+            raise SettingsError(f"{what}, which is no format", f"give some of {','.join(FORMATS)}")
     return list(dict.fromkeys(kinds))
 
 
@@ -87,8 +87,8 @@ def _unit(name: str) -> str:
 def _lines(out: Path, solid: Solid, model: Model, sizes: dict[str, int], notes: list[str]) -> list[str]:
     x, y, z = solid.size_mm
     before, after = len(model.solid.triangles), len(solid.triangles)
-    fewer = f" of {before}" if after < before else ""
-    lines = [f"{x:.1f} x {y:.1f} x {z:.1f} mm, {after} triangles{fewer}"]
+    written = f"{after} of {before} triangles" if after < before else counted(after, "triangle")
+    lines = [f"{x:.1f} x {y:.1f} x {z:.1f} mm, {written}"]
     if model.axes is not None:
         lines.append(f"axes: {model.axes.text}")
     for name, size in sizes.items():

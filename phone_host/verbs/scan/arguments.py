@@ -116,7 +116,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         type=reading(file_size, "--memory"),
         default=300e6,
         metavar="SIZE",
-        help="memory of the model at most; what does not fit is left out, and told (default 300MB)",
+        help="memory of the model at most; when it is full, voxels become twice as wide, or with --voxel what does not fit is left out; the report says so (default 300MB)",
     )
 
 

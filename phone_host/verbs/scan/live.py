@@ -22,8 +22,8 @@ from phone_host.run.host_settings import EndReason
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.run.stereo_results import require_writable
-from phone_host.scan.scan import Submap
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import Submap
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
 from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run

@@ -18,8 +18,8 @@ from phone_host.run.scan_result import own_axes
 from phone_host.scan.box import Box
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.mat import USUAL_MAT, Mat, parse_mat
-from phone_host.scan.scan import Submap
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import Submap
 from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.stereo_options import output_options
 from phone_host.verbs.units import length_mm
