@@ -21,6 +21,7 @@ from phone_host.scan.fineness import thinner
 from phone_host.scan.mat import Mat, mat_corners
 from phone_host.scan.mat_pose import MatPose, MatScale, fit_mat
 from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
+from phone_host.scan.reflections import without_reflections
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
 from phone_host.scan.tracker import Tracked, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -115,7 +116,7 @@ class MatTracker:
         self.volume = Volume(settings, threads, found)
         self._library = found if isinstance(found, Library) else None
         self._finder, self._threads = MatFinder(mat), threads
-        self._room = room_of(box, settings.truncation_m + 2 * settings.voxel_m)
+        self._box, self._room = box, room_of(box, settings.truncation_m + 2 * settings.voxel_m)
         self._pose = SE3.identity()
         self._was_lost = False
         self._last: View | None = None
@@ -158,14 +159,15 @@ class MatTracker:
     def _fused(self, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
         self._pose = pose
         view = with_exact_depths(view, depths_inside(view, pose, self._room))
+        self._last = reduced(replace(view, depth_m=depths_inside(view, pose, self._room)))
+        view = without_reflections(view, depths_inside(view, pose, self._box))
         inside = depths_inside(view, pose, self._room)
-        self._last = reduced(replace(view, depth_m=inside))
         self.volume.fuse(view, pose, inside)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
         if self._was_lost and state is Tracking.TRACKING and self.volume.fused > 1:
             state = Tracking.RELOCALISED
         self._was_lost = False
-        return _told(pose, state, weakness, fit)
+        return replace(_told(pose, state, weakness, fit), used=view)
 
     def _followed(self, view: View) -> SE3 | None:
         """Return where a view was taken by the corners that stand on the mat; None: too few are followed from the last view.

@@ -153,9 +153,10 @@ class Scan:
             self._joined(told.joined)
             self._moved(told.moved_views)
             if told.is_fused:
-                self._depths.remember(len(self._pairs), view, told.world_camera)
+                used = view if told.used is None else told.used
+                self._depths.remember(len(self._pairs), used, told.world_camera)
                 if self._carving is not None:
-                    self._carving.see(view, told.world_camera)
+                    self._carving.see(used, told.world_camera)
             elif isinstance(self.tracker, Tracker):  # its piece may be joined later
                 self._depths.keep_apart(len(self._pairs), view)
             state, weakness = self._judged(told.state, told.weakness)

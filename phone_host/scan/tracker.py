@@ -55,6 +55,7 @@ class Tracked:
         joined: earlier views that were lost, and have become part of the model with this one.
         moved_views: where the views in the model were taken, this one too, if a loop has moved them; else none.
         mat: what a mat told; None: there is none, or it was not seen.
+        used: the view with the depths that went into the model; None: with all that it had.
     """
 
     world_camera: SE3
@@ -65,6 +66,7 @@ class Tracked:
     joined: tuple[Joined, ...] = ()
     moved_views: tuple[Placed, ...] = ()
     mat: MatSaid | None = None
+    used: View | None = None
 
     @property
     def is_fused(self) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.model import Epipolar, Image, StereoGeometry
+from phone_host.model import Confidence, Epipolar, Image, StereoGeometry
 
 Depth = NDArray[np.float32]
 
@@ -34,6 +34,7 @@ class View:
         epipolar: which way the epipolar lines run.
         stamp_s: when it was taken, s, from any beginning; NaN: nobody knows.
         skew_s: by how much its left and its right image were not taken at the same moment, s.
+        confidence: (H, W) uint8, how sure the matcher is of each depth, 0 = no value; None: it does not tell.
     """
 
     grey: Image
@@ -46,6 +47,7 @@ class View:
     epipolar: Epipolar = Epipolar.LEFT
     stamp_s: float = float("nan")
     skew_s: float = 0.0
+    confidence: Confidence | None = None
 
     @property
     def noise_per_m(self) -> float:
