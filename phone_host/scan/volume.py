@@ -26,7 +26,7 @@ from phone_host.stereo.native.library import Library, Missing, native
 from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, TouchJob, VolumeArrays
 
 _LOOKS_A_BLOCK: Final = 3
-_NEARLY_FULL: Final = 0.97
+_NEARLY_FULL: Final = 0.9
 _CUBE: Final = (-1, SIDE, SIDE, SIDE)
 _HALF, _EVEN = SIDE // 2, slice(None, None, 2)
 _MOST_STEP_PX: Final = 4
