@@ -159,9 +159,10 @@ class MatTracker:
     def _fused(self, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
         self._pose = pose
         view = with_exact_depths(view, depths_inside(view, pose, self._room))
-        self._last = reduced(replace(view, depth_m=depths_inside(view, pose, self._room)))
-        view = without_reflections(view, depths_inside(view, pose, self._box))
         inside = depths_inside(view, pose, self._room)
+        self._last = reduced(replace(view, depth_m=inside))
+        view = without_reflections(view, depths_inside(view, pose, self._box))
+        inside = np.where(np.isfinite(view.depth_m), inside, np.float32(np.nan))
         self.volume.fuse(view, pose, inside)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
         if self._was_lost and state is Tracking.TRACKING and self.volume.fused > 1:
