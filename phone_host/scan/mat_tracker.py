@@ -158,10 +158,11 @@ class MatTracker:
 
     def _fused(self, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
         self._pose = pose
-        view = with_exact_depths(view, depths_inside(view, pose, self._room))
+        thing = depths_inside(view, pose, self._box)
+        view = with_exact_depths(view, thing)
         inside = depths_inside(view, pose, self._room)
         self._last = reduced(replace(view, depth_m=inside))
-        view = without_reflections(view, depths_inside(view, pose, self._box))
+        view = without_reflections(view, thing)
         inside = np.where(np.isfinite(view.depth_m), inside, np.float32(np.nan))
         self.volume.fuse(view, pose, inside)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK

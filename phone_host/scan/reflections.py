@@ -29,7 +29,8 @@ def without_reflections(view: View, wanted: Depth) -> View:
     is_thing = np.isfinite(wanted)
     if view.confidence is None or not is_thing.any():
         return view
-    darkest = view.colours.min(axis=2)  # a lamp's light is white, whatever the colour of the thing
+    blue, green, red = cv2.split(view.colours)
+    darkest = np.minimum(np.minimum(blue, green), red)  # a lamp's light is white, whatever the colour of the thing
     is_bright = darkest > np.percentile(darkest[is_thing], _BRIGHT_PERCENT)
     around = cv2.dilate(is_bright.astype(np.uint8), np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
     is_out = is_thing & around & (view.confidence < _SURE)

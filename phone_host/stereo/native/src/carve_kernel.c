@@ -13,46 +13,47 @@
 
 enum { AT_ONCE = 64 };
 
-static inline void count_up(uint8_t *counter)
-{
-    *counter += *counter < UINT8_MAX;
-}
+/* What a view tells of some cells: 0 or 1 each. Loops over it are vectorised, and no branch leaves them. */
+struct told {
+    int32_t through[AT_ONCE], hidden[AT_ONCE], blank[AT_ONCE];
+};
 
-static void some_cells(const struct tandem_carve_job *job, const float *start, int32_t from, int32_t to, ptrdiff_t at)
+static inline void tell(const struct tandem_carve_job *job, const float *start, int32_t from, int count, struct told *to)
 {
-    uint8_t *looked = job->looked_through + at, *hidden = job->hidden + at, *blank = job->blank + at;
-    const float *pose = job->camera_world, cell = job->cell_m;
-    const float step[3] = {pose[0], pose[4], pose[8]};
-    int32_t place[AT_ONCE];
-    float depth[AT_ONCE];
-    for (int i = 0; i < to - from; i++) { /* vectorised: no branch leaves the loop */
-        const float along = job->low_m[0] + (float)(from + i) * cell;
-        const float x = start[0] + step[0] * along, y = start[1] + step[1] * along, z = start[2] + step[2] * along;
+    const float *pose = job->camera_world, cell = job->cell_m, low = job->low_m[0];
+    const float start_x = start[0], start_y = start[1], start_z = start[2];
+    const float step_x = pose[0], step_y = pose[4], step_z = pose[8];
+    const float focal = job->focal_px, cx = job->cx_px, cy = job->cy_px;
+    const float width = (float)job->width, height = (float)job->height;
+    const float clear_m = job->clear_m, noise_per_m = job->noise_per_m, sigmas = job->sigmas;
+    int32_t place[AT_ONCE], inside[AT_ONCE];
+    float depth[AT_ONCE], seen[AT_ONCE];
+    for (int i = 0; i < count; i++) {
+        const float along = low + (float)(from + i) * cell;
+        const float x = start_x + step_x * along, y = start_y + step_y * along, z = start_z + step_z * along;
         const float safe = z > 1e-3f ? z : 1e-3f;
-        const float u = job->focal_px * x / safe + job->cx_px + 0.5f, v = job->focal_px * y / safe + job->cy_px + 0.5f;
-        const int inside = z > 1e-3f && u >= 0 && v >= 0 && u < (float)job->width && v < (float)job->height;
-        place[i] = inside ? (int32_t)v * job->width + (int32_t)u : -1;
+        const float u = focal * x / safe + cx + 0.5f, v = focal * y / safe + cy + 0.5f;
+        inside[i] = (z > 1e-3f) & (u >= 0) & (v >= 0) & (u < width) & (v < height);
+        const float column = inside[i] ? u : 0, line = inside[i] ? v : 0;
+        place[i] = (int32_t)line * job->width + (int32_t)column;
         depth[i] = z;
     }
-    for (int i = 0; i < to - from; i++) {
-        if (place[i] < 0) {
-            continue;
-        }
-        const float seen = job->depth_m[place[i]];
-        if (seen > FLT_MAX) { /* nothing is there as far as one can see */
-            count_up(looked + from + i);
-            continue;
-        }
-        if (!(seen > 0)) {
-            count_up(blank + from + i);
-            continue;
-        }
-        const float clear = job->clear_m + job->sigmas * job->noise_per_m * seen * seen;
-        if (seen - depth[i] > clear) {
-            count_up(looked + from + i);
-        } else if (depth[i] - seen > clear) {
-            count_up(hidden + from + i);
-        }
+    for (int i = 0; i < count; i++) {
+        seen[i] = job->depth_m[place[i]];
+    }
+    for (int i = 0; i < count; i++) {
+        const float clear = clear_m + sigmas * noise_per_m * seen[i] * seen[i];
+        const int known = seen[i] > 0, endless = seen[i] > FLT_MAX; /* nothing is there as far as one can see */
+        to->through[i] = inside[i] & (endless | (known & (seen[i] - depth[i] > clear)));
+        to->hidden[i] = inside[i] & known & !endless & (depth[i] - seen[i] > clear);
+        to->blank[i] = inside[i] & !known;
+    }
+}
+
+static inline void count_up(uint8_t *counters, const int32_t *by, int count)
+{
+    for (int i = 0; i < count; i++) {
+        counters[i] = (uint8_t)(counters[i] + (by[i] & (counters[i] < UINT8_MAX)));
     }
 }
 
@@ -68,7 +69,11 @@ void ISA_NAME(carve_layer)(const struct tandem_carve_job *job, int32_t layer)
         }
         for (int32_t from = 0; from < job->counts[0]; from += AT_ONCE) {
             const int32_t to = from + AT_ONCE < job->counts[0] ? from + AT_ONCE : job->counts[0];
-            some_cells(job, start, from, to, at);
+            struct told told;
+            tell(job, start, from, to - from, &told);
+            count_up(job->looked_through + at + from, told.through, to - from);
+            count_up(job->hidden + at + from, told.hidden, to - from);
+            count_up(job->blank + at + from, told.blank, to - from);
         }
     }
 }
