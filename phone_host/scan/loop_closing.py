@@ -40,7 +40,7 @@ class LoopSettings:
         least_turn: or turns by more, rad.
     """
 
-    most_bytes: int = 60_000_000
+    most_bytes: int = 45_000_000
     compared: int = 3
     every: int = 4
     at_once: int = 256
