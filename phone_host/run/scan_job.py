@@ -4,6 +4,7 @@ A pair that cannot be computed is named, and the others go on. After Ctrl-C or S
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from common import now
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
+from common.program.interrupts import is_heard
 from common.words import counted
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
@@ -95,10 +97,12 @@ def run_scan(job: ScanJob, watcher: Watcher) -> ScanReport:
 
     def write_so_far() -> None:
         if work.scan.fused:
-            work.kept.before_end()
             goes_on = "" if job.wanted.turntable else f"; --resume {job.out} goes on with it"
-            job.tell(f"stopped after {work.taken} of {counted(count, 'pair')}: writing their model{goes_on}")
-            finished = work.finished()
+            if is_heard():
+                with suppress(OSError):  # nobody listens any more: the model is written all the same
+                    job.tell(f"stopped after {work.taken} of {counted(count, 'pair')}: writing their model{goes_on}")
+            finished = work.finished()  # first, for it makes the field whole where a loop was just moving it
+            work.kept.before_end()
             write_scan(job.out, replace(finished, report=replace(finished.report, interrupted_of=count)))
 
     with kept_if_interrupted(write_so_far):

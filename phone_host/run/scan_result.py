@@ -184,20 +184,20 @@ def memory_remarks(scan: Scan) -> Sequence[Remark]:
     Args:
         scan: that made it.
     """
-    settings = scan.settings
+    settings, remarks = scan.settings, list[Remark]()
     if settings is not None and settings.voxel_m > scan.begun_voxel_m:
         begun, now = (distance_text(each) for each in (scan.begun_voxel_m, settings.voxel_m))
-        return (
+        remarks.append(
             Remark(
                 f"the model has reached its greatest size: its voxels became {now} wide, {begun} at first",
                 "give a greater --memory, or a nearer --far",
-            ),
+            )
         )
-    if scan.volume is None or not scan.volume.left_out:
-        return ()
-    return (
-        Remark(
-            "the model has reached its greatest size: what was seen later is missing from it",
-            "give a greater --memory or --voxel, or a nearer --far",
-        ),
-    )
+    if scan.volume is not None and scan.volume.left_out:
+        remarks.append(
+            Remark(
+                "the model has reached its greatest size: what was seen later is missing from it",
+                "give a greater --memory or --voxel, or a nearer --far",
+            )
+        )
+    return remarks

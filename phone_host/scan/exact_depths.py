@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from phone_host.model import Image
 from phone_host.scan.view import Depth, View
+from phone_host.stereo.reproject import least_in_front_px
 
 Floats = NDArray[np.float32]
 F: Final = np.float32
@@ -59,8 +60,9 @@ def with_exact_depths(view: View, wanted: Depth) -> View:
     of, depth = view.geometry, view.depth_m.copy()
     scale = F(of.focal_px * of.baseline_m)
     disparity = scale / depth[part] - F(of.doffs_px)
-    with np.errstate(divide="ignore"):
-        depth[part] = scale / (_moved(view, view.right, part, disparity) + F(of.doffs_px))
+    moved = _moved(view, view.right, part, disparity) + F(of.doffs_px)
+    is_before = moved > least_in_front_px(of)  # not what is so far away that it would move behind the cameras
+    depth[part] = np.where(is_before, scale / np.where(is_before, moved, F(1)), depth[part])
     return replace(view, depth_m=depth)
 
 

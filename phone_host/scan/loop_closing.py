@@ -132,13 +132,14 @@ class LoopCloser:
         is_little = shift_m < self._settings.least_voxels * model.volume.settings.voxel_m
         if is_little and turn < self._settings.least_turn and not (self._is_coarse and step == 1):
             return ()
-        self._is_coarse = step > 1
+        self._is_coarse = True  # until it is whole again: Ctrl-C may come in between
         self._stretches.move(by)
         model.places.move([by[stretch] for stretch in self._stretch_of])
         model.volume.emptied()
         placed = [each for stretch in range(self._stretches.count) for each in self._stretches.views(stretch)]
         self._fuse(model, placed[:-1], step)
         model.volume.fuse(self._newest, placed[-1].world_camera)  # whole: the next view follows it
+        self._is_coarse = step > 1
         return tuple(placed)
 
     def _is_compared(self, number: int, view: View, world_camera: SE3) -> bool:

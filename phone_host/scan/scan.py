@@ -182,9 +182,10 @@ class Scan:
         if math.isnan(self._voxel_m):
             self.begun_voxel_m = voxel_m
         elif voxel_m != self._voxel_m:
-            self._is_changed, self._carving = True, self._carving_of(self._wanted.model_box)
-            if self._carving is not None:
-                self._depths.carve(self._carving)
+            before, self._carving = self._carving, self._carving_of(self._wanted.model_box)
+            if before is not None and self._carving is not None:
+                self._carving.take_in(before.carved)
+            self._is_changed = True
         self._voxel_m = voxel_m
 
     def _joined(self, views: Sequence[Joined]) -> None:
@@ -269,7 +270,13 @@ class Scan:
         assert self.geometry is not None
         before, volume = self._closed, self.tracker.volume
         blocks = volume.changed_blocks()
-        is_whole = whole or self._is_changed or before.blocks + len(blocks.places) > _MOST_COPIES * volume.blocks.count
+        is_coarser = volume.settings.voxel_m != self._voxel_m
+        is_whole = (
+            whole
+            or is_coarser
+            or self._is_changed
+            or before.blocks + len(blocks.places) > _MOST_COPIES * volume.blocks.count
+        )
         if is_whole:
             before, blocks = _Closed(), volume.changed_blocks(every=True)
         self._is_changed = False

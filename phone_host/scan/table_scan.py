@@ -24,6 +24,7 @@ from phone_host.scan.table_box import thing_box
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness, unless_flat
 from phone_host.scan.view import View
+from phone_host.scan.volume_settings import VolumeSettings
 
 _TRUNCATION_SHARE: Final = 2 / 3
 """Of the usual truncation: a rendered figure then lies 0.59 mm off in place of 0.68, and is 3.7 % too large in place of 5.3. Half of it gives 0.56 mm and
@@ -54,6 +55,10 @@ class TableScan(Scan):
         settings = thinner(fineness_for(view, wanted.voxel_m, wanted.most_bytes), _TRUNCATION_SHARE)
         self._room, self._cells = found.room, Cells.of(found.room, settings.voxel_m)
         return Tracker(settings, wanted.threads, start=found.world_camera)
+
+    def _tracker(self, settings: VolumeSettings) -> Tracker:
+        """Return one that keeps its fineness: the room is carved in cells of it."""
+        return Tracker(settings, self._wanted.threads)
 
     def _judged(self, state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
         """Return what is told of a pair. The table is always flat; corners on it tell what its plane does not, or the pair is weak for want of them."""

@@ -51,5 +51,5 @@ def view_of(processed: Processed, mat: Mat | None = None) -> View:
         noise_px=NOISE_PX / scale,
         right=None if mat is None else to_grey(processed.pair.right),
         epipolar=processed.pair.epipolar,
-        confidence=processed.confidence,
+        confidence=None if mat is None else processed.confidence,
     )

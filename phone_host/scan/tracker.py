@@ -151,7 +151,7 @@ class Tracker:
         active = self._pieces.active
         fit = active.laid(view, believed, self._sure_px(moved, shift_px))
         doubt = active.doubt(moved, fit)
-        if doubt is Weakness.LITTLE_OVERLAP and self.volume.left_out:
+        if doubt is Weakness.LITTLE_OVERLAP and self.volume.left_out and self.volume.is_nearly_full:
             doubt = Weakness.FULL
         if doubt is Weakness.NONE:
             pose, weakness = (believed @ fit.start_now).exact(), self._weakness(moved, fit)
@@ -239,6 +239,8 @@ class Tracker:
         """Return the standard deviation of the view's pixels where odometry puts it."""
         if not moved.is_known or moved.inliers < self._gate.weak_inliers:
             return math.inf
+        if self._was_lost:  # the way since then adds up
+            return _LEAST_SURE_PX
         return min(max(_SURE_SHARE * shift_px, _SUREST_PX), _LEAST_SURE_PX)
 
     def _weakness(self, moved: Moved, fit: Registered) -> Weakness:

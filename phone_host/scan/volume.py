@@ -184,16 +184,16 @@ class Volume:
         places, of_old = np.unique(old >> 1, axis=0, return_inverse=True)
         made, numbers = Blocks(max(len(places), 1)), of_old.reshape(-1)
         made.add(places.astype(np.int32))
-        # A truncation is twice as long now. What was empty is at least half of one before the surface: more would let rays step over it.
-        halves = np.rint(of.field[:count] / 2).astype(np.int16)
-        halves[halves == 0] = 1
-        field = np.where(of.weights[:count] > 0, halves, np.int16(ONE)).reshape(_CUBE)
         for octant in product((0, 1), repeat=3):
             chosen = np.flatnonzero((old & 1 == octant).all(axis=1))
             x, y, z = (slice(_HALF * at, _HALF * (at + 1)) for at in octant)
             target, source = (numbers[chosen], z, y, x), (chosen, _EVEN, _EVEN, _EVEN)
-            made.field.reshape(_CUBE)[target] = field[source]
-            made.weights.reshape(_CUBE)[target] = of.weights[:count].reshape(_CUBE)[source]
+            weights = of.weights[:count].reshape(_CUBE)[source]
+            # A truncation is twice as long now. What was empty is at least half of one before the surface: more would let rays step over it.
+            halves = np.rint(of.field[:count].reshape(_CUBE)[source] * np.float32(0.5)).astype(np.int16)
+            halves[halves == 0] = 1
+            made.field.reshape(_CUBE)[target] = np.where(weights > 0, halves, np.int16(ONE))
+            made.weights.reshape(_CUBE)[target] = weights
             made.colours.reshape((*_CUBE, 3))[target] = of.colours[:count].reshape((*_CUBE, 3))[source]
         self.blocks, self.settings = made, self.settings.coarser
         self._changes = np.zeros(made.count, np.int64)
