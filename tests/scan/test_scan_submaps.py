@@ -156,6 +156,20 @@ def test_a_model_that_fills_its_memory_becomes_coarser_and_goes_on() -> None:
     assert fine.settings.voxel_m == begun_m
 
 
+def test_what_was_carved_before_a_resume_counts_in_coarser_cells_too() -> None:
+    """A model that becomes coarser after it was gone on with knows what all five views told of its box."""
+    wanted = ScanWanted(most_bytes=5_500_000, box=Box((-0.5, -0.5, 0.2), (0.5, 0.5, 1.5)))
+    first = taken(Scan(wanted), POSES[:2]).close_submap()
+    again = Scan(wanted)
+    again.go_on([submap_of(submap_bytes(first), "a file")])
+    last = taken(again, POSES[2:5], 2).close_submap()
+    assert last.settings.voxel_m == 2 * first.settings.voxel_m
+    assert last.carved is not None
+    assert last.carved.cells.voxel_m == last.settings.voxel_m
+    assert last.carved.views == 5
+    assert last.carved.counts[0].max() > 2
+
+
 def test_files_are_kept_and_removed(tmp_path: Path) -> None:
     """One after 20 fused pairs; a resumed scan writes the next number; what is missing is told; none is left at the end."""
     scan = Scan(WANTED)
