@@ -1,6 +1,7 @@
 """An input that is not there: one line, and exit code 4 whichever command was to read it. A camera that is not there is none of these: 3."""
 
 import logging
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,14 @@ from phone_host.cli import main
 
 _RIG = ("--calibration", "rig.yaml")
 _OUT = ("--out", "out")
+
+
+@pytest.fixture(autouse=True)
+def _logs_as_before() -> Iterator[None]:
+    """A run sets up logs of its own; take them away again."""
+    before = logging.root.handlers[:]
+    yield
+    logging.root.handlers[:] = before
 
 
 @pytest.mark.parametrize(
@@ -44,7 +53,6 @@ def test_what_is_missing_has_one_exit_code(
 ) -> None:
     """The line names the missing file, and nothing is left behind."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(logging.root, "handlers", logging.root.handlers[:])  # a run sets up its own
     assert main(words) == code
     printed = capsys.readouterr()
     assert not printed.out
