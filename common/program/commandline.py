@@ -211,7 +211,7 @@ def run_command(
         command: takes the options, returns the exit code; prints its output when it is done.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device or link cannot be had or stdout cannot be written, 4 bad data, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device or link cannot be had or stdout cannot be written, 4 bad data, 129, 130, 131 and 143 ended by a signal.
     """
     options = argparse.Namespace(debug=False)
     code = 0
@@ -247,13 +247,12 @@ def _ran(
         _say(f"{parser.prog}: error: {error}")
         return error.exit_code
     except KeyboardInterrupt as error:
-        is_term = isinstance(error, interrupts.Terminated)
+        number = error.number if isinstance(error, interrupts.StopRequested) else signal.SIGINT
         if not interrupts.is_heard():
-            interrupts.leave(
-                signal.SIGTERM if is_term else signal.SIGINT
-            )  # saying so would block, and the interpreter's end too
-        _say(f"{parser.prog}: {'terminated' if is_term else 'interrupted'}")
-        return interrupts.TERMINATED if is_term else INTERRUPTED
+            interrupts.leave(number)  # saying so would block, and the interpreter's end too
+        word, code = interrupts.ENDINGS[number]
+        _say(f"{parser.prog}: {word}")
+        return code
 
 
 def _say(line: str) -> None:

@@ -1,12 +1,15 @@
-"""Ctrl-C and SIGTERM end a command within a second, wherever they come: exit code 130 or 143, one line, no traceback, nothing half written.
+"""Ctrl-C, SIGTERM, SIGHUP and SIGQUIT end a command within a second, wherever they come: one line, no traceback, nothing half written.
+
+`ENDINGS` is the one table of these signals and their exit codes, for every command and both daemons.
 
 Three phases. While a command is being imported there is nothing to tidy up: `leave_at_once` ends the process in the
 signal handler. While it runs, Python raises KeyboardInterrupt, but only once native code returns, and OpenCV may
 compute for a minute. So under `interruptible(native=True)` a thread waits for the signal too. It ends the process if
 the main thread has not left within `_GRACE_S`. Once the command is done, its results count and Ctrl-C is ignored.
 
-SIGTERM ends a command that computes in the same way, at once: nothing of it is of use yet, so its exit code is not 0.
-One that keeps what it has come to takes it as Ctrl-C (`terminable`), and is given the time to write it (`answering`).
+SIGTERM, SIGHUP (the terminal was closed, ssh was lost) and SIGQUIT end a command that computes in the same way, at once:
+nothing of it is of use yet, so its exit code is not 0. One that keeps what it has come to takes them as Ctrl-C
+(`terminable`), and is given the time to write it (`answering`). Where a parent has SIGHUP ignored (nohup), it stays so.
 
 Commands that end in their own way (StopSignals) replace the handler while they run. Light: a command's first import.
 """
@@ -17,16 +20,30 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from stat import S_ISCHR
 from types import FrameType
-from typing import Final, NoReturn
+from typing import Final, NamedTuple, NoReturn
 
-INTERRUPTED: Final = 130
-"""128 + SIGINT, as shells report it."""
 
-TERMINATED: Final = 143
-"""128 + SIGTERM."""
+class Ending(NamedTuple):
+    """How a command ends by a signal: the word that it says, and its exit code."""
 
-_SAID: Final = {signal.SIGINT: (b"interrupted\n", INTERRUPTED), signal.SIGTERM: (b"terminated\n", TERMINATED)}
+    word: str
+    exit_code: int
+
+
+ENDINGS: Final[dict[int, Ending]] = {
+    signal.SIGINT: Ending("interrupted", 130),
+    signal.SIGTERM: Ending("terminated", 143),
+    signal.SIGHUP: Ending("hung up", 129),
+    signal.SIGQUIT: Ending("quit", 131),
+}
+"""Signals that end a command, with 128 + their number, as shells report it. Daemons and streams end in order by all but Ctrl-C, with 0."""
+
+INTERRUPTED: Final = ENDINGS[signal.SIGINT].exit_code
+
+_OTHERS: Final = tuple(number for number in ENDINGS if number != signal.SIGINT)
+"""Those that Python leaves to the system."""
 
 _STDERR: Final = 2
 
@@ -40,8 +57,16 @@ _GRACE_S: Final = 0.5
 """Python code ends within milliseconds of a signal; the other half of the second is for a busy machine."""
 
 
-class Terminated(KeyboardInterrupt):
-    """SIGTERM came where it is taken as Ctrl-C."""
+class StopRequested(KeyboardInterrupt):
+    """A signal came where it is taken as Ctrl-C.
+
+    Attributes:
+        number: of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(ENDINGS[number].word)
+        self.number = number
 
 
 def leave_at_once() -> None:
@@ -70,9 +95,9 @@ def interruptible(*, native: bool = False) -> Iterator[None]:
         return
     if handler is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    is_default = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    if is_default:
-        signal.signal(signal.SIGTERM, _end)
+    defaults = [number for number in _OTHERS if signal.getsignal(number) is signal.SIG_DFL]
+    for number in defaults:
+        signal.signal(number, _end)
     watcher = _Watcher() if native else None
     try:
         yield
@@ -81,21 +106,24 @@ def interruptible(*, native: bool = False) -> Iterator[None]:
             watcher.stop()
         # A process that began with `leave_at_once` has only its exit left, which a signal must not disturb.
         signal.signal(signal.SIGINT, signal.SIG_IGN if handler is _leave else handler)
-        if is_default:
-            signal.signal(signal.SIGTERM, signal.SIG_IGN if handler is _leave else signal.SIG_DFL)
+        for number in defaults:
+            signal.signal(number, signal.SIG_IGN if handler is _leave else signal.SIG_DFL)
 
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Raise `Terminated` on SIGTERM while the block runs, where `interruptible` would end the process at once."""
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGTERM) is not _end:
+    """Raise `StopRequested` on SIGTERM, SIGHUP and SIGQUIT while the block runs, where `interruptible` would end the process at once."""
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGTERM, _terminate)
+    taken = [number for number in _OTHERS if signal.getsignal(number) is _end]
+    for number in taken:
+        signal.signal(number, _request_stop)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, _end)
+        for number in taken:
+            signal.signal(number, _end)
 
 
 @contextmanager
@@ -112,13 +140,13 @@ def leave(number: int = signal.SIGINT) -> NoReturn:
     """End this process now with one line and the exit code of a signal. What it had begun to write is removed.
 
     Args:
-        number: SIGINT or SIGTERM.
+        number: one of `ENDINGS`.
     """
     from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
 
     remove_unfinished()
     _say_so(number)
-    os._exit(_SAID[signal.Signals(number)][1])
+    os._exit(ENDINGS[number].exit_code)
 
 
 def is_heard() -> bool:
@@ -132,7 +160,19 @@ def _say_so(number: int) -> None:
     """Write the one line, in a terminal in place of a progress bar."""
     if is_heard():
         with suppress(OSError):  # closed: the exit code must suffice
-            os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + _SAID[signal.Signals(number)][0])
+            os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + f"{ENDINGS[number].word}\n".encode())
+
+
+def forget_terminal() -> None:
+    """Send what goes to a terminal that has hung up nowhere: writing there would fail, in the middle of what must still be done."""
+    for descriptor in (0, 1, 2):
+        with suppress(OSError):
+            poll = select.poll()
+            poll.register(descriptor, 0)
+            if S_ISCHR(os.fstat(descriptor).st_mode) and any(event & select.POLLHUP for _, event in poll.poll(0)):
+                nowhere = os.open(os.devnull, os.O_RDWR)
+                os.dup2(nowhere, descriptor)
+                os.close(nowhere)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
@@ -140,9 +180,10 @@ def _end(number: int, frame: FrameType | None) -> None:
     leave(number)
 
 
-def _terminate(number: int, frame: FrameType | None) -> NoReturn:
-    del number, frame
-    raise Terminated
+def _request_stop(number: int, frame: FrameType | None) -> NoReturn:
+    del frame
+    forget_terminal()
+    raise StopRequested(number)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
@@ -173,7 +214,7 @@ class _Watcher:
 
     def _watch(self) -> None:
         while number := os.read(self._reader, 1):
-            if number[0] in _SAID:
+            if number[0] in ENDINGS:
                 break
         if not number or self._stopped.wait(_GRACE_S):
             return
@@ -187,4 +228,4 @@ class _Watcher:
         if not select.select([self._reader], [], [], _GRACE_S)[0]:
             return False
         number = os.read(self._reader, 1)
-        return not number or number[0] in _SAID
+        return not number or number[0] in ENDINGS

@@ -1,6 +1,7 @@
-"""SIGTERM and SIGINT as something a poll loop can wait for. Create it once, in a process's main thread.
+"""The signals that end a process (`interrupts.ENDINGS`) as something a poll loop can wait for. Create it once, in a process's main thread.
 
-A second Ctrl-C ends the process at once: whoever presses it again does not want to wait for the summary.
+A second Ctrl-C ends the process at once: whoever presses it again does not want to wait for the summary. A signal that comes
+again otherwise is the same request. Where a parent has SIGHUP or SIGQUIT ignored (nohup, a job in a script's background), they stay so.
 """
 
 import signal
@@ -11,14 +12,16 @@ from common.program import interrupts
 
 
 class StopSignals:
-    """Catches SIGTERM and SIGINT; `reader` becomes readable with the first one."""
+    """Catches what ends a process; `reader` becomes readable with the first one."""
 
     def __init__(self) -> None:
         self.reader, self._writer = socket.socketpair()
         self._writer.setblocking(False)  # noqa: FBT003 - the standard library's own signature
         self._came: set[int] = set()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, self._note)
+        for number in interrupts.ENDINGS:
+            is_ours = number in {signal.SIGINT, signal.SIGTERM} or signal.getsignal(number) is not signal.SIG_IGN
+            if is_ours:
+                signal.signal(number, self._note)
         signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
 
     @property
@@ -31,8 +34,14 @@ class StopSignals:
         """Whether Ctrl-C asked for it."""
         return signal.SIGINT in self._came
 
+    @property
+    def hung_up(self) -> bool:
+        """Whether the terminal was closed."""
+        return signal.SIGHUP in self._came
+
     def _note(self, number: int, frame: FrameType | None) -> None:
         del frame
+        interrupts.forget_terminal()
         if number == signal.SIGINT and self.interrupted:
             interrupts.leave()
         self._came.add(number)

@@ -1,10 +1,13 @@
-"""Makes a process's standard streams safe to use, whatever its parent left of them."""
+"""Makes a process's standard streams safe to use, whatever its parent left of them, and whatever becomes of its terminal."""
 
+import errno
 import io
 import os
 import sys
 from contextlib import suppress
 from typing import Final
+
+from common.program.interrupts import forget_terminal
 
 _STANDARD: Final = (0, 1, 2)
 
@@ -27,3 +30,31 @@ def mend_streams() -> None:
         with suppress(OSError, ValueError):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
+    if isinstance(sys.stderr, io.TextIOWrapper) and not isinstance(sys.stderr, _Stderr) and sys.stderr.isatty():
+        sys.stderr = _Stderr(
+            sys.stderr.buffer, encoding=sys.stderr.encoding, errors=sys.stderr.errors, line_buffering=True
+        )
+
+
+class _Stderr(io.TextIOWrapper):
+    """Messages to a terminal. Once that is closed they are lost: a bar that cannot be drawn must not end the work that it shows."""
+
+    def write(self, text: str, /) -> int:
+        """Write, as every stream; a terminal that is gone takes everything."""
+        try:
+            return super().write(text)
+        except OSError as error:
+            self._forget(error)
+            return len(text)
+
+    def flush(self) -> None:
+        """Flush, likewise."""
+        try:
+            super().flush()
+        except OSError as error:
+            self._forget(error)
+
+    def _forget(self, error: OSError) -> None:
+        if error.errno != errno.EIO:
+            raise error
+        forget_terminal()

@@ -48,8 +48,8 @@ class BoardProcess:
 
     def stop(self) -> BoardAccount:
         """Ask the process to end. Return its account."""
-        # Ctrl-C reaches every process of a terminal: then the board has ended by itself and has written its account.
-        if self._process.poll() != INTERRUPTED:
+        # Ctrl-C and a closed terminal reach every process of it: then the board has ended by itself and has written its account.
+        if self._process.poll() not in {0, INTERRUPTED}:
             self.check()
         self._process.terminate()
         try:

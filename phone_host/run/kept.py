@@ -1,4 +1,4 @@
-"""What was computed so far is kept when Ctrl-C or SIGTERM ends a long work."""
+"""What was computed so far is kept when Ctrl-C, SIGTERM, SIGHUP or SIGQUIT ends a long work."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -10,7 +10,7 @@ from common.unfinished import unfinished
 
 @contextmanager
 def kept_if_interrupted(write: Callable[[], None]) -> Iterator[None]:
-    """Write what there is if Ctrl-C or SIGTERM ends the block, in Python or out of native code.
+    """Write what there is if Ctrl-C, SIGTERM, SIGHUP or SIGQUIT ends the block, in Python or out of native code.
 
     Args:
         write: writes it; what cannot be written (OSError) is left out.

@@ -37,7 +37,14 @@ class TerminalProgram:
         environment = {name: value for name, value in os.environ.items() if name not in unwanted}
         environment |= {"TERM": "xterm-256color", "XDG_CONFIG_HOME": str(folder / "config"), **(more or {})}
         self.process = subprocess.Popen(
-            command, stdin=slave, stdout=slave, stderr=slave, env=environment, cwd=folder, start_new_session=True
+            command,
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            env=environment,
+            cwd=folder,
+            start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # noqa: PLW1509 - a terminal that can hang up
         )
         os.close(slave)
         self.seen = b""
@@ -67,12 +74,19 @@ class TerminalProgram:
             assert time.monotonic() < deadline, "the program does not end"
         return self.process.wait(PATIENCE_S)
 
+    def hang_up(self) -> int:
+        """Close the terminal, as a window that is closed or an ssh that is lost does; return the program's exit code."""
+        os.close(self._master)
+        self._master = -1
+        return self.process.wait(PATIENCE_S)
+
     def close(self) -> None:
         """End it if it still runs."""
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()
-        os.close(self._master)
+        if self._master >= 0:
+            os.close(self._master)
 
 
 @contextmanager

@@ -91,20 +91,24 @@ def test_a_full_pipe_keeps_nobody_alive(code: str) -> None:
     os.close(stderr)
 
 
+_WORDS = {signal.SIGTERM: (b"terminated", 143), signal.SIGHUP: (b"hung up", 129), signal.SIGQUIT: (b"quit", 131)}
+
+
+@pytest.mark.parametrize("number", _WORDS)
 @pytest.mark.parametrize("code", [_STUCK.format(begun=1, said=b"begun"), _IN_PYTHON])
-def test_sigterm_ends_a_computation_with_one_line(code: str) -> None:
-    """In native code and in Python: 143 within seconds, and one word on stderr."""
+def test_a_signal_ends_a_computation_with_one_line(code: str, number: signal.Signals) -> None:
+    """In native code and in Python: 128 + its number, one word on stderr, and no core file."""
     with subprocess.Popen(
         [sys.executable, "-P", "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:
         assert process.stdout is not None
         assert os.read(process.stdout.fileno(), 5) == b"begun"
-        process.send_signal(signal.SIGTERM)
-        assert process.communicate(timeout=20)[1] == b"terminated\n"
-        assert process.returncode == 143
+        process.send_signal(number)
+        assert process.communicate(timeout=60)[1] == _WORDS[number][0] + b"\n"
+        assert process.returncode == _WORDS[number][1]
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGHUP, 129)])
 def test_what_was_computed_is_written_however_long_it_takes(number: signal.Signals, code: int) -> None:
     """Longer than a command may take to leave; a second signal ends that, too."""
     for seconds, again, written in ((2, False, b" written"), (60, True, b"")):
@@ -118,5 +122,5 @@ def test_what_was_computed_is_written_however_long_it_takes(number: signal.Signa
                 process.send_signal(number)
             out, told = process.communicate(timeout=30)
         assert out == written
-        assert told.endswith(b"terminated\n" if number is signal.SIGTERM else b"interrupted\n")
+        assert told.endswith(_WORDS.get(number, (b"interrupted", 130))[0] + b"\n")
         assert process.returncode == code
