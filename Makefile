@@ -7,7 +7,7 @@ SHELL := /bin/sh
 BIN := .venv/bin
 READY := .venv/.ready
 RUN := .venv/.ready-run
-PARTS := unit scan contract native system hostile print web
+PARTS := unit cases scan contract native system hostile print web
 # What the native library is made of; .ci/venv knows the same.
 NATIVE := setup.py phone_host/stereo/native/build_library.py $(wildcard phone_host/stereo/native/src/*)
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
@@ -40,7 +40,7 @@ demo: $(RUN) ## run both programs on this machine with a rendered scene; writes 
 native: $(RUN) ## build the native library again, in place (the set-up does this itself; after installing a compiler, or with CC=clang)
 	@$(BIN)/python -m phone_host.stereo.native.build_library
 
-test: $(READY) ## run the unit, scan, contract, native, system, hostile, print and web tests; prints the minutes of each part
+test: $(READY) ## run the unit, cases, scan, contract, native, system, hostile, print and web tests; prints the minutes of each part
 	@.ci/test $(PARTS)
 
 $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
@@ -49,8 +49,8 @@ $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
 test-slow: $(READY) ## run the tests with large samples, too slow for every day; the unit tests use small ones
 	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract tests/print
 
-coverage: $(READY) ## run the unit, scan, contract and print tests; lists branches of the pure modules that no test takes (CI requires 98 %)
-	@COVERAGE=1 .ci/test unit scan contract print
+coverage: $(READY) ## run the unit, cases, scan, contract and print tests; lists branches of the pure modules that no test takes (CI requires 98 %)
+	@COVERAGE=1 .ci/test unit cases scan contract print
 
 test-arm: $(READY) ## compare the native library's bits on aarch64, armv7 and older x86 with this machine's, and try the phone's stand-in, under qemu-user
 	@$(BIN)/python -m tests.native.arm
