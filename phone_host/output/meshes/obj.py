@@ -4,16 +4,18 @@ Source: "Object Files (.obj)", Wavefront Advanced Visualizer Manual, appendix B1
 """
 
 import io
+from array import array
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.output.meshes.solid import Solid, sound_solid
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, polygon_triangles, sound_solid
+from phone_host.output.meshes.text import text_lines, without_mark
 
-_MOST_CORNERS: Final = 64
-"""Of one face; a longer one is no face of a scan."""
+_NUMBERS: Final = (3, 4, 6, 7)
+"""Of a point: three, perhaps a weight that polygons do not heed, or a colour, perhaps with its opacity."""
 
 
 def obj_bytes(solid: Solid, comment: str) -> bytes:
@@ -36,7 +38,7 @@ def obj_bytes(solid: Solid, comment: str) -> bytes:
 
 
 def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
-    """Read the points, colours and faces of an OBJ file; a face of more than three corners becomes a fan.
+    """Read the points, their colours and the faces of an OBJ file. What else is in it, such as materials, has no part in its shape.
 
     Args:
         content: of the file; it may come from anybody.
@@ -46,36 +48,38 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
     Raises:
         DataError: it is no OBJ file, or holds no sound triangle.
     """
-    points: list[list[float]] = []
-    corners: list[tuple[int, int, int]] = []
-    for number, line in enumerate(content.splitlines(), start=1):
-        word, _, rest = line.partition(b" ")
+    points, shades, counts, corners = array("d"), array("d"), array("q"), array("q")
+    for number, line in enumerate(text_lines(without_mark(content)), start=1):
+        words = line.partition(b"#")[0].split()
+        word = words[0].lower() if words else b""
         try:
             if word == b"v":
-                points.append([float(part) for part in rest.split()])
+                values = [float(part) for part in words[1:]]
+                if len(values) not in _NUMBERS:
+                    raise DataError(f"{name} is no OBJ file: a point has not three numbers", "export it anew")
+                points.extend(values[:3])
+                shades.extend(values[3:6] if len(values) > 4 else ())
             elif word == b"f":
-                corners += _fan(rest, len(points))
-        except ValueError:
+                counts.append(len(words) - 1)
+                corners.extend(_corners(words, len(points) // 3))
+        except (ValueError, OverflowError):
             raise DataError(f"{name} is no OBJ file: line {number} is not read", "export it anew") from None
-    lengths = {len(point) for point in points}
-    if not lengths <= {3, 4, 6, 7}:
-        raise DataError(f"{name} is no OBJ file: a point has not three numbers", "export it anew")
-    places = np.array([point[:3] for point in points], np.float64).reshape(-1, 3) * unit_m
-    return sound_solid(name, places, np.array(corners, np.int64).reshape(-1, 3), _colours(points, lengths))
+    places = np.frombuffer(points, np.float64).reshape(-1, 3) if points else np.zeros((0, 3))
+    faces = polygon_triangles(name, places, np.array(counts), np.array(corners))
+    return sound_solid(name, places * unit_m, faces, _colours(shades, len(places)))
 
 
-def _colours(points: list[list[float]], lengths: set[int]) -> NDArray[np.uint8]:
-    if lengths != {6}:
-        return np.zeros((0, 3), np.uint8)
-    shares = np.array([point[3:] for point in points])
-    return np.asarray(np.rint(255 * np.clip(np.nan_to_num(shares), 0, 1)), np.uint8)
+def _corners(words: list[bytes], count: int) -> list[int]:
+    """Return a face's corners; numbers below zero count back from the newest point, and none is zero."""
+    numbers = [int(word.partition(b"/")[0]) for word in words[1:]]
+    if 0 in numbers:
+        raise ValueError("no point has the number 0")
+    return [number - 1 if number > 0 else count + number for number in numbers]
 
 
-def _fan(rest: bytes, count: int) -> list[tuple[int, int, int]]:
-    """Return the triangles of a face; numbers below zero count back from the newest point."""
-    words = rest.split(maxsplit=_MOST_CORNERS)
-    if not 3 <= len(words) <= _MOST_CORNERS:
-        raise ValueError("a face")
-    numbers = [int(word.partition(b"/")[0]) for word in words]
-    places = [number - 1 if number > 0 else count + number for number in numbers]
-    return [(places[0], places[at], places[at + 1]) for at in range(1, len(places) - 1)]
+def _colours(shades: "array[float]", count: int) -> NDArray[np.uint8]:
+    """Return (V, 3), or none where not each point has one. They go to 1, of a few writers to 255."""
+    if not count or len(shades) != 3 * count:
+        return NO_COLOURS
+    shares = np.nan_to_num(np.frombuffer(shades, np.float64).reshape(-1, 3))
+    return np.asarray(np.rint(np.clip(shares if shares.max() > 1 else 255 * shares, 0, 255)), np.uint8)

@@ -1,28 +1,23 @@
-"""PLY with triangles: binary is written; binary of either byte order and text are read, whatever their properties. Pure.
+"""PLY with faces: binary is written; whatever `ply_records` reads is read. Pure.
 
 Source: Greg Turk, "The PLY Polygon File Format", 1994.
 """
 
-import re
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.output.meshes.solid import Solid, sound_solid
+from phone_host.output.meshes.ply_records import Column, Numbers, ShortError, Table, read_records
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, polygon_triangles, sound_solid
+from phone_host.output.meshes.text import without_mark
 
-_TYPES: Final = {
-    **dict.fromkeys((b"char", b"int8"), "i1"), **dict.fromkeys((b"uchar", b"uint8"), "u1"),
-    **dict.fromkeys((b"short", b"int16"), "i2"), **dict.fromkeys((b"ushort", b"uint16"), "u2"),
-    **dict.fromkeys((b"int", b"int32"), "i4"), **dict.fromkeys((b"uint", b"uint32"), "u4"),
-    **dict.fromkeys((b"float", b"float32"), "f4"), **dict.fromkeys((b"double", b"float64"), "f8"),
-}  # fmt: skip
-_ORDERS: Final = {b"binary_little_endian": "<", b"binary_big_endian": ">", b"ascii": ""}
-_END: Final = re.compile(rb"end_header\r?\n")
-_MOST_HEADER: Final = 16384
-_CORNER_LISTS: Final = (b"vertex_indices", b"vertex_index")
+_CORNER_LISTS: Final = ("vertex_indices", "vertex_index")
+_SHADES: Final = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
+_WHITE: Final = {"u2": 1 / 257, "f4": 255.0, "f8": 255.0}
+"""What a colour is multiplied with to go from 0 to 255, where it is no byte."""
+
 _VERTEX: Final = np.dtype([*((name, "<f4") for name in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))])
 _BLANKS: Final = np.frombuffer(b"\t\n\v\f\r ", np.uint8)
 _FACE: Final = np.dtype([("corners", "u1"), ("numbers", "<i4", 3)])
@@ -66,17 +61,8 @@ def _begun_well(solid: Solid) -> Solid:
     return Solid(solid.points_m[order], order[solid.triangles], colours)
 
 
-@dataclass(frozen=True, slots=True)
-class _Element:
-    """One kind of thing in a file: its number, and its properties as (name, type) or (name, type of count, type)."""
-
-    name: bytes
-    count: int
-    properties: tuple[tuple[bytes, ...], ...]
-
-
 def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
-    """Read a PLY file with triangles.
+    """Read a PLY file with faces: polygons or strips of triangles, colours of points or of faces.
 
     Args:
         content: of the file; it may come from anybody.
@@ -86,89 +72,67 @@ def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
     Raises:
         DataError: it is no PLY file, or is cut short, or holds no sound triangle.
     """
-    end = _END.search(content[:_MOST_HEADER])
-    if not content.startswith(b"ply") or end is None:
-        raise DataError(f"{name} is no PLY file", "give a mesh file")
     try:
-        order, elements = _header(content[: end.start()])
-        tables = _text(content[end.end() :], elements) if not order else _binary(content, end.end(), order, elements)
-    except (ValueError, KeyError, IndexError, OverflowError):
+        tables = read_records(without_mark(content))
+    except LookupError:
+        raise DataError(f"{name} is no PLY file", "give a mesh file") from None
+    except ShortError:
         raise DataError(
             f"{name} is cut short, or no PLY file of a mesh", "copy the file again, or export it anew"
         ) from None
-    vertices, faces = tables.get(b"vertex", {}), tables.get(b"face", {})
-    if not all(axis in vertices for axis in (b"x", b"y", b"z")):
+    vertices, faces = tables.get("vertex", {}), tables.get("face", {})
+    if not all(axis in vertices and vertices[axis].counts is None for axis in "xyz"):
         raise DataError(f"{name} has no points", "give a mesh")
-    places = np.column_stack([vertices[axis].astype(np.float64) for axis in (b"x", b"y", b"z")]) * unit_m
-    corners = next((faces[key] for key in _CORNER_LISTS if key in faces), np.zeros((0, 3), np.int64))
-    shades = [vertices[key] for key in (b"red", b"green", b"blue") if key in vertices]
-    is_coloured = len(shades) == 3 and all(shade.dtype == np.uint8 for shade in shades)
-    colours = np.asarray(np.column_stack(shades) if is_coloured else np.zeros((0, 3)), np.uint8)
-    return sound_solid(name, places, corners.astype(np.int64), colours)
+    places = np.stack([np.asarray(vertices[axis].values, np.float64) for axis in "xyz"], axis=1)
+    if "tristrips" in tables and not faces:
+        triangles = _unrolled(next(iter(tables["tristrips"].values()), None))
+        return sound_solid(name, places * unit_m, triangles, _colours(vertices))
+    counts, corners = _polygons(faces)
+    triangles = polygon_triangles(name, places, counts, corners)
+    colours = _colours(vertices)
+    if not len(colours) and len(painted := _colours(faces)):
+        painted = np.repeat(painted, 3 * np.maximum(counts - 2, 0), axis=0)
+        colours = colours_of_points(triangles.ravel(), painted, len(places))
+    return sound_solid(name, places * unit_m, triangles, colours)
 
 
-def _header(head: bytes) -> tuple[str, list[_Element]]:
-    order, elements = "", list[_Element]()
-    for line in head.splitlines()[1:]:
-        words = line.split()
-        if not words or words[0] in {b"comment", b"obj_info"}:
-            continue
-        if words[0] == b"format":
-            order = _ORDERS[words[1]]
-        elif words[0] == b"element":
-            elements.append(_Element(words[1], int(words[2]), ()))
-        elif words[0] == b"property":
-            last = elements[-1]
-            given = (words[4], words[2], words[3]) if words[1] == b"list" else (words[2], words[1])
-            elements[-1] = _Element(last.name, last.count, (*last.properties, given))
-        else:
-            raise ValueError("a header's line")
-    if any(not 0 <= element.count < 1 << 31 for element in elements):
-        raise ValueError("a count")
-    return order, elements
+def _polygons(faces: Table) -> tuple[Numbers, Numbers]:
+    """Return the numbers of corners, and the corners, of a file's faces."""
+    for column in (faces.get(key) for key in _CORNER_LISTS):
+        if column is not None and column.counts is not None:
+            return column.counts, _integers(column.values)
+    return np.zeros(0, np.int64), np.zeros(0, np.int64)
 
 
-Table = dict[bytes, NDArray[np.generic]]
+def _integers(values: Numbers) -> Numbers:
+    """Return numbers of points; what is no such number becomes -1, which is none either."""
+    if values.dtype.kind in "iu":
+        return values
+    return np.where((values >= 0) & (values < 1 << 31), values, -1).astype(np.int32)
 
 
-def _binary(content: bytes, at: int, order: str, elements: list[_Element]) -> dict[bytes, Table]:
-    """Read the elements one after another. A list is read as triangles, which all faces are in a mesh of a scan."""
-    tables: dict[bytes, Table] = {}
-    for element in elements:
-        fields: list[tuple[str, str] | tuple[str, str, int]] = []
-        lists = []
-        for number, (_, *kinds) in enumerate(element.properties):
-            if len(kinds) == 1:
-                fields.append((f"f{number}", order + _TYPES[kinds[0]]))
-            else:
-                fields += [(f"n{number}", order + _TYPES[kinds[0]]), (f"f{number}", order + _TYPES[kinds[1]], 3)]
-                lists.append(f"n{number}")
-        record = np.dtype(fields)
-        rows = np.frombuffer(content, record, element.count, at)
-        if any((rows[counts] != 3).any() for counts in lists):
-            raise ValueError("a face is no triangle")
-        at += element.count * record.itemsize
-        tables[element.name] = {title: rows[f"f{number}"] for number, (title, *_) in enumerate(element.properties)}
-    return tables
+def _unrolled(strips: Column | None) -> Numbers:
+    """Return the triangles of strips in which each point makes one with the two before it; -1 ends a strip."""
+    if strips is None or strips.counts is None:
+        return np.zeros((0, 3), np.int64)
+    ends = np.cumsum(strips.counts)
+    corners = np.insert(strips.values.astype(np.int64), ends[:-1], -1)
+    number = np.arange(len(corners))
+    begun = np.maximum.accumulate(np.where(corners < 0, number, -1))
+    triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1) if len(corners) > 2 else np.zeros((0, 3), np.int64)  # fmt: skip
+    is_odd = (number - begun)[: len(triangles)] % 2 == 0
+    triangles[is_odd] = triangles[is_odd][:, [1, 0, 2]]
+    return triangles[(triangles >= 0).all(axis=1)]
 
 
-def _text(body: bytes, elements: list[_Element]) -> dict[bytes, Table]:
-    lines = iter(body.splitlines())
-    tables: dict[bytes, Table] = {}
-    for element in elements:
-        rows = [next(lines, b"").split() for _ in range(min(element.count, len(body)))]
-        if len(rows) < element.count:
-            raise ValueError("too few lines")
-        if len(element.properties) == 1 and len(element.properties[0]) == 3:
-            if any(int(row[0]) != 3 for row in rows):
-                raise ValueError("a face is no triangle")
-            tables[element.name] = {
-                element.properties[0][0]: np.array([[int(n) for n in row[1:4]] for row in rows], np.int64)
-            }
-            continue
-        tables[element.name] = {
-            title: np.array([float(row[at]) for row in rows]).astype(_TYPES[kinds[-1]])
-            for at, (title, *kinds) in enumerate(element.properties)
-            if len(kinds) == 1
-        }
-    return tables
+def _colours(table: Table) -> NDArray[np.uint8]:
+    """Return (N, 3): bytes as they are, words by their upper half, fractions as shares of 255; (0, 3) where there are none."""
+    for names in _SHADES:
+        shades = [table[name] for name in names if name in table and table[name].counts is None]
+        if len(shades) == 3:
+            factors = [_WHITE.get(shade.kind, 1.0) for shade in shades]
+            values = [
+                np.asarray(shade.values, np.float64) * factor for shade, factor in zip(shades, factors, strict=True)
+            ]
+            return np.asarray(np.rint(np.clip(np.nan_to_num(np.stack(values, axis=1)), 0, 255)), np.uint8)
+    return NO_COLOURS

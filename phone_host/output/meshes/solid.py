@@ -4,11 +4,13 @@ Inside, points are metres; files for printers hold millimetres. Triangles go ant
 """
 
 from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from phone_host.output.meshes.polygons import MAX_CONCAVE, TooManyCornersError, triangulated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +50,16 @@ class Solid:
         return np.asarray(np.rint(self.colours[self.triangles].mean(axis=1)), np.uint8)
 
 
+NO_COLOURS: Final = np.zeros((0, 3), np.uint8)
+_MAX_M: Final = 1e5
+"""Farthest place that a corner may have: 100 km."""
+
+
 def sound_solid(
-    name: str, points_m: NDArray[np.float64], triangles: NDArray[np.int64], colours: NDArray[np.uint8]
+    name: str,
+    points_m: NDArray[np.float64],
+    triangles: NDArray[np.integer[Any]],
+    colours: NDArray[np.uint8] = NO_COLOURS,
 ) -> Solid:
     """Make a mesh of what a file says, if that can be one.
 
@@ -57,32 +67,98 @@ def sound_solid(
         name: of the file, for errors.
         points_m: (V, 3), m.
         triangles: (T, 3) numbers of points.
-        colours: (V, 3) or (0, 3) uint8.
+        colours: (V, 3) or (0, 3).
 
     Returns:
-        The mesh, without triangles of which two corners are one point.
+        The mesh, without triangles of which two corners are one point, and without points that no triangle uses: those may be NaN.
 
     Raises:
         DataError: it has no triangle, a corner that is no point, or a point that is no place.
     """
     if not len(triangles):
         raise DataError(f"{name} holds no triangle", "give a mesh, not points alone")
-    if triangles.min() < 0 or triangles.max() >= len(points_m):
-        raise DataError(f"{name} has a triangle with a corner that is no point of it", "write the file again")
-    used = points_m[np.unique(triangles)]
-    if not (np.isfinite(used).all() and np.abs(used).max() < _FAR_M):
+    require_corners(name, triangles, len(points_m))
+    whole = np.ascontiguousarray(triangles, np.int32)
+    is_used = np.zeros(len(points_m), np.bool_)
+    is_used[whole] = True
+    if not is_used.all():
+        whole = (np.cumsum(is_used, dtype=np.int32) - 1)[whole]
+        points_m, colours = points_m[is_used], colours[is_used] if len(colours) else colours
+    if not (points_m.min() > -_MAX_M and points_m.max() < _MAX_M):  # neither holds of NaN
         raise DataError(
             f"{name} has a corner that is no place (NaN, infinite or beyond 100 km)",
             "mend it in a mesh editor, or scan again",
         )
+    return Solid(points_m.astype(np.float32), require_triangles(name, whole), colours)
+
+
+def require_corners(name: str, corners: NDArray[np.integer[Any]], count: int) -> None:
+    """Check that corners are points.
+
+    Args:
+        name: of the file, for errors.
+        corners: numbers of points, in any shape.
+        count: how many points there are.
+
+    Raises:
+        DataError: one of them is none.
+    """
+    if corners.size and not 0 <= corners.min() <= corners.max() < count:
+        raise DataError(f"{name} has a triangle with a corner that is no point of it", "write the file again")
+
+
+def polygon_triangles(
+    name: str, points: NDArray[np.float64], counts: NDArray[np.integer[Any]], corners: NDArray[np.integer[Any]]
+) -> NDArray[np.integer[Any]]:
+    """Return the triangles of a file's polygons.
+
+    Args:
+        name: of the file, for errors.
+        points: (V, 3).
+        counts: (F,) numbers of corners.
+        corners: numbers of points, polygon after polygon.
+
+    Raises:
+        DataError: a corner is no point, or a polygon has too many corners.
+    """
+    require_corners(name, corners, len(points))
+    try:
+        return triangulated(points, counts, corners)
+    except TooManyCornersError:
+        raise DataError(
+            f"{name} has a hollow face of more than {MAX_CONCAVE} corners",
+            "let the program that made it write triangles",
+        ) from None
+
+
+def require_triangles(name: str, triangles: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Leave out triangles of which two corners are one point.
+
+    Args:
+        name: of the file, for errors.
+        triangles: (T, 3).
+
+    Raises:
+        DataError: none is left.
+    """
     a, b, c = triangles.T
-    whole = triangles[(a != b) & (b != c) & (c != a)]
-    if not len(whole):
+    is_whole = (a != b) & (b != c) & (c != a)
+    if not is_whole.any():
         raise DataError(f"{name} holds no triangle with three corners", "give a mesh, not points alone")
-    return Solid(points_m.astype(np.float32), np.ascontiguousarray(whole, np.int32), colours)
+    return triangles if is_whole.all() else triangles[is_whole]
 
 
-_FAR_M = 1e5
+def colours_of_points(corners: NDArray[np.integer[Any]], colours: NDArray[np.uint8], count: int) -> NDArray[np.uint8]:
+    """Return (V, 3): for each point the mean of the colours that its corners have; black where it is no corner.
+
+    Args:
+        corners: (N,) numbers of points, 0..V-1.
+        colours: (N, 3) of the corners.
+        count: V.
+    """
+    amounts = np.maximum(np.bincount(corners, minlength=count), 1)
+    sums = [np.bincount(corners, colours[:, channel], count) for channel in range(3)]
+    return np.asarray(np.rint(np.stack(sums, axis=1) / amounts[:, np.newaxis]), np.uint8)
 
 
 def welded(solid: Solid) -> Solid:

@@ -1,9 +1,9 @@
-"""STL: triangles alone, without unit, colour or shared points; binary is written, binary and text are read. Pure.
+"""STL: triangles alone, without unit, colour or shared points; binary is written, binary and text are read, as writers of many kinds leave them. Pure.
 
 Source: "The StL Format", 3D Systems, 1989: 80 bytes of header, a count, then 50 bytes a triangle.
 """
 
-import re
+from array import array
 from typing import Final
 
 import numpy as np
@@ -11,11 +11,16 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.words import counted
-from phone_host.output.meshes.solid import Solid, sound_solid, welded
+from phone_host.output.meshes.solid import Solid, require_triangles, sound_solid, welded
+from phone_host.output.meshes.text import text_lines, without_mark
 
 _TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER: Final = 80
-_VERTEX: Final = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
+_COUNTS_NOT_SET: Final = (0, 0xFFFFFFFF)
+"""What writers leave there that do not go back to the header."""
+
+_TEXT_HEAD: Final = 512
+"""A binary file has a zero byte here: it is in the count, or in the first triangles' attributes."""
 
 
 def stl_bytes(solid: Solid, comment: str) -> bytes:
@@ -43,6 +48,8 @@ def _normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
 def read_stl(content: bytes, name: str, unit_m: float) -> Solid:
     """Read a binary or text STL file; points at one place become one.
 
+    Binary or text is told apart by the bytes: many programs begin binary files with "solid", too.
+
     Args:
         content: of the file; it may come from anybody.
         name: of the file, for errors.
@@ -51,36 +58,48 @@ def read_stl(content: bytes, name: str, unit_m: float) -> Solid:
     Raises:
         DataError: it is no STL file, or is cut short, or holds no sound triangle.
     """
-    if len(content) >= _HEADER + 4:
-        count = int.from_bytes(content[_HEADER : _HEADER + 4], "little")
-        expected = _HEADER + 4 + count * _TRIANGLE.itemsize
-        if expected <= len(content) and (expected == len(content) or not content.startswith(b"solid")):
-            corners = np.frombuffer(content, _TRIANGLE, count, _HEADER + 4)["corners"].reshape(-1, 3)
-            return _soup(corners.astype(np.float64), name, unit_m)
-        if not content.startswith(b"solid"):
-            raise DataError(
-                f"{name} is cut short: its header names {counted(count, 'triangle')}, {max(0, len(content) - _HEADER - 4) // _TRIANGLE.itemsize} are there",
-                "copy the file again",
-            )
-    if not content.lstrip().startswith(b"solid") or b"endsolid" not in content:
+    head = without_mark(content[:_TEXT_HEAD])
+    is_text = head.lstrip().lower().startswith(b"solid") and b"\0" not in head
+    corners = _text(content, name) if is_text else _binary(content, name)
+    triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    solid = welded(sound_solid(name, corners * unit_m, triangles))
+    return Solid(solid.points_m, require_triangles(name, solid.triangles), solid.colours)
+
+
+def _binary(content: bytes, name: str) -> NDArray[np.float32]:
+    """Return (3 T, 3). Bytes behind the last triangle mean nothing; of a count that was never set, the file's length says what it is."""
+    body = len(content) - _HEADER - 4
+    if body < 0:
         raise DataError(f"{name} is no whole STL file", "copy the file again, or export it anew")
-    try:
-        corners = np.array(
-            [[float(number) for number in one.groups()] for one in _VERTEX.finditer(content)], np.float64
+    count, held = int.from_bytes(content[_HEADER : _HEADER + 4], "little"), body // _TRIANGLE.itemsize
+    if count in _COUNTS_NOT_SET and body == held * _TRIANGLE.itemsize:
+        count = held
+    if count > held:
+        raise DataError(
+            f"{name} is cut short: its header names {counted(count, 'triangle')}, {held} are there",
+            "copy the file again",
         )
-    except ValueError:
+    return np.frombuffer(content, _TRIANGLE, count, _HEADER + 4)["corners"].reshape(-1, 3)
+
+
+def _text(content: bytes, name: str) -> NDArray[np.float64]:
+    """Return (3 T, 3). The last line may be missing, half a triangle not."""
+    corners, opened, closed = array("d"), 0, 0
+    try:
+        for line in text_lines(without_mark(content)):
+            words = iter(line.lower().split())
+            for number, word in enumerate(words):
+                if word == b"vertex":
+                    corners.extend([float(next(words)), float(next(words)), float(next(words))])
+                elif number == 0 and word in {b"solid", b"endsolid"}:
+                    break  # a name follows, of any words
+                else:
+                    opened += word == b"facet"
+                    closed += word == b"endfacet"
+    except (ValueError, StopIteration):
         raise DataError(f"{name} has a vertex that is no number", "export it anew") from None
-    if len(corners) % 3:
+    if opened != closed:
+        raise DataError(f"{name} is no whole STL file", "copy the file again, or export it anew")
+    if len(corners) % 9:
         raise DataError(f"{name} has a triangle without three corners", "export it anew")
-    return _soup(corners.reshape(-1, 3), name, unit_m)
-
-
-def _soup(corners: NDArray[np.float64], name: str, unit_m: float) -> Solid:
-    triangles = np.arange(len(corners)).reshape(-1, 3)
-    return _sound(welded(sound_solid(name, corners * unit_m, triangles, np.zeros((0, 3), np.uint8))), name)
-
-
-def _sound(solid: Solid, name: str) -> Solid:
-    if not len(solid.triangles):
-        raise DataError(f"{name} holds no triangle with three corners", "give a mesh, not points alone")
-    return solid
+    return np.frombuffer(corners, np.float64).reshape(-1, 3)
