@@ -10,7 +10,7 @@ from common.errors import DataError
 from common.files import read_whole
 from common.places import Kind, kind_of
 from phone_host.output.axes import Axes
-from phone_host.output.meshes.formats import OURS_MM, read_mesh
+from phone_host.output.meshes.formats import read_mesh
 from phone_host.output.meshes.solid import Solid
 
 _MODEL = "model.ply"
@@ -19,8 +19,6 @@ _REPORTS: Final = ("report.json", "report-scan.json")
 
 _MOST_BYTES: Final = 2 << 30
 _MOST_REPORT_BYTES: Final = 16 << 20
-_HEAD: Final = 256
-_STL_HEAD: Final = 80
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -47,7 +45,7 @@ def read_model(path: Path, unit_m: float) -> Model:
 
     Args:
         path: the folder of a scan, or a mesh file.
-        unit_m: unit of a mesh file, m; NaN: what the file says if we wrote it, or else the metre. A scan's is the metre.
+        unit_m: unit of a mesh file, m; NaN: what the file says, as ours and each 3MF do, else the metre.
 
     Raises:
         DataError: there is none, it is no mesh, or a spoiled one.
@@ -65,20 +63,12 @@ def read_model(path: Path, unit_m: float) -> Model:
         raise DataError(f"{file} cannot be read ({error.strerror})", "check its permissions") from None
     reports = [_report(path / name) for name in _REPORTS] if is_scan else []
     report = next((told for told in reports if told), {})
-    if is_scan or math.isnan(unit_m):
-        unit_m = 0.001 if OURS_MM in content[:_HEAD] else 1.0
-    solid = read_mesh(content, file.name, unit_m)
+    mesh = read_mesh(content, file.name, math.nan if is_scan else unit_m)
     stem = (path.resolve().name or "model") if is_scan else path.stem
-    axes = next((axes for axes in Axes if axes.text == report.get("axes") or _says(content[:_HEAD], axes)), None)
+    axes = next((axes for axes in Axes if axes.text == report.get("axes")), mesh.axes)
     voxel = report.get("voxel_m")
     voxel_m = float(voxel) if isinstance(voxel, int | float) and 0 < voxel < 1 else math.nan
-    return Model(path=file, stem=stem, solid=solid, axes=axes, voxel_m=voxel_m)
-
-
-def _says(head: bytes, axes: Axes) -> bool:
-    """Return whether a file of ours says that it has these axes; an STL says them as far as they fit."""
-    said = f"; {axes.text}".encode()
-    return said + b"\n" in head or head[:_STL_HEAD].rstrip() == (OURS_MM + said)[:_STL_HEAD].rstrip()
+    return Model(path=file, stem=stem, solid=mesh.solid, axes=axes, voxel_m=voxel_m)
 
 
 def _report(path: Path) -> dict[str, object]:

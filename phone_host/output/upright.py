@@ -15,7 +15,7 @@ _UNITS_M: Final = {"m": 1.0, "mm": 0.001}
 _UP: Final = {"z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}  # fmt: skip
 """Rows of the rotation that puts this axis up."""
 
-_UP_OF: Final = {Axes.CAMERA: "-y", Axes.Y_UP: "y", Axes.MAT: "z", Axes.TABLE: "z", None: "z"}
+_UP_OF: Final = {Axes.CAMERA: "-y", Axes.Y_UP: "y", Axes.MAT: "z", Axes.TABLE: "z", Axes.GLTF: "y", None: "z"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

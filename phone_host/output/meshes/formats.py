@@ -1,6 +1,8 @@
 """The formats of meshes by name: the only place that knows all of them. Pure."""
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -8,12 +10,14 @@ import numpy as np
 from common.errors import DataError
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.glb import glb_bytes
+from phone_host.output.meshes.glb_read import read_glb
 from phone_host.output.meshes.obj import obj_bytes, read_obj
 from phone_host.output.meshes.ply_mesh import ply_bytes, read_ply_mesh
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.meshes.stl import read_stl, stl_bytes
 from phone_host.output.meshes.three_ds import three_ds_bytes
 from phone_host.output.meshes.three_mf import three_mf_bytes
+from phone_host.output.meshes.three_mf_read import read_three_mf
 
 METRES: Final = "glb"
 """The only format whose specification wants metres and y up; all others are in mm, in the model's own axes."""
@@ -27,17 +31,33 @@ _WRITERS: Final[dict[str, Callable[[Solid, str], bytes]]] = {
     "obj": obj_bytes,
     "3ds": lambda solid, _comment: three_ds_bytes(solid),
     "ply": ply_bytes,
-    "3mf": lambda solid, _comment: three_mf_bytes(solid),
-    "glb": lambda solid, _comment: glb_bytes(solid),
 }
 _READERS: Final[dict[str, Callable[[bytes, str, float], Solid]]] = {
     "stl": read_stl,
     "obj": read_obj,
     "ply": read_ply_mesh,
 }
+_FIRST_BYTES: Final = {b"glTF": "glb", b"PK\x03\x04": "3mf", b"ply\n": "ply", b"ply\r": "ply"}
+"""What a file is, whatever its name."""
 
-FORMATS: Final = tuple(_WRITERS)
-READABLE: Final = tuple(_READERS)
+_HEAD: Final = 256
+_STL_HEAD: Final = 80
+
+FORMATS: Final = (*_WRITERS, "3mf", METRES)
+READABLE: Final = (*_READERS, "3mf", METRES)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshFile:
+    """A mesh of a file.
+
+    Attributes:
+        solid: the mesh.
+        axes: in which its points are; None: nobody says.
+    """
+
+    solid: Solid
+    axes: Axes | None
 
 
 def mesh_bytes(solid: Solid, kind: str, axes: Axes | None) -> bytes:
@@ -48,26 +68,42 @@ def mesh_bytes(solid: Solid, kind: str, axes: Axes | None) -> bytes:
         kind: one of `FORMATS`.
         axes: in which its points are; None: nobody knows. A GLB is turned so that y is up.
     """
-    turned = solid
-    if kind == METRES and axes is Axes.CAMERA:
-        turned = Solid(solid.points_m * Axes.Y_UP.signs, solid.triangles, solid.colours)
+    if kind == METRES:
+        turned = solid if axes is None else Solid(solid.points_m @ axes.to_y_up.T, solid.triangles, solid.colours)
+        return glb_bytes(turned, axes)
+    if kind == "3mf":
+        return three_mf_bytes(solid, axes)
     words = OURS_MM.decode() if axes is None else f"{OURS_MM.decode()}; {axes.text}"
-    return _WRITERS[kind](turned, words)
+    return _WRITERS[kind](solid, words)
 
 
-def read_mesh(content: bytes, name: str, unit_m: float) -> Solid:
-    """Read a mesh file by the ending of its name.
+def read_mesh(content: bytes, name: str, unit_m: float = math.nan) -> MeshFile:
+    """Read a mesh file: by its first bytes where they say what it is, else by the ending of its name.
 
     Args:
         content: of the file; it may come from anybody.
         name: of the file.
-        unit_m: its unit, m.
+        unit_m: its unit, m; NaN: what the file says, as ours and each 3MF do, else the metre.
 
     Raises:
         DataError: it is no mesh, or not in a format that is read.
     """
-    kind = name.rpartition(".")[2].lower()
-    if kind not in _READERS:
-        raise DataError(f"{name} is no mesh that is read", f"give a scan's folder, or {', '.join(_READERS)}")
+    kind = _FIRST_BYTES.get(content[:4], name.rpartition(".")[2].lower())
+    if kind not in READABLE:
+        raise DataError(f"{name} is no mesh that is read", f"give a scan's folder, or {', '.join(READABLE)}")
+    is_told = not math.isnan(unit_m)
     with np.errstate(all="ignore"):  # absurd numbers are judged afterwards
-        return _READERS[kind](content, name, unit_m)
+        if kind == METRES:
+            return MeshFile(*read_glb(content, name, unit_m if is_told else 1.0))
+        if kind == "3mf":
+            return MeshFile(*read_three_mf(content, name, unit_m if is_told else None))
+        head = content[:_HEAD]
+        own_m = 0.001 if OURS_MM in head else 1.0
+        solid = _READERS[kind](content, name, unit_m if is_told else own_m)
+    return MeshFile(solid, next((axes for axes in Axes if _says(head, axes)), None))
+
+
+def _says(head: bytes, axes: Axes) -> bool:
+    """Return whether a file of ours says that it has these axes; an STL says them as far as they fit."""
+    said = f"; {axes.text}".encode()
+    return said + b"\n" in head or head[:_STL_HEAD].rstrip() == (OURS_MM + said)[:_STL_HEAD].rstrip()

@@ -9,19 +9,22 @@ from typing import Any, Final
 
 import numpy as np
 
+from phone_host.output.axes import Axes
 from phone_host.output.meshes.solid import Solid
 
 _FLOAT, _UNSIGNED, _BYTE = 5126, 5125, 5121
 _POINTS_TARGET, _CORNERS_TARGET = 34962, 34963
 _JSON, _BINARY = 0x4E4F534A, 0x004E4942
 _MAGIC: Final = 0x46546C67
+GENERATOR: Final = "tandemscan"
 
 
-def glb_bytes(solid: Solid) -> bytes:
+def glb_bytes(solid: Solid, axes: Axes | None) -> bytes:
     """Return a GLB file, in metres.
 
     Args:
         solid: the mesh; y up.
+        axes: that it had before it was turned, for `read_glb` to turn it back; None: nobody knows.
     """
     points = np.ascontiguousarray(solid.points_m, "<f4")
     parts = [points.tobytes()]
@@ -45,7 +48,7 @@ def glb_bytes(solid: Solid) -> bytes:
         views.append({"buffer": 0, "byteOffset": at, "byteLength": len(part), "target": target})
         at += len(part)
     told = {
-        "asset": {"version": "2.0", "generator": "tandemscan"},
+        "asset": {"version": "2.0", "generator": GENERATOR} | ({"extras": {"axes": axes.text}} if axes else {}),
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],

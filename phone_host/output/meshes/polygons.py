@@ -112,7 +112,7 @@ def _ears(flat: Points) -> NDArray[np.bool_]:
     for corner in (before, flat, after):  # these three touch the triangle, as does another corner at the same place
         inside &= (flat[:, np.newaxis] != corner[:, :, np.newaxis]).any(axis=3)
     inside &= ~sticks_out[:, np.newaxis]  # where one that sticks out lies inside, another does that does not
-    ears = sticks_out & ~inside.any(axis=2)
+    ears: NDArray[np.bool_] = sticks_out & ~inside.any(axis=2)
     none = np.flatnonzero(~ears.any(axis=1))
     ears[none, doubled[none].argmax(axis=1)] = True
     return ears

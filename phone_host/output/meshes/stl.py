@@ -62,7 +62,7 @@ def read_stl(content: bytes, name: str, unit_m: float) -> Solid:
     is_text = head.lstrip().lower().startswith(b"solid") and b"\0" not in head
     corners = _text(content, name) if is_text else _binary(content, name)
     triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
-    solid = welded(sound_solid(name, corners * unit_m, triangles))
+    solid = welded(sound_solid(name, np.multiply(corners, unit_m, dtype=np.float64), triangles))
     return Solid(solid.points_m, require_triangles(name, solid.triangles), solid.colours)
 
 
@@ -70,7 +70,7 @@ def _binary(content: bytes, name: str) -> NDArray[np.float32]:
     """Return (3 T, 3). Bytes behind the last triangle mean nothing; of a count that was never set, the file's length says what it is."""
     body = len(content) - _HEADER - 4
     if body < 0:
-        raise DataError(f"{name} is no whole STL file", "copy the file again, or export it anew")
+        raise _cut(name)
     count, held = int.from_bytes(content[_HEADER : _HEADER + 4], "little"), body // _TRIANGLE.itemsize
     if count in _COUNTS_NOT_SET and body == held * _TRIANGLE.itemsize:
         count = held
@@ -97,9 +97,15 @@ def _text(content: bytes, name: str) -> NDArray[np.float64]:
                     opened += word == b"facet"
                     closed += word == b"endfacet"
     except (ValueError, StopIteration):
+        if b"endsolid" not in content[-_TEXT_HEAD:].lower():
+            raise _cut(name) from None
         raise DataError(f"{name} has a vertex that is no number", "export it anew") from None
     if opened != closed:
-        raise DataError(f"{name} is no whole STL file", "copy the file again, or export it anew")
+        raise _cut(name)
     if len(corners) % 9:
         raise DataError(f"{name} has a triangle without three corners", "export it anew")
     return np.frombuffer(corners, np.float64).reshape(-1, 3)
+
+
+def _cut(name: str) -> DataError:
+    return DataError(f"{name} is no whole STL file", "copy the file again, or export it anew")

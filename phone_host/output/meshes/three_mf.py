@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from phone_host.output.axes import Axes
 from phone_host.output.meshes.solid import Solid
 
 _CORE: Final = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -27,18 +28,19 @@ _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """The same mesh gives the same bytes."""
 
 
-def three_mf_bytes(solid: Solid) -> bytes:
+def three_mf_bytes(solid: Solid, axes: Axes | None) -> bytes:
     """Return a 3MF file in mm.
 
     Args:
         solid: the mesh.
+        axes: in which its points are, for `read_three_mf`; None: nobody knows.
     """
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in (
             ("[Content_Types].xml", _TYPES),
             ("_rels/.rels", _RELATIONS),
-            ("3D/3dmodel.model", _model(solid)),
+            ("3D/3dmodel.model", _model(solid, "" if axes is None else axes_element(axes))),
         ):
             entry = zipfile.ZipInfo(name, _EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED
@@ -46,7 +48,12 @@ def three_mf_bytes(solid: Solid) -> bytes:
     return held.getvalue()
 
 
-def _model(solid: Solid) -> str:
+def axes_element(axes: Axes) -> str:
+    """Return the element that says the axes."""
+    return f'<metadata name="Description">{axes.text}</metadata>'
+
+
+def _model(solid: Solid, axes: str) -> str:
     group, paint = "", None
     if solid.has_colours:
         distinct, paint = np.unique(solid.colours, axis=0, return_inverse=True)
@@ -64,7 +71,7 @@ def _model(solid: Solid) -> str:
     paints = ' pid="2" pindex="0"' if group else ""
     return (
         f'<?xml version="1.0" encoding="UTF-8"?>\n<model unit="millimeter" xml:lang="en-US" xmlns="{_CORE}" xmlns:m="{_MATERIAL}">'
-        f'<metadata name="Application">tandemscan</metadata><resources>{group}<object id="1" type="model"{paints}>'
+        f'<metadata name="Application">tandemscan</metadata>{axes}<resources>{group}<object id="1" type="model"{paints}>'
         f"<mesh><vertices>{vertices}</vertices><triangles>{faces}</triangles></mesh></object></resources>"
         '<build><item objectid="1"/></build></model>\n'
     )

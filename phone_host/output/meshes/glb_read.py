@@ -1,0 +1,213 @@
+"""Reads GLB: the triangles of all meshes where the scene's nodes put them, in metres, y up. Pure.
+
+Pictures, skins, animations and cameras have no part in the shape. Compressed meshes (Draco, meshopt) are refused by name.
+Source: Khronos, glTF 2.0 Specification, sections 3.5 (nodes), 3.6 (accessors), 3.7.2 (meshes) and 4 (GLB).
+"""
+
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from phone_host.output.axes import Axes
+from phone_host.output.meshes.glb import GENERATOR
+from phone_host.output.meshes.placed import Part, placed, require_few
+from phone_host.output.meshes.solid import NO_COLOURS, Solid
+
+_MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+_KINDS: Final = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_COLUMNS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_READ_EXTENSIONS: Final = ("KHR_mesh_quantization",)
+_COMPRESSED: Final = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+_MAX_DEPTH: Final = 64
+_WRONG: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
+"""What reading a tree of JSON raises where something else stands than must."""
+
+Tree = dict[str, Any]
+
+
+def read_glb(content: bytes, name: str, unit_m: float) -> tuple[Solid, Axes | None]:
+    """Read a GLB file. One of ours is turned back to the axes it was made from.
+
+    Args:
+        content: of the file; it may come from anybody.
+        name: of the file, for errors.
+        unit_m: its unit, m; the specification wants the metre.
+
+    Returns:
+        The mesh, and its axes; None: it is one of ours, and they were not known then either.
+
+    Raises:
+        DataError: it is no GLB file, is cut short or compressed, or holds no sound triangle.
+    """
+    try:
+        file = _file(content, name)
+        parts, axes = list(_parts(file)), _axes(file.tree["asset"])
+    except _WRONG as error:
+        raise DataError(f"{name} is cut short, or no GLB file of a mesh", "copy the file again, or export it anew") from error  # fmt: skip
+    solid = placed(name, parts, unit_m)
+    if axes is None:
+        return solid, None
+    return Solid(solid.points_m @ axes.to_y_up, solid.triangles, solid.colours), axes
+
+
+def _axes(asset: Tree) -> Axes | None:
+    """Return the axes that the points shall have when they are turned back."""
+    if asset.get("generator") != GENERATOR:
+        return Axes.GLTF
+    extras = asset.get("extras", {})
+    return next((axes for axes in Axes if axes.text == extras.get("axes")), None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _File:
+    name: str
+    tree: Tree
+    buffer: memoryview
+
+    def view(self, number: int) -> tuple[memoryview, int]:
+        """Return the bytes of a view, and how far apart its rows are; 0: close together."""
+        view = self.tree["bufferViews"][number]
+        if view["buffer"] != 0:
+            raise IndexError("a file beside it")
+        begin, length = view.get("byteOffset", 0), view["byteLength"]
+        if min(begin, length) < 0 or begin + length > len(self.buffer):
+            raise IndexError("beyond the end")
+        return self.buffer[begin : begin + length], view.get("byteStride", 0)
+
+    def numbers(self, number: int) -> NDArray[Any]:
+        """Return (N, columns) numbers of an accessor; integers that stand for shares are float32."""
+        told = self.tree["accessors"][number]
+        count, kind, columns = told["count"], np.dtype(_KINDS[told["componentType"]]), _COLUMNS[told["type"]]
+        if "bufferView" in told:
+            values = self._rows(told["bufferView"], told.get("byteOffset", 0), (count, columns), kind)
+        elif "sparse" in told:
+            require_few(self.name, count)
+            values = np.zeros((count, columns), kind)
+        else:
+            raise IndexError("numbers that are nowhere")
+        if "sparse" in told:
+            values = self._changed(values, told["sparse"])
+        if told.get("normalized") and kind.kind in "iu":
+            values = np.maximum(values.astype(np.float32) / np.iinfo(kind).max, -1)
+        return values
+
+    def _rows(self, view: int, begin: int, shape: tuple[int, int], kind: np.dtype[Any]) -> NDArray[Any]:
+        held, step = self.view(view)
+        row = shape[1] * kind.itemsize
+        step = step or row
+        if min(begin, shape[0], step) < 0 or (shape[0] and begin + (shape[0] - 1) * step + row > len(held)):
+            raise IndexError("beyond the end")
+        return np.ndarray(shape, kind, held, begin, (step, kind.itemsize))
+
+    def _changed(self, values: NDArray[Any], sparse: Tree) -> NDArray[Any]:
+        count, where, what = sparse["count"], sparse["indices"], sparse["values"]
+        kind = np.dtype(_KINDS[where["componentType"]])
+        rows = self._rows(where["bufferView"], where.get("byteOffset", 0), (count, 1), kind)
+        shape = (count, values.shape[1])
+        changed = values.copy()
+        changed[rows[:, 0]] = self._rows(what["bufferView"], what.get("byteOffset", 0), shape, values.dtype)
+        return changed
+
+
+def _file(content: bytes, name: str) -> _File:
+    """Take a file apart. Its tree's numbers are not believed yet."""
+    if len(content) < 20 or struct.unpack_from("<I", content)[0] != _MAGIC:
+        raise DataError(f"{name} is no GLB file", "give a mesh file")
+    if (version := struct.unpack_from("<I", content, 4)[0]) != 2:
+        raise DataError(f"{name} is a GLB of version {version}, which is not read", "export it as glTF 2.0")
+    whole, at, found = memoryview(content), 12, dict[int, memoryview]()
+    while at + 8 <= len(whole) and not (_JSON in found and _BINARY in found):
+        length, kind = struct.unpack_from("<II", whole, at)
+        if at + 8 + length > len(whole):
+            raise IndexError("beyond the end")
+        found.setdefault(kind, whole[at + 8 : at + 8 + length])
+        at += 8 + length
+    try:
+        tree = json.loads(bytes(found[_JSON]))
+    except RecursionError:
+        raise ValueError("too deep") from None
+    for extension in tree.get("extensionsRequired", ()):
+        if extension not in _READ_EXTENSIONS and (extension in _COMPRESSED or "mesh" in extension):
+            raise DataError(f"{name} is compressed by {extension}, which is not read", "export it without compression")
+    return _File(name, tree, found.get(_BINARY, memoryview(b"")))
+
+
+def _parts(file: _File) -> Iterator[Part]:
+    """Yield the meshes as often as nodes place them."""
+    meshes = [_mesh(file, mesh) for mesh in file.tree.get("meshes", ())]
+    nodes = file.tree.get("nodes", ())
+    scenes = file.tree.get("scenes", ())
+    roots = scenes[file.tree.get("scene", 0)].get("nodes", ()) if scenes else range(len(nodes) and 1)
+    waiting, visits = [(root, np.eye(4), 0) for root in roots], 0
+    while waiting:
+        number, place, depth = waiting.pop()
+        visits += 1
+        if depth > _MAX_DEPTH or visits > len(nodes):  # a node has one parent
+            raise DataError(f"{file.name} has nodes in a circle", "export it anew")
+        node = nodes[number]
+        place = place @ _matrix(node)
+        waiting += [(child, place, depth + 1) for child in node.get("children", ())]
+        if "mesh" in node:
+            for part in meshes[node["mesh"]]:
+                yield Part(part.points, part.triangles, part.colours, place)
+
+
+def _matrix(node: Tree) -> NDArray[np.float64]:
+    """Return (4, 4): from a node's coordinates to its parent's."""
+    if "matrix" in node:
+        return np.array(node["matrix"], np.float64).reshape(4, 4).T
+    x, y, z, w = (float(value) for value in node.get("rotation", (0, 0, 0, 1)))
+    turn = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), np.float64)
+    matrix[:3, 3] = node.get("translation", (0, 0, 0))
+    return matrix
+
+
+def _mesh(file: _File, mesh: Tree) -> list[Part]:
+    """Return the triangles of a mesh; lines and points are none."""
+    parts = []
+    for primitive in mesh["primitives"]:
+        mode, extensions = primitive.get("mode", _TRIANGLES), primitive.get("extensions", {})
+        if compressed := next((each for each in _COMPRESSED if each in extensions), None):
+            raise DataError(f"{file.name} is compressed by {compressed}, which is not read", "export it without compression")  # fmt: skip
+        if mode not in (_TRIANGLES, _STRIP, _FAN):
+            continue
+        attributes = primitive["attributes"]
+        points = file.numbers(attributes["POSITION"])
+        if points.shape[1] != 3:
+            raise ValueError("places of another shape")
+        corners = file.numbers(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(points), dtype=np.int32)  # fmt: skip
+        colours = _colours(file.numbers(attributes["COLOR_0"])) if "COLOR_0" in attributes else NO_COLOURS
+        if len(colours) not in (0, len(points)):
+            raise ValueError("colours of other points")
+        parts.append(Part(points, _triangles(corners, mode), colours, np.eye(4)))
+    return parts
+
+
+def _triangles(corners: NDArray[Any], mode: int) -> NDArray[Any]:
+    if mode == _TRIANGLES:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    first = corners[:-2] if mode == _STRIP else np.full(max(len(corners) - 2, 0), corners[0])
+    triangles = np.stack([first, corners[1:-1], corners[2:]], axis=1)
+    if mode == _STRIP:
+        triangles[1::2] = triangles[1::2, [1, 0, 2]]
+    return triangles
+
+
+def _colours(shades: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return (N, 3): sRGB, as in pictures; those of a file are linear."""
+    linear = np.clip(np.nan_to_num(shades[:, :3].astype(np.float64)), 0, 1)
+    shares = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.asarray(np.rint(255 * shares), np.uint8)

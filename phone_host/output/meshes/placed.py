@@ -1,0 +1,76 @@
+"""Meshes of several parts, each moved to its place: what GLB and 3MF hold. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, require_corners, sound_solid
+
+_MAX_PLACED: Final = 20_000_000
+"""Triangles of one mesh, or its points: a part may be placed often, and a small file so name an endless mesh."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Triangles, and where they go.
+
+    Attributes:
+        points: (V, 3), in the file's unit.
+        triangles: (T, 3) numbers of its points.
+        colours: (V, 3) or (0, 3) uint8.
+        place: (4, 4) float64: from its coordinates to the whole mesh's.
+    """
+
+    points: NDArray[Any]
+    triangles: NDArray[np.integer[Any]]
+    colours: NDArray[np.uint8]
+    place: NDArray[np.float64]
+
+
+def require_few(name: str, count: int) -> None:
+    """Check a number of points or triangles before there is room made for them.
+
+    Args:
+        name: of the file, for errors.
+        count: of points or triangles.
+
+    Raises:
+        DataError: it is beyond 20 million.
+    """
+    if count > _MAX_PLACED:
+        raise DataError(f"{name} holds more than {_MAX_PLACED // 10**6} million points or triangles", "export fewer")
+
+
+def placed(name: str, parts: Sequence[Part], unit_m: float) -> Solid:
+    """Put parts together.
+
+    Args:
+        name: of the file, for errors.
+        parts: of it; where some have colours and others have none, those are white.
+        unit_m: their unit, m.
+
+    Returns:
+        One mesh. A part that its place mirrors has its triangles turned, so that outside stays outside.
+
+    Raises:
+        DataError: they hold no sound triangle, or too many.
+    """
+    require_few(name, max(sum(len(part.points) for part in parts), sum(len(part.triangles) for part in parts)))
+    has_colours = any(len(part.colours) for part in parts)
+    points, triangles, colours, count = [], [], [], 0
+    for part in parts:
+        require_corners(name, part.triangles, len(part.points))
+        moved = part.points.astype(np.float64) @ (part.place[:3, :3].T * unit_m) + part.place[:3, 3] * unit_m
+        turned = part.triangles[:, ::-1] if np.linalg.det(part.place[:3, :3]) < 0 else part.triangles
+        points.append(moved)
+        triangles.append(turned.astype(np.int32) + np.int32(count))
+        if has_colours:
+            colours.append(part.colours if len(part.colours) else np.full((len(part.points), 3), 255, np.uint8))
+        count += len(part.points)
+    if not triangles:
+        raise DataError(f"{name} holds no triangle", "give a mesh, not points alone")
+    return sound_solid(name, np.concatenate(points), np.concatenate(triangles), np.concatenate(colours) if colours else NO_COLOURS)  # fmt: skip

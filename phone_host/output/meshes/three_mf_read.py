@@ -1,0 +1,215 @@
+"""Reads 3MF: the meshes of all objects where the build puts them, in the unit that the file names. Pure.
+
+Source: 3MF Core Specification 1.3; colours by the Materials and Properties Extension 1.2.1, parts in files of their own (as Bambu Studio and OrcaSlicer
+write them) by the Production Extension 1.1.
+"""
+
+import io
+import re
+import zipfile
+import zlib
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.errors import DataError
+from phone_host.output.axes import Axes
+from phone_host.output.meshes.placed import Part, placed, require_few
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, require_corners
+from phone_host.output.meshes.three_mf import axes_element
+
+_UNITS_M: Final = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
+_TARGET: Final = re.compile(r'Target\s*=\s*"/?([^"]+\.model)"', re.IGNORECASE)
+_RELATIONS: Final = "_rels/.rels"
+_MAX_INFLATED: Final = 100
+"""Times the file's size that its parts may have: a mesh's text has 5 to 20."""
+
+_FREE_BYTES: Final = 1 << 20
+_CHUNK: Final = 1 << 16
+_HEAD: Final = 1024
+_MAX_DEPTH: Final = 16
+_MAX_PLACED: Final = 10_000
+_NO_COLOUR: Final = -1
+
+Key = tuple[str, str]
+"""The file of a package that an object or a group of colours is in, and its number there."""
+
+
+@dataclass(slots=True)
+class _Object:
+    """A mesh, or objects put together."""
+
+    points: "array[float]" = field(default_factory=lambda: array("d"))
+    triangles: "array[int]" = field(default_factory=lambda: array("i"))
+    paints: "array[int]" = field(default_factory=lambda: array("i"))
+    components: list[tuple[Key, NDArray[np.float64]]] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Package:
+    """What the files of a package hold."""
+
+    objects: dict[Key, _Object] = field(default_factory=dict)
+    items: list[tuple[Key, NDArray[np.float64]]] = field(default_factory=list)
+    groups: dict[Key, list[int]] = field(default_factory=dict)
+    colours: list[tuple[int, ...]] = field(default_factory=list)
+    unit_m: float = 1e-3
+
+
+def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Solid, Axes | None]:
+    """Read a 3MF file.
+
+    Args:
+        content: of the file; it may come from anybody.
+        name: of the file, for errors.
+        unit_m: its unit, m; None: the one it names.
+
+    Returns:
+        The mesh, and its axes if it is one of ours and they were known.
+
+    Raises:
+        DataError: it is no 3MF file, is cut short, or holds no sound triangle.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            _require_bounded(archive, name, len(content))
+            package, root = _Package(), _root(archive)
+            with archive.open(root) as file:
+                head = file.read(_HEAD).decode("utf-8", "replace")
+            names = sorted((each for each in archive.namelist() if each.lower().endswith(".model")), key=root.__ne__)
+            for each in names:
+                _Reader(package, each, name, is_root=each == root).read(archive)
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError, expat.ExpatError, ValueError, KeyError, IndexError, OverflowError) as error:  # fmt: skip
+        raise DataError(f"{name} is no 3MF file, or cut short", "copy the file again, or export it anew") from error
+    parts = list(_placed(package, name))
+    axes = next((axes for axes in Axes if axes_element(axes) in head), None)
+    return placed(name, parts, package.unit_m if unit_m is None else unit_m), axes
+
+
+def _require_bounded(archive: zipfile.ZipFile, name: str, held: int) -> None:
+    inflated = sum(each.file_size for each in archive.infolist() if each.filename.lower().endswith(".model"))
+    if inflated > _FREE_BYTES + _MAX_INFLATED * held:
+        raise DataError(f"{name} would grow to {inflated // held} times its size", "no mesh does: export it anew")
+
+
+def _root(archive: zipfile.ZipFile) -> str:
+    """Return the name of the file with the build: as the package says, else the first model."""
+    models = [each for each in archive.namelist() if each.lower().endswith(".model")]
+    said = _TARGET.search(archive.read(_RELATIONS).decode("utf-8", "replace")) if _RELATIONS in archive.namelist() else None  # fmt: skip
+    named = said[1].lower() if said else ""
+    return next((each for each in models if each.lower() == named), models[0])
+
+
+class _Reader:
+    """Takes the elements of one file as they come, so that no tree of them is built.
+
+    Args:
+        package: takes what they hold.
+        part: name of the file in the package.
+        name: of the package, for errors.
+        is_root: whether its build counts.
+    """
+
+    def __init__(self, package: _Package, part: str, name: str, *, is_root: bool) -> None:
+        self._package, self._part, self._name, self._is_root = package, part, name, is_root
+        self._object, self._group = _Object(), list[int]()
+        self._paint: tuple[str | None, str | None] = (None, None)
+
+    def read(self, archive: zipfile.ZipFile) -> None:
+        """Read the file."""
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = self._begin
+        parser.StartDoctypeDeclHandler = self._refuse
+        parser.buffer_text = True
+        with archive.open(self._part) as file:
+            while chunk := file.read(_CHUNK):
+                parser.Parse(chunk)
+            parser.Parse(b"", True)  # noqa: FBT003 - expat's own argument
+
+    def _refuse(self, *_: object) -> None:
+        raise DataError(f"{self._name} has a document type, which no 3MF file has", "export it anew")
+
+    def _begin(self, tag: str, told: dict[str, str]) -> None:
+        match tag.rpartition(":")[2]:
+            case "vertex":
+                self._object.points.extend((float(told["x"]), float(told["y"]), float(told["z"])))
+            case "triangle":
+                self._object.triangles.extend((int(told["v1"]), int(told["v2"]), int(told["v3"])))
+                self._object.paints.extend(self._paints(told))
+            case "object":
+                self._object, self._paint = _Object(), (told.get("pid"), told.get("pindex"))
+                self._package.objects[self._part, told["id"]] = self._object
+            case "component":
+                path = next((value for key, value in told.items() if key.rpartition(":")[2] == "path"), self._part)
+                self._object.components.append(((path.lstrip("/"), told["objectid"]), _matrix(told)))
+            case "item" if self._is_root:
+                path = next((value for key, value in told.items() if key.rpartition(":")[2] == "path"), self._part)
+                self._package.items.append(((path.lstrip("/"), told["objectid"]), _matrix(told)))
+            case "model" if self._is_root:
+                self._package.unit_m = _UNITS_M[told.get("unit", "millimeter")]
+            case "colorgroup" | "basematerials":
+                self._group = self._package.groups.setdefault((self._part, told["id"]), [])
+            case "color" | "base":
+                self._group.append(len(self._package.colours))
+                self._package.colours.append(_colour(told.get("color") or told.get("displaycolor", "")))
+
+    def _paints(self, told: dict[str, str]) -> tuple[int, int, int]:
+        """Return the numbers of the colours of a triangle's corners."""
+        of_object, index = self._paint
+        group = self._package.groups.get((self._part, told.get("pid") or of_object or ""))
+        if not group:
+            return (_NO_COLOUR,) * 3
+        first = int(told.get("p1") or index or 0)
+        a, b, c = (int(told.get(key) or first) for key in ("p1", "p2", "p3"))
+        return group[a], group[b], group[c]
+
+
+def _matrix(told: dict[str, str]) -> NDArray[np.float64]:
+    """Return (4, 4) of twelve numbers, row by row, for places that are rows."""
+    matrix = np.eye(4)
+    if words := told.get("transform", "").split():
+        matrix[:3] = np.array([float(word) for word in words]).reshape(4, 3).T
+    return matrix
+
+
+def _colour(text: str) -> tuple[int, ...]:
+    """Return red, green and blue of #RRGGBB or #RRGGBBAA."""
+    red, green, blue = bytes.fromhex(text.lstrip("#"))[:3]
+    return red, green, blue
+
+
+def _placed(package: _Package, name: str) -> Iterator[Part]:
+    """Yield the meshes as often as the build places them; of a build without items, all."""
+    items = package.items or [(key, np.eye(4)) for key in package.objects]
+    waiting, parts, visits, triangles = [(*item, 0) for item in items], dict[Key, Part](), 0, 0
+    while waiting:
+        key, place, depth = waiting.pop()
+        visits += 1
+        if depth > _MAX_DEPTH or visits > _MAX_PLACED:
+            raise DataError(f"{name} has objects in a circle, or places them more than {_MAX_PLACED} times", "export it anew")  # fmt: skip
+        if key not in package.objects:
+            raise DataError(f"{name} places an object that it does not hold", "export it anew")
+        thing = package.objects[key]
+        waiting += [(inner, place @ way, depth + 1) for inner, way in thing.components]
+        if thing.triangles:
+            part = parts.get(key) or _part(package, thing, name)
+            parts[key] = part
+            triangles += len(part.triangles)
+            require_few(name, triangles)
+            yield Part(part.points, part.triangles, part.colours, place)
+
+
+def _part(package: _Package, thing: _Object, name: str) -> Part:
+    points = np.frombuffer(thing.points, np.float64).reshape(-1, 3) if thing.points else np.zeros((0, 3))
+    triangles = np.frombuffer(thing.triangles, np.int32).reshape(-1, 3)
+    require_corners(name, triangles, len(points))
+    paints: NDArray[Any] = np.frombuffer(thing.paints, np.int32)
+    if not (paints >= 0).any():
+        return Part(points, triangles, NO_COLOURS, np.eye(4))
+    palette = np.array([*package.colours, (255, 255, 255)], np.uint8)  # the last is for those without
+    return Part(points, triangles, colours_of_points(triangles.ravel(), palette[paints], len(points)), np.eye(4))
