@@ -87,7 +87,7 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
         cases[f"indices-{index}"] = file.bytes([primitive], [{"mesh": 0}]), answer
     file, primitive = plain(points[numbers.ravel()])
     del primitive["indices"]
-    cases["without-indices"] = file.bytes([primitive], [{"mesh": 0}]), answer
+    cases["without-indices"] = file.bytes([primitive], [{"mesh": 0}]), answer | {"points": 8}
     file = _File()
     tops = {number: numbers[2 * number : 2 * number + 2] for number in range(6)}
     strips = [[int(first[0]), int(first[1]), int(second[2]), int(first[2])] for first, second in tops.values()]
@@ -107,7 +107,7 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
     cases["interleaved"] = file.bytes([primitive], [{"mesh": 0}]), answer
     file, primitive = plain(1000 * points)
     half = np.sqrt(0.5)
-    nodes = [
+    nodes: list[dict[str, Any]] = [
         {"children": [1], "rotation": [half, 0, 0, half]},
         {"children": [2], "translation": [5, 6, 7]},
         {"mesh": 0, "matrix": [0.001, 0, 0, 0, 0, 0.001, 0, 0, 0, 0, 0.001, 0, 1, 0, 0, 1]},

@@ -86,6 +86,7 @@ def ply_cases() -> list[Case]:
         ("capitals.ply", (_ply(6, _LIST).upper() + points + _text(four)).encode(), BOX),
         ("neighbours-of-points.ply", (_ply(6, _LIST, of_vertex="property list uchar int near\nproperty double x\nproperty double y\nproperty double z\n") + "".join(f"{n % 3} {'1 ' * (n % 3)}{x:g} {y:g} {z:g}\n" for n, (x, y, z) in enumerate(CORNERS)) + _text(four)).encode(), BOX),
         ("points-that-are-no-places.ply", (_ply(6, _LIST, vertices=11) + points + "nan nan nan\ninf 0 0\n1e300 0 0\n" + _text(four)).encode(), BOX),
+        ("parted-at-seams.ply", (_ply(6, _LIST, vertices=24) + _text([CORNERS[n].tolist() for each in QUADS for n in each]) + _text([(4, *range(4 * k, 4 * k + 4)) for k in range(6)])).encode(), BOX | {"points": 8}),
         ("faces-of-two-corners.ply", (_ply(8, _LIST) + points + _text(four) + "2 0 1\n1 4\n").encode(), BOX),
         ("claims-too-many-points.ply", (_ply(6, _LIST, vertices=2_000_000_000) + points + _text(four)).encode(), {"refused": "cut short"}),
         ("claims-too-many-faces.ply", _ply(2_000_000_000, _LIST, form=_LITTLE).encode() + packed + quads, {"refused": "cut short"}),

@@ -37,6 +37,7 @@ def require(solid: Solid, answer: dict[str, Any]) -> None:
     assert volume_mm3(solid.points_mm[solid.triangles].astype(np.float64)) == pytest.approx(
         answer["volume"], rel=3 * near
     )
+    assert len(solid.points_m) == answer.get("points", len(solid.points_m))
     if "colour" in answer:
         assert solid.has_colours
         assert np.abs(solid.colours.astype(int) - answer["colour"]).max() <= 1

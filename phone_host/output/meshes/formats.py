@@ -13,7 +13,7 @@ from phone_host.output.meshes.glb import glb_bytes
 from phone_host.output.meshes.glb_read import read_glb
 from phone_host.output.meshes.obj import obj_bytes, read_obj
 from phone_host.output.meshes.ply_mesh import ply_bytes, read_ply_mesh
-from phone_host.output.meshes.solid import Solid
+from phone_host.output.meshes.solid import Solid, joined
 from phone_host.output.meshes.stl import read_stl, stl_bytes
 from phone_host.output.meshes.three_ds import three_ds_bytes
 from phone_host.output.meshes.three_mf import three_mf_bytes
@@ -94,13 +94,15 @@ def read_mesh(content: bytes, name: str, unit_m: float = math.nan) -> MeshFile:
     is_told = not math.isnan(unit_m)
     with np.errstate(all="ignore"):  # absurd numbers are judged afterwards
         if kind == METRES:
-            return MeshFile(*read_glb(content, name, unit_m if is_told else 1.0))
-        if kind == "3mf":
-            return MeshFile(*read_three_mf(content, name, unit_m if is_told else None))
-        head = content[:_HEAD]
-        own_m = 0.001 if OURS_MM in head else 1.0
-        solid = _READERS[kind](content, name, unit_m if is_told else own_m)
-    return MeshFile(solid, next((axes for axes in Axes if _says(head, axes)), None))
+            solid, axes = read_glb(content, name, unit_m if is_told else 1.0)
+        elif kind == "3mf":
+            solid, axes = read_three_mf(content, name, unit_m if is_told else None)
+        else:
+            own_m = 0.001 if OURS_MM in content[:_HEAD] else 1.0
+            solid = _READERS[kind](content, name, unit_m if is_told else own_m)
+            axes = next((axes for axes in Axes if _says(content[:_HEAD], axes)), None)
+    is_ours = OURS_MM in content[:_HEAD] or axes not in (None, Axes.GLTF)
+    return MeshFile(solid if is_ours else joined(solid), axes)
 
 
 def _says(head: bytes, axes: Axes) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, polygon_triangles, sound_solid
-from phone_host.output.meshes.text import text_lines, without_mark
+from phone_host.output.meshes.text import require_short, text_lines, without_mark
 
 _NUMBERS: Final = (3, 4, 6, 7)
 """Of a point: three, perhaps a weight that polygons do not heed, or a colour, perhaps with its opacity."""
@@ -48,6 +48,7 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
     Raises:
         DataError: it is no OBJ file, or holds no sound triangle.
     """
+    require_short(content, name)
     points, shades, counts, corners = array("d"), array("d"), array("q"), array("q")
     for number, line in enumerate(text_lines(without_mark(content)), start=1):
         words = line.partition(b"#")[0].split()

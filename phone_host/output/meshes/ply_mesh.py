@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.output.meshes.ply_records import Column, Numbers, ShortError, Table, read_records
+from phone_host.output.meshes.ply_records import Column, Numbers, ShortError, Table, is_text, read_records
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, polygon_triangles, sound_solid
-from phone_host.output.meshes.text import without_mark
+from phone_host.output.meshes.text import require_short, without_mark
 
 _CORNER_LISTS: Final = ("vertex_indices", "vertex_index")
 _SHADES: Final = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
@@ -72,6 +72,8 @@ def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
     Raises:
         DataError: it is no PLY file, or is cut short, or holds no sound triangle.
     """
+    if is_text(content):
+        require_short(content, name)
     try:
         tables = read_records(without_mark(content))
     except LookupError:

@@ -24,7 +24,7 @@ _TYPES: Final = {
 _ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 _END: Final = re.compile(rb"end_header[ \t]*(?:\r?\n|\r|$)", re.IGNORECASE)
 _MAX_HEADER: Final = 1 << 16
-_MAX_AT_ONCE: Final = 1 << 16
+_MAX_AT_ONCE: Final = 1 << 14
 
 
 class ShortError(ValueError):
@@ -93,6 +93,15 @@ def read_records(content: bytes) -> dict[str, Table]:
     for element in elements:
         tables[element.name], at = _read(cells, element, at)
     return tables
+
+
+def is_text(content: bytes) -> bool:
+    """Return whether the header says that numbers follow as text.
+
+    Args:
+        content: of the file.
+    """
+    return b"format ascii" in content[:_MAX_HEADER].lower()
 
 
 def _header(head: str) -> tuple[str, list[Element]]:

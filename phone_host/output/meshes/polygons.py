@@ -15,8 +15,10 @@ Numbers = NDArray[np.integer[Any]]
 MAX_CONCAVE: Final = 1024
 """Largest number of corners of a polygon that is not convex: clipping takes the cube of it. A convex one may have any number."""
 
-_MAX_AT_ONCE: Final = 1 << 20
-"""Pairs of corners that are compared at once: 8 MB for each array."""
+_MAX_AT_ONCE: Final = 1 << 16
+"""Pairs of corners that are compared at once: 0.5 MB for each array, or what one polygon needs."""
+
+_ROWS_AT_ONCE: Final = 1 << 16
 
 _FLAT: Final = 1e-12
 """Share of a polygon's area below which three of its corners count as one line."""
@@ -40,28 +42,37 @@ def triangulated(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
     Raises:
         TooManyCornersError: a concave polygon has too many corners.
     """
-    if (counts == 3).all():
-        return corners.reshape(-1, 3)
+    if not len(counts) or (counts == counts[0]).all():
+        return _all_cut(points, corners.reshape(len(counts), -1))
     starts = np.cumsum(counts) - counts
     amounts = np.maximum(counts - 2, 0)
     places = np.cumsum(amounts) - amounts
     triangles = np.empty((int(amounts.sum()), 3), corners.dtype)
     for count in np.unique(counts[counts > 2]).tolist():
         rows = np.flatnonzero(counts == count)
-        step = max(1, _MAX_AT_ONCE // count**2)
-        for first in range(0, len(rows), step):
-            part = rows[first : first + step]
-            polygons = corners[starts[part, np.newaxis] + np.arange(count)]
-            triangles[places[part, np.newaxis] + np.arange(count - 2)] = _cut(points, polygons)
+        for first in range(0, len(rows), _ROWS_AT_ONCE):
+            part = rows[first : first + _ROWS_AT_ONCE, np.newaxis]
+            made = _all_cut(points, corners[starts[part] + np.arange(count)])
+            triangles[places[part] + np.arange(count - 2)] = made.reshape(len(part), count - 2, 3)
     return triangles
+
+
+def _all_cut(points: Points, polygons: Numbers) -> Numbers:
+    """Return (T, 3) for polygons (n, k) of one size, some of them at a time."""
+    count = polygons.shape[1]
+    if count == 3:
+        return polygons
+    triangles = np.empty((len(polygons), max(count - 2, 0), 3), polygons.dtype)
+    step = max(1, _MAX_AT_ONCE // max(count, 1) ** 2)
+    for first in range(0, len(polygons) if count > 3 else 0, step):
+        triangles[first : first + step] = _cut(points, polygons[first : first + step])
+    return triangles.reshape(-1, 3)
 
 
 def _cut(points: Points, polygons: Numbers) -> Numbers:
     """Return (n, k - 2, 3) for n polygons of k corners."""
     first = np.broadcast_to(polygons[:, :1], polygons[:, 2:].shape)
     triangles = np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2)
-    if polygons.shape[1] == 3:
-        return triangles
     corners = points[triangles]
     normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
     whole = normals.sum(axis=1)

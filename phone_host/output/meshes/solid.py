@@ -171,7 +171,26 @@ def welded(solid: Solid) -> Solid:
     _, first, number = np.unique(places, axis=0, return_index=True, return_inverse=True)
     triangles = number.ravel()[solid.triangles].astype(np.int32)
     a, b, c = triangles.T
-    kept = triangles[(a != b) & (b != c) & (c != a)]
+    is_whole = (a != b) & (b != c) & (c != a)
     return Solid(
-        solid.points_m[first], np.ascontiguousarray(kept), solid.colours[first] if solid.has_colours else solid.colours
+        solid.points_m[first], triangles[is_whole], solid.colours[first] if solid.has_colours else solid.colours
     )
+
+
+def joined(solid: Solid) -> Solid:
+    """Return a mesh without seams: many programs part its points where texture or normals change, which leaves edges open.
+
+    Args:
+        solid: a mesh; one without open edges stays as it is.
+    """
+    edges = np.empty((3, len(solid.triangles)), np.int64)
+    for row, corner in zip(edges, range(3), strict=True):
+        one, other = solid.triangles[:, corner], solid.triangles[:, (corner + 1) % 3]
+        np.minimum(one, other, out=row)
+        np.multiply(row, len(solid.points_m), out=row)
+        np.add(row, np.maximum(one, other), out=row)
+    sorted_edges = edges.reshape(-1)
+    sorted_edges.sort()
+    is_new = np.ones(sorted_edges.size + 1, np.bool_)
+    np.not_equal(sorted_edges[1:], sorted_edges[:-1], out=is_new[1:-1])
+    return welded(solid) if (is_new[1:] & is_new[:-1]).any() else solid

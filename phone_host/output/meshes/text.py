@@ -4,7 +4,11 @@ import io
 from collections.abc import Iterator
 from typing import Final
 
+from common.errors import DataError
+
 _MARK: Final = b"\xef\xbb\xbf"
+_MAX_BYTES: Final = 1 << 29
+"""Of a text: some eight million triangles, which take ten times as much memory while they are read."""
 
 
 def without_mark(content: bytes) -> bytes:
@@ -14,6 +18,20 @@ def without_mark(content: bytes) -> bytes:
         content: of the file.
     """
     return content.removeprefix(_MARK)
+
+
+def require_short(content: bytes, name: str) -> None:
+    """Check the size of a text before it is read.
+
+    Args:
+        content: of the file.
+        name: of the file, for errors.
+
+    Raises:
+        DataError: it has more than 512 MB.
+    """
+    if len(content) > _MAX_BYTES:
+        raise DataError(f"{name} is a text of {len(content) >> 20} MB; 512 are read", "export it as binary PLY or STL")
 
 
 def text_lines(content: bytes) -> Iterator[bytes]:

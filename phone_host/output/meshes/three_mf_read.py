@@ -140,7 +140,8 @@ class _Reader:
                 self._object.points.extend((float(told["x"]), float(told["y"]), float(told["z"])))
             case "triangle":
                 self._object.triangles.extend((int(told["v1"]), int(told["v2"]), int(told["v3"])))
-                self._object.paints.extend(self._paints(told))
+                if self._package.groups:
+                    self._object.paints.extend(self._paints(told))
             case "object":
                 self._object, self._paint = _Object(), (told.get("pid"), told.get("pindex"))
                 self._package.objects[self._part, told["id"]] = self._object
