@@ -6,6 +6,7 @@ import struct
 import zipfile
 from io import BytesIO
 from pathlib import Path
+from typing import Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -21,6 +22,7 @@ from phone_host.output.meshes.formats import FORMATS, READABLE, mesh_bytes, read
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.meshes.three_ds import MOST, three_ds_bytes
 from phone_host.output.model_file import read_model
+from phone_host.output.upright import upright_model
 from phone_host.run.model_job import fewer_triangles
 
 _NONE = np.zeros((0, 3), np.uint8)
@@ -81,6 +83,38 @@ def test_a_glb_holds_linear_colours_and_y_up() -> None:
     back = np.where(linear[:, :3] <= 0.0031308, 12.92 * linear[:, :3], 1.055 * linear[:, :3] ** (1 / 2.4) - 0.055)
     assert 255 * back == pytest.approx(solid.colours, abs=0.6)
     assert len(content) == struct.unpack_from("<I", content, 8)[0]
+
+
+_TOPS: Final = {
+    Axes.CAMERA: (0, -1, 0),
+    Axes.Y_UP: (0, 1, 0),
+    Axes.GLTF: (0, 1, 0),
+    Axes.MAT: (0, 0, 1),
+    Axes.TABLE: (0, 0, 1),
+}
+
+
+@pytest.mark.parametrize("axes", list(Axes))
+def test_a_glb_stands_upright_for_other_programs(axes: Axes) -> None:
+    """A needle from where the thing stands upwards goes along y, as trimesh reads it, and nothing is mirrored."""
+    shape = trimesh.creation.icosphere(subdivisions=1, radius=0.01)
+    shape.vertices[0] = 0.1 * np.array(_TOPS[axes])
+    solid = Solid(np.asarray(shape.vertices, np.float32), np.asarray(shape.faces, np.int32), _NONE)
+    found = trimesh.load(BytesIO(mesh_bytes(solid, "glb", axes)), file_type="glb", force="mesh")
+    assert isinstance(found, trimesh.Trimesh)
+    assert found.bounds[1] == pytest.approx((0.01, 0.1, 0.01), abs=0.002)
+    assert found.volume == pytest.approx(shape.volume, rel=1e-5)
+    assert found.volume > 0
+
+
+def test_a_glb_of_another_program_stands_on_what_y_points_away_from(tmp_path: Path) -> None:
+    """Its specification says that y is up, so a print of it is turned without being asked."""
+    content = mesh_bytes(ball(1), "glb", None).replace(b'"tandemscan"', b'"other tool"')
+    (tmp_path / "cup.glb").write_bytes(content)
+    upright = upright_model(tmp_path / "cup.glb", None, None)
+    read = upright.model.solid.points_m
+    assert upright.model.axes is Axes.GLTF
+    assert upright.points_mm[:, 2] == pytest.approx(1000 * read[:, 1], abs=1e-3)
 
 
 def test_a_3mf_says_its_unit_and_keeps_colours() -> None:
@@ -344,11 +378,15 @@ def test_a_scan_says_its_fineness_when_another_report_has_taken_its_name(tmp_pat
 
 
 @pytest.mark.parametrize("axes", [None, *Axes])
-@pytest.mark.parametrize("kind", ["ply", "obj", "stl"])
+@pytest.mark.parametrize("kind", READABLE)
 def test_a_file_of_ours_says_its_axes(tmp_path: Path, kind: str, axes: Axes | None) -> None:
-    """Alone, without its scan's folder: what is made of it stands as the scan did."""
-    (tmp_path / f"cup.{kind}").write_bytes(mesh_bytes(ball(1), kind, axes))
-    assert read_model(tmp_path / f"cup.{kind}", math.nan).axes is axes
+    """Alone, without its scan's folder: what is made of it stands as the scan did, with its points where they were."""
+    solid = ball(1)
+    (tmp_path / f"cup.{kind}").write_bytes(mesh_bytes(solid, kind, axes))
+    found = read_model(tmp_path / f"cup.{kind}", math.nan)
+    assert found.axes is axes
+    places = found.solid.points_m[found.solid.triangles]
+    assert places == pytest.approx(solid.points_m[solid.triangles], abs=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,9 @@ def triangulated(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
     Raises:
         TooManyCornersError: a concave polygon has too many corners.
     """
-    if not len(counts) or (counts == counts[0]).all():
+    if not len(counts):
+        return corners.reshape(0, 3)
+    if (counts == counts[0]).all():
         return _all_cut(points, corners.reshape(len(counts), -1))
     starts = np.cumsum(counts) - counts
     amounts = np.maximum(counts - 2, 0)

@@ -93,7 +93,7 @@ def _lines(out: Path, solid: Solid, model: Model, sizes: dict[str, int], notes: 
         lines.append(f"axes: {model.axes.text}")
     for name, size in sizes.items():
         lost = "; without colours" if solid.has_colours and name.rpartition(".")[2] in WITHOUT_COLOUR else ""
-        unit = "metres, y up" if _unit(name) == "m" else "mm"
+        unit = "mm" if _unit(name) == "mm" else "metres" if model.axes is None else "metres, y up"
         lines.append(f"written to {out / name} ({size / 1e6:.1f} MB, {unit}{lost})")
     if max(solid.size_mm) > _LARGE_MM:
         notes = [
