@@ -1,6 +1,7 @@
 """Meshes as other programs write them are read with their right answer, or refused in one line that names why (`make_meshes` wrote them)."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any, Final
 
@@ -92,3 +93,18 @@ def test_a_file_is_what_its_bytes_say() -> None:
     for name in ("indices-u2.glb", "plain.3mf", "quads-binary.ply"):
         content = (FOLDER / name).read_bytes()
         assert len(read_mesh(content, "model.stl", 0.001).solid.triangles) == ANSWERS[name]["triangles"]
+
+
+def test_the_documentation_names_every_case_and_no_other() -> None:
+    """Each row of the table in docs/files.md is backed by the files that it names."""
+    text = (
+        (FOLDER.parents[2] / "docs/files.md")
+        .read_text()
+        .partition("## Meshes of other programs")[2]
+        .partition("\n## ")[0]
+    )
+    rows = [line.split("|") for line in text.splitlines() if line.startswith("| ") and "`" in line]
+    named = [name for row in rows for name in re.findall(r"`([^`]+)`", row[4])]
+    assert sorted(named) == sorted(ANSWERS)
+    for row in rows:
+        assert all(f".{row[1].strip().lower()}`" in name for name in row[4].split())

@@ -14,7 +14,7 @@ EXAMPLES = """  phone-host export scan --to stl --out print                    #
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("model", metavar="MODEL", help="the folder of a scan, or a mesh: .ply, .stl, .obj")
+    parser.add_argument("model", metavar="MODEL", help="the folder of a scan, or a mesh: .ply, .stl, .obj, .glb, .3mf")
     parser.add_argument("--to", required=True, metavar="stl,3mf", help="formats: stl, obj, 3ds, ply, 3mf, glb")
     parser.add_argument(
         "--unit", choices=("m", "mm"), help="unit of a mesh file of another program (default m; our own files say it)"

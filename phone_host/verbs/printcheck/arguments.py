@@ -13,7 +13,7 @@ EXAMPLES = """  phone-host printcheck scan                          # scan: the 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's options."""
-    parser.add_argument("model", metavar="MODEL", help="the folder of a scan, or a mesh: .ply, .stl, .obj")
+    parser.add_argument("model", metavar="MODEL", help="the folder of a scan, or a mesh: .ply, .stl, .obj, .glb, .3mf")
     parser.add_argument(
         "--unit", choices=("m", "mm"), help="unit of a mesh file of another program (default m; our own files say it)"
     )
