@@ -177,6 +177,16 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
         del each["bufferView"]
     cases["draco"] = file.bytes([primitive], [{"mesh": 0}], extensionsRequired=["KHR_draco_mesh_compression"]), {"refused": "KHR_draco_mesh_compression"}  # fmt: skip
     file, primitive = plain()
+    content = file.bytes([primitive], [{"mesh": 0}], extensionsRequired=["EXT_mesh_gpu_instancing"])
+    cases["instances-of-an-extension"] = content, {"refused": "EXT_mesh_gpu_instancing"}
+    file, primitive = plain()
+    rest = {**primitive, "indices": file.add(numbers[6:].ravel(), "u2")}
+    first = {**primitive, "indices": file.add(numbers[:6].ravel(), "u2")}
+    cases["parts-that-share-points"] = (
+        file.bytes([first, half], [{"mesh": 0}, {"mesh": 1}], (0, 1)),
+        answer | {"points": 8},
+    )
+    file, primitive = plain()
     file.accessors[0]["count"] = 2_000_000_000
     del file.accessors[0]["bufferView"]
     cases["claims-2-billion-points"] = file.bytes([primitive], [{"mesh": 0}]), {"refused": "cut short"}

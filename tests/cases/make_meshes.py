@@ -86,7 +86,7 @@ def ply_cases() -> list[Case]:
         ("capitals.ply", (_ply(6, _LIST).upper() + points + _text(four)).encode(), BOX),
         ("neighbours-of-points.ply", (_ply(6, _LIST, of_vertex="property list uchar int near\nproperty double x\nproperty double y\nproperty double z\n") + "".join(f"{n % 3} {'1 ' * (n % 3)}{x:g} {y:g} {z:g}\n" for n, (x, y, z) in enumerate(CORNERS)) + _text(four)).encode(), BOX),
         ("points-that-are-no-places.ply", (_ply(6, _LIST, vertices=11) + points + "nan nan nan\ninf 0 0\n1e300 0 0\n" + _text(four)).encode(), BOX),
-        ("parted-at-seams.ply", (_ply(6, _LIST, vertices=24) + _text([CORNERS[n].tolist() for each in QUADS for n in each]) + _text([(4, *range(4 * k, 4 * k + 4)) for k in range(6)])).encode(), BOX | {"points": 8}),
+        ("split-at-seams.ply", (_ply(6, _LIST, vertices=24) + _text([CORNERS[n].tolist() for each in QUADS for n in each]) + _text([(4, *range(4 * k, 4 * k + 4)) for k in range(6)])).encode(), BOX | {"points": 8}),
         ("faces-of-two-corners.ply", (_ply(8, _LIST) + points + _text(four) + "2 0 1\n1 4\n").encode(), BOX),
         ("claims-too-many-points.ply", (_ply(6, _LIST, vertices=2_000_000_000) + points + _text(four)).encode(), {"refused": "cut short"}),
         ("claims-too-many-faces.ply", _ply(2_000_000_000, _LIST, form=_LITTLE).encode() + packed + quads, {"refused": "cut short"}),
@@ -102,7 +102,7 @@ def obj_cases() -> list[Case]:
     f = _text(ones, "f ")
     sides = [(i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6) for i in range(6)]
     faces = [tuple(range(5, -1, -1)), tuple(range(6, 12)), *sides]
-    hollow = _text([(x, y, z) for z in (0, 10) for x, y in _L], "v ") + _text(
+    concave = _text([(x, y, z) for z in (0, 10) for x, y in _L], "v ") + _text(
         [[number + 1 for number in each] for each in faces], "f "
     )
     red = {"colour": list(_RED)}
@@ -119,6 +119,7 @@ def obj_cases() -> list[Case]:
         ("tabs.obj", (v + f).replace(" ", "\t").encode(), BOX),
         ("indented.obj", (_text(CORNERS.tolist(), "  v ") + _text(ones, "\t f ")).encode(), BOX),
         ("continued-lines.obj", (v + "".join(f"f {a} {b} \\\n  {c} {d}\n" for a, b, c, d in ones)).encode(), BOX),
+        ("paths-with-backslashes.obj", ("# made by C:\\models\\\n" + v + "g C:\\parts\\\n" + f).encode(), BOX),
         ("continued-windows-lines.obj", (v + "".join(f"f {a} \\\r\n {b} \\\r\n {c} {d}\r\n" for a, b, c, d in ones)).encode(), BOX),
         ("comments-behind.obj", (v.replace("\n", " # corner\n") + f.replace("\n", " # side\n")).encode(), BOX),
         ("one-point-with-a-tab.obj", (v + "v\t500 500 500\n" + _text((CORNERS + np.array([60, 0, 0])).tolist(), "v ") + f + _text([[n + 9 for n in each] for each in ones], "f ")).encode(), {"triangles": 24, "size": [100, 30, 20], "area": 10400, "volume": 48000}),
@@ -126,7 +127,7 @@ def obj_cases() -> list[Case]:
         ("capitals.obj", (v + f).upper().encode(), BOX),
         ("mark-of-utf-8.obj", b"\xef\xbb\xbf" + (v + f).encode(), BOX),
         ("old-mac-lines.obj", (v + f).replace("\n", "\r").encode(), BOX),
-        ("hollow-face.obj", hollow.encode(), {"triangles": 20, "size": [40, 40, 10], "area": 3000, "volume": 7000}),
+        ("concave-face.obj", concave.encode(), {"triangles": 20, "size": [40, 40, 10], "area": 3000, "volume": 7000}),
         ("face-of-200-corners.obj", (_text(ring, "v ") + _text(round_faces, "f ")).encode(), {"triangles": 796, "size": [20, 20, 5], "area": 2 * disc + 5 * 200 * 20 * float(np.sin(np.pi / 200)), "volume": 5 * disc}),
         ("counted-back.obj", (v + _text(relative, "f ")).encode(), BOX),
         ("counted-back-in-two-parts.obj", (v + _text(relative[:3], "f ") + "v 7 7 7\n" + _text([[n - 1 for n in each] for each in relative[3:]], "f ")).encode(), BOX),
@@ -172,6 +173,8 @@ def stl_cases() -> list[Case]:
         ("text-of-old-macs.stl", text.replace("\n", "\r").encode(), BOX),
         ("text-of-two-solids.stl", two.encode(), {"triangles": 24, "size": [140, 30, 20], "area": 10400, "volume": 48000}),
         ("text-named-facet-and-vertex.stl", text.replace("box", "facet vertex 1 of 2").encode(), BOX),
+        ("text-named-by-a-path.stl", text.replace("solid box", "solid C:\\parts\\").encode(), BOX),
+        ("text-on-one-line-a-facet.stl", text.replace("\n  ", " ").replace("\n    ", " ").encode(), BOX),
         ("text-cut-in-a-triangle.stl", text.encode()[:-60], {"refused": "no whole STL"}),
         ("binary-cut-short.stl", binary(b"box", body=records[:-7]), {"refused": "cut short"}),
         ("binary-that-claims-4-billion.stl", binary(b"box", 0xFFFFFFF0), {"refused": "cut short"}),

@@ -13,7 +13,7 @@ from phone_host.output.meshes.glb import glb_bytes
 from phone_host.output.meshes.glb_read import read_glb
 from phone_host.output.meshes.obj import obj_bytes, read_obj
 from phone_host.output.meshes.ply_mesh import ply_bytes, read_ply_mesh
-from phone_host.output.meshes.solid import Solid, joined
+from phone_host.output.meshes.solid import Solid, weld_seams
 from phone_host.output.meshes.stl import read_stl, stl_bytes
 from phone_host.output.meshes.three_ds import three_ds_bytes
 from phone_host.output.meshes.three_mf import three_mf_bytes
@@ -91,21 +91,21 @@ def read_mesh(content: bytes, name: str, unit_m: float = math.nan) -> MeshFile:
     kind = _FIRST_BYTES.get(content[:4], name.rpartition(".")[2].lower())
     if kind not in READABLE:
         raise DataError(f"{name} is no mesh that is read", f"give a scan's folder, or {', '.join(READABLE)}")
-    is_told = not math.isnan(unit_m)
+    has_unit = not math.isnan(unit_m)
     with np.errstate(all="ignore"):  # absurd numbers are judged afterwards
         if kind == METRES:
-            solid, axes = read_glb(content, name, unit_m if is_told else 1.0)
+            solid, axes = read_glb(content, name, unit_m if has_unit else 1.0)
         elif kind == "3mf":
-            solid, axes = read_three_mf(content, name, unit_m if is_told else None)
+            solid, axes = read_three_mf(content, name, unit_m if has_unit else None)
         else:
             own_m = 0.001 if OURS_MM in content[:_HEAD] else 1.0
-            solid = _READERS[kind](content, name, unit_m if is_told else own_m)
-            axes = next((axes for axes in Axes if _says(content[:_HEAD], axes)), None)
+            solid = _READERS[kind](content, name, unit_m if has_unit else own_m)
+            axes = next((axes for axes in Axes if _states_axes(content[:_HEAD], axes)), None)
     is_ours = OURS_MM in content[:_HEAD] or axes not in (None, Axes.GLTF)
-    return MeshFile(solid if is_ours else joined(solid), axes)
+    return MeshFile(solid if is_ours else weld_seams(solid), axes)
 
 
-def _says(head: bytes, axes: Axes) -> bool:
+def _states_axes(head: bytes, axes: Axes) -> bool:
     """Return whether a file of ours says that it has these axes; an STL says them as far as they fit."""
     said = f"; {axes.text}".encode()
     return said + b"\n" in head or head[:_STL_HEAD].rstrip() == (OURS_MM + said)[:_STL_HEAD].rstrip()

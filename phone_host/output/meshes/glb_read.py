@@ -6,7 +6,7 @@ Source: Khronos, glTF 2.0 Specification, sections 3.5 (nodes), 3.6 (accessors), 
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -15,16 +15,17 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.output.axes import Axes
+from phone_host.output.meshes.assembly import Part, assemble, require_count
 from phone_host.output.meshes.glb import GENERATOR
-from phone_host.output.meshes.placed import Part, placed, require_few
-from phone_host.output.meshes.solid import NO_COLOURS, Solid
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, drop_unused, require_corners
 
 _MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _KINDS: Final = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _COLUMNS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_READ_EXTENSIONS: Final = ("KHR_mesh_quantization",)
-_COMPRESSED: Final = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
+_UNREAD_EXTENSIONS: Final = (
+    "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_mesh_gpu_instancing",
+)  # fmt: skip
 _MAX_DEPTH: Final = 64
 _WRONG: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
 """What reading a tree of JSON raises where something else stands than must."""
@@ -51,7 +52,7 @@ def read_glb(content: bytes, name: str, unit_m: float) -> tuple[Solid, Axes | No
         parts, axes = list(_parts(file)), _axes(file.tree["asset"])
     except _WRONG as error:
         raise DataError(f"{name} is cut short, or no GLB file of a mesh", "copy the file again, or export it anew") from error  # fmt: skip
-    solid = placed(name, parts, unit_m)
+    solid = assemble(name, parts, unit_m)
     if axes is None:
         return solid, None
     return Solid(solid.points_m @ axes.to_y_up, solid.triangles, solid.colours), axes
@@ -83,30 +84,34 @@ class _File:
 
     def numbers(self, number: int) -> NDArray[Any]:
         """Return (N, columns) numbers of an accessor; integers that stand for shares are float32."""
-        told = self.tree["accessors"][number]
-        count, kind, columns = told["count"], np.dtype(_KINDS[told["componentType"]]), _COLUMNS[told["type"]]
-        if "bufferView" in told:
-            values = self._rows(told["bufferView"], told.get("byteOffset", 0), (count, columns), kind)
-        elif "sparse" in told:
-            require_few(self.name, count)
+        accessor = self.tree["accessors"][number]
+        count, kind, columns = (
+            accessor["count"],
+            np.dtype(_KINDS[accessor["componentType"]]),
+            _COLUMNS[accessor["type"]],
+        )
+        if "bufferView" in accessor:
+            values = self._rows(accessor["bufferView"], accessor.get("byteOffset", 0), (count, columns), kind)
+        elif "sparse" in accessor:
+            require_count(self.name, count)
             values = np.zeros((count, columns), kind)
         else:
             raise IndexError("numbers that are nowhere")
-        if "sparse" in told:
-            values = self._changed(values, told["sparse"])
-        if told.get("normalized") and kind.kind in "iu":
+        if "sparse" in accessor:
+            values = self._apply_sparse(values, accessor["sparse"])
+        if accessor.get("normalized") and kind.kind in "iu":
             values = np.maximum(values.astype(np.float32) / np.iinfo(kind).max, -1)
         return values
 
     def _rows(self, view: int, begin: int, shape: tuple[int, int], kind: np.dtype[Any]) -> NDArray[Any]:
-        held, step = self.view(view)
+        content, step = self.view(view)
         row = shape[1] * kind.itemsize
         step = step or row
-        if min(begin, shape[0], step) < 0 or (shape[0] and begin + (shape[0] - 1) * step + row > len(held)):
+        if min(begin, shape[0], step) < 0 or (shape[0] and begin + (shape[0] - 1) * step + row > len(content)):
             raise IndexError("beyond the end")
-        return np.ndarray(shape, kind, held, begin, (step, kind.itemsize))
+        return np.ndarray(shape, kind, content, begin, (step, kind.itemsize))
 
-    def _changed(self, values: NDArray[Any], sparse: Tree) -> NDArray[Any]:
+    def _apply_sparse(self, values: NDArray[Any], sparse: Tree) -> NDArray[Any]:
         count, where, what = sparse["count"], sparse["indices"], sparse["values"]
         kind = np.dtype(_KINDS[where["componentType"]])
         rows = self._rows(where["bufferView"], where.get("byteOffset", 0), (count, 1), kind)
@@ -133,30 +138,41 @@ def _file(content: bytes, name: str) -> _File:
         tree = json.loads(bytes(found[_JSON]))
     except RecursionError:
         raise ValueError("too deep") from None
-    for extension in tree.get("extensionsRequired", ()):
-        if extension not in _READ_EXTENSIONS and (extension in _COMPRESSED or "mesh" in extension):
-            raise DataError(f"{name} is compressed by {extension}, which is not read", "export it without compression")
+    _require_plain(name, tree.get("extensionsRequired", ()))
     return _File(name, tree, found.get(_BINARY, memoryview(b"")))
+
+
+def _require_plain(name: str, extensions: Iterable[str]) -> None:
+    """Check that no extension changes the shape in a way that is not read."""
+    for extension in extensions:
+        if extension in _UNREAD_EXTENSIONS:
+            raise DataError(f"{name} needs {extension}, which is not read", "export it without compression or instancing")  # fmt: skip
 
 
 def _parts(file: _File) -> Iterator[Part]:
     """Yield the meshes as often as nodes place them."""
-    meshes = [_mesh(file, mesh) for mesh in file.tree.get("meshes", ())]
+    meshes, count = list[list[Part]](), 0
+    for mesh in file.tree.get("meshes", ()):
+        meshes.append([])
+        for part in _mesh(file, mesh):
+            count += len(part.triangles)
+            require_count(file.name, count)
+            meshes[-1].append(part)
     nodes = file.tree.get("nodes", ())
     scenes = file.tree.get("scenes", ())
     roots = scenes[file.tree.get("scene", 0)].get("nodes", ()) if scenes else range(len(nodes) and 1)
     waiting, visits = [(root, np.eye(4), 0) for root in roots], 0
     while waiting:
-        number, place, depth = waiting.pop()
+        number, transform, depth = waiting.pop()
         visits += 1
         if depth > _MAX_DEPTH or visits > len(nodes):  # a node has one parent
             raise DataError(f"{file.name} has nodes in a circle", "export it anew")
         node = nodes[number]
-        place = place @ _matrix(node)
-        waiting += [(child, place, depth + 1) for child in node.get("children", ())]
+        transform = transform @ _matrix(node)
+        waiting += [(child, transform, depth + 1) for child in node.get("children", ())]
         if "mesh" in node:
             for part in meshes[node["mesh"]]:
-                yield Part(part.points, part.triangles, part.colours, place)
+                yield Part(part.points, part.triangles, part.colours, transform)
 
 
 def _matrix(node: Tree) -> NDArray[np.float64]:
@@ -175,13 +191,11 @@ def _matrix(node: Tree) -> NDArray[np.float64]:
     return matrix
 
 
-def _mesh(file: _File, mesh: Tree) -> list[Part]:
-    """Return the triangles of a mesh; lines and points are none."""
-    parts = []
+def _mesh(file: _File, mesh: Tree) -> Iterator[Part]:
+    """Yield the triangles of a mesh, each part with the points that it uses alone; lines and points are none."""
     for primitive in mesh["primitives"]:
-        mode, extensions = primitive.get("mode", _TRIANGLES), primitive.get("extensions", {})
-        if compressed := next((each for each in _COMPRESSED if each in extensions), None):
-            raise DataError(f"{file.name} is compressed by {compressed}, which is not read", "export it without compression")  # fmt: skip
+        _require_plain(file.name, primitive.get("extensions", ()))
+        mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_TRIANGLES, _STRIP, _FAN):
             continue
         attributes = primitive["attributes"]
@@ -192,8 +206,9 @@ def _mesh(file: _File, mesh: Tree) -> list[Part]:
         colours = _colours(file.numbers(attributes["COLOR_0"])) if "COLOR_0" in attributes else NO_COLOURS
         if len(colours) not in (0, len(points)):
             raise ValueError("colours of other points")
-        parts.append(Part(points, _triangles(corners, mode), colours, np.eye(4)))
-    return parts
+        triangles = _triangles(corners, mode)
+        require_corners(file.name, triangles, len(points))
+        yield Part(*drop_unused(points, triangles, colours), np.eye(4))
 
 
 def _triangles(corners: NDArray[Any], mode: int) -> NDArray[Any]:

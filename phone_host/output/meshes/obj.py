@@ -5,6 +5,7 @@ Source: "Object Files (.obj)", Wavefront Advanced Visualizer Manual, appendix B1
 
 import io
 from array import array
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -50,7 +51,7 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
     """
     require_short(content, name)
     points, shades, counts, corners = array("d"), array("d"), array("q"), array("q")
-    for number, line in enumerate(text_lines(without_mark(content)), start=1):
+    for number, line in enumerate(_statements(without_mark(content)), start=1):
         words = line.partition(b"#")[0].split()
         word = words[0].lower() if words else b""
         try:
@@ -68,6 +69,19 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
     places = np.frombuffer(points, np.float64).reshape(-1, 3) if points else np.zeros((0, 3))
     faces = polygon_triangles(name, places, np.array(counts), np.array(corners))
     return sound_solid(name, places * unit_m, faces, _colours(shades, len(places)))
+
+
+def _statements(content: bytes) -> Iterator[bytes]:
+    """Yield lines. A backslash ends one that goes on, but only of a point or face: in a comment or a name it is part of a path."""
+    begin = b""
+    for line in text_lines(content):
+        whole = begin + line
+        if whole.rstrip().endswith(b"\\") and whole.split(maxsplit=1)[0].lower() in {b"v", b"f"}:
+            begin = whole.rstrip()[:-1] + b" "
+            continue
+        yield whole
+        begin = b""
+    yield begin
 
 
 def _corners(words: list[bytes], count: int) -> list[int]:

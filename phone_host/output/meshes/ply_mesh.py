@@ -87,7 +87,7 @@ def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
         raise DataError(f"{name} has no points", "give a mesh")
     places = np.stack([np.asarray(vertices[axis].values, np.float64) for axis in "xyz"], axis=1)
     if "tristrips" in tables and not faces:
-        triangles = _unrolled(next(iter(tables["tristrips"].values()), None))
+        triangles = _strip_triangles(next(iter(tables["tristrips"].values()), None))
         return sound_solid(name, places * unit_m, triangles, _colours(vertices))
     counts, corners = _polygons(faces)
     triangles = polygon_triangles(name, places, counts, corners)
@@ -113,7 +113,7 @@ def _integers(values: Numbers) -> Numbers:
     return np.where((values >= 0) & (values < 1 << 31), values, -1).astype(np.int32)
 
 
-def _unrolled(strips: Column | None) -> Numbers:
+def _strip_triangles(strips: Column | None) -> Numbers:
     """Return the triangles of strips in which each point makes one with the two before it; -1 ends a strip."""
     if strips is None or strips.counts is None:
         return np.zeros((0, 3), np.int64)

@@ -171,7 +171,7 @@ class _Cells:
         size = self.data.itemsize
         return np.ndarray(shape, held, self.data.data, begin * size, (step * size, self.width(kind) * size))
 
-    def gathered(self, begins: Numbers, kind: str, length: int) -> Numbers:
+    def gather(self, begins: Numbers, kind: str, length: int) -> Numbers:
         """Copy (rows, length) numbers from their places."""
         cells = self.data[begins[:, np.newaxis] + np.arange(length * self.width(kind))]
         return cells.view(self.order + kind) if self.order else cells
@@ -184,10 +184,10 @@ def _read(cells: _Cells, element: Element, at: int) -> tuple[Table, int]:
         raise ShortError(f"{element.count} records of {element.name}")
     if not element.count:
         return {each.name: Column(np.zeros(0), np.zeros(0, np.int64) if each.count_kind else None, each.kind) for each in element.properties}, at  # fmt: skip
-    return _uniform(cells, element, at) or _walked(cells, element, at)
+    return _read_uniform(cells, element, at) or _read_ragged(cells, element, at)
 
 
-def _uniform(cells: _Cells, element: Element, at: int) -> tuple[Table, int] | None:
+def _read_uniform(cells: _Cells, element: Element, at: int) -> tuple[Table, int] | None:
     """Read records whose lists are all as long as the first one's; None: they are not. Nothing is copied."""
     lengths, ends = _row(cells, element, at)
     step, rows = ends[-1] - at, element.count
@@ -226,7 +226,7 @@ def _row(cells: _Cells, element: Element, at: int) -> tuple[list[int], list[int]
     return lengths, ends
 
 
-def _walked(cells: _Cells, element: Element, at: int) -> tuple[Table, int]:
+def _read_ragged(cells: _Cells, element: Element, at: int) -> tuple[Table, int]:
     """Read records of unlike lengths, one after another."""
     begins = [array("q") for _ in element.properties]
     counts = [array("q") for _ in element.properties]
@@ -239,12 +239,12 @@ def _walked(cells: _Cells, element: Element, at: int) -> tuple[Table, int]:
     table = {}
     for each, begin, count in zip(element.properties, begins, counts, strict=True):
         lengths_of = np.frombuffer(count, np.int64)
-        values = _gathered(cells, each.kind, np.frombuffer(begin, np.int64), lengths_of)
+        values = _gather(cells, each.kind, np.frombuffer(begin, np.int64), lengths_of)
         table[each.name] = Column(values, lengths_of if each.count_kind else None, each.kind)
     return table, at
 
 
-def _gathered(cells: _Cells, kind: str, begins: Numbers, counts: Numbers) -> Numbers:
+def _gather(cells: _Cells, kind: str, begins: Numbers, counts: Numbers) -> Numbers:
     """Copy lists of unlike lengths from their places to one behind another."""
     places = np.cumsum(counts) - counts
     values = np.empty(int(counts.sum()), kind if cells.order else "f8")
@@ -253,5 +253,5 @@ def _gathered(cells: _Cells, kind: str, begins: Numbers, counts: Numbers) -> Num
         step = max(1, _MAX_AT_ONCE // length)
         for first in range(0, len(rows), step):
             part = rows[first : first + step]
-            values[places[part, np.newaxis] + np.arange(length)] = cells.gathered(begins[part], kind, length)
+            values[places[part, np.newaxis] + np.arange(length)] = cells.gather(begins[part], kind, length)
     return values

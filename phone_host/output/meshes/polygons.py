@@ -28,7 +28,7 @@ class TooManyCornersError(Exception):
     """Raised for a concave polygon of more than `MAX_CONCAVE` corners. The file's fault."""
 
 
-def triangulated(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
+def triangulate(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
     """Cut polygons into triangles, with no further points; what has fewer than three corners gives none.
 
     Args:
@@ -45,7 +45,7 @@ def triangulated(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
     if not len(counts):
         return corners.reshape(0, 3)
     if (counts == counts[0]).all():
-        return _all_cut(points, corners.reshape(len(counts), -1))
+        return _split_in_chunks(points, corners.reshape(len(counts), -1))
     starts = np.cumsum(counts) - counts
     amounts = np.maximum(counts - 2, 0)
     places = np.cumsum(amounts) - amounts
@@ -54,12 +54,12 @@ def triangulated(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
         rows = np.flatnonzero(counts == count)
         for first in range(0, len(rows), _ROWS_AT_ONCE):
             part = rows[first : first + _ROWS_AT_ONCE, np.newaxis]
-            made = _all_cut(points, corners[starts[part] + np.arange(count)])
+            made = _split_in_chunks(points, corners[starts[part] + np.arange(count)])
             triangles[places[part] + np.arange(count - 2)] = made.reshape(len(part), count - 2, 3)
     return triangles
 
 
-def _all_cut(points: Points, polygons: Numbers) -> Numbers:
+def _split_in_chunks(points: Points, polygons: Numbers) -> Numbers:
     """Return (T, 3) for polygons (n, k) of one size, some of them at a time."""
     count = polygons.shape[1]
     if count == 3:
@@ -67,11 +67,11 @@ def _all_cut(points: Points, polygons: Numbers) -> Numbers:
     triangles = np.empty((len(polygons), max(count - 2, 0), 3), polygons.dtype)
     step = max(1, _MAX_AT_ONCE // max(count, 1) ** 2)
     for first in range(0, len(polygons) if count > 3 else 0, step):
-        triangles[first : first + step] = _cut(points, polygons[first : first + step])
+        triangles[first : first + step] = _split(points, polygons[first : first + step])
     return triangles.reshape(-1, 3)
 
 
-def _cut(points: Points, polygons: Numbers) -> Numbers:
+def _split(points: Points, polygons: Numbers) -> Numbers:
     """Return (n, k - 2, 3) for n polygons of k corners."""
     first = np.broadcast_to(polygons[:, :1], polygons[:, 2:].shape)
     triangles = np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2)
@@ -83,11 +83,11 @@ def _cut(points: Points, polygons: Numbers) -> Numbers:
     if len(back):
         if polygons.shape[1] > MAX_CONCAVE:
             raise TooManyCornersError
-        triangles[back] = _clipped(_flattened(points[polygons[back]], whole[back]), polygons[back])
+        triangles[back] = _clip_ears(_project(points[polygons[back]], whole[back]), polygons[back])
     return triangles
 
 
-def _flattened(corners: Points, normals: Points) -> Points:
+def _project(corners: Points, normals: Points) -> Points:
     """Return (n, k, 2): polygons as seen along the axis that their normals are nearest to, anticlockwise."""
     rows = np.arange(len(corners))
     axis = np.abs(normals).argmax(axis=1)
@@ -95,7 +95,7 @@ def _flattened(corners: Points, normals: Points) -> Points:
     return np.stack([u, corners[rows, :, (axis + 2) % 3]], axis=2)
 
 
-def _clipped(flat: Points, polygons: Numbers) -> Numbers:
+def _clip_ears(flat: Points, polygons: Numbers) -> Numbers:
     """Return (n, k - 2, 3): in each round ears that are no neighbours are cut off, as many of each polygon."""
     made = []
     while polygons.shape[1] > 3:
@@ -117,15 +117,15 @@ def _ears(flat: Points) -> NDArray[np.bool_]:
     before, after = np.roll(flat, 1, axis=1), np.roll(flat, -1, axis=1)
     doubled = _cross(flat - before, after - flat)
     limit = _FLAT * np.abs(_cross(flat, after).sum(axis=1, keepdims=True))
-    sticks_out = doubled > limit
+    is_convex = doubled > limit
     inside = np.ones((*doubled.shape, doubled.shape[1]), np.bool_)
     for one, other in ((before, flat), (flat, after), (after, before)):
         edge, way = (other - one)[:, :, np.newaxis], flat[:, np.newaxis] - one[:, :, np.newaxis]
         inside &= _cross(edge, way) >= -limit[:, :, np.newaxis]
     for corner in (before, flat, after):  # these three touch the triangle, as does another corner at the same place
         inside &= (flat[:, np.newaxis] != corner[:, :, np.newaxis]).any(axis=3)
-    inside &= ~sticks_out[:, np.newaxis]  # where one that sticks out lies inside, another does that does not
-    ears: NDArray[np.bool_] = sticks_out & ~inside.any(axis=2)
+    inside &= ~is_convex[:, np.newaxis]  # where one that sticks out lies inside, another does that does not
+    ears: NDArray[np.bool_] = is_convex & ~inside.any(axis=2)
     none = np.flatnonzero(~ears.any(axis=1))
     ears[none, doubled[none].argmax(axis=1)] = True
     return ears

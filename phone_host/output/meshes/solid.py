@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.output.meshes.polygons import MAX_CONCAVE, TooManyCornersError, triangulated
+from phone_host.output.meshes.polygons import MAX_CONCAVE, TooManyCornersError, triangulate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,17 +79,34 @@ def sound_solid(
         raise DataError(f"{name} holds no triangle", "give a mesh, not points alone")
     require_corners(name, triangles, len(points_m))
     whole = np.ascontiguousarray(triangles, np.int32)
-    is_used = np.zeros(len(points_m), np.bool_)
-    is_used[whole] = True
-    if not is_used.all():
-        whole = (np.cumsum(is_used, dtype=np.int32) - 1)[whole]
-        points_m, colours = points_m[is_used], colours[is_used] if len(colours) else colours
+    points_m, whole, colours = drop_unused(points_m, whole, colours)
     if not (points_m.min() > -_MAX_M and points_m.max() < _MAX_M):  # neither holds of NaN
         raise DataError(
             f"{name} has a corner that is no place (NaN, infinite or beyond 100 km)",
             "mend it in a mesh editor, or scan again",
         )
     return Solid(points_m.astype(np.float32), require_triangles(name, whole), colours)
+
+
+def drop_unused(
+    points: NDArray[Any], triangles: NDArray[Any], colours: NDArray[np.uint8]
+) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.uint8]]:
+    """Leave out points that no triangle uses.
+
+    Args:
+        points: (V, 3).
+        triangles: (T, 3) numbers of points, 0..V-1.
+        colours: (V, 3) or (0, 3).
+
+    Returns:
+        The points that are left, the triangles with their new numbers, and the colours.
+    """
+    is_used = np.zeros(len(points), np.bool_)
+    is_used[triangles] = True
+    if is_used.all():
+        return points, triangles.astype(np.int32, copy=False), colours
+    numbers = np.cumsum(is_used, dtype=np.int32) - 1
+    return points[is_used], numbers[triangles], colours[is_used] if len(colours) else colours
 
 
 def require_corners(name: str, corners: NDArray[np.integer[Any]], count: int) -> None:
@@ -123,10 +140,10 @@ def polygon_triangles(
     """
     require_corners(name, corners, len(points))
     try:
-        return triangulated(points, counts, corners)
+        return triangulate(points, counts, corners)
     except TooManyCornersError:
         raise DataError(
-            f"{name} has a hollow face of more than {MAX_CONCAVE} corners",
+            f"{name} has a concave face of more than {MAX_CONCAVE} corners",
             "let the program that made it write triangles",
         ) from None
 
@@ -177,7 +194,7 @@ def welded(solid: Solid) -> Solid:
     )
 
 
-def joined(solid: Solid) -> Solid:
+def weld_seams(solid: Solid) -> Solid:
     """Return a mesh without seams: many programs part its points where texture or normals change, which leaves edges open.
 
     Args:

@@ -70,7 +70,7 @@ def _binary(content: bytes, name: str) -> NDArray[np.float32]:
     """Return (3 T, 3). Bytes behind the last triangle mean nothing; of a count that was never set, the file's length says what it is."""
     body = len(content) - _HEADER - 4
     if body < 0:
-        raise _cut(name)
+        raise _cut_error(name)
     count, held = int.from_bytes(content[_HEADER : _HEADER + 4], "little"), body // _TRIANGLE.itemsize
     if count in _COUNTS_NOT_SET and body == held * _TRIANGLE.itemsize:
         count = held
@@ -99,14 +99,14 @@ def _text(content: bytes, name: str) -> NDArray[np.float64]:
                     closed += word == b"endfacet"
     except (ValueError, StopIteration):
         if b"endsolid" not in content[-_TEXT_HEAD:].lower():
-            raise _cut(name) from None
+            raise _cut_error(name) from None
         raise DataError(f"{name} has a vertex that is no number", "export it anew") from None
     if opened != closed:
-        raise _cut(name)
+        raise _cut_error(name)
     if len(corners) % 9:
         raise DataError(f"{name} has a triangle without three corners", "export it anew")
     return np.frombuffer(corners, np.float64).reshape(-1, 3)
 
 
-def _cut(name: str) -> DataError:
+def _cut_error(name: str) -> DataError:
     return DataError(f"{name} is no whole STL file", "copy the file again, or export it anew")

@@ -1,4 +1,4 @@
-"""Texts as other programs write them: with or without a byte order mark, lines that end in any way, and lines that go on. Pure."""
+"""Texts as other programs write them: with or without a byte order mark, with lines that end in any way. Pure."""
 
 import io
 from collections.abc import Iterator
@@ -35,20 +35,9 @@ def require_short(content: bytes, name: str) -> None:
 
 
 def text_lines(content: bytes) -> Iterator[bytes]:
-    r"""Yield the lines of a text one by one, which takes no memory for all of them. A backslash at the end joins the next line.
+    r"""Yield the lines of a text one by one, which takes no memory for all of them.
 
     Args:
         content: of the file; its lines end in `\n`, `\r\n` or, if it holds no `\n`, in `\r`.
     """
-    begun: list[bytes] = []
-    lines = content.split(b"\r") if b"\n" not in content else io.BytesIO(content)
-    for line in lines:
-        if line.rstrip().endswith(b"\\"):
-            begun.append(line.rstrip()[:-1])
-        elif begun:
-            yield b" ".join((*begun, line))
-            begun.clear()
-        else:
-            yield line
-    if begun:
-        yield b" ".join(begun)
+    yield from content.split(b"\r") if b"\n" not in content else io.BytesIO(content)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.output.axes import Axes
-from phone_host.output.meshes.placed import Part, placed, require_few
+from phone_host.output.meshes.assembly import Part, assemble, require_count
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, require_corners
 from phone_host.output.meshes.three_mf import axes_element
 
@@ -33,7 +33,11 @@ _FREE_BYTES: Final = 1 << 20
 _CHUNK: Final = 1 << 16
 _HEAD: Final = 1024
 _MAX_DEPTH: Final = 16
-_MAX_PLACED: Final = 10_000
+_MAX_VISITS: Final = 10_000
+_MAX_ENTRIES: Final = 100_000
+"""Objects, components, items and groups of colours: each takes far more memory than text."""
+
+_ENTRIES: Final = ("object", "component", "item", "colorgroup", "basematerials")
 _NO_COLOUR: Final = -1
 
 Key = tuple[str, str]
@@ -59,6 +63,7 @@ class _Package:
     groups: dict[Key, list[int]] = field(default_factory=dict)
     colours: list[tuple[int, ...]] = field(default_factory=list)
     unit_m: float = 1e-3
+    entries: int = 0
 
 
 def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Solid, Axes | None]:
@@ -86,13 +91,13 @@ def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Soli
                 _Reader(package, each, name, is_root=each == root).read(archive)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError, expat.ExpatError, ValueError, KeyError, IndexError, OverflowError) as error:  # fmt: skip
         raise DataError(f"{name} is no 3MF file, or cut short", "copy the file again, or export it anew") from error
-    parts = list(_placed(package, name))
+    parts = list(_build_parts(package, name))
     axes = next((axes for axes in Axes if axes_element(axes) in head), None)
-    return placed(name, parts, package.unit_m if unit_m is None else unit_m), axes
+    return assemble(name, parts, package.unit_m if unit_m is None else unit_m), axes
 
 
 def _require_bounded(archive: zipfile.ZipFile, name: str, held: int) -> None:
-    inflated = sum(each.file_size for each in archive.infolist() if each.filename.lower().endswith(".model"))
+    inflated = sum(each.file_size for each in archive.infolist() if each.filename.lower().endswith((".model", ".rels")))
     if inflated > _FREE_BYTES + _MAX_INFLATED * held:
         raise DataError(f"{name} would grow to {inflated // held} times its size", "no mesh does: export it anew")
 
@@ -123,7 +128,7 @@ class _Reader:
     def read(self, archive: zipfile.ZipFile) -> None:
         """Read the file."""
         parser = expat.ParserCreate()
-        parser.StartElementHandler = self._begin
+        parser.StartElementHandler = self._start_element
         parser.StartDoctypeDeclHandler = self._refuse
         parser.buffer_text = True
         with archive.open(self._part) as file:
@@ -134,46 +139,54 @@ class _Reader:
     def _refuse(self, *_: object) -> None:
         raise DataError(f"{self._name} has a document type, which no 3MF file has", "export it anew")
 
-    def _begin(self, tag: str, told: dict[str, str]) -> None:
-        match tag.rpartition(":")[2]:
+    def _start_element(self, tag: str, attributes: dict[str, str]) -> None:
+        element = tag.rpartition(":")[2]
+        if element in _ENTRIES:
+            self._package.entries += 1
+            if self._package.entries > _MAX_ENTRIES:
+                raise DataError(f"{self._name} has more than {_MAX_ENTRIES} objects and groups", "export fewer")
+        match element:
             case "vertex":
-                self._object.points.extend((float(told["x"]), float(told["y"]), float(told["z"])))
+                self._object.points.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
             case "triangle":
-                self._object.triangles.extend((int(told["v1"]), int(told["v2"]), int(told["v3"])))
+                self._object.triangles.extend((int(attributes["v1"]), int(attributes["v2"]), int(attributes["v3"])))
                 if self._package.groups:
-                    self._object.paints.extend(self._paints(told))
+                    self._object.paints.extend(self._paints(attributes))
             case "object":
-                self._object, self._paint = _Object(), (told.get("pid"), told.get("pindex"))
-                self._package.objects[self._part, told["id"]] = self._object
+                self._object, self._paint = _Object(), (attributes.get("pid"), attributes.get("pindex"))
+                self._package.objects[self._part, attributes["id"]] = self._object
             case "component":
-                path = next((value for key, value in told.items() if key.rpartition(":")[2] == "path"), self._part)
-                self._object.components.append(((path.lstrip("/"), told["objectid"]), _matrix(told)))
+                self._object.components.append((self._key(attributes), _matrix(attributes)))
             case "item" if self._is_root:
-                path = next((value for key, value in told.items() if key.rpartition(":")[2] == "path"), self._part)
-                self._package.items.append(((path.lstrip("/"), told["objectid"]), _matrix(told)))
+                self._package.items.append((self._key(attributes), _matrix(attributes)))
             case "model" if self._is_root:
-                self._package.unit_m = _UNITS_M[told.get("unit", "millimeter")]
+                self._package.unit_m = _UNITS_M[attributes.get("unit", "millimeter")]
             case "colorgroup" | "basematerials":
-                self._group = self._package.groups.setdefault((self._part, told["id"]), [])
+                self._group = self._package.groups.setdefault((self._part, attributes["id"]), [])
             case "color" | "base":
                 self._group.append(len(self._package.colours))
-                self._package.colours.append(_colour(told.get("color") or told.get("displaycolor", "")))
+                self._package.colours.append(_colour(attributes.get("color") or attributes.get("displaycolor", "")))
 
-    def _paints(self, told: dict[str, str]) -> tuple[int, int, int]:
+    def _key(self, attributes: dict[str, str]) -> Key:
+        """Return which object a component or an item places."""
+        path = next((value for key, value in attributes.items() if key.rpartition(":")[2] == "path"), self._part)
+        return path.lstrip("/"), attributes["objectid"]
+
+    def _paints(self, attributes: dict[str, str]) -> tuple[int, int, int]:
         """Return the numbers of the colours of a triangle's corners."""
         of_object, index = self._paint
-        group = self._package.groups.get((self._part, told.get("pid") or of_object or ""))
+        group = self._package.groups.get((self._part, attributes.get("pid") or of_object or ""))
         if not group:
             return (_NO_COLOUR,) * 3
-        first = int(told.get("p1") or index or 0)
-        a, b, c = (int(told.get(key) or first) for key in ("p1", "p2", "p3"))
+        first = int(attributes.get("p1") or index or 0)
+        a, b, c = (int(attributes.get(key) or first) for key in ("p1", "p2", "p3"))
         return group[a], group[b], group[c]
 
 
-def _matrix(told: dict[str, str]) -> NDArray[np.float64]:
+def _matrix(attributes: dict[str, str]) -> NDArray[np.float64]:
     """Return (4, 4) of twelve numbers, row by row, for places that are rows."""
     matrix = np.eye(4)
-    if words := told.get("transform", "").split():
+    if words := attributes.get("transform", "").split():
         matrix[:3] = np.array([float(word) for word in words]).reshape(4, 3).T
     return matrix
 
@@ -184,25 +197,25 @@ def _colour(text: str) -> tuple[int, ...]:
     return red, green, blue
 
 
-def _placed(package: _Package, name: str) -> Iterator[Part]:
+def _build_parts(package: _Package, name: str) -> Iterator[Part]:
     """Yield the meshes as often as the build places them; of a build without items, all."""
     items = package.items or [(key, np.eye(4)) for key in package.objects]
     waiting, parts, visits, triangles = [(*item, 0) for item in items], dict[Key, Part](), 0, 0
     while waiting:
-        key, place, depth = waiting.pop()
+        key, transform, depth = waiting.pop()
         visits += 1
-        if depth > _MAX_DEPTH or visits > _MAX_PLACED:
-            raise DataError(f"{name} has objects in a circle, or places them more than {_MAX_PLACED} times", "export it anew")  # fmt: skip
+        if depth > _MAX_DEPTH or visits > _MAX_VISITS:
+            raise DataError(f"{name} has objects in a circle, or places them more than {_MAX_VISITS} times", "export it anew")  # fmt: skip
         if key not in package.objects:
             raise DataError(f"{name} places an object that it does not hold", "export it anew")
         thing = package.objects[key]
-        waiting += [(inner, place @ way, depth + 1) for inner, way in thing.components]
+        waiting += [(inner, transform @ way, depth + 1) for inner, way in thing.components]
         if thing.triangles:
             part = parts.get(key) or _part(package, thing, name)
             parts[key] = part
             triangles += len(part.triangles)
-            require_few(name, triangles)
-            yield Part(part.points, part.triangles, part.colours, place)
+            require_count(name, triangles)
+            yield Part(part.points, part.triangles, part.colours, transform)
 
 
 def _part(package: _Package, thing: _Object, name: str) -> Part:

@@ -11,7 +11,7 @@ from common.errors import DataError
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, require_corners, sound_solid
 
 _MAX_PLACED: Final = 20_000_000
-"""Triangles of one mesh, or its points: a part may be placed often, and a small file so name an endless mesh."""
+"""Triangles of one mesh, or its points: a part may be placed often, so that a small file names an endless mesh."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,16 +22,16 @@ class Part:
         points: (V, 3), in the file's unit.
         triangles: (T, 3) numbers of its points.
         colours: (V, 3) or (0, 3) uint8.
-        place: (4, 4) float64: from its coordinates to the whole mesh's.
+        transform: (4, 4) float64: from its coordinates to the whole mesh's.
     """
 
     points: NDArray[Any]
     triangles: NDArray[np.integer[Any]]
     colours: NDArray[np.uint8]
-    place: NDArray[np.float64]
+    transform: NDArray[np.float64]
 
 
-def require_few(name: str, count: int) -> None:
+def require_count(name: str, count: int) -> None:
     """Check a number of points or triangles before there is room made for them.
 
     Args:
@@ -45,7 +45,7 @@ def require_few(name: str, count: int) -> None:
         raise DataError(f"{name} holds more than {_MAX_PLACED // 10**6} million points or triangles", "export fewer")
 
 
-def placed(name: str, parts: Sequence[Part], unit_m: float) -> Solid:
+def assemble(name: str, parts: Sequence[Part], unit_m: float) -> Solid:
     """Put parts together.
 
     Args:
@@ -54,19 +54,19 @@ def placed(name: str, parts: Sequence[Part], unit_m: float) -> Solid:
         unit_m: their unit, m.
 
     Returns:
-        One mesh. A part that its place mirrors has its triangles turned, so that outside stays outside.
+        One mesh. A part that is mirrored by its transform has its triangles turned, so that outside stays outside.
 
     Raises:
         DataError: they hold no sound triangle, or too many.
     """
-    require_few(name, max(sum(len(part.points) for part in parts), sum(len(part.triangles) for part in parts)))
+    require_count(name, max(sum(len(part.points) for part in parts), sum(len(part.triangles) for part in parts)))
     has_colours = any(len(part.colours) for part in parts)
     points, triangles, colours, count = [], [], [], 0
     for part in parts:
         require_corners(name, part.triangles, len(part.points))
-        moved = part.points.astype(np.float64) @ (part.place[:3, :3].T * unit_m) + part.place[:3, 3] * unit_m
-        turned = part.triangles[:, ::-1] if np.linalg.det(part.place[:3, :3]) < 0 else part.triangles
-        points.append(moved)
+        points_m = part.points.astype(np.float64) @ (part.transform[:3, :3].T * unit_m) + part.transform[:3, 3] * unit_m
+        turned = part.triangles[:, ::-1] if np.linalg.det(part.transform[:3, :3]) < 0 else part.triangles
+        points.append(points_m)
         triangles.append(turned.astype(np.int32) + np.int32(count))
         if has_colours:
             colours.append(part.colours if len(part.colours) else np.full((len(part.points), 3), 255, np.uint8))
