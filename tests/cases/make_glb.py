@@ -183,7 +183,7 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
     rest = {**primitive, "indices": file.add(numbers[6:].ravel(), "u2")}
     first = {**primitive, "indices": file.add(numbers[:6].ravel(), "u2")}
     cases["parts-that-share-points"] = (
-        file.bytes([first, half], [{"mesh": 0}, {"mesh": 1}], (0, 1)),
+        file.bytes([first, rest], [{"mesh": 0}, {"mesh": 1}], (0, 1)),
         answer | {"points": 8},
     )
     file, primitive = plain()

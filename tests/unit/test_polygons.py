@@ -1,5 +1,7 @@
 """Polygons become triangles that cover them once, whatever their shape, by areas that geometry gives."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +13,7 @@ from phone_host.output.meshes.polygons import MAX_CONCAVE, TooManyCornersError, 
 _L = np.array([(0, 40, 0), (0, 0, 0), (40, 0, 0), (40, 10, 0), (10, 10, 0), (10, 40, 0)], np.float64)
 
 
-def areas(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+def areas(points: NDArray[np.float64], triangles: NDArray[np.integer[Any]]) -> NDArray[np.float64]:
     """Signed areas along z."""
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     return np.asarray(np.cross(b - a, c - a)[:, 2] / 2)

@@ -92,7 +92,7 @@ def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
     counts, corners = _polygons(faces)
     triangles = polygon_triangles(name, places, counts, corners)
     colours = _colours(vertices)
-    if not len(colours) and len(painted := _colours(faces)):
+    if len(triangles) and not len(colours) and len(painted := _colours(faces)):
         painted = np.repeat(painted, 3 * np.maximum(counts - 2, 0), axis=0)
         colours = colours_of_points(triangles.ravel(), painted, len(places))
     return sound_solid(name, places * unit_m, triangles, colours)

@@ -4,6 +4,7 @@ A fan from the first corner is right for convex polygons alone: of an L it cover
 Source: G. H. Meisters, "Polygons Have Ears", American Mathematical Monthly 82 (1975); all polygons of one size are clipped at once here.
 """
 
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -24,8 +25,25 @@ _FLAT: Final = 1e-12
 """Share of a polygon's area below which three of its corners count as one line."""
 
 
+_MAX_WORK: Final = 8_000_000_000
+"""Sum of the cubes of the corners of all concave polygons: a minute at the worst, where each round finds one ear."""
+
+
 class TooManyCornersError(Exception):
-    """Raised for a concave polygon of more than `MAX_CONCAVE` corners. The file's fault."""
+    """Raised for a concave polygon of more than `MAX_CONCAVE` corners, or for too many of them. The file's fault."""
+
+
+@dataclass(slots=True)
+class _Work:
+    """What clipping may still take."""
+
+    left: int = _MAX_WORK
+
+    def take(self, polygons: int, corners: int) -> None:
+        """Take the work of clipping from what is left."""
+        self.left -= polygons * corners**3
+        if corners > MAX_CONCAVE or self.left < 0:
+            raise TooManyCornersError
 
 
 def triangulate(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
@@ -42,10 +60,11 @@ def triangulate(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
     Raises:
         TooManyCornersError: a concave polygon has too many corners.
     """
+    work = _Work()
     if not len(counts):
         return corners.reshape(0, 3)
     if (counts == counts[0]).all():
-        return _split_in_chunks(points, corners.reshape(len(counts), -1))
+        return _split_in_chunks(points, corners.reshape(len(counts), -1), work)
     starts = np.cumsum(counts) - counts
     amounts = np.maximum(counts - 2, 0)
     places = np.cumsum(amounts) - amounts
@@ -54,12 +73,12 @@ def triangulate(points: Points, counts: Numbers, corners: Numbers) -> Numbers:
         rows = np.flatnonzero(counts == count)
         for first in range(0, len(rows), _ROWS_AT_ONCE):
             part = rows[first : first + _ROWS_AT_ONCE, np.newaxis]
-            made = _split_in_chunks(points, corners[starts[part] + np.arange(count)])
+            made = _split_in_chunks(points, corners[starts[part] + np.arange(count)], work)
             triangles[places[part] + np.arange(count - 2)] = made.reshape(len(part), count - 2, 3)
     return triangles
 
 
-def _split_in_chunks(points: Points, polygons: Numbers) -> Numbers:
+def _split_in_chunks(points: Points, polygons: Numbers, work: _Work) -> Numbers:
     """Return (T, 3) for polygons (n, k) of one size, some of them at a time."""
     count = polygons.shape[1]
     if count == 3:
@@ -67,11 +86,11 @@ def _split_in_chunks(points: Points, polygons: Numbers) -> Numbers:
     triangles = np.empty((len(polygons), max(count - 2, 0), 3), polygons.dtype)
     step = max(1, _MAX_AT_ONCE // max(count, 1) ** 2)
     for first in range(0, len(polygons) if count > 3 else 0, step):
-        triangles[first : first + step] = _split(points, polygons[first : first + step])
+        triangles[first : first + step] = _split(points, polygons[first : first + step], work)
     return triangles.reshape(-1, 3)
 
 
-def _split(points: Points, polygons: Numbers) -> Numbers:
+def _split(points: Points, polygons: Numbers, work: _Work) -> Numbers:
     """Return (n, k - 2, 3) for n polygons of k corners."""
     first = np.broadcast_to(polygons[:, :1], polygons[:, 2:].shape)
     triangles = np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2)
@@ -81,8 +100,7 @@ def _split(points: Points, polygons: Numbers) -> Numbers:
     # A polygon without area, or with a corner that is no place, is cut anyhow.
     back = np.flatnonzero(((normals @ whole[:, :, np.newaxis])[:, :, 0] <= 0).any(axis=1) & (whole != 0).any(axis=1))
     if len(back):
-        if polygons.shape[1] > MAX_CONCAVE:
-            raise TooManyCornersError
+        work.take(len(back), polygons.shape[1])
         triangles[back] = _clip_ears(_project(points[polygons[back]], whole[back]), polygons[back])
     return triangles
 
@@ -118,13 +136,14 @@ def _ears(flat: Points) -> NDArray[np.bool_]:
     doubled = _cross(flat - before, after - flat)
     limit = _FLAT * np.abs(_cross(flat, after).sum(axis=1, keepdims=True))
     is_convex = doubled > limit
-    inside = np.ones((*doubled.shape, doubled.shape[1]), np.bool_)
+    # Where a convex corner lies in a triangle, one that is not does, too: only those are looked for.
+    columns = np.flatnonzero(~is_convex.all(axis=0))
+    inside = np.broadcast_to(~is_convex[:, np.newaxis, columns], (*doubled.shape, len(columns))).copy()
     for one, other in ((before, flat), (flat, after), (after, before)):
-        edge, way = (other - one)[:, :, np.newaxis], flat[:, np.newaxis] - one[:, :, np.newaxis]
-        inside &= _cross(edge, way) >= -limit[:, :, np.newaxis]
-    for corner in (before, flat, after):  # these three touch the triangle, as does another corner at the same place
-        inside &= (flat[:, np.newaxis] != corner[:, :, np.newaxis]).any(axis=3)
-    inside &= ~is_convex[:, np.newaxis]  # where one that sticks out lies inside, another does that does not
+        edge = other - one
+        x, y = (flat[:, np.newaxis, columns, axis] - one[:, :, np.newaxis, axis] for axis in (0, 1))
+        inside &= edge[:, :, :1] * y - edge[:, :, 1:] * x >= -limit[:, :, np.newaxis]
+        inside &= (x != 0) | (y != 0)  # the triangle's own corners touch it, as does another at the same place
     ears: NDArray[np.bool_] = is_convex & ~inside.any(axis=2)
     none = np.flatnonzero(~ears.any(axis=1))
     ears[none, doubled[none].argmax(axis=1)] = True

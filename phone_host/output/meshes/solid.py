@@ -143,7 +143,7 @@ def polygon_triangles(
         return triangulate(points, counts, corners)
     except TooManyCornersError:
         raise DataError(
-            f"{name} has a concave face of more than {MAX_CONCAVE} corners",
+            f"{name} has concave faces of too many corners (more than {MAX_CONCAVE}, or too many such faces)",
             "let the program that made it write triangles",
         ) from None
 
