@@ -1,5 +1,6 @@
 """GLB as other programs write it; see `make_meshes`."""
 
+import base64
 import json
 import struct
 from collections.abc import Sequence
@@ -167,6 +168,13 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
         file.bytes([primitive, {**primitive, "mode": 1}], [{"mesh": 0}, {"mesh": 1}, {"camera": 0}], (0, 1, 2), cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}]),
         answer,
     )  # fmt: skip
+    file, primitive = plain()
+    packed = f"data:application/octet-stream;base64,{base64.b64encode(file.buffer).decode()}"
+    whole, file.buffer = len(file.buffer), b""
+    buffers = [{"byteLength": whole, "uri": packed}]
+    cases["numbers-within-the-json"] = file.bytes([primitive], [{"mesh": 0}], buffers=buffers), answer
+    buffers = [{"byteLength": whole, "uri": "box.bin"}]
+    cases["numbers-in-another-file"] = file.bytes([primitive], [{"mesh": 0}], buffers=buffers), {"refused": "another file"}  # fmt: skip
     file, primitive = plain()
     content = file.bytes([primitive], [{"mesh": 0}])
     cases["bytes-behind"] = content + b"\0\0\n", answer

@@ -1,5 +1,6 @@
 """Reading a mesh takes at most 12 times the size of a binary file and 40 times that of a text, whatever the file claims."""
 
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -51,6 +52,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     made["short-text.ply"] = (_header("ascii", 200_000, 200_000) + "1 2 3\n" * 200_000 + "3 1 2 3\n" * 200_000).encode()
     made["claims-text.ply"] = (_header("ascii", 2_000_000_000, 9) + "1 2 3\n" * 400_000).encode()
     made["short.obj"] = b"v 1 2 3\n" * 200_000 + b"f 1 2 3\n" * 200_000
+    text = b'{"asset":{},"extras":[' + b"[]," * 1_000_000 + b"0]}"
+    lists = struct.pack("<II", len(text), 0x4E4F534A) + text
+    made["lists.glb"] = struct.pack("<III", 0x46546C67, 2, 12 + len(lists)) + lists
     facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
     made["same-text.stl"] = f"solid a\n{facet * 25_000}endsolid\n".encode()
     for name, content in made.items():
@@ -68,6 +72,7 @@ def test_reading_takes_a_bounded_multiple_of_the_file(files: list[Path]) -> None
         most = (40 if path.name.endswith(TEXTS) else 12) * path.stat().st_size + SLACK
         assert peak <= most, (path.name, peak / path.stat().st_size)
     assert "claims-text.ply is cut short" in said.stderr
+    assert "lists.glb is cut short, or no GLB file" in said.stderr
 
 
 def test_a_text_that_is_too_long_is_refused_before_it_is_read() -> None:

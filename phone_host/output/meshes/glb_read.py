@@ -4,6 +4,7 @@ Pictures, skins, animations and cameras have no part in the shape. Compressed me
 Source: Khronos, glTF 2.0 Specification, sections 3.5 (nodes), 3.6 (accessors), 3.7.2 (meshes) and 4 (GLB).
 """
 
+import base64
 import json
 import struct
 from collections.abc import Iterable, Iterator
@@ -27,6 +28,9 @@ _UNREAD_EXTENSIONS: Final = (
     "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_mesh_gpu_instancing",
 )  # fmt: skip
 _MAX_DEPTH: Final = 64
+_FREE_LISTS, _BYTES_PER_LIST = 100_000, 16
+"""Lists and maps that the JSON may have, and how many bytes the file must have for each further one: each takes 64 bytes of memory."""
+
 _WRONG: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
 """What reading a tree of JSON raises where something else stands than must."""
 
@@ -70,17 +74,15 @@ def _axes(asset: Tree) -> Axes | None:
 class _File:
     name: str
     tree: Tree
-    buffer: memoryview
+    buffers: list[memoryview]
 
     def view(self, number: int) -> tuple[memoryview, int]:
         """Return the bytes of a view, and how far apart its rows are; 0: close together."""
         view = self.tree["bufferViews"][number]
-        if view["buffer"] != 0:
-            raise IndexError("a file beside it")
-        begin, length = view.get("byteOffset", 0), view["byteLength"]
-        if min(begin, length) < 0 or begin + length > len(self.buffer):
+        begin, length, buffer = view.get("byteOffset", 0), view["byteLength"], self.buffers[view["buffer"]]
+        if min(begin, length) < 0 or begin + length > len(buffer):
             raise IndexError("beyond the end")
-        return self.buffer[begin : begin + length], view.get("byteStride", 0)
+        return buffer[begin : begin + length], view.get("byteStride", 0)
 
     def numbers(self, number: int) -> NDArray[Any]:
         """Return (N, columns) numbers of an accessor; integers that stand for shares are float32."""
@@ -135,11 +137,26 @@ def _file(content: bytes, name: str) -> _File:
         found.setdefault(kind, whole[at + 8 : at + 8 + length])
         at += 8 + length
     try:
-        tree = json.loads(bytes(found[_JSON]))
+        text = bytes(found[_JSON])
+        if text.count(b"[") + text.count(b"{") > _FREE_LISTS + len(content) // _BYTES_PER_LIST:
+            raise ValueError("too many lists")
+        tree = json.loads(text)
     except RecursionError:
         raise ValueError("too deep") from None
     _require_plain(name, tree.get("extensionsRequired", ()))
-    return _File(name, tree, found.get(_BINARY, memoryview(b"")))
+    return _File(name, tree, list(_buffers(name, tree, found.get(_BINARY, memoryview(b"")))))
+
+
+def _buffers(name: str, tree: Tree, binary: memoryview) -> Iterator[memoryview]:
+    """Yield the buffers: the binary chunk, or bytes within the JSON, as Open3D writes them."""
+    for buffer in tree.get("buffers", ()):
+        uri = buffer.get("uri")
+        if uri is None:
+            yield binary
+        elif uri.startswith("data:"):
+            yield memoryview(base64.b64decode(uri.partition(",")[2]))
+        else:
+            raise DataError(f"{name} has its numbers in another file", "export it as one file")
 
 
 def _require_plain(name: str, extensions: Iterable[str]) -> None:
