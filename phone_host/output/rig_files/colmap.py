@@ -1,7 +1,8 @@
 """COLMAP's text model: cameras.txt and images.txt. Pure.
 
 cameras.txt: CAMERA_ID MODEL WIDTH HEIGHT PARAMS... images.txt: two lines for each image, IMAGE_ID QW QX QY QZ TX TY TZ
-CAMERA_ID NAME, and its points; a point p of the world is R(q) p + t in the camera's axes. The centre of the first pixel is
+CAMERA_ID NAME, and its points, an empty line where it has none. Editors and scripts drop empty lines, so each line is told
+from the other kind by what it holds: points are X Y POINT3D_ID, three numbers each. A point p of the world is R(q) p + t in the camera's axes. The centre of the first pixel is
 (0.5, 0.5). A reconstruction has no unit of its own; ETH3D's are in metres.
 Source: https://colmap.github.io/format.html and cameras.html.
 """
@@ -30,6 +31,7 @@ _CENTRE_PX: Final = 0.5
 _QUATERNION_TOLERANCE: Final = 1e-3
 _POSE_WORDS: Final = 10
 _CAMERA_LINE: Final = re.compile(r"\s*\d+\s+[A-Z][A-Z_]+\s+-?\d+\s+-?\d+\s+\S.*")
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?nan|[+-]?inf", re.ASCII | re.IGNORECASE)
 _IMAGE_LINE: Final = re.compile(r"\s*\d+(?:\s+[-+.\deE]+){7}\s+\d+\s+\S.*")
 
 
@@ -144,20 +146,29 @@ class _Posed:
 
 
 def _images(text: str, file: str) -> list[_Posed]:
-    """Return the images in the order of their ids. Behind each image's line stands one of points, which may be empty."""
+    """Return the images in the order of their ids."""
     found: list[_Posed] = []
-    lines = iter(text.removeprefix("\ufeff").splitlines())
-    for line in lines:
-        if not line.strip() or line.startswith("#"):
+    is_owner_known = False  # of points that may follow
+    for line in _lines(text):
+        if _is_points(line):
+            if not is_owner_known:
+                raise DataError(f"{file} has points that belong to no image", "write an image's line before its points")
+            is_owner_known = False
             continue
         words = line.split(maxsplit=_POSE_WORDS - 1)
         node = Node(file, f"image {words[0]}", list(words[1:8]))
-        if len(words) < _POSE_WORDS or not words[0].isdecimal():
+        if len(words) < _POSE_WORDS or not (words[0].isdecimal() and words[8].isdecimal()):
             raise node.problem("is no image", "write IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")
         values = node.numbers(7)
         found.append(_Posed(words[0], words[8], _rotation(node, values[:4]), np.array(values[4:], np.float64)))
-        next(lines, None)
+        is_owner_known = True
     return sorted(found, key=lambda each: int(each.id))
+
+
+def _is_points(line: str) -> bool:
+    """Return whether a line holds points of an image: nothing but numbers, three for each."""
+    words = line.split()
+    return len(words) % 3 == 0 and all(_NUMBER.fullmatch(word) for word in words)
 
 
 def _rotation(node: Node, quaternion: tuple[float, ...]) -> NDArray[np.float64]:

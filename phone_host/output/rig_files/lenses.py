@@ -21,7 +21,7 @@ class NamedLens:
     Attributes:
         name: that name.
         lens: the model.
-        counts: how many coefficients may be stated.
+        counts: how many coefficients may be stated; those that are not stated are 0.
     """
 
     name: str
@@ -32,9 +32,10 @@ class NamedLens:
 Names = tuple[NamedLens, ...]
 
 ROS_LENSES: Final[Names] = (
-    NamedLens("plumb_bob", Lens.PINHOLE, (4, 5)),
-    NamedLens("rational_polynomial", Lens.RATIONAL, (8, 12, 14)),
+    NamedLens("plumb_bob", Lens.PINHOLE, (0, 4, 5)),
+    NamedLens("rational_polynomial", Lens.RATIONAL, (0, 4, 5, 8, 12, 14)),
     NamedLens("equidistant", Lens.FISHEYE, (4,)),
+    NamedLens("none", Lens.PINHOLE, (0, 4, 5)),
 )
 KALIBR_LENSES: Final[Names] = (
     NamedLens("radtan", Lens.PINHOLE, (4,)),
@@ -51,6 +52,8 @@ EUROC_LENSES: Final[Names] = (
 def lens_of(name: Node, coefficients: Node, names: Names) -> tuple[Lens, tuple[float, ...]]:
     """Read which lens a file names, and its coefficients.
 
+    Drivers state eight coefficients for every model, so those beyond what the model has are left out if they are 0.
+
     Args:
         name: the model's name.
         coefficients: its coefficients.
@@ -64,12 +67,19 @@ def lens_of(name: Node, coefficients: Node, names: Names) -> tuple[Lens, tuple[f
     if known is None:
         raise name.problem(f"is {word!r}", f"read are {', '.join(each.name for each in names)}")
     values = coefficients.values()
+    limit = max(known.counts)
+    if any(values[limit:]):
+        raise coefficients.problem(
+            f"has {counted(len(values), 'value')}", f"{word} has at most {limit}: name the model that has them all"
+        )
+    values = values[:limit]
     if len(values) not in known.counts:
-        said = f"has {counted(len(values), 'value')}"
-        raise coefficients.problem(said, f"{word} has {' or '.join(map(str, known.counts))}")
+        stated = f"has {counted(len(values), 'value')}"
+        raise coefficients.problem(stated, f"{word} has {' or '.join(map(str, known.counts))}")
     if word == "none" and any(values):
         raise coefficients.problem("bends rays", f"but {name.key} is none; name the model")
-    return known.lens, values if len(values) >= 4 else (0.0,) * 4
+    length = 8 if known.lens is Lens.RATIONAL else 4
+    return known.lens, values + (0.0,) * (length - len(values))
 
 
 def lens_name(camera: StatedCamera, names: Names, program: str) -> NamedLens:

@@ -2,7 +2,8 @@
 
 Keys: image_width, image_height, camera_name, camera_matrix (K), distortion_model, distortion_coefficients (D),
 rectification_matrix (R), projection_matrix (P). What `ros2 topic echo` prints of the message (width, height, k, d, r, p) is
-read, too. The message holds no relative pose; it follows from the rectification: with P = K' [I | t'],
+read, too, with its binning and its region of interest: K and P are those of the full image, the pictures that a driver
+publishes show the region, binned. A matrix whose first number is 0 means that the camera is not calibrated. The message holds no relative pose; it follows from the rectification: with P = K' [I | t'],
 
     p_rectified = R_left p_left,  p_rectified + t'_right = R_right p_right,
 
@@ -10,6 +11,7 @@ so R_right_left = R_right^T R_left and t = R_right^T t'. Metres.
 Source: sensor_msgs/msg/CameraInfo; http://wiki.ros.org/image_pipeline/CameraInfo.
 """
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -34,7 +36,8 @@ def is_ros(node: Node) -> bool:
     return (node.has("camera_matrix") and node.has("projection_matrix")) or (
         any(node.has(key) for key in ("K", "k"))
         and any(node.has(key) for key in ("P", "p"))
-        and node.has("distortion_model")
+        and isinstance(node.tree, dict)
+        and "distortion_model" in node.tree  # it may be empty: no distortion
     )
 
 
@@ -63,33 +66,98 @@ def read_ros(left: Node, right: Node) -> StatedRig:
         R_right_left=turn_right.T @ turn_left,
         t_right_left=turn_right.T @ shift,
         name=f"{right.file}: projection_matrix",
+        notes=tuple(
+            f"{node.file} publishes a part of its image or bins it: the pictures must be {camera.width_px}x{camera.height_px} px"
+            for node, camera in zip((left, right), cameras, strict=True)
+            if _published(node) != _Published(*_full_size_px(node))
+        ),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Published:
+    """The part of the full image that a driver publishes, px of the full image, and how many of these px make one."""
+
+    width_px: int
+    height_px: int
+    x_px: int = 0
+    y_px: int = 0
+    binning_x: int = 1
+    binning_y: int = 1
+
+
+def _full_size_px(node: Node) -> tuple[int, int]:
+    return node.first_of("image_width", "width").whole(), node.first_of("image_height", "height").whole()
+
+
+def _published(node: Node) -> _Published:
+    """Read binning and region of interest; 0 stands for "all" in both."""
+    width_px, height_px = _full_size_px(node)
+    binning = [max(_count(node, key), 1) for key in ("binning_x", "binning_y")]
+    if not node.has("roi"):
+        return _Published(width_px, height_px, binning_x=binning[0], binning_y=binning[1])
+    roi = node.child("roi")
+    x, y, width, height = (_count(roi, key) for key in ("x_offset", "y_offset", "width", "height"))
+    part = _Published(width or width_px - x, height or height_px - y, x, y, *binning)
+    if not (0 < part.width_px <= width_px - x and 0 < part.height_px <= height_px - y):
+        raise roi.problem("reaches out of the image", f"the image has {width_px}x{height_px} px")
+    return part
+
+
+def _count(node: Node, key: str) -> int:
+    """Read a whole number that may be 0; it is 0 where the key is missing."""
+    if not node.has(key):
+        return 0
+    value = node.child(key).number()
+    return 0 if value == 0 else node.child(key).whole()
 
 
 def _camera(node: Node) -> StatedCamera:
     matrix_node = node.first_of("camera_matrix", "K", "k")
     matrix = matrix_node.matrix(3, 3)
+    if not matrix.any():
+        raise matrix_node.problem("is all 0: the camera is not calibrated", "calibrate it, then write its file again")
     if matrix[0, 1] or matrix[1, 0] or not np.array_equal(matrix[2], [0, 0, 1]):
         raise matrix_node.problem("is no camera matrix", "it must be fx 0 cx 0 fy cy 0 0 1")
-    model = node.child("distortion_model")
-    lens, coefficients = lens_of(model, node.first_of("distortion_coefficients", "D", "d"), ROS_LENSES)
+    model = (
+        node.child("distortion_model") if node.has("distortion_model") else Node(node.file, "distortion_model", "none")
+    )
+    lens, coefficients = lens_of(model, _coefficients(node), ROS_LENSES)
+    part = _published(node)
+    # As ROS' image_geometry has it (PinholeCameraModel::fromCameraInfo): first the region, then the binning.
     return StatedCamera(
         name=node.file,
-        width_px=node.first_of("image_width", "width").whole(),
-        height_px=node.first_of("image_height", "height").whole(),
-        focal_px=(float(matrix[0, 0]), float(matrix[1, 1])),
-        centre_px=(float(matrix[0, 2]), float(matrix[1, 2])),
+        width_px=part.width_px // part.binning_x,
+        height_px=part.height_px // part.binning_y,
+        focal_px=(float(matrix[0, 0]) / part.binning_x, float(matrix[1, 1]) / part.binning_y),
+        centre_px=(
+            (float(matrix[0, 2]) - part.x_px) / part.binning_x,
+            (float(matrix[1, 2]) - part.y_px) / part.binning_y,
+        ),
         lens=lens,
         coefficients=coefficients,
     )
 
 
+def _coefficients(node: Node) -> Node:
+    names = ("distortion_coefficients", "D", "d")
+    is_empty = isinstance(node.tree, dict) and any(node.tree.get(name) in ([], "") for name in names)
+    return Node(node.file, "d", []) if is_empty else node.first_of(*names)
+
+
 def _rectified(node: Node) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the rotation to the rectified axes, and the shift of its projection, m."""
     turn_node = node.first_of("rectification_matrix", "R", "r")
-    turn = rotation_of(turn_node, turn_node.matrix(3, 3))
+    matrix = turn_node.matrix(3, 3)
     projection_node = node.first_of("projection_matrix", "P", "p")
     projection = projection_node.matrix(3, 4)
+    for each, values in ((turn_node, matrix), (projection_node, projection)):
+        if not values.any():
+            raise each.problem(
+                "is all 0: the camera is not rectified",
+                "calibrate both cameras as one stereo pair, then write the file again",
+            )
+    turn = rotation_of(turn_node, matrix)
     focal = projection[0, 0], projection[1, 1]
     if not min(focal) > 0 or not np.array_equal(projection[2], [0, 0, 1, 0]) or projection[0, 1] or projection[1, 0]:
         raise projection_node.problem(
