@@ -6,6 +6,10 @@ JPEG itself says where it begins and ends: its segments carry their lengths, and
 always followed by 0 or a restart marker (ITU-T T.81, B.1.1.2 to B.1.1.5). So an image is returned with its last byte,
 not one period later when the next part begins.
 
+Some servers leave the end marker of every image out; browsers and ffmpeg show such images. After `_HABIT_IMAGES` of
+them, with none that ends, an image is taken to end where the next part begins, and gets its end marker. So it comes one
+period late, and whether its data were cut short is not known.
+
 Rules: only whole images are returned. A broken image is reported once, and the search continues behind the fault, so
 every byte is examined once. At most MAX_IMAGE_BYTES are kept.
 """
@@ -29,6 +33,14 @@ _MARKER: Final = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]", re.DOTALL)
 """Ends entropy-coded data: not a stuffed byte, a restart marker or a fill byte."""
 
 _SOI, _EOI, _SOS = 0xD8, 0xD9, 0xDA
+
+_HABIT_IMAGES: Final = 5
+"""Number of images without an end marker, and none with one, that make it a habit of the server: a third of a second at 15 frames a second."""
+
+_PART_HEAD: Final = re.compile(rb"\r?\n?--[\x20-\x7e]{1,200}\r?\n(?:[\x20-\x7e]{0,200}\r?\n){0,20}\Z")
+"""A multipart boundary and the headers of the next part (RFC 2046, 5.1.1), right before an image."""
+
+_PART_HEAD_BYTES: Final = 4096
 _LEAST_CODE: Final = 0xC0
 """Codes below are reserved (Table B.1)."""
 
@@ -38,7 +50,7 @@ class Whole:
     """A whole image.
 
     Attributes:
-        payload: bytes from SOI to EOI.
+        payload: bytes from SOI to EOI; the latter is added where a server never sends it.
         width_px: width from its frame header, px.
         height_px: height from its frame header, px.
         began_ns: when its first byte came.
@@ -77,6 +89,9 @@ class JpegStream:
         self._heard_ns = 0
         self._old_bytes = 0
         self._passed_bytes = 0
+        self._has_scan = False  # this image has entropy-coded data
+        self._endless_images = 0
+        self._some_image_ended = False
 
     @property
     def held_bytes(self) -> int:
@@ -127,7 +142,7 @@ class JpegStream:
             return False
         self._began_ns = self._heard_ns if found < self._old_bytes else now_ns
         self._drop(found)
-        self._phase, self._at, self._size_px = _Phase.SEGMENTS, 2, (0, 0)
+        self._phase, self._at, self._size_px, self._has_scan = _Phase.SEGMENTS, 2, (0, 0), False
         return True
 
     def _segment(self, now_ns: int, events: list[Whole | Broken]) -> bool:  # noqa: PLR0911 - one return for each kind of marker
@@ -136,6 +151,8 @@ class JpegStream:
         if len(data) < at + 4:
             return self._short(now_ns, events)
         code = data[at + 1]
+        if code == _SOI and self._has_scan and data[at] == 0xFF:
+            return self._next_began(now_ns, events)
         if data[at] != 0xFF or code < _LEAST_CODE or code == _SOI:
             return self._give_up(at, events)
         if code == 0xFF:  # a fill byte before a marker
@@ -155,6 +172,7 @@ class JpegStream:
             self._size_px = (int.from_bytes(data[at + 7 : at + 9], "big"), int.from_bytes(data[at + 5 : at + 7], "big"))
         self._at += 2 + length
         self._phase = _Phase.ENTROPY if code == _SOS else _Phase.SEGMENTS
+        self._has_scan |= code == _SOS
         return True
 
     def _short(self, now_ns: int, events: list[Whole | Broken]) -> bool:
@@ -175,21 +193,30 @@ class JpegStream:
         return True
 
     def _end(self, now_ns: int, events: list[Whole | Broken]) -> bool:
+        self._some_image_ended = True
         end = self._at + 2
+        return self._deliver(bytes(self._data[:end]), end, now_ns, events)
+
+    def _next_began(self, now_ns: int, events: list[Whole | Broken]) -> bool:
+        """Handle the begin of the next image where this one has not ended."""
+        self._endless_images += 1
+        if self._some_image_ended or self._endless_images <= _HABIT_IMAGES:
+            return self._give_up(self._at, events)
+        whole = self._data[: self._at]
+        head = _PART_HEAD.search(whole, max(0, self._at - _PART_HEAD_BYTES))
+        payload = bytes(whole[: head.start() if head else self._at]) + bytes((0xFF, _EOI))
+        return self._deliver(payload, self._at, now_ns, events)
+
+    def _deliver(self, payload: bytes, count: int, now_ns: int, events: list[Whole | Broken]) -> bool:
+        """Report a whole image, and go on behind the first `count` bytes."""
         width_px, height_px = self._size_px
         if not (1 <= width_px <= MAX_SIZE_PX and 1 <= height_px <= MAX_SIZE_PX):
-            return self._give_up(end, events, FrameFault.WRONG_LENGTH)
+            return self._give_up(count, events, FrameFault.WRONG_LENGTH)
         events.append(
-            Whole(
-                payload=bytes(self._data[:end]),
-                width_px=width_px,
-                height_px=height_px,
-                began_ns=self._began_ns,
-                ended_ns=now_ns,
-            )
+            Whole(payload=payload, width_px=width_px, height_px=height_px, began_ns=self._began_ns, ended_ns=now_ns)
         )
-        del self._data[:end]
-        self._old_bytes = max(0, self._old_bytes - end)
+        del self._data[:count]
+        self._old_bytes = max(0, self._old_bytes - count)
         self._phase = _Phase.BETWEEN
         return True
 

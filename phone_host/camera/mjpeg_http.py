@@ -52,7 +52,7 @@ class HttpCamera(FarCamera):
         self._life = Life(LIFE, now.monotonic_ns())
         self._problem: TandemError | None = None
         self._failure: Exception | None = None
-        self._sequence = 0
+        self._sequence = self._whole_images = 0
         self._first_ns = self._heard_ns = 0
         self._size_px = self._asked_px = (0, 0)
         self._arrivals = Arrivals()
@@ -148,9 +148,9 @@ class HttpCamera(FarCamera):
                 gives_up = self._life.gives_up(now_ns)
                 if (failure := self._failure or self._problem) is not None:
                     raise failure
-                slow = self._sequence >= 2 and now_ns - self._first_ns >= MEASURE_NS
-                if self._sequence >= MEASURE_FRAMES or slow:
-                    period_ns = self._rate.period_ns or (self._heard_ns - self._first_ns) // (self._sequence - 1)
+                slow = self._whole_images >= 2 and now_ns - self._first_ns >= MEASURE_NS
+                if self._whole_images >= MEASURE_FRAMES or slow:
+                    period_ns = self._rate.period_ns or (self._heard_ns - self._first_ns) // (self._whole_images - 1)
                     self._asked_px = self._size_px
                     self._sequence = 0
                     self._waiting.clear()
@@ -164,6 +164,12 @@ class HttpCamera(FarCamera):
 
     def _no_images(self) -> UnavailableError:
         shown, patience_s = self._settings.shown, LIFE.start_ns // SECOND_NS
+        if self._faults and not self._whole_images:
+            often = max(self._faults, key=lambda fault: self._faults[fault])
+            return UnavailableError(
+                f"camera {shown}: every image is spoiled ({often.value.replace('_', ' ')})",
+                "look at it in a browser; choose another quality or size in the server's settings",
+            )
         if self._sequence:
             return UnavailableError(f"camera {shown} sent one image in {patience_s} s", "give the video's own address")
         if not self._life.counts.opened:
@@ -275,6 +281,7 @@ class HttpCamera(FarCamera):
                 return
             self._life.heard(now.monotonic_ns(), self._rate.period_ns or 0)
             sequence, self._sequence = self._sequence, self._sequence + 1
+            self._whole_images += 1
             if not self._life.is_lost:
                 self._log_back(self._settings.shown)
             self._first_ns, self._heard_ns = self._first_ns or image.began_ns, image.began_ns

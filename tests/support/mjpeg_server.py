@@ -162,6 +162,20 @@ def truncated(on: Exchange) -> None:
         on.part(image[: len(image) // 2] if count % 4 == 3 else image)
 
 
+def no_end(on: Exchange) -> None:
+    """Every image lacks its end marker."""
+    on.answer(f"{_TYPE}; boundary=frame")
+    for image in on.film():
+        on.part(image[:-2])
+
+
+def sizeless(on: Exchange) -> None:
+    """Every image claims to have no pixels."""
+    on.answer(f"{_TYPE}; boundary=frame")
+    for image in on.film():
+        on.part(claiming(image, 0, 0))
+
+
 def bombs(on: Exchange) -> None:
     """After a while every image claims 8000x8000."""
     on.answer(f"{_TYPE}; boundary=frame")
@@ -313,7 +327,7 @@ def bomb_burst(on: Exchange) -> None:
 MANNERS: Final[dict[str, Callable[[Exchange], None]]] = {
     manner.__name__: manner
     for manner in (
-        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, bombs, turning, password, digest, page,
+        plain, dashes, no_dashes, no_line_end, wrong_boundary, chunked, early_boundary, empty_parts, garbage, truncated, no_end, sizeless, bombs, turning, password, digest, page,
         snapshot, missing, moved, moved_here, busy, another_tongue, no_image, mute, drips_head, hangs, closes, resets, bad_chunks, last_chunk, drips, endless, bomb_burst,
     )
 }  # fmt: skip

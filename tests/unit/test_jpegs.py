@@ -118,6 +118,30 @@ def test_an_image_without_end_is_bounded() -> None:
     assert parts(stream, IMAGES[1]) == [IMAGES[1]]
 
 
+@pytest.mark.parametrize("between", [between for between in BETWEEN.values() if b"--" in between or not between])
+def test_a_server_that_never_ends_an_image_is_understood_after_five(between: bytes) -> None:
+    """Five images are broken; from then on each comes as it was before its end marker was left out, when the next begins."""
+    stream = JpegStream()
+    images = IMAGES[:4] * 4
+    came: list[Whole | Broken] = []
+    for number, image in enumerate(images):
+        head = between % len(image) if b"%d" in between else between
+        came += stream.feed(head + image[:-2], number)
+    assert came[:5] == [Broken(FrameFault.NO_END)] * 5
+    assert [event.payload for event in came[5:] if isinstance(event, Whole)] == images[5:-1]
+    assert [(event.began_ns, event.ended_ns) for event in came[5:] if isinstance(event, Whole)] == [
+        (number, number + 1) for number in range(5, len(images) - 1)
+    ]
+
+
+def test_a_server_that_ended_an_image_once_has_no_such_habit() -> None:
+    """Where any image has ended, those that do not are truncated, however many they are."""
+    data = b"".join([IMAGES[0], *[IMAGES[1][:-2]] * 12, IMAGES[2]])
+    events = JpegStream().feed(data, 1)
+    assert [event.payload for event in events if isinstance(event, Whole)] == [IMAGES[0], IMAGES[2]]
+    assert sum(event == Broken(FrameFault.NO_END) for event in events) == 12
+
+
 def test_ten_million_random_bytes() -> None:
     """During 10^7 random bytes no more than one image's bytes are held, and the next good image comes within a segment's length."""
     chance, stream = random.Random(4), JpegStream()
