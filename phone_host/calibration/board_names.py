@@ -10,8 +10,11 @@ from phone_host.calibration.target import Board, parse_board
 
 _FAMILIES: Final = {"4x4": MarkFamily.ARUCO_4X4, "5x5": MarkFamily.ARUCO_5X5, "6x6": MarkFamily.ARUCO_6X6}
 _LENGTH: Final = r"(\d+(?:\.\d+)?)\s*mm"
-_CHARUCO: Final = re.compile(rf"charuco:(\d{{1,3}})x(\d{{1,3}}):{_LENGTH}:{_LENGTH}:([456]x[456])", re.IGNORECASE)
+_CHARUCO: Final = re.compile(
+    rf"charuco:(\d{{1,3}})x(\d{{1,3}}):{_LENGTH}:{_LENGTH}:([456]x[456])(:legacy)?", re.IGNORECASE
+)
 _GRID: Final = re.compile(rf"aprilgrid:(\d{{1,2}})x(\d{{1,2}}):{_LENGTH}:{_LENGTH}", re.IGNORECASE)
+_LEGACY: Final = ":legacy"
 _LEAST_TAGS: Final = 2
 _TAGS: Final = 587
 """In the family 36h11."""
@@ -28,7 +31,7 @@ def named_board(text: str, square_mm: float | None) -> Board:
 
     Args:
         text: inner corners such as "9x6"; "charuco:10x8:25mm:18mm:5x5" (squares, side of a square, side of a mark, ArUco
-            family); or "aprilgrid:6x6:30mm:9mm" (tags, side of a tag, gap between two).
+            family; ":legacy" behind it: `Charuco.is_legacy`); or "aprilgrid:6x6:30mm:9mm" (tags, side of a tag, gap between two).
         square_mm: side of a square, or of a tag, as it was measured; None: as the board's name says.
 
     Raises:
@@ -54,9 +57,9 @@ def board_name(board: Board) -> str:
     match board.marks:
         case None:
             return f"{board.columns}x{board.rows}"
-        case Charuco(family, share):
+        case Charuco(family, share, is_legacy):
             words = next(word for word, each in _FAMILIES.items() if each is family)
-            return f"charuco:{board.columns + 1}x{board.rows + 1}:{side_mm:.8g}mm:{side_mm * share:.8g}mm:{words}"
+            return f"charuco:{board.columns + 1}x{board.rows + 1}:{side_mm:.8g}mm:{side_mm * share:.8g}mm:{words}{_LEGACY if is_legacy else ''}"
         case AprilGrid(share):
             return f"aprilgrid:{board.columns // 2}x{board.rows // 2}:{side_mm:.8g}mm:{side_mm * share:.8g}mm"
         case _:
@@ -105,7 +108,7 @@ def _charuco(name: str, square_mm: float | None) -> Board:
         )
     columns, rows = int(found[1]), int(found[2])
     require_marks(columns, rows, found[5])
-    marks = Charuco(_FAMILIES[found[5]], _share(found))
+    marks = Charuco(_FAMILIES[found[5]], _share(found), is_legacy=bool(found[6]) and rows % 2 == 0)
     return Board(columns - 1, rows - 1, _side_mm(float(found[3]), square_mm) / 1000, marks)
 
 

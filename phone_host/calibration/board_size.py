@@ -347,7 +347,7 @@ def require_size(files: ViewFiles, given: Inner, most_pixels: int = MOST_PIXELS)
     )
 
 
-def require_marks_of(files: ViewFiles, board: Board, most_pixels: int = MOST_PIXELS) -> None:
+def require_marks_of(files: ViewFiles, board: Board, most_pixels: int = MOST_PIXELS) -> Board:
     """Check in some images that the marks are those of the board that was given; what cannot be told passes.
 
     Args:
@@ -355,10 +355,13 @@ def require_marks_of(files: ViewFiles, board: Board, most_pixels: int = MOST_PIX
         board: the board, with marks.
         most_pixels: an image that claims more is passed over.
 
+    Returns:
+        The board, with the arrangement of its marks as the images show it.
+
     Raises:
         SettingsError: the images show another board of marks.
     """
-    require_marks(_marks_in(files, most_pixels), board)
+    return require_marks(_marks_in(files, most_pixels), board)
 
 
 def _marks_in(files: ViewFiles, most_pixels: int) -> SeenMarks | None:

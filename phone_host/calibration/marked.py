@@ -51,10 +51,18 @@ class MarkFamily(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Charuco:
-    """The marks of a ChArUco board: their family, and the side of a mark as a share of a square's side."""
+    """The marks of a ChArUco board.
+
+    Attributes:
+        family: their family.
+        mark_share: side of a mark as a share of a square's side.
+        is_legacy: whether they are arranged as OpenCV did before 4.6, and calib.io does: with an even number of rows the
+            upper left square is white and holds a mark. Boards with an odd number of rows are the same in both.
+    """
 
     family: MarkFamily
     mark_share: float
+    is_legacy: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +181,7 @@ def _charuco(grey: Image, columns: int, rows: int, marks: Charuco) -> Corners:
     own = np.ascontiguousarray(every.bytesList[: (columns + 1) * (rows + 1) // 2])
     dictionary = cv2.aruco.Dictionary(own, every.markerSize, every.maxCorrectionBits)
     board = cv2.aruco.CharucoBoard((columns + 1, rows + 1), 1.0, marks.mark_share, dictionary)
+    board.setLegacyPattern(marks.is_legacy)
     corners, ids, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(grey)
     found = np.full((columns * rows, 2), np.nan)
     if np.ndim(corners) == 0 or len(corners) == 0:  # OpenCV gives None where there is nothing

@@ -6,7 +6,7 @@ homography, lenses aside; those of a board with other columns do not, because it
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
@@ -26,6 +26,9 @@ _LEAST: Final = 3
 
 _LEAST_PLACED: Final = 6
 """So many marks, not all in two rows, tell where rows end."""
+
+_MARGIN: Final = 2
+"""So many marks more must one arrangement explain. With an odd number of columns the two differ at the ends of rows alone."""
 
 _COLUMNS: Final = range(3, 41)
 _NEAR: Final = 0.3
@@ -60,24 +63,30 @@ def find_marks(images: Sequence[Image | None]) -> SeenMarks | None:
     return SeenMarks(best, seen[best]) if counts[best] else None
 
 
-def require_marks(seen: SeenMarks | None, board: Board) -> None:
+def require_marks(seen: SeenMarks | None, board: Board) -> Board:
     """Check that marks are those of a board; what cannot be told passes.
+
+    ChArUco boards of OpenCV before 4.6 and of calib.io are recognised by where their marks lie.
 
     Args:
         seen: the marks.
         board: with marks.
 
+    Returns:
+        The board, with the arrangement that the marks have.
+
     Raises:
         SettingsError: they are of another family, or of a board of another size.
     """
     if seen is None or board.marks is None:
-        return
+        return board
     given = board.marks.family if isinstance(board.marks, Charuco) else MarkFamily.APRILTAG_36H11
     is_charuco = seen.family is not MarkFamily.APRILTAG_36H11
     wanted = _counted(board)
-    found = _size(seen, wanted if seen.family is given else None)
+    board = _as_arranged(seen, board) if seen.family is given else board
+    found = _size(seen, wanted if seen.family is given else None, is_legacy=_is_legacy(board))
     if seen.family is given and found in {None, wanted}:
-        return
+        return board
     size = "" if found is None else f" and {found[0]}x{found[1]} {'squares' if is_charuco else 'tags'}"
     kind = "charuco" if is_charuco else "aprilgrid"
     right = f"{kind}:{'COLUMNSxROWS' if found is None else f'{found[0]}x{found[1]}'}"
@@ -87,6 +96,28 @@ def require_marks(seen: SeenMarks | None, board: Board) -> None:
         f"these boards have {seen.words}{size}, --board says {board_name(board)}",
         f"give --board {':'.join([right, *sides, *family])}, with its sides as you measure them",
     )
+
+
+def _is_legacy(board: Board) -> bool:
+    return isinstance(board.marks, Charuco) and board.marks.is_legacy
+
+
+def _as_arranged(seen: SeenMarks, board: Board) -> Board:
+    """Return the board with the arrangement that explains the marks of more images; as it is where that cannot be told."""
+    columns, rows = _counted(board)
+    if not isinstance(board.marks, Charuco) or rows % 2:
+        return board
+    votes = Counter[bool]()
+    for middles in seen.middles_px:
+        if len(middles) >= _LEAST_PLACED:
+            fits = {
+                legacy: len(_fitting(middles, columns, is_charuco=True, is_legacy=legacy)) for legacy in (False, True)
+            }
+            best = max(fits, key=fits.__getitem__)
+            if fits[best] >= _EXPLAINED * len(middles) and fits[best] - fits[not best] >= _MARGIN:
+                votes[best] += 1
+    is_legacy = votes.most_common(1)[0][0] if votes else board.marks.is_legacy
+    return replace(board, marks=replace(board.marks, is_legacy=is_legacy))
 
 
 def _marks(grey: Image, family: MarkFamily) -> dict[int, Corners]:
@@ -110,17 +141,18 @@ def _counted(board: Board) -> tuple[int, int]:
     return board.columns + 1, board.rows + 1
 
 
-def _size(seen: SeenMarks, wanted: tuple[int, int] | None) -> tuple[int, int] | None:
+def _size(seen: SeenMarks, wanted: tuple[int, int] | None, *, is_legacy: bool) -> tuple[int, int] | None:
     """Return squares or tags in a row and in a column, as far as they are seen; None: it cannot be told.
 
     Args:
         seen: the marks.
         wanted: a size that is right unless the marks contradict it; None: there is none.
+        is_legacy: the arrangement of the marks at that size.
     """
     is_charuco = seen.family is not MarkFamily.APRILTAG_36H11
     votes, last = Counter[int](), Counter[int]()
     for middles in seen.middles_px:
-        fitting = _columns(middles, is_charuco=is_charuco, wanted=None if wanted is None else wanted[0])
+        fitting = _columns(middles, None if wanted is None else wanted[0], is_charuco=is_charuco, is_legacy=is_legacy)
         if fitting is not None:
             votes[fitting[0]] += 1
             last[fitting[0]] = max(last[fitting[0]], fitting[1])
@@ -133,15 +165,26 @@ def _size(seen: SeenMarks, wanted: tuple[int, int] | None) -> tuple[int, int] | 
     return columns, rows
 
 
-def _columns(middles: dict[int, Corners], *, is_charuco: bool, wanted: int | None) -> tuple[int, int] | None:
+def _columns(
+    middles: dict[int, Corners], wanted: int | None, *, is_charuco: bool, is_legacy: bool
+) -> tuple[int, int] | None:
     """Return how many columns explain the marks of an image, and the last mark that is so explained; None: it cannot be told."""
     if len(middles) < _LEAST_PLACED:
         return None
     least = _EXPLAINED * len(middles)
-    given = [] if wanted is None else _fitting(middles, wanted, is_charuco=is_charuco)
+    given = [] if wanted is None else _fitting(middles, wanted, is_charuco=is_charuco, is_legacy=is_legacy)
     if wanted is not None and len(given) >= least:
         return wanted, max(given)
-    fits = {columns: _fitting(middles, columns, is_charuco=is_charuco) for columns in _COLUMNS}
+    fits = {
+        columns: max(
+            (
+                _fitting(middles, columns, is_charuco=is_charuco, is_legacy=legacy)
+                for legacy in ((False, True) if is_charuco else (False,))
+            ),
+            key=len,
+        )
+        for columns in _COLUMNS
+    }
     best = max(fits, key=lambda columns: len(fits[columns]))
     others = max(len(fits[each]) for each in fits if each != best)
     if len(fits[best]) < least or others > _UNEXPLAINED * len(fits[best]):
@@ -149,10 +192,13 @@ def _columns(middles: dict[int, Corners], *, is_charuco: bool, wanted: int | Non
     return best, max(fits[best])
 
 
-def _fitting(middles: dict[int, Corners], columns: int, *, is_charuco: bool) -> list[int]:
+def _fitting(middles: dict[int, Corners], columns: int, *, is_charuco: bool, is_legacy: bool) -> list[int]:
     """Return the numbers of the marks that lie where a board with so many columns has them."""
     numbers = list(middles)
-    plan, found = _places(numbers, columns, is_charuco=is_charuco), np.array(list(middles.values()))
+    plan, found = (
+        _places(numbers, columns, is_charuco=is_charuco, is_legacy=is_legacy),
+        np.array(list(middles.values())),
+    )
     if np.linalg.matrix_rank(plan - plan.mean(axis=0)) < plan.shape[1]:
         return []
     apart = np.linalg.norm(found[:, np.newaxis] - found, axis=2)
@@ -163,10 +209,10 @@ def _fitting(middles: dict[int, Corners], columns: int, *, is_charuco: bool) -> 
     return [number for number, is_inside in zip(numbers, inside.ravel(), strict=True) if is_inside]
 
 
-def _places(numbers: list[int], columns: int, *, is_charuco: bool) -> Corners:
+def _places(numbers: list[int], columns: int, *, is_charuco: bool, is_legacy: bool = False) -> Corners:
     """Return column and row of marks, (N, 2): row by row, of a ChArUco board on the white squares alone."""
     if not is_charuco:
         return np.array([(number % columns, number // columns) for number in numbers], np.float64)
     rows = 2 * max(numbers) // columns + 2
-    white = [(column, row) for row in range(rows) for column in range(columns) if (row + column) % 2]
+    white = [(column, row) for row in range(rows) for column in range(columns) if (row + column + is_legacy) % 2]
     return np.array([white[number] for number in numbers], np.float64)

@@ -12,6 +12,7 @@ import numpy as np
 
 from common.errors import DataError, SettingsError
 from phone_host.calibration.board_fits import ENOUGH, Fits, Inner
+from phone_host.calibration.board_names import board_name
 from phone_host.calibration.board_size import (
     Vote,
     size_in_pictures,
@@ -179,10 +180,7 @@ class SizeCheck:
             return
         if self._board.marks is not None:
             if self._looks % _PATIENT_LOOKS == 0:  # all families take 0.2 s
-                require_marks(
-                    find_marks([shrunk(grey, min(1.0, _MARKS_PX / max(grey.shape)))[0] for grey in (left, right)]),
-                    self._board,
-                )
+                self._require_marks(left, right)
             return
         shown = self._finder.find(left, right)
         given: Inner = (self._board.columns, self._board.rows)
@@ -191,6 +189,15 @@ class SizeCheck:
             raise SettingsError(
                 f"this board has {size} inner corners, --board says {size_text(given)}",
                 f"give --board {size}, or leave --board out",
+            )
+
+    def _require_marks(self, left: Image, right: Image) -> None:
+        seen = find_marks([shrunk(grey, min(1.0, _MARKS_PX / max(grey.shape)))[0] for grey in (left, right)])
+        shown = require_marks(seen, self._board)
+        if shown != self._board:
+            raise SettingsError(
+                f"this board's marks are arranged otherwise than --board {board_name(self._board)} says",
+                f"give --board {board_name(shown)}: OpenCV before 4.6 and calib.io begin with a white square (legacy)",
             )
 
 

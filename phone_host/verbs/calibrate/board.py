@@ -66,7 +66,9 @@ class Known:
         kind = "" if marks is None else "ChArUco board of " if isinstance(marks, Charuco) else "AprilGrid of "
         what = "inner corners" if marks is None else "corners"
         size = size_text((self.board.columns, self.board.rows))
-        return f"board    {kind}{size} {what}, {_SAID[self.origin]}; squares of {self.board.square_m * 1e3:g} mm"
+        legacy = isinstance(marks, Charuco) and marks.is_legacy
+        arrangement = ", marks arranged as by OpenCV before 4.6 and calib.io" if legacy else ""
+        return f"board    {kind}{size} {what}, {_SAID[self.origin]}{arrangement}; squares of {self.board.square_m * 1e3:g} mm"
 
 
 def named(board: str, square: str | None) -> Named:
@@ -104,8 +106,7 @@ def board_in(files: ViewFiles, named: Named, most_pixels: int) -> Known:
     with busy_bar("looking at the board"):
         if named.board is not None:
             if named.board.marks is not None:
-                require_marks_of(files, named.board, most_pixels)
-                return Known(named.board, Origin.OPTION)
+                return Known(require_marks_of(files, named.board, most_pixels), Origin.OPTION)
             require_size(files, (named.board.columns, named.board.rows), most_pixels)
             return Known(named.board, Origin.OPTION)
         columns, rows = size_in_files(files, most_pixels)
