@@ -340,6 +340,33 @@ def glare(random: np.random.Generator) -> Made:
     return _pictured(random, glaring(random), random.uniform(0.5, 1.0))
 
 
+_SHAPES: Final = {4 / 3: 16 / 9, 16 / 9: 4 / 3, 3 / 2: 16 / 9}
+"""Shapes of pictures, and to which each is squeezed or stretched."""
+
+
+def resized(random: np.random.Generator) -> Made:
+    """All pictures were given another width, so that they have another camera's shape."""
+    made = _series(random)
+    factors = []
+    for width, height in made.sizes_px:
+        shape = min(_SHAPES, key=lambda each: abs(each * height / width - 1))
+        factors.append(round(width * _SHAPES[shape] / shape) / width)
+    if abs(factors[0] - factors[1]) > 0.01:  # cameras of two shapes are not resized alike
+        return resized(random)
+    pairs = [
+        BoardPair(
+            pair.name,
+            *(
+                (seen + 0.5) * [factor, 1] - 0.5
+                for seen, factor in zip((pair.left_px, pair.right_px), factors, strict=True)
+            ),
+        )
+        for pair in made.pairs
+    ]
+    sizes = [(round(width * factor), height) for (width, height), factor in zip(made.sizes_px, factors, strict=True)]
+    return replace(made, pairs=pairs, sizes_px=(sizes[0], sizes[1]), truth=f"width times {factors[0]:.3f}")
+
+
 MAKERS: Final[dict[Mistake, Callable[[np.random.Generator], Made]]] = {
     Mistake.SWAPPED: swapped,
     Mistake.MIRRORED: mirrored,
@@ -354,4 +381,5 @@ MAKERS: Final[dict[Mistake, Callable[[np.random.Generator], Made]]] = {
     Mistake.FOCUS: focus,
     Mistake.UNSTIFF: unstiff,
     Mistake.BENT: bent,
+    Mistake.RESIZED: resized,
 }

@@ -137,6 +137,29 @@ def test_lenses_that_are_stretched_alike_tell_a_stretched_print() -> None:
 
 
 @pytest.mark.parametrize(
+    ("size_px", "stretch", "said"),
+    [
+        (
+            (270, 180),
+            270 / 180 / (16 / 9),
+            "270x180 px show the squares 15.6% narrower than they are, as pictures of 16:9",
+        ),
+        ((640, 360), 640 / 360 / (4 / 3), "640x360 px show the squares 33.3% wider than they are, as pictures of 4:3"),
+        ((640, 480), 0.95, "the squares look stretched: they are 5.0% narrower than they are high"),
+        ((640, 480), 1.03, "the squares look stretched: they are 3.0% wider than they are high"),
+    ],
+)
+def test_a_pictures_shape_tells_whether_it_was_resized(size_px: tuple[int, int], stretch: float, said: str) -> None:
+    """Where the pictures have a camera's shape without the stretch, they were resized; else the print is to blame."""
+    rig = unlike_rig()
+    both = replace(rig, left=_stretched(rig.left, stretch), right=_stretched(rig.right, stretch))
+    found = name_mistake(replace(_series(), sizes_px=(size_px, size_px)), _calibration(both))
+    assert found is not None
+    assert said in found.sentence
+    assert found.mistake is (Mistake.RESIZED if "resized" in found.sentence else Mistake.SQUARE)
+
+
+@pytest.mark.parametrize(
     ("centre", "named"), [((-0.1, 0, 0), Mistake.SWAPPED), ((0.02, 0, 0.1), None), ((-0.02, 0.1, 0), None)]
 )
 def test_only_cameras_beside_each_other_are_swapped(centre: tuple[float, float, float], named: Mistake | None) -> None:

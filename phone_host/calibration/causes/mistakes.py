@@ -26,6 +26,7 @@ class Mistake(Enum):
         FOCUS: focus or zoom changed between views.
         UNSTIFF: the cameras turned against each other between views.
         BENT: the board is not flat.
+        RESIZED: the pictures were resized to another shape.
     """
 
     SWAPPED = "swapped sides"
@@ -41,6 +42,7 @@ class Mistake(Enum):
     FOCUS = "focus changed"
     UNSTIFF = "rig not stiff"
     BENT = "board not flat"
+    RESIZED = "resized pictures"
 
 
 class Course(Enum):

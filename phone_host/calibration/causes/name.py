@@ -53,6 +53,12 @@ _BASELINE_FAR_OFF: Final = 0.1
 _STRETCHED: Final = 0.01
 """Pixels of all usual cameras are square to 0.1 %, and so are prints to scale."""
 
+_SHAPES: Final = ("4:3", "16:9", "3:2", "16:10", "5:4")
+"""Width to height of cameras' pictures."""
+
+_SAME_SHAPE: Final = 0.006
+"""Two shapes differ by less. It is small beside a print's stretch, so that few prints are taken for resized pictures."""
+
 _ALIKE: Final = 0.3
 """Two cameras before one stretched print err alike to this share."""
 
@@ -103,7 +109,7 @@ def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Finding
         or _other_baseline(series, found, _BASELINE_FAR_OFF)
         or _deviating(series, found)
         or _other_baseline(series, found, BASELINE_OFF)
-        or _upright_stretch(found)
+        or _upright_stretch(series, found)
         or (None if isinstance(found, DataError) else bent(found, series.board))
     )
 
@@ -264,14 +270,14 @@ def _other_baseline(series: BoardSeries, found: Calibration | DataError, off_sha
     )
 
 
-def _upright_stretch(found: Calibration | DataError) -> Finding | None:
+def _upright_stretch(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
     """Name squares that are no squares of boards that were all held upright: the lenses take the stretch, both the same."""
     if isinstance(found, DataError):
         return None
     left, right = (lens.matrix[0, 0] / lens.matrix[1, 1] - 1 for lens in (found.rig.left, found.rig.right))
     stretch = float(left + right) / 2
     is_stretched = abs(stretch) > _STRETCHED and abs(left - right) < _ALIKE * abs(stretch)
-    return _no_squares(stretch) if is_stretched else None
+    return _no_squares(stretch, series) if is_stretched else None
 
 
 def _stretched(series: BoardSeries) -> Finding | None:
@@ -288,7 +294,7 @@ def _stretched(series: BoardSeries) -> Finding | None:
     remaining = as_said - (less - more) ** 2 / (8 * bend) if bend > 0 else as_said
     if abs(stretch) < _STRETCHED or remaining > (1 - _EXPLAINED_SHARE) * as_said:
         return None
-    return _no_squares(stretch)
+    return _no_squares(stretch, series)
 
 
 def _squares_by_stretch(pairs: list[BoardPair], series: BoardSeries) -> tuple[float, float, float] | None:
@@ -311,10 +317,30 @@ def _squares_by_stretch(pairs: list[BoardPair], series: BoardSeries) -> tuple[fl
     return squares[0], squares[1], squares[2]
 
 
-def _no_squares(stretch: float) -> Finding:
+def _no_squares(stretch: float, series: BoardSeries) -> Finding:
+    """Name resized pictures where both have a camera's shape without the stretch, else the print."""
+    amount = f"{abs(stretch):.1%} {'wider' if stretch > 0 else 'narrower'}"
+    shapes = [_usual_shape(width / height / (1 + stretch)) for width, height in series.sizes_px]
+    if all(shapes):
+        width, height = series.sizes_px[0]
+        return Finding(
+            mistake=Mistake.RESIZED,
+            sentence=f"the pictures were resized: {width}x{height} px show the squares {amount} than they are, as pictures of {shapes[0]} would",
+            remedy="give the pictures as the camera took them, or resize width and height by the same factor",
+            most=Verdict.USABLE,
+        )
     return Finding(
         mistake=Mistake.SQUARE,
-        sentence=f"the board's squares are no squares: they are {abs(stretch):.1%} {'wider' if stretch > 0 else 'lower'} than they should be",
+        sentence=f"the squares look stretched: they are {amount} than they are high",
         remedy='print the board without "fit to page", and measure a square both ways',
         most=Verdict.REJECT,
     )
+
+
+def _usual_shape(ratio: float) -> str:
+    """Return the shape that a ratio of width to height has, held upright or not; empty: no camera's."""
+    for shape in _SHAPES:
+        width, height = map(int, shape.split(":"))
+        if any(abs(ratio / each - 1) < _SAME_SHAPE for each in (width / height, height / width)):
+            return shape
+    return ""
