@@ -25,6 +25,7 @@ from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.model import Result, StereoGeometry
 from phone_host.output.meshes.printable import Printer, Problem
 from phone_host.output.rig_files.imported import Imported, import_rig
+from phone_host.printers.bed import Bed
 from phone_host.printers.door import Wishes
 from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.run.kept_field import read_field
@@ -40,6 +41,7 @@ from phone_host.scan.ways import scan_for
 
 __all__ = [
     "SE3",
+    "Bed",
     "Box",
     "Ended",
     "Imported",

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.errors import DataError
+from phone_host.printers.bed import Bed, stated_bed
+from phone_host.printers.nozzle_path import Place, PrintPath, words_of
 
 MOST_FOR_LINES: Final = 90
 """Marlin's lines hold 96 (MAX_CMD_SIZE), number and checksum included."""
@@ -19,14 +21,15 @@ MOST_FOR_LINES: Final = 90
 MOST_FOR_SERVERS: Final = 4096
 """Klipper has commands as long as the outline of a thing (EXCLUDE_OBJECT_DEFINE)."""
 
-_WORD: Final = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+)?)")
-"""Firmware takes blanks between a letter and its number."""
-
 _NUMBERED: Final = re.compile(r"[Nn]\s*\d+\s*(?=[A-Za-z])([^*]*)(?:\*\s*\d+)?")
 """A line that has its number already, and perhaps its checksum, as hosts send them."""
 
 _NAME: Final = re.compile(r"([GMT]\d+)(?!\d)")
 _TIME: Final = re.compile(r";\s*(?:estimated printing time(?: \(normal mode\))?\s*=|TIME:)\s*(.+)", re.IGNORECASE)
+_AREA: Final = re.compile(r";\s*(?:bed_shape|printable_area)\s*=\s*(.+)")
+_HEIGHT: Final = re.compile(r";\s*(?:max_print_height|printable_height)\s*=\s*(\d+(?:\.\d+)?)\s*$")
+"""What PrusaSlicer and OrcaSlicer write at the end of a file."""
+
 _TIME_PART: Final = re.compile(r"(\d+)\s*([dhms]?)")
 _UNIT_S: Final = {"d": 86400, "h": 3600, "m": 60, "s": 1, "": 1}
 _HEATING: Final = {
@@ -37,10 +40,6 @@ _HEATING: Final = {
     "M141": "chamber",
     "M191": "chamber",
 }
-_INCH_MM: Final = 25.4
-_AXES: Final = "XYZ"
-_TURNS: Final = {"G2": -1, "G3": 1}
-"""Of arcs: with the clock, and against it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +62,13 @@ class GcodeFacts:
     Attributes:
         lines: that are sent.
         extruding: of these, those that move and extrude.
-        low_mm: lowest X, Y, Z of these moves, mm; NaN: there are none.
+        low_mm: lowest X, Y, Z of those that print the model, mm; NaN: there are none.
         high_mm: highest, likewise.
+        prime_low_mm: lowest X, Y, Z of those of the printer's own code (prime lines, purges), mm; NaN: there are none.
+        prime_high_mm: highest, likewise.
+        start_moves: how many of the first moves that extrude are start code.
+        is_marked: whether the slicer marks where the model begins.
+        bed: the printer's, as the slicer states it; None: it does not.
         seconds: time that the slicer tells, s; NaN: it tells none.
         heats: whether anything is heated.
         leaves_hot: whether a heater is still on at its end.
@@ -74,6 +78,11 @@ class GcodeFacts:
     extruding: int
     low_mm: tuple[float, float, float]
     high_mm: tuple[float, float, float]
+    prime_low_mm: tuple[float, float, float]
+    prime_high_mm: tuple[float, float, float]
+    start_moves: int
+    is_marked: bool
+    bed: Bed | None
     seconds: float
     heats: bool
     leaves_hot: bool
@@ -129,25 +138,91 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
     Raises:
         DataError: a line is none of G-code, or nothing is sent.
     """
-    path, heaters, seconds, count = _Path(), _Heaters(), math.nan, 0
+    path, heaters, comments, count = PrintPath(), _Heaters(), _Comments(), 0
 
     def watched() -> Iterator[str]:
-        nonlocal seconds
         for raw in file:
-            if raw.startswith(";") and (found := _TIME.match(raw)):
-                seconds = _seconds(found[1])
+            if raw.startswith(";"):
+                comments.take(raw)
+                path.take_comment(raw)
             yield raw
 
     for line in lines_of(watched(), name, most_characters):
         count += 1
         heaters.take(line.text)
-        path.take(line.text)
+        path.take(name_of(line.text), line.text)
         if not path.is_somewhere:
             raise DataError(f"{name}: line {line.number} moves to no place", "give the file that a slicer wrote")
     if not count:
         raise DataError(f"{name} has no line that a printer would do", "give the file that a slicer wrote")
-    ends = _ends(path.low), _ends(path.high)
-    return GcodeFacts(count, path.extruding, *ends, seconds, heaters.heats, heaters.are_on)
+    whole = path.model if path.model.moves else path.printer  # nothing but start code is what is printed
+    return GcodeFacts(
+        lines=count,
+        extruding=path.model.moves + path.printer.moves,
+        low_mm=_ends(whole.low),
+        high_mm=_ends(whole.high),
+        prime_low_mm=_ends(path.printer.low),
+        prime_high_mm=_ends(path.printer.high),
+        start_moves=path.start_moves if path.model.moves else 0,
+        is_marked=path.is_marked,
+        bed=comments.bed,
+        seconds=comments.seconds,
+        heats=heaters.heats,
+        leaves_hot=heaters.are_on,
+    )
+
+
+def first_outside(file: Iterable[str], name: str, facts: GcodeFacts, bed: Bed) -> tuple[Line, Place] | None:
+    """Find the first line that extrudes the model beyond a bed.
+
+    Args:
+        file: lines of G-code.
+        name: of the file, for messages.
+        facts: of the same file.
+        bed: that must hold it.
+
+    Returns:
+        The line, and a place that it reaches there, mm; None: there is none.
+    """
+    path, moves = PrintPath(), 0
+
+    def watched() -> Iterator[str]:
+        for raw in file:
+            if raw.startswith(";"):
+                path.take_comment(raw)
+            yield raw
+
+    for line in lines_of(watched(), name, MOST_FOR_SERVERS):
+        printers = path.printer.moves
+        places = path.take(name_of(line.text), line.text)
+        moves += bool(places)
+        is_model = moves > facts.start_moves and path.printer.moves == printers
+        outside = next((place for place in places if not bed.holds(*place)), None)
+        if is_model and outside is not None:
+            return line, outside
+    return None
+
+
+class _Comments:
+    """Reads what a slicer tells beside the lines: how long it takes, and the printer's bed."""
+
+    def __init__(self) -> None:
+        self.seconds = math.nan
+        self._area, self._height_mm = "", math.nan
+
+    @property
+    def bed(self) -> Bed | None:
+        """The bed, if area and height are both stated."""
+        return stated_bed(self._area, self._height_mm) if self._area and math.isfinite(self._height_mm) else None
+
+    def take(self, raw: str) -> None:
+        """Take a line that begins with a semicolon."""
+        if found := _TIME.match(raw):
+            self.seconds = _seconds(found[1])
+        elif found := _AREA.match(raw):
+            self._area = found[1]
+        elif found := _HEIGHT.match(raw):
+            self._height_mm = float(found[1])
 
 
 def _ends(values: list[float]) -> tuple[float, float, float]:
@@ -181,106 +256,8 @@ class _Heaters:
             self._tool = float(name[1:])
         elif name in _HEATING:
             self.heats = True
-            words = _words(text)
+            words = words_of(text)
             goal = words.get("S", words.get("R"))
             heater = (_HEATING[name], words.get("T", self._tool) if _HEATING[name] == "nozzle" else 0.0)
             if goal is not None:
                 (self._on.add if goal > 0 else self._on.discard)(heater)
-
-
-def _words(text: str) -> dict[str, float]:
-    return {letter: float(value) for letter, value in _WORD.findall(text.upper()) if value not in {"", "+", "-"}}
-
-
-class _Path:
-    """Follows the nozzle: absolute or relative, mm or inches; where it extrudes, it notes how far it goes."""
-
-    def __init__(self) -> None:
-        self.low, self.high = [math.inf] * 3, [-math.inf] * 3
-        self.extruding = 0
-        self._at = [0.0, 0.0, 0.0]
-        self._shift = [0.0, 0.0, 0.0]
-        self._is_homed = [False, False, False]
-        self._e = 0.0
-        self._is_relative = self._e_is_relative = False
-        self._unit = 1.0
-
-    @property
-    def is_somewhere(self) -> bool:
-        """Whether the nozzle is at a place that has numbers."""
-        return all(map(math.isfinite, self._at))
-
-    def take(self, text: str) -> None:
-        """Take a line."""
-        words = _words(text)
-        match name_of(text):
-            case "G0" | "G1" | "G2" | "G3" as name:
-                self._move(words, _TURNS.get(name, 0))
-            case "G28":
-                self._home([axis for axis, letter in enumerate(_AXES) if letter in text.upper()[3:]])
-            case "G90":
-                self._is_relative = self._e_is_relative = False
-            case "G91":
-                self._is_relative = self._e_is_relative = True
-            case "M82":
-                self._e_is_relative = False
-            case "M83":
-                self._e_is_relative = True
-            case "G92":
-                self._set(words)
-            case "G20":
-                self._unit = _INCH_MM
-            case "G21":
-                self._unit = 1.0
-
-    def _home(self, asked: list[int]) -> None:
-        for axis in asked or range(3):
-            self._at[axis] = self._shift[axis] = 0.0
-            self._is_homed[axis] = True
-
-    def _set(self, words: dict[str, float]) -> None:
-        """Give the place where the nozzle is other numbers: it does not move. Before it was homed, they say where it is."""
-        for axis, letter in enumerate(_AXES):
-            if letter in words and self._is_homed[axis]:
-                self._shift[axis] = self._at[axis] - words[letter] * self._unit
-            elif letter in words:
-                self._at[axis] = words[letter] * self._unit
-        self._e = words.get("E", self._e)
-
-    def _move(self, words: dict[str, float], turn: int) -> None:
-        """Follow a line, or an arc: against the clock (1), or with it (-1)."""
-        before = list(self._at)
-        for axis, letter in enumerate(_AXES):
-            if letter in words:
-                value = words[letter] * self._unit
-                self._at[axis] = value + (self._at[axis] if self._is_relative else self._shift[axis])
-        amount = words.get("E", 0.0 if self._e_is_relative else self._e)
-        fed = amount if self._e_is_relative else amount - self._e
-        self._e = self._e + amount if self._e_is_relative else amount
-        if fed <= 0 or not {"X", "Y", "I", "J"} & words.keys():
-            return
-        self.extruding += 1
-        for place in (before, self._at, *(self._tips(before, words, turn) if turn else ())):
-            for axis in range(3):
-                self.low[axis] = min(self.low[axis], place[axis])
-                self.high[axis] = max(self.high[axis], place[axis])
-
-    def _tips(self, before: list[float], words: dict[str, float], turn: int) -> Iterator[tuple[float, float, float]]:
-        """Yield where an arc in the plane of the bed reaches farthest along its axes, beside its ends."""
-        along, across = self._at[0] - before[0], self._at[1] - before[1]
-        if "R" in words:
-            radius, chord = words["R"] * self._unit, math.hypot(along, across)
-            if not chord:
-                return
-            # Left of the way for a short arc against the clock; a radius below 0 means the long one.
-            off = math.sqrt(max(radius**2 - chord**2 / 4, 0.0)) * turn * math.copysign(1, radius) / chord
-            x, y = along / 2 - across * off, across / 2 + along * off
-        else:
-            x, y = words.get("I", 0.0) * self._unit, words.get("J", 0.0) * self._unit
-        radius = math.hypot(x, y)
-        begin, end = math.atan2(-y, -x), math.atan2(across - y, along - x)
-        swept = (turn * (end - begin)) % math.tau or math.tau
-        for quarter in range(4):
-            angle = quarter * math.pi / 2
-            if (turn * (angle - begin)) % math.tau < swept:
-                yield before[0] + x + radius * math.cos(angle), before[1] + y + radius * math.sin(angle), self._at[2]

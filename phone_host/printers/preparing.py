@@ -15,12 +15,13 @@ from phone_host.output.meshes.formats import mesh_bytes
 from phone_host.output.meshes.printable import Printer, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.upright import Upright, upright_model
+from phone_host.printers.binary_gcode import text_gcode
 from phone_host.printers.door import Job
 from phone_host.printers.gcode import MOST_FOR_LINES, MOST_FOR_SERVERS
 from phone_host.printers.printer_uri import LineUri, PrinterUri
 from phone_host.printers.slicing import SlicingWanted, facts_of, find_slicer, require_inside, sliced
 
-_SUFFIXES: Final = frozenset({".gcode", ".gco", ".g"})
+_SUFFIXES: Final = frozenset({".gcode", ".gco", ".g", ".bgcode", ".bgc"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,21 +60,21 @@ def job_of(what: Path, wanted: Wanted, uri: PrinterUri, tell: Callable[[str], No
         UnavailableError: there is no slicer.
     """
     most = MOST_FOR_LINES if isinstance(uri, LineUri) else MOST_FOR_SERVERS
-    bed_mm = wanted.slicing.bed_mm
     if is_gcode(what):
         if wanted.slicing.profile or wanted.unit or wanted.up:
             raise SettingsError(
                 "--profile, --unit and --up are for models", f"leave them out, or give a model, not {what}"
             )
         tell("reading")
-        facts = facts_of(what, most)
-        require_inside(what, facts, bed_mm)
-        yield Job(what, what.name, facts)
+        with text_gcode(what) as gcode:
+            facts = facts_of(gcode, most)
+            require_inside(gcode, facts, wanted.slicing.bed)
+            yield Job(gcode, gcode.name, facts)
         return
     find_slicer(wanted.slicing.slicer)
     tell("reading")
     upright = upright_model(what, wanted.unit, wanted.up)
-    _require_printable(upright, bed_mm, tell)
+    _require_printable(upright, wanted.slicing.model_bed.size_mm, tell)
     with _folder() as folder:
         gcode = folder / f"{upright.model.stem}.gcode"
         stl = folder / f"{upright.model.stem}.stl"

@@ -11,13 +11,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import product
 from pathlib import Path
 from typing import Final, assert_never
 
 from common import now
 from common.errors import DataError, SettingsError, UnavailableError
 from common.places import Kind, kind_of
-from phone_host.printers.gcode import MOST_FOR_LINES, GcodeFacts, examine
+from phone_host.printers.bed import USUAL_BED, Bed
+from phone_host.printers.gcode import MOST_FOR_LINES, GcodeFacts, examine, first_outside
 
 
 class Slicer(Enum):
@@ -43,6 +45,9 @@ _USUAL: Final = (
     "--end-gcode=M104 S0\nM140 S0\nM107\nG91\nG1 Z5 F600\nG90\nM84",
 )
 """PLA in a printer with a nozzle of 0.4 mm: what nearly everybody begins with. Without the last one, the bed would stay hot."""
+
+_AROUND: Final = tuple(index * math.tau / 72 for index in range(72))
+"""Angles of the corners of a round bed."""
 
 _BARE: Final = "--skirts=0"
 """Without the line that is drawn around the thing first, for what fills the bed."""
@@ -73,8 +78,10 @@ _CURA_MACHINE: Final = "fdmprinter.def.json"
 
 _PATIENCE_S: Final = 1800
 _TELL_S: Final = 0.2
-_AXES: Final = "XYZ"
-_SLACK_MM: Final = 0.01
+_NEAR_MM: Final = 20.0
+"""So far beyond the bed may start code go that no mark tells from the model: printers reach 2 to 10 mm beyond."""
+
+_OTHER_BED: Final = "move or scale the model in the slicer; if this printer has another bed, or its origin elsewhere, give --bed, such as 200,200,300@centre"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +89,19 @@ class SlicingWanted:
     """How a model is sliced.
 
     Attributes:
-        bed_mm: of the printer.
+        bed: of the printer; None: what the G-code states, else the usual one.
         profile: settings for the slicer: an .ini that PrusaSlicer has exported, or a machine's .def.json of Cura; None: PLA, 0.2 mm layers.
         slicer: which one; None: the first that is installed.
     """
 
-    bed_mm: tuple[float, float, float]
+    bed: Bed | None = None
     profile: Path | None = None
     slicer: Slicer | None = None
+
+    @property
+    def model_bed(self) -> Bed:
+        """The bed that a model is sliced for."""
+        return self.bed or USUAL_BED
 
 
 class _OutsideError(DataError):
@@ -151,7 +163,7 @@ def sliced(
             environment.setdefault(_CURA_PATH, os.pathsep.join(map(str, _cura_folders())))
         case _:
             assert_never(slicer)
-    slicing = _Slicing(asked, environment, gcode, wanted.bed_mm, most_characters, tell)
+    slicing = _Slicing(asked, environment, gcode, wanted.model_bed, most_characters, tell)
     if slicer is Slicer.PRUSA and wanted.profile is None:
         return _sliced_bare_if_needed(slicing)
     return _run(slicing)
@@ -165,7 +177,7 @@ class _Slicing:
         asked: its words.
         environment: of its process.
         gcode: that it writes.
-        bed_mm: that must hold it.
+        bed: that must hold it.
         most_characters: of its lines.
         tell: called several times a second; what it raises ends the slicer.
     """
@@ -173,7 +185,7 @@ class _Slicing:
     asked: list[str]
     environment: dict[str, str]
     gcode: Path
-    bed_mm: tuple[float, float, float]
+    bed: Bed
     most_characters: int
     tell: Callable[[], None]
 
@@ -203,7 +215,7 @@ def _run(slicing: _Slicing) -> GcodeFacts:
             "see what phone-host printcheck says of it",
         )
     facts = facts_of(gcode, slicing.most_characters)
-    require_inside(gcode, facts, slicing.bed_mm)
+    require_inside(gcode, facts, slicing.bed)
     return facts
 
 
@@ -233,19 +245,38 @@ def _ended(slicing: _Slicing) -> tuple[int, str]:
 
 
 def _prusa(program: str, stl: Path, gcode: Path, wanted: SlicingWanted) -> list[str]:
-    x, y, _ = wanted.bed_mm
+    bed = wanted.model_bed
+    (x, y), middle = bed.origin_mm, bed.centre_mm
+    corners = (
+        [
+            (middle[0] + bed.size_mm[0] / 2 * math.cos(at), middle[1] + bed.size_mm[0] / 2 * math.sin(at))
+            for at in _AROUND
+        ]
+        if bed.is_round
+        else [(x + a * bed.size_mm[0], y + b * bed.size_mm[1]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    )
     given = (f"--load={wanted.profile}",) if wanted.profile else _USUAL
-    bed = f"--bed-shape=0x0,{x:g}x0,{x:g}x{y:g},0x{y:g}"
-    return [program, "--export-gcode", *given, bed, f"--center={x / 2:g},{y / 2:g}", f"--output={gcode}", str(stl)]
+    shape = f"--bed-shape={','.join(f'{a:.6g}x{b:.6g}' for a, b in corners)}"
+    centre = f"--center={middle[0]:g},{middle[1]:g}"
+    return [program, "--export-gcode", *given, shape, centre, f"--output={gcode}", str(stl)]
 
 
 def _cura(program: str, stl: Path, gcode: Path, wanted: SlicingWanted) -> list[str]:
     if wanted.profile and not wanted.profile.name.endswith(".def.json"):
         raise SettingsError(f"{wanted.profile} is no profile for CuraEngine", "give a machine's .def.json")
     machine = wanted.profile or _cura_machine()
-    x, y, z = (f"{length:g}" for length in wanted.bed_mm)
-    bed = {"machine_width": x, "machine_depth": y, "machine_height": z, "machine_center_is_zero": "false"}
-    values = {**({} if wanted.profile else _USUAL_CURA), **bed, "center_object": "true"}
+    bed = wanted.model_bed
+    is_centred = bed.centre_mm == (0.0, 0.0)
+    if not is_centred and bed.origin_mm != (0.0, 0.0):
+        raise SettingsError(
+            "CuraEngine knows an origin in a corner or in the middle of the bed only",
+            "give --slicer prusa, or the bed with @centre",
+        )
+    x, y, z = (f"{length:g}" for length in bed.size_mm)
+    machine_bed = {"machine_width": x, "machine_depth": y, "machine_height": z}
+    machine_bed["machine_center_is_zero"] = "true" if is_centred else "false"
+    machine_bed["machine_shape"] = "elliptic" if bed.is_round else "rectangular"
+    values = {**({} if wanted.profile else _USUAL_CURA), **machine_bed, "center_object": "true"}
     told = [word for name, value in values.items() for word in ("-s", f"{name}={value}")]
     return [program, "slice", "-j", str(machine), *told, "-l", str(stl), "-o", str(gcode)]
 
@@ -288,17 +319,46 @@ def facts_of(gcode: Path, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
         raise DataError(f"{gcode} cannot be read ({error.strerror})", "give the file that a slicer wrote") from None
 
 
-def require_inside(gcode: Path, facts: GcodeFacts, bed_mm: tuple[float, float, float]) -> None:
+def require_inside(gcode: Path, facts: GcodeFacts, given: Bed | None) -> None:
     """Refuse a print that leaves the bed. A slicer does not: it writes such a file without a word.
+
+    The printer's own code (prime lines, purges) may lie beyond it: that is the business of its profile. In G-code that does
+    not mark it, it must stay near.
+
+    Args:
+        gcode: the file.
+        facts: of it.
+        given: the bed; None: the one that the slicer states, else the usual one.
 
     Raises:
         DataError: it does, or extrudes nothing.
     """
     if not facts.extruding:
         raise DataError(f"{gcode} extrudes nothing", "slice the model again; see what the slicer says of it")
-    for axis, low, high, most in zip(_AXES, facts.low_mm, facts.high_mm, bed_mm, strict=True):
-        if math.isfinite(low) and (low < -_SLACK_MM or high > most + _SLACK_MM):
-            raise _OutsideError(
-                f"{gcode} leaves the bed: {axis} from {low:.1f} to {high:.1f} mm, the bed from 0 to {most:g}",
-                "scale or move the model in the slicer, or give the printer's --bed",
-            )
+    bed = given or facts.bed or USUAL_BED
+    near = replace(
+        bed,
+        size_mm=(bed.size_mm[0] + 2 * _NEAR_MM, bed.size_mm[1] + 2 * _NEAR_MM, bed.size_mm[2]),
+        origin_mm=(bed.origin_mm[0] - _NEAR_MM, bed.origin_mm[1] - _NEAR_MM),
+    )
+    if not facts.is_marked and not _holds(near, facts.prime_low_mm, facts.prime_high_mm):
+        low, high = facts.prime_low_mm, facts.prime_high_mm
+        raise _OutsideError(
+            f"{gcode} begins with lines from X {low[0]:.1f} to {high[0]:.1f}, Y {low[1]:.1f} to {high[1]:.1f} mm; the bed {bed.words}",
+            _OTHER_BED,
+        )
+    if _holds(bed, facts.low_mm, facts.high_mm):
+        return
+    with gcode.open(encoding="utf-8", errors="replace") as file:
+        found = first_outside(file, str(gcode), facts, bed)
+    if found is not None:
+        line, (x, y, z) = found
+        raise _OutsideError(
+            f"{gcode} leaves the bed: line {line.number} extrudes at X {x:.1f}, Y {y:.1f}, Z {z:.1f} mm; the bed {bed.words}",
+            _OTHER_BED,
+        )
+
+
+def _holds(bed: Bed, low: tuple[float, float, float], high: tuple[float, float, float]) -> bool:
+    """Return whether a box lies on a bed: its eight corners do. So does no box at all (NaN)."""
+    return any(map(math.isnan, low)) or all(bed.holds(*corner) for corner in product(*zip(low, high, strict=True)))

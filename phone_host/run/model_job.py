@@ -14,6 +14,7 @@ from phone_host.output.meshes.printable import Printer, Problem, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
 from phone_host.output.upright import upright_model
+from phone_host.printers.bed import Bed
 from phone_host.printers.door import Job, Wishes
 from phone_host.printers.doors import door_to, key_of
 from phone_host.printers.journal import Journal
@@ -132,7 +133,8 @@ def print_model(
     what: str | Path,
     printer: str,
     *,
-    bed_mm: tuple[float, float, float] = (220.0, 220.0, 250.0),
+    bed_mm: tuple[float, float, float] | None = None,
+    bed: Bed | None = None,
     unit: str | None = None,
     up: str | None = None,
     profile: str | Path | None = None,
@@ -145,7 +147,8 @@ def print_model(
     Args:
         what: the folder of a scan or a mesh file, which is sliced, or G-code.
         printer: its address, such as `octoprint://HOST` or `serial:/dev/ttyUSB0`.
-        bed_mm: what it holds, mm.
+        bed_mm: what it holds, mm, for a printer whose coordinates begin in the front left corner.
+        bed: its bed in place of `bed_mm`; None for both: what G-code states, else 220 x 220 x 250 mm.
         unit: of a mesh file, m or mm; None: as the file says, else m.
         up: the axis of a model that points up: z, y or -y; None: as its axes say, else z.
         profile: settings of the slicer; None: PLA, layers of 0.2 mm.
@@ -159,7 +162,7 @@ def print_model(
     Raises:
         TandemError: it cannot be printed, or the printer is gone.
     """
-    slicing = SlicingWanted(bed_mm, None if profile is None else Path(profile))
+    slicing = SlicingWanted(bed or (Bed(bed_mm) if bed_mm else None), None if profile is None else Path(profile))
     file = None if config is None else Path(config)
     with closing(prepare_print(Path(what), printer, Wanted(slicing, unit, up), config=file)) as prepared:
         return printed(prepared.place, prepared.job, wishes or Wishes(), tell or (lambda _: None))

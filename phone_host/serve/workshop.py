@@ -69,7 +69,7 @@ class Workshop:
             SettingsError: there is no scan.
             DataError: its model cannot be read.
         """
-        found = check_model(_some(folder), Printer(bed_mm=wanted.how.slicing.bed_mm))
+        found = check_model(_some(folder), Printer(bed_mm=wanted.how.slicing.model_bed.size_mm))
         blocking = [problem for problem in found if problem.blocks]
         if blocking:
             return f"it cannot be printed: {'; '.join(problem.sentence for problem in blocking)}: {blocking[0].remedy}"

@@ -1,19 +1,17 @@
 """The bed that a model has to fit on, as the options of the verbs that print name it."""
 
 import argparse
+from typing import Final
 
-from common.errors import SettingsError
-from phone_host.verbs.units import length_mm
+from phone_host.printers.bed import Bed, parse_bed
+
+BED_HELP: Final = "what the printer holds: width, depth and height, mm; @centre or @X,Y behind them says where the coordinates begin, round:DIAMETER,HEIGHT a round one"
 
 
-def bed_of(options: argparse.Namespace) -> tuple[float, float, float]:
-    """Read --bed, mm.
+def bed_of(options: argparse.Namespace) -> Bed | None:
+    """Read --bed; None: it is not given.
 
     Raises:
         SettingsError: it is none.
     """
-    words = options.bed.split(",")
-    if len(words) != 3:
-        raise SettingsError(f"--bed is {options.bed!r}", "give three lengths, for example 220,220,250")
-    x, y, z = (length_mm(word, "--bed", "220,220,250") for word in words)
-    return x, y, z
+    return None if options.bed is None else parse_bed(options.bed)

@@ -130,7 +130,7 @@ def test_a_printer_that_stops_is_told(gcode: Path, tmp_path: Path, said: str, wo
         (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 3, "there is no printer at /dev/ttyNOPE"),
         (["cube.gcode", "--printer", "serial:/dev/ttyNOPE"], 2, "give --yes"),
         (["cube.gcode", "--printer", "usb0", "--yes"], 2, "names no printer"),
-        (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--bed", "50,50,50", "--yes"], 4, "leaves the bed: X"),
+        (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--bed", "50,50,50", "--yes"], 4, "leaves the bed: line"),
         (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--bed", "50"], 2, "--bed"),
         (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--up", "y"], 2, "are for models"),
         (["none.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "cannot be read"),

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from phone_host.verbs.printer_bed import BED_HELP
+
 SUMMARY = "slice a model, or take G-code, and send it to a 3D printer"
 
 EXAMPLES = """  phone-host print --find                                   # printers that announce themselves in the network
@@ -35,8 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bed",
         metavar="X,Y,Z",
-        default="220,220,250",
-        help="what the printer holds, mm (default 220,220,250); nothing that leaves it is sent",
+        help=f"{BED_HELP} (default: what the G-code states, else 220,220,250); no model that leaves it is sent",
     )
     parser.add_argument("--slicer", choices=("prusa", "cura"), help="of those installed (default: prusa, else cura)")
     parser.add_argument(

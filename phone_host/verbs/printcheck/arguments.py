@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from phone_host.verbs.printer_bed import BED_HELP
+
 SUMMARY = "tell whether a scan or mesh can be printed, and what to do if not"
 
 EXAMPLES = """  phone-host printcheck scan                          # scan: the folder that phone-host scan wrote
@@ -22,9 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("z", "y", "-y"),
         help="axis of the model that points up (default: -y or y for a scan in the camera's axes, as its report says; z otherwise)",
     )
-    parser.add_argument(
-        "--bed", metavar="X,Y,Z", default="220,220,250", help="what the printer holds, mm (default 220,220,250)"
-    )
+    parser.add_argument("--bed", metavar="X,Y,Z", help=f"{BED_HELP} (default 220,220,250)")
     parser.add_argument("--wall", metavar="MM", default="0.8mm", help="least thickness of a wall (default 0.8mm)")
     parser.add_argument(
         "--overhang",

@@ -21,6 +21,7 @@ from phone_host.output.meshes.printable_view import picture
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model
 from phone_host.output.upright import upright_model
+from phone_host.printers.bed import USUAL_BED
 from phone_host.run.progress_bar import step_bar
 from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
 from phone_host.verbs.printer_bed import bed_of
@@ -62,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _printer(options: argparse.Namespace) -> Printer:
-    bed_mm = bed_of(options)
+    bed_mm = (bed_of(options) or USUAL_BED).size_mm
     if not 0 < options.overhang < 90:
         raise SettingsError(f"--overhang is {options.overhang:g}", "give degrees between 0 and 90, for example 45")
     wall_mm = length_mm(options.wall, "--wall", "0.8mm")

@@ -1,9 +1,8 @@
 """What the page's options of `print` mean."""
 
-import argparse
 from pathlib import Path
-from typing import Final
 
+from phone_host.printers.bed import parse_bed
 from phone_host.printers.doors import door_to, key_of
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted
@@ -11,10 +10,7 @@ from phone_host.printers.printer_uri import read_uri
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.serve.program import Choices, PrintWanted
 from phone_host.settings import printer_keys
-from phone_host.verbs.printer_bed import bed_of
 from phone_host.verbs.serve.places import data_folder
-
-_BED: Final = "220,220,250"
 
 
 def asked_print(values: Choices, file: Path | None) -> PrintWanted:
@@ -28,8 +24,8 @@ def asked_print(values: Choices, file: Path | None) -> PrintWanted:
         SettingsError: they make no sense.
     """
     text = values.get("printer", "").strip()
-    bed_mm = bed_of(argparse.Namespace(bed=values.get("bed", "").strip() or _BED))
-    how, journal = Wanted(SlicingWanted(bed_mm)), Journal(data_folder() / "printing.json")
+    bed = parse_bed(words) if (words := values.get("bed", "").strip()) else None
+    how, journal = Wanted(SlicingWanted(bed)), Journal(data_folder() / "printing.json")
     if not text:
         return PrintWanted("", None, None, how, journal)
     uri = read_uri(text)
