@@ -16,6 +16,7 @@ from common.errors import TandemError
 from common.plain_text import printable
 from common.program import interrupts
 from common.program.invocation import as_found
+from common.program.out_of_memory import REMEDY, is_out_of_memory, words_of
 from common.program.quantities import decimal_number, whole_number
 from common.program.streams import mend_streams
 from common.program.terminal import fitted
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 INTERRUPTED: Final = interrupts.INTERRUPTED
 
 _UNAVAILABLE: Final = 3
+_BAD_DATA: Final = 4
 
 # Errors on writing to stdout when the disk, a quota, a device or the terminal behind it fails.
 _WRITE_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
@@ -253,6 +255,11 @@ def _ran(
         word, code = interrupts.ENDINGS[number]
         _say(f"{parser.prog}: {word}")
         return code
+    except Exception as error:
+        if options.debug or not is_out_of_memory(error):
+            raise
+        _say(f"{parser.prog}: error: memory ran out{words_of(error)}: {REMEDY}")
+        return _BAD_DATA
 
 
 def _say(line: str) -> None:

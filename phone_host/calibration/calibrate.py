@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 
 from common.errors import DataError
+from common.program.out_of_memory import is_out_of_memory
 from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
 from phone_host.calibration.board_pose import fit_pose
@@ -109,6 +110,8 @@ def _unexplained() -> Iterator[None]:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # on the way; the result is checked
             yield
     except (cv2.error, np.linalg.LinAlgError) as error:
+        if is_out_of_memory(error):
+            raise
         raise DataError("no lens explains the views", "take new pairs") from error
 
 

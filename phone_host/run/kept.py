@@ -1,16 +1,17 @@
-"""What was computed so far is kept when Ctrl-C, SIGTERM, SIGHUP or SIGQUIT ends a long work."""
+"""What was computed so far is kept when memory runs out, or when Ctrl-C, SIGTERM, SIGHUP or SIGQUIT ends a long work."""
 
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from common.program.interrupts import answering, terminable
+from common.program.out_of_memory import is_out_of_memory
 from common.unfinished import unfinished
 
 
 @contextmanager
 def kept_if_interrupted(write: Callable[[], None]) -> Iterator[None]:
-    """Write what there is if Ctrl-C, SIGTERM, SIGHUP or SIGQUIT ends the block, in Python or out of native code.
+    """Write what there is if memory runs out in the block, or if Ctrl-C, SIGTERM, SIGHUP or SIGQUIT ends the block, in Python or out of native code.
 
     Args:
         write: writes it; what cannot be written (OSError) is left out.
@@ -22,6 +23,11 @@ def kept_if_interrupted(write: Callable[[], None]) -> Iterator[None]:
         except KeyboardInterrupt:
             with answering(), suppress(OSError):
                 last()
+            raise
+        except Exception as error:
+            if is_out_of_memory(error):
+                with suppress(OSError, MemoryError):
+                    last()
             raise
 
 

@@ -28,6 +28,7 @@ from common.imagesize.head import size_text as px_text
 from common.imagesize.read import read_head, whole_image
 from common.orientation import UPRIGHT, Orientation
 from common.program.logs import event
+from common.program.out_of_memory import is_out_of_memory
 from phone_host.model import Image
 from phone_host.stereo.eight_bit import AnyImage, to_8_bit
 from phone_host.stereo.orient import upright
@@ -303,6 +304,8 @@ def _decoded(image: EncodedFile, reduction: int) -> AnyImage:
     try:
         said = overhear(lambda: found.append(cv2.imdecode(payload, flags)))
     except cv2.error as error:
+        if is_out_of_memory(error):  # the image is sound
+            raise
         raise SpoiledImageError(FrameFault.CORRUPT, f"{name} cannot be decoded ({error.err})", _REPLACE) from error
     [decoded] = found
     if decoded is None:
