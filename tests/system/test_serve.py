@@ -217,6 +217,27 @@ def test_the_page_of_a_run_is_served_to_other_machines_too(tmp_path: Path) -> No
     assert "'banana' is not an address that only this machine reaches: give" in strange.stderr.splitlines()[-1]
 
 
+def test_two_pages_on_one_settings_file_lose_nothing(tmp_path: Path) -> None:
+    """What either sets is in the file, a value that one takes back is gone, and a file that is a link stays one."""
+    (tmp_path / "dotfiles").mkdir()
+    real, link = tmp_path / "dotfiles" / "host.toml", tmp_path / "host.toml"
+    real.write_text('# mine\ntolerance = "5ms"\n')
+    link.symlink_to(real)
+    arguments = ["serve", "127.0.0.1:0", "--config", str(link)]
+    with page(arguments, tmp_path, "one") as (_, one), page(arguments, tmp_path, "two") as (_, two):
+        assert "set" in one.do("set", link="tcp://127.0.0.1:1")["words"]
+        assert "set" in two.do("set", board_side="right")["words"]
+        assert "set" in one.do("set", matcher="block")["words"]
+        assert "taken back" in two.do("set", board_side="")["words"]
+        assert "set" in two.do("set", fifo="2")["words"]
+    assert link.is_symlink()
+    text = real.read_text()
+    assert text.startswith("# mine\n")
+    for line in ("tcp://127.0.0.1:1", "block", "fifo", "tolerance"):
+        assert line in text, text
+    assert "right" not in text
+
+
 def test_a_port_that_is_taken_is_told_with_the_remedy(tmp_path: Path) -> None:
     """Exit 3, one line."""
     with socket.socket() as taken:

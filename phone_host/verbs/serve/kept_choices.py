@@ -1,5 +1,6 @@
 """The page's choices in the settings file: settings as its keys, other options of `run` in the table [page]."""
 
+import fcntl
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -57,17 +58,46 @@ def kept(file: Path) -> tuple[dict[str, str], list[str]]:
     return {name: value for name, value in found.items() if value and name not in _OF_PROGRAM}, others
 
 
-def keep(file: Path, choices: Mapping[str, str]) -> None:
+def keep(file: Path, choices: Mapping[str, str], before: Mapping[str, str] | None = None) -> None:
     """Write the choices, whole or not at all. What else the file says stays, with its comments.
+
+    The file is read again under a lock on its folder, and only what differs from `before` is changed in it, so that two pages
+    on one file lose nothing of each other. A file that is a link stays one: what it points to is written.
 
     Args:
         file: the settings file; created with its folder if missing.
         choices: by option.
+        before: the choices as whoever writes knew them; None: all that the file says is to be replaced.
 
     Raises:
         SettingsError: the file is written in a way that cannot be changed, or cannot be written.
     """
-    text = file.read_text(encoding="utf-8") if is_there(file) else ""
+    target = file.resolve() if file.is_symlink() else file.absolute()
+    try:
+        with opened_folder(target.parent, make=True) as folder:
+            fcntl.flock(folder, fcntl.LOCK_EX)  # until the folder is closed
+            text = file.read_text(encoding="utf-8") if is_there(file) else ""
+            new = _with_choices(text, choices if before is None else _merged(kept(file)[0], before, choices))
+            if new == text:
+                return
+            with replacing_in(folder, target.name, mode=0o600) as writing:  # a camera's address may hold a password
+                writing.write(new.encode())
+    except OSError as error:
+        raise SettingsError(
+            f"settings file {file} cannot be written ({error.strerror})", "make room, or name another with --config"
+        ) from None
+
+
+def _merged(current: Mapping[str, str], before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, str]:
+    """Return what a file says now, changed where two states of one page differ."""
+    names = {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
+    return {name: value for name, value in current.items() if name not in names} | {
+        name: after[name] for name in names if name in after
+    }
+
+
+def _with_choices(text: str, choices: Mapping[str, str]) -> str:
+    """Return the text of a settings file with these choices in place of its own."""
     options = vars(run_options(run_words(choices)))
     keys: dict[str, Value | None] = {}
     for name, key in _NAMES.items():
@@ -75,19 +105,7 @@ def keep(file: Path, choices: Mapping[str, str]) -> None:
             value: Any = options[key] if name in choices else None
             keys[key] = tuple(value) if isinstance(value, list) else value
     others = {name: value for name, value in choices.items() if name not in _NAMES}
-    new = changed(text, keys, PAGE_TABLE, others)
-    if new == text:
-        return
-    try:
-        with (
-            opened_folder(file.parent.absolute(), make=True) as folder,
-            replacing_in(folder, file.name, mode=0o600) as writing,  # a camera's address may hold a password
-        ):
-            writing.write(new.encode())
-    except OSError as error:
-        raise SettingsError(
-            f"settings file {file} cannot be written ({error.strerror})", "make room, or name another with --config"
-        ) from None
+    return changed(text, keys, PAGE_TABLE, others)
 
 
 def _as_words(value: object) -> str:

@@ -98,7 +98,8 @@ class Commands:
 
     def keep(self, choices: Choices) -> None:
         """See Program."""
-        keep(self._file, choices)
+        keep(self._file, choices, self._kept)
+        self._kept = choices
 
     def changed(self, choices: Choices, changes: Choices) -> Choices:
         """See Program."""
