@@ -6,7 +6,9 @@ differences on the board's own clock. So the delays add up to end-to-end to the 
 
 import json
 from dataclasses import asdict, dataclass
+from typing import Any
 
+from common.strict_json import strict_json, whole_number
 from common.value import value
 
 
@@ -163,14 +165,18 @@ def ledger_of(text: str) -> PairLedger:
         ValueError: it is none.
     """
     try:
-        record = json.loads(text)
-        same = {name: record[name] for name in PairLedger.__dataclass_fields__ if name in record}
+        record = strict_json(text)
+        texts: dict[str, Any] = {name: str(record[name]) for name in ("session", "link")}
+        numbers: dict[str, Any] = {
+            name: whole_number(each) for name, each in record.items() if name not in {*texts, "stages_ns"}
+        }
         return PairLedger(
-            **same,
-            board=BoardMarks(**{name: record[name] for name in ("exposed_ns", "grabbed_ns", "sent_ns")}),
-            previous_done_ns=record["queued_ns"] - record["starvation_ns"],
-            stages=StageTimes(**record["stages_ns"]),
-            host=HostMarks(exposed_ns=record["host_exposed_ns"], grabbed_ns=record["host_grabbed_ns"]),
+            **texts,
+            **{name: numbers[name] for name in PairLedger.__dataclass_fields__ if name in numbers},
+            board=BoardMarks(**{name: numbers[name] for name in ("exposed_ns", "grabbed_ns", "sent_ns")}),
+            previous_done_ns=numbers["queued_ns"] - numbers["starvation_ns"],
+            stages=StageTimes(**{name: whole_number(each) for name, each in record["stages_ns"].items()}),
+            host=HostMarks(exposed_ns=numbers["host_exposed_ns"], grabbed_ns=numbers["host_grabbed_ns"]),
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"no line of delays.jsonl: {error}") from error

@@ -1,5 +1,7 @@
 """Words that all texts share: a number and its noun agree. Pure."""
 
+from collections.abc import Sequence
+
 
 def counted(count: int, noun: str, plural: str = "") -> str:
     """Write a number with its noun: `1 pair`, `2 pairs`, `0 pairs`.
@@ -13,6 +15,17 @@ def counted(count: int, noun: str, plural: str = "") -> str:
         The number and the noun that fits it.
     """
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
+def listed(items: Sequence[str], most: int = 8) -> str:
+    """Write names one after the other, but not more than fit a line: `a, b and 70 more`.
+
+    Args:
+        items: the names.
+        most: how many are written.
+    """
+    more = f" and {len(items) - most} more" if len(items) > most else ""
+    return ", ".join(items[:most]) + more
 
 
 def times(count: int) -> str:

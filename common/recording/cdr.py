@@ -1,4 +1,4 @@
-"""The Common Data Representation, little endian, as ROS 2 writes messages. Pure: values in, bytes out, and back.
+"""The Common Data Representation, as ROS 2 writes messages: little endian, and read in either order. Pure: values in, bytes out, and back.
 
 Each value is aligned to its size, counted from behind the header of four bytes.
 Source: OMG DDSI-RTPS 2.5, section 10.5 (the header); CORBA 3.4 part 2, section 9.3 (alignment, strings, sequences).
@@ -12,6 +12,9 @@ from common.frame import Buffer
 
 HEADER: Final = b"\x00\x01\x00\x00"
 """CDR_LE, no options."""
+
+_ORDERS: Final = {b"\x00\x00": ">", HEADER[:2]: "<"}
+"""Order of the bytes by the header: CDR_BE, which other programs may write, and CDR_LE."""
 
 
 class BrokenMessageError(ValueError):
@@ -76,15 +79,17 @@ class CdrReader:
 
     def __init__(self, data: "bytes | memoryview") -> None:
         self._data = memoryview(data)
-        if bytes(self._data[:2]) != HEADER[:2]:
-            raise BrokenMessageError("the message is not little-endian CDR")
+        order = _ORDERS.get(bytes(self._data[:2]))
+        if order is None:
+            raise BrokenMessageError("the message is not plain CDR")
+        self._order = order
         self._at = len(HEADER)
 
     def number(self, kind: str) -> "int | float":
         """Return a number; `kind` as in `CdrWriter.number`."""
         size = struct.calcsize(kind)
         self._at += -(self._at - len(HEADER)) % size
-        found: int | float = struct.unpack(f"<{kind}", self._take(size))[0]
+        found: int | float = struct.unpack(f"{self._order}{kind}", self._take(size))[0]
         return found
 
     def text(self) -> str:
@@ -101,7 +106,7 @@ class CdrReader:
         if not length:
             return ()
         self._at += -(self._at - len(HEADER)) % 8
-        return struct.unpack(f"<{length}d", self._take(8 * length))
+        return struct.unpack(f"{self._order}{length}d", self._take(8 * length))
 
     def data(self) -> memoryview:
         """Return a sequence of bytes, as a view of the message."""

@@ -2,11 +2,13 @@
 
 import mmap
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 from common.errors import DataError
 from common.recording.recorded import Recorded, read_recorded
+from common.recording.ros1 import EXTRA, ROS1_REASON
 from common.recording.salvage import is_mcap
+from common.words import listed
 
 SUFFIX: Final = ".mcap"
 
@@ -34,41 +36,84 @@ def mapped(path: Path) -> memoryview:
     return data
 
 
-def open_recorded(path: Path) -> Recorded:
+def open_recorded(path: Path, *, needs_times: bool = True) -> Recorded:
     """Read all that is whole in a recording.
 
+    Args:
+        path: the file.
+        needs_times: whether it is refused if none of its times can be true.
+
     Raises:
-        DataError: it cannot be read, is no MCAP file, or holds no images.
+        DataError: it cannot be read, is no MCAP file, or holds no images, or none of which the time is known.
     """
     found = read_recorded(mapped(path), inflate)
     if not found.images:
-        held = f", only {', '.join(sorted(found.kinds))}" if found.kinds else ", and nothing else"
-        spoiled = f" ({found.damages[0].words})" if found.damages else ""
+        _refuse_without_images(path, found)
+    if found.time_fault and needs_times:
         raise DataError(
-            f"{path} holds no images{held}{spoiled}",
-            "give a file with sensor_msgs/msg/CompressedImage or Image in it",
+            f"{path}: {found.time_fault}", "give the rate: phone-host sessions import FILE.mcap --fps N --out NEW.mcap"
         )
     return found
+
+
+def _refuse_without_images(path: Path, found: Recorded) -> NoReturn:
+    if any(each.reason == ROS1_REASON for each in found.unused.values()):
+        raise DataError(f"{path} holds {ROS1_REASON}", f"install it: {EXTRA}")
+    reasons = [f"{topic}: {each.reason}" for topic, each in sorted(found.unused.items())]
+    held = f", only {listed(reasons)}" if reasons else "" if found.kinds else ", and nothing else"
+    spoiled = f" ({found.damages[0].words})" if found.damages else ""
+    raise DataError(
+        f"{path} holds no images{held}{spoiled}",
+        "give a file with sensor_msgs/msg/CompressedImage or Image in it",
+    )
+
+
+MOST_CHUNK_BYTES: Final = 128 << 20
+"""Largest chunk that is decompressed: one message of 8K in colour is 100 MB. Usual ones have 1 to 4 MB."""
+
+_MOST_RATIO: Final = 1000
+"""A chunk that claims to be this many times larger than its bytes is not believed, if it is also larger than the next."""
+
+_ALWAYS_BYTES: Final = 8 << 20
 
 
 def inflate(compression: str, data: memoryview, size: int) -> memoryview:
     """Undo a chunk's compression, with packages that another program's files need and ours do not.
 
+    No more memory is taken than the chunk may have, whatever its bytes become.
+
+    Args:
+        compression: its name.
+        data: the chunk.
+        size: how many bytes it claims to become.
+
     Raises:
-        ValueError: it cannot be undone.
+        ValueError: it cannot be undone, becomes more than it claims, or claims more than any chunk has.
     """
+    if size > MOST_CHUNK_BYTES or size > max(_ALWAYS_BYTES, _MOST_RATIO * len(data)):
+        raise ValueError(
+            f"a chunk claims to become {size / 1e6:.0f} MB of {len(data) / 1e6:.3f} MB: more than is believed"
+        )
     try:
         match compression:
             case "zstd":
                 import zstandard  # noqa: PLC0415 - not ours to require
 
-                return memoryview(zstandard.ZstdDecompressor().decompress(bytes(data), max_output_size=size))
+                with zstandard.ZstdDecompressor(max_window_size=MOST_CHUNK_BYTES).stream_reader(data) as reader:
+                    plain = reader.read(size + 1)
             case "lz4":
                 import lz4.frame  # noqa: PLC0415 - not ours to require
 
-                return memoryview(lz4.frame.decompress(bytes(data)))
+                plain = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+            case _:
+                raise ValueError(f"a chunk is compressed with {compression}, which nobody here knows")
     except ImportError as error:
-        raise ValueError(f"a chunk is compressed with {compression}: pip install {error.name}") from error
+        package = "zstandard" if compression == "zstd" else "lz4"
+        raise ValueError(f"a chunk is compressed with {compression}: pip install {package}") from error
+    except ValueError:
+        raise
     except Exception as error:
         raise ValueError(f"a chunk cannot be decompressed ({error})") from error
-    raise ValueError(f"a chunk is compressed with {compression}, which nobody here knows")
+    if len(plain) != size:
+        raise ValueError("a chunk cannot be decompressed (it has another length than it claims)")
+    return memoryview(plain)

@@ -1,24 +1,44 @@
 """A recording that is read: what is in it, in the order in which it came, however much of it is whole. Pure: bytes in.
 
-A file of another program is read, too: any topics with CompressedImage or Image. Without our metadata its times are Unix times.
+A file of another program is read, too: any topics with CompressedImage or Image. Without our metadata its times are Unix times, and are used only
+if they can be true. What is not used of it has its reason.
 """
 
-import json
 import statistics
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, assert_never
 
+from common.frame import Buffer
 from common.imagesize.read import read_head
 from common.protocol.message import CameraDescription
 from common.recording.cdr import BrokenMessageError
-from common.recording.layout import ABOUT, CAPTURE, COMPUTED, SIDES, About, about_of, camera_name, camera_of, side_of
-from common.recording.ros_messages import COMPRESSED_IMAGE, IMAGE, RecordedImage, read_image
-from common.recording.salvage import Attachment, Damage, Inflate, Message, Metadata, Salvage
+from common.recording.image_layouts import UnreadableEncodingError
+from common.recording.layout import (
+    ABOUT,
+    CAPTURE,
+    CLOCK,
+    COMPUTED,
+    DELAYS,
+    SIDES,
+    About,
+    about_of,
+    camera_name,
+    camera_of,
+    side_of,
+)
+from common.recording.ros1 import ROS1, NoRos1Error, read_ros1_image
+from common.recording.ros_messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, RecordedImage, StoredBytes, read_image
+from common.recording.salvage import Attachment, Channel, Damage, Inflate, Message, Metadata, Salvage, StoredMessage
+from common.recording.stamps import stamp_fault
+from common.strict_json import strict_json, whole_number
 from common.words import counted
 
+_TEXTS: Final = (DELAYS, CLOCK, CAPTURE)
+_LARGEST_NS: Final = 2**62
+_LONGEST_CAPTURE_NS: Final = 60_000_000_000
 _NEVER_NS: Final = 33_333_333
 """The time between images of a camera that gave only one."""
 
@@ -42,6 +62,19 @@ class Shown:
     grabbed_ns: int
 
 
+@dataclass(slots=True)
+class Unused:
+    """Messages of a topic that are not used.
+
+    Attributes:
+        reason: why the first is not.
+        messages: how many.
+    """
+
+    reason: str
+    messages: int = 0
+
+
 @dataclass(slots=True, eq=False)
 class Recorded:
     """What is in a recording.
@@ -51,6 +84,9 @@ class Recorded:
         images: by topic, in the order in which they were received.
         texts: the messages in JSON, by topic.
         kinds: how many messages of each topic there are.
+        unused: what is not used, by topic.
+        remarks: what is used instead of stamps that cannot be true, in words.
+        time_fault: why neither stamps nor the times of receipt can be true, in words; empty: one of both can.
         metadata: values by name of the whole; of several of one name the last.
         attachments: files by name.
         damages: where something is missing.
@@ -63,6 +99,9 @@ class Recorded:
     images: dict[str, list[Shown]] = field(default_factory=dict)
     texts: dict[str, list[Message]] = field(default_factory=dict)
     kinds: dict[str, int] = field(default_factory=dict)
+    unused: dict[str, Unused] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    time_fault: str = ""
     metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
     attachments: dict[str, memoryview] = field(default_factory=dict)
     damages: list[Damage] = field(default_factory=list)
@@ -150,7 +189,41 @@ def read_recorded(data: memoryview, inflate: Inflate) -> Recorded:
         is_board = side_of(topic) == found.about.board_side and not found.about.board_boot_id
         whole = [_marked(each, captured if is_board else None, is_ours=found.is_ours) for each in shown]
         found.images[topic] = sorted(whole, key=lambda each: each.log_ns)
+    if not found.is_ours:
+        _believe_times(found)
     return found
+
+
+def _believe_times(found: Recorded) -> None:
+    """Replace stamps of another program that cannot be true by the times of receipt, or those by the stamps."""
+    stamps = {topic: stamp_fault([each.image.stamp_ns for each in of]) for topic, of in found.images.items()}
+    logged = {topic: stamp_fault([each.log_ns for each in of]) for topic, of in found.images.items()}
+    topic, fault = next(((topic, each) for topic, each in stamps.items() if each), ("", None))
+    log_topic, log_fault = next(((topic, each) for topic, each in logged.items() if each), ("", None))
+    if fault and log_fault:
+        found.time_fault = f"the stamps of {topic} {fault.value}, the times of receipt of {log_topic} {log_fault.value}"
+    elif fault:
+        found.remarks.append(f"the stamps of {topic} {fault.value}: the times of receipt are used for all images")
+        for each, of in found.images.items():
+            found.images[each] = [retimed(shown, shown.log_ns) for shown in of]
+    elif log_fault:
+        found.remarks.append(
+            f"the times of receipt of {log_topic} {log_fault.value}: the stamps are used for all images"
+        )
+        for each, of in found.images.items():
+            moved = [retimed(shown, shown.image.stamp_ns) for shown in of]
+            found.images[each] = sorted(moved, key=lambda shown: shown.log_ns)
+
+
+def retimed(shown: Shown, at_ns: int) -> Shown:
+    """Return an image with one time for all that happened to it.
+
+    Args:
+        shown: the image.
+        at_ns: the time, ns since 1970.
+    """
+    image = replace(shown.image, stamp_ns=at_ns)
+    return replace(shown, image=image, log_ns=at_ns, publish_ns=at_ns, grabbed_ns=at_ns)
 
 
 def _marked(shown: Shown, captured: "Mapping[int, int] | None", *, is_ours: bool) -> Shown:
@@ -162,31 +235,80 @@ def _marked(shown: Shown, captured: "Mapping[int, int] | None", *, is_ours: bool
 
 def _take(found: Recorded, message: Message, captured: dict[int, int], lost: dict[int, int]) -> None:
     channel = message.channel
-    if channel is None:
+    if channel is None or max(message.log_ns, message.publish_ns) >= _LARGEST_NS:
         lost[message.number] += 1
         return
     found.kinds[channel.topic] = found.kinds.get(channel.topic, 0) + 1
     if channel.topic in COMPUTED:
         return
-    kind = channel.kind.replace("sensor_msgs/C", "sensor_msgs/msg/C").replace("sensor_msgs/I", "sensor_msgs/msg/I")
-    if kind in {COMPRESSED_IMAGE, IMAGE}:
-        try:
-            image = read_image(kind, message.data)
-        except BrokenMessageError:
-            lost[message.number] += 1
-            return
-        shown = Shown(image, message.sequence, message.log_ns, message.publish_ns, image.stamp_ns)
-        found.images.setdefault(channel.topic, []).append(shown)
-    elif channel.encoding == "json":
+    if channel.encoding == "json" and channel.topic in _TEXTS:
         if channel.topic == CAPTURE:
             _note_captured(captured, message.data)
-        found.texts.setdefault(channel.topic, []).append(message)
+        held = (
+            message if message.stored is None else replace(message, data=memoryview(bytes(message.data)), stored=None)
+        )
+        found.texts.setdefault(channel.topic, []).append(held)
+        return
+    kind = image_kind(channel)
+    if not kind:
+        _leave_out(found, channel, f"{channel.kind or channel.encoding or 'its message'} is no image")
+        return
+    try:
+        image = read_message(kind, channel.encoding, message)
+    except (UnreadableEncodingError, NoRos1Error) as unreadable:
+        _leave_out(found, channel, str(unreadable))
+    except BrokenMessageError:
+        lost[message.number] += 1
+    else:
+        shown = Shown(image, message.sequence, message.log_ns, message.publish_ns, image.stamp_ns)
+        found.images.setdefault(channel.topic, []).append(shown)
+
+
+def image_kind(channel: Channel) -> str:
+    """Return the name of a channel's message, if it holds images: COMPRESSED_IMAGE or IMAGE; empty: it does not.
+
+    ROS 1 names them without `msg`.
+    """
+    kind = channel.kind.replace("sensor_msgs/C", "sensor_msgs/msg/C").replace("sensor_msgs/I", "sensor_msgs/msg/I")
+    return kind if kind in {COMPRESSED_IMAGE, IMAGE} and channel.encoding in {"cdr", ROS1} else ""
+
+
+def read_message(kind: str, encoding: str, message: Message) -> RecordedImage:
+    """Read the image of a message. One from a compressed chunk is read from there again whenever its bytes are wanted.
+
+    Args:
+        kind: COMPRESSED_IMAGE or IMAGE.
+        encoding: of the message: cdr or ros1.
+        message: the message.
+
+    Raises:
+        UnreadableEncodingError: the image's encoding is none that is read.
+        NoRos1Error: it is a message of ROS 1, and what reads them is not installed.
+        BrokenMessageError: it is no image.
+    """
+    read = read_ros1_image if encoding == ROS1 else read_image
+    image, stored = read(kind, message.data), message.stored
+    if stored is None:
+        return image
+    return replace(image, content=StoredBytes(lambda: _read_again(read, kind, stored), len(image.content)))
+
+
+def _read_again(read: Callable[[str, memoryview], RecordedImage], kind: str, stored: StoredMessage) -> Buffer:
+    return read(kind, stored.chunk.records()[stored.at : stored.at + stored.size]).payload
+
+
+def _leave_out(found: Recorded, channel: Channel, reason: str) -> None:
+    if channel.kind != CAMERA_INFO or not side_of(channel.topic):
+        found.unused.setdefault(channel.topic, Unused(reason)).messages += 1
 
 
 def _note_captured(captured: dict[int, int], data: memoryview) -> None:
     try:
-        runs = json.loads(bytes(data))
-        for first, values in runs:
-            captured.update({int(first) + at: int(value) for at, value in enumerate(values)})
+        for first, values in strict_json(bytes(data)):
+            whole = [whole_number(each) for each in values]
+            first_number = whole_number(first)
+            captured.update(
+                {first_number + at: each for at, each in enumerate(whole) if 0 <= each <= _LONGEST_CAPTURE_NS}
+            )
     except (ValueError, TypeError):
         return

@@ -5,13 +5,14 @@ Source: common_interfaces, sensor_msgs/msg/CompressedImage, Image, CameraInfo, P
 """
 
 import struct
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
 from common.frame import Buffer, PixelFormat
-from common.recording.cdr import HEADER, BrokenMessageError, CdrReader, CdrWriter
+from common.recording.cdr import HEADER, CdrReader, CdrWriter
+from common.recording.image_layouts import RawForm, RawLayout, compressed_format, frame_bytes, raw_layout
 
 NS: Final = 1_000_000_000
 _MOST_SECONDS: Final = 2**31 - 1
@@ -54,8 +55,26 @@ _FIELDS: Final = ("x", "y", "z", "rgb")
 POINT_BYTES: Final = 4 * len(_FIELDS)
 """A point of a cloud: x, y, z, m, and its colour 0x00RRGGBB in the place of a number, as ROS has it."""
 
-_FORMAT_OF: Final = {name: form for form, name in _COMPRESSED.items()}
-_FORMAT_OF_RAW: Final = {name: form for form, (name, _) in _RAW.items()}
+
+class StoredBytes:
+    """Bytes that are made anew whenever somebody wants them, so that nobody holds those of a whole file.
+
+    Args:
+        read: makes them.
+        size: how many stand in the file.
+    """
+
+    __slots__ = ("_read", "_size")
+
+    def __init__(self, read: Callable[[], Buffer], size: int) -> None:
+        self._read, self._size = read, size
+
+    def __len__(self) -> int:
+        return self._size
+
+    def read(self) -> Buffer:
+        """Make them."""
+        return self._read()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,14 +86,23 @@ class RecordedImage:
         frame_id: whose image it is: left or right.
         pixel_format: its encoding.
         size_px: width and height; (0, 0): the image itself says it.
-        payload: the image as its camera gave it.
+        content: the image as its camera gave it, or what makes it.
     """
 
     stamp_ns: int
     frame_id: str
     pixel_format: PixelFormat
     size_px: tuple[int, int]
-    payload: Buffer
+    content: Buffer | StoredBytes
+
+    @property
+    def payload(self) -> Buffer:
+        """The image as its camera gave it. Where it is made from other bytes, each look makes it anew: see `loaded`."""
+        return self.content.read() if isinstance(self.content, StoredBytes) else self.content
+
+    def loaded(self) -> "RecordedImage":
+        """Return the same image with its bytes in memory."""
+        return replace(self, content=self.payload) if isinstance(self.content, StoredBytes) else self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,23 +211,56 @@ def read_image(kind: str, data: "bytes | memoryview") -> RecordedImage:
         data: the message.
 
     Raises:
-        BrokenMessageError: it is none, or of an encoding that no camera of ours has.
+        UnreadableEncodingError: its encoding is none that is read.
+        BrokenMessageError: it is no image.
     """
     reader = CdrReader(data)
     stamp_ns, frame_id = _read_header(reader)
     if kind == COMPRESSED_IMAGE:
-        name = reader.text()
-        pixel_format = _FORMAT_OF.get(_short(name))
-        size_px = (0, 0)
-    else:
-        height, width = int(reader.number("I")), int(reader.number("I"))
-        name = reader.text()
-        pixel_format, size_px = _FORMAT_OF_RAW.get(name), (width, height)
-        reader.number("B")
-        reader.number("I")
-    if pixel_format is None:
-        raise BrokenMessageError(f"an image is encoded as {name!r}")
-    return RecordedImage(stamp_ns, frame_id, pixel_format, size_px, reader.data())
+        label = reader.text()
+        return compressed_image(stamp_ns, frame_id, label, reader.data())
+    height, width = int(reader.number("I")), int(reader.number("I"))
+    label, is_big_endian = reader.text(), bool(reader.number("B"))
+    step_bytes = int(reader.number("I"))
+    form = RawForm(label, (width, height), step_bytes, is_big_endian)
+    return raw_image(stamp_ns, frame_id, form, reader.data())
+
+
+def compressed_image(stamp_ns: int, frame_id: str, label: str, data: Buffer) -> RecordedImage:
+    """Return an image that a message holds encoded.
+
+    Args:
+        stamp_ns: its stamp, ns since 1970.
+        frame_id: whose image it is.
+        label: the encoding, as the message says.
+        data: the image.
+
+    Raises:
+        UnreadableEncodingError: its encoding is none that is read.
+    """
+    return RecordedImage(stamp_ns, frame_id, compressed_format(data, label), (0, 0), data)
+
+
+def raw_image(stamp_ns: int, frame_id: str, form: RawForm, data: Buffer) -> RecordedImage:
+    """Return an image that a message holds as pixels.
+
+    Args:
+        stamp_ns: its stamp, ns since 1970.
+        frame_id: whose image it is.
+        form: what its message says of its bytes.
+        data: the pixels.
+
+    Raises:
+        UnreadableEncodingError: its encoding is none that is read.
+        BrokenMessageError: it is shorter than its size says.
+    """
+    layout = raw_layout(form, data)
+    if not isinstance(layout, RawLayout):
+        return RecordedImage(stamp_ns, frame_id, layout, (0, 0), data)
+    content = (
+        frame_bytes(layout, data) if layout.is_packed else StoredBytes(lambda: frame_bytes(layout, data), len(data))
+    )
+    return RecordedImage(stamp_ns, frame_id, layout.encoding.pixel_format, form.size_px, content)
 
 
 def camera_info_message(info: CameraInfo) -> bytes:
@@ -249,11 +310,6 @@ def _write_raw(writer: CdrWriter, size_px: tuple[int, int], encoding: str, bytes
     writer.text(encoding)
     writer.number("B", 0)
     writer.number("I", width * bytes_per_column)
-
-
-def _short(name: str) -> str:
-    """Return the encoding itself: image_transport writes `bgr8; jpeg compressed bgr8`."""
-    return next((each for each in _FORMAT_OF if each in name.lower()), name)
 
 
 def _write_header(writer: CdrWriter, stamp_ns: int, frame_id: str) -> None:

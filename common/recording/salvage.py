@@ -1,7 +1,8 @@
 """Reads an MCAP file record by record and gives everything that is whole, whatever happened to the rest. Pure: bytes in, records out.
 
 A file that was cut, or in which bytes flipped, has no summary that could be trusted: so none is needed. A chunk counts as whole if its
-checksum is right. Behind a spoiled record the next one is looked for by its form, not by the length that the spoiled one claims.
+checksum is right. Behind a spoiled record the next one is looked for by its form, not by the length that the spoiled one claims. Bytes that look
+like the heads of records and are none are tried until that has cost a few times the file: the time grows with the file's length, whoever made it.
 Source: the MCAP specification, version 0, sections Records and Chunk (https://mcap.dev/spec).
 """
 
@@ -24,8 +25,26 @@ _CHUNK: Final = struct.Struct("<QQQI")
 _SCHEMA, _CHANNEL, _MESSAGE_OPCODE, _CHUNK_OPCODE = 0x03, 0x04, 0x05, 0x06
 _ATTACHMENT, _METADATA, _DATA_END = 0x09, 0x0C, 0x0F
 _LAST_OPCODE: Final = 0x0F
+_IN_CHUNKS: Final = frozenset({_SCHEMA, _CHANNEL, _MESSAGE_OPCODE})
 _STARTS: Final = re.compile(b"[\x06\x09\x0c\x0f]")
 _LONGEST_NAME: Final = 64
+_LONGEST_NAME_BYTES: Final = 4 * _LONGEST_NAME
+_LONGEST_TEXT: Final = 1 << 20
+"""Longest text in a record outside of metadata, bytes."""
+
+_MOST_INFLATED: Final = 64
+"""How many times the file's length its chunks may become when they are decompressed, all together. Raw images of a real scene become 2 to 5 times
+as large."""
+
+_ALWAYS_INFLATED_BYTES: Final = 64 << 20
+"""As many bytes may always be."""
+
+MOST_TRIED: Final = 4
+"""How many times the file's length the bytes of records that turn out to be none may be looked at. Each spoiled record of an honest file costs its
+own length once."""
+
+_MOST_TRIED_BYTES: Final = 16 << 20
+"""As many may always be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +72,8 @@ class Message:
         sequence: as its writer counted.
         log_ns: when it was received.
         publish_ns: when it was sent.
-        data: its bytes: a view of the file.
+        data: its bytes: a view of the file, or of a chunk that was decompressed, which stays in memory as long as this view.
+        stored: where its bytes can be had again; None: they are the file's own.
     """
 
     channel: Channel | None
@@ -62,6 +82,7 @@ class Message:
     log_ns: int
     publish_ns: int
     data: memoryview
+    stored: "StoredMessage | None" = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,13 +131,68 @@ class Damage:
         return f"at byte {self.at}: {self.words}; {counted(self.lost, 'byte')} passed over" if self.lost else self.words
 
 
+class Chunk:
+    """A chunk that is compressed.
+
+    Args:
+        latest: the chunk whose compression was undone last, of all chunks of a file, and what it became.
+        inflate: undoes the compression.
+        compression: its name.
+        packed: the bytes in the file.
+        size: how many bytes they are once the compression is undone.
+    """
+
+    def __init__(
+        self, latest: "dict[Chunk, memoryview]", inflate: "Inflate", compression: str, packed: memoryview, size: int
+    ) -> None:
+        self._latest, self._inflate = latest, inflate
+        self._compression, self._packed, self._size = compression, packed, size
+
+    def records(self) -> memoryview:
+        """Undo the compression.
+
+        Raises:
+            ValueError: it cannot be undone.
+        """
+        records = self._latest.get(self)
+        if records is None:
+            self._latest.clear()  # first: so that no two are held
+            records = self._inflate(self._compression, self._packed, self._size)
+            self._latest[self] = records
+        return records
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredMessage:
+    """Where a message stands.
+
+    Attributes:
+        chunk: in which it is.
+        at: place of its bytes in the chunk's records.
+        size: how many they are.
+    """
+
+    chunk: Chunk
+    at: int
+    size: int
+
+
 Record = Message | Attachment | Metadata | Damage
 Inflate = Callable[[str, memoryview, int], memoryview]
 """Takes the compression's name, the data and the size wanted; returns the data. Raises ValueError: it cannot."""
 
 
 class _SpoiledError(ValueError):
-    """Raised for a record that is not whole."""
+    """Raised for a record that is not whole.
+
+    Args:
+        words: what is wrong.
+        tried_bytes: how many bytes were looked at to find out.
+    """
+
+    def __init__(self, words: str, tried_bytes: int = 0) -> None:
+        super().__init__(words)
+        self.tried_bytes = tried_bytes
 
 
 def is_mcap(data: memoryview) -> bool:
@@ -129,6 +205,8 @@ class Salvage:
 
     Attributes:
         is_complete: whether the file was ended in order; known once all was read.
+        tried_bytes: how many bytes were looked at in all records that are none.
+        inflated_bytes: how many bytes chunks became that were decompressed.
 
     Args:
         data: the whole file.
@@ -139,7 +217,9 @@ class Salvage:
         self._data, self._inflate = data, inflate
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, Channel] = {}
+        self._latest: dict[Chunk, memoryview] = {}
         self.is_complete = False
+        self.tried_bytes = self.inflated_bytes = 0
 
     def records(self) -> Iterator[Record]:
         """Return all records that are whole, in the order of the file, and each place where something is missing."""
@@ -149,6 +229,7 @@ class Salvage:
                 opcode, content = self._record(at)
                 found = list(self._top(opcode, content))
             except _SpoiledError as spoiled:
+                self.tried_bytes += spoiled.tried_bytes
                 behind = self._next_start(at + 1)
                 yield Damage(at, behind - at, str(spoiled))
                 at = behind
@@ -188,27 +269,37 @@ class Salvage:
 
     def _chunk(self, content: memoryview) -> Iterator[Record]:
         _, _, size, checksum = _unpacked(_CHUNK, content, 0)
-        compression, at = _text(content, _CHUNK.size)
+        compression, at = _text(content, _CHUNK.size, _LONGEST_NAME_BYTES)
         (length,) = _unpacked(_LENGTH, content, at)
         packed = content[at + _LENGTH.size :]
-        if len(packed) != length:
+        if len(packed) != length or (not compression and length != size):
             raise _SpoiledError("a chunk contradicts itself")
+        chunk = Chunk(self._latest, self._inflate, compression, packed, size) if compression else None
+        if chunk is not None:
+            self.inflated_bytes += size
+            if self.inflated_bytes > _MOST_INFLATED * len(self._data) + _ALWAYS_INFLATED_BYTES:
+                raise _SpoiledError("the chunks become larger than is believed: undo their compression first")
         try:
-            records = self._inflate(compression, packed, size) if compression else packed
+            records = packed if chunk is None else chunk.records()
         except ValueError as error:
-            raise _SpoiledError(str(error)) from error
+            raise _SpoiledError(str(error), size) from error
         if len(records) != size or (checksum and zlib.crc32(records) != checksum):
-            raise _SpoiledError("the checksum of a chunk is wrong")
+            raise _SpoiledError("the checksum of a chunk is wrong", size)
         at = 0
-        while at < len(records):
-            opcode, inner = _unpacked(_HEAD, records, at)
-            taken = records[at + _HEAD.size : at + _HEAD.size + inner]
-            if len(taken) != inner:
-                raise _SpoiledError("a chunk contradicts itself")
-            yield from self._inner(opcode, taken)
-            at += _HEAD.size + inner
+        try:
+            while at < size:
+                opcode, inner = _unpacked(_HEAD, records, at)
+                at += _HEAD.size
+                taken = records[at : at + inner]
+                if len(taken) != inner or opcode not in _IN_CHUNKS:
+                    raise _SpoiledError("a chunk contradicts itself")
+                yield from self._inner(opcode, taken, chunk, at)
+                at += inner
+        except _SpoiledError as spoiled:
+            raise _SpoiledError(str(spoiled), size) from None
 
-    def _inner(self, opcode: int, content: memoryview) -> Iterator[Message]:
+    def _inner(self, opcode: int, content: memoryview, chunk: "Chunk | None" = None, at: int = 0) -> Iterator[Message]:
+        """Take in a record that may stand in a chunk: at this place of one that is compressed, or in the file."""
         if opcode == _SCHEMA:
             (number,) = _unpacked(_SHORT, content, 0)
             self._schemas[number] = _text(content, _SHORT.size)[0]
@@ -219,7 +310,8 @@ class Salvage:
         elif opcode == _MESSAGE_OPCODE:
             number, sequence, log_ns, publish_ns = _unpacked(_MESSAGE, content, 0)
             data = content[_MESSAGE.size :]
-            yield Message(self._channels.get(number), number, sequence, log_ns, publish_ns, data)
+            where = None if chunk is None else StoredMessage(chunk, at + _MESSAGE.size, len(data))
+            yield Message(self._channels.get(number), number, sequence, log_ns, publish_ns, data, where)
 
     def _tell_channels(self, values: Mapping[str, str]) -> None:
         for number, told in values.items():
@@ -230,16 +322,18 @@ class Salvage:
 
     def _next_start(self, at: int) -> int:
         """Return where the next record that is whole by its form begins; the file's end, if there is none."""
+        most = MOST_TRIED * len(self._data) + _MOST_TRIED_BYTES
         for found in _STARTS.finditer(self._data, at):
             if self._may_start(found.start()):
                 return found.start()
+            if self.tried_bytes > most:
+                break
         return len(self._data)
 
     def _may_start(self, at: int) -> bool:
         try:
             opcode, content = self._record(at)
             if opcode == _CHUNK_OPCODE:
-                _text(content, _CHUNK.size)
                 next(self._chunk(content), None)
             elif opcode == _ATTACHMENT:
                 _attachment(content)
@@ -247,7 +341,8 @@ class Salvage:
                 _metadata(content)
             else:
                 return len(content) == _SUM.size
-        except _SpoiledError:
+        except _SpoiledError as spoiled:
+            self.tried_bytes += spoiled.tried_bytes
             return False
         return True
 
@@ -264,21 +359,20 @@ def _unpacked(form: struct.Struct, data: memoryview, at: int) -> tuple[int, ...]
     return form.unpack_from(data, at)
 
 
-def _text(data: memoryview, at: int) -> tuple[str, int]:
+def _text(data: memoryview, at: int, longest: int = _LONGEST_TEXT) -> tuple[str, int]:
     """Return a text, and where what follows begins."""
     (length,) = _unpacked(_SUM, data, at)
-    raw = bytes(data[at + _SUM.size : at + _SUM.size + length])
-    if len(raw) < length:
-        raise _SpoiledError("a record is shorter than its kind")
+    if length > longest or at + _SUM.size + length > len(data):
+        raise _SpoiledError("a record is shorter than its kind" if length <= longest else "a name is too long")
     try:
-        return raw.decode(), at + _SUM.size + length
+        return bytes(data[at + _SUM.size : at + _SUM.size + length]).decode(), at + _SUM.size + length
     except UnicodeDecodeError:
-        raise _SpoiledError("a name is not UTF-8") from None
+        raise _SpoiledError("a name is not UTF-8", length) from None
 
 
 def _attachment(content: memoryview) -> Attachment:
-    name, at = _text(content, 16)
-    _, at = _text(content, at)
+    name, at = _text(content, 16, _LONGEST_NAME_BYTES)
+    _, at = _text(content, at, _LONGEST_NAME_BYTES)
     (length,) = _unpacked(_LENGTH, content, at)
     data = content[at + _LENGTH.size : at + _LENGTH.size + length]
     (checksum,) = _unpacked(_SUM, content, len(content) - _SUM.size)
@@ -289,18 +383,21 @@ def _attachment(content: memoryview) -> Attachment:
     ):
         raise _SpoiledError("an attachment contradicts itself")
     if checksum and zlib.crc32(content[: -_SUM.size]) != checksum:
-        raise _SpoiledError(f"the checksum of the attachment {name!r} is wrong")
+        raise _SpoiledError(f"the checksum of the attachment {name!r} is wrong", len(content))
     return Attachment(name, data)
 
 
 def _metadata(content: memoryview) -> Metadata:
-    name, at = _text(content, 0)
+    name, at = _text(content, 0, _LONGEST_NAME_BYTES)
     (length,) = _unpacked(_SUM, content, at)
     at += _SUM.size
     if at + length != len(content) or not 0 < len(name) <= _LONGEST_NAME:
         raise _SpoiledError("a metadata record contradicts itself")
     values: dict[str, str] = {}
-    while at < len(content):
-        key, at = _text(content, at)
-        values[key], at = _text(content, at)
+    try:
+        while at < len(content):
+            key, at = _text(content, at, len(content))
+            values[key], at = _text(content, at, len(content))
+    except _SpoiledError as spoiled:
+        raise _SpoiledError(str(spoiled), at) from None
     return Metadata(name, values)

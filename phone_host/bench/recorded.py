@@ -3,7 +3,6 @@
 What a recording does not tell is not guessed, but for one thing: a board frame whose number is missing counts as replaced by a newer one.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -16,6 +15,7 @@ from common.ledger import PairLedger
 from common.protocol.message import BoardCounts, Pacing
 from common.recording.numbering import pairs_of_two
 from common.recording.recorded import Recorded
+from common.strict_json import strict_json
 from common.words import counted
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up
@@ -117,7 +117,7 @@ def _accounts(playback: Playback, ledgers: Sequence[PairLedger]) -> tuple[BoardA
 def _settings(recorded: Recorded) -> dict[str, str]:
     """Return the settings of the run, as far as they are texts."""
     try:
-        values = json.loads(bytes(recorded.attachments.get("settings.json", b"{}")))
+        values = strict_json(bytes(recorded.attachments.get("settings.json", b"{}")))
         return {name: each["value"] for name, each in values.items() if isinstance(each["value"], str)}
     except (ValueError, TypeError, KeyError, AttributeError):
         return {}

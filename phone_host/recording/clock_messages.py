@@ -7,6 +7,7 @@ from typing import Final
 from common.protocol.message import BoardHello
 from common.recording.layout import CLOCK
 from common.recording.recorded import Recorded
+from common.strict_json import strict_json, whole_number
 from phone_host.sync.clock import ClockEstimate
 
 _BOOT: Final = "boot_id"
@@ -47,9 +48,11 @@ def told_clocks(recorded: Recorded) -> list[ToldClock]:
     found = []
     for message in recorded.texts.get(CLOCK, []):
         try:
-            values = json.loads(bytes(message.data))
+            values = strict_json(bytes(message.data))
             boot_id = str(values.pop(_BOOT, ""))
+            for name in values:
+                values[name] = whole_number(values[name]) if name.endswith("_ns") else float(values[name])
             found.append(ToldClock(message.log_ns, boot_id, ClockEstimate(**values)))
-        except (ValueError, TypeError, AttributeError):
+        except (ValueError, TypeError, AttributeError, OverflowError):
             continue
     return found

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -157,8 +157,7 @@ def _ascending(shown: Sequence[Shown]) -> list[Shown]:
 
 def _later(shown: Shown, by_ns: int, frame_id: str = "") -> Shown:
     image = shown.image
-    stamp_ns = image.stamp_ns + by_ns
-    moved = RecordedImage(stamp_ns, frame_id or image.frame_id, image.pixel_format, image.size_px, image.payload)
+    moved = replace(image, stamp_ns=image.stamp_ns + by_ns, frame_id=frame_id or image.frame_id)
     return Shown(moved, shown.sequence, shown.log_ns + by_ns, shown.publish_ns + by_ns, shown.grabbed_ns + by_ns)
 
 

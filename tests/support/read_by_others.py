@@ -43,7 +43,7 @@ def by_rosbags(path: Path) -> dict[str, list[Any]]:
     with AnyReader([path], default_typestore=store) as reader:
         wanted = [one for one in reader.connections if one.msgtype.startswith("sensor_msgs")]
         for connection, _, raw in reader.messages(wanted):
-            message = reader.deserialize(raw, connection.msgtype)
+            message: Any = reader.deserialize(raw, connection.msgtype)
             again = bytes(store.serialize_cdr(message, connection.msgtype))
             found.setdefault(connection.topic, []).append([message.header.frame_id, again == bytes(raw)])
     return found

@@ -196,7 +196,7 @@ def test_parts_of_several_processes_are_brought_together(
 def test_what_cannot_be_joined_is_refused_in_one_line(tmp_path: Path, films: tuple[list[Shown], list[Shown]]) -> None:
     """Each with what is wrong and what to do."""
     payload = films[0][0].image.payload
-    rest = [replace(one, image=replace(one.image, payload=payload)) for one in films[0]]
+    rest = [replace(one, image=replace(one.image, content=payload)) for one in films[0]]
     board, host = _board(tmp_path, films[0]), _file(tmp_path / "host.mcap", films[1], _host_about(), side="right")
     known = _file(tmp_path / "known.mcap", films[1], _host_about(), side="right", clocks=[(_clock(), "b2")])
     empty = tmp_path / "empty.mcap"

@@ -19,7 +19,7 @@ def _two(chance: np.random.Generator, positions: Floats, first: Eye, second: Eye
 
 
 def _spoiled(shown: Shown) -> Shown:
-    return replace(shown, image=replace(shown.image, payload=b"\xff\xd8"))
+    return replace(shown, image=replace(shown.image, content=b"\xff\xd8"))
 
 
 def test_offset_and_drift_are_found_within_what_is_stated() -> None:
