@@ -219,7 +219,7 @@ def _tell(outcome: Outcome, health: CameraHealth, bound: _Bound, *, as_json: boo
         print(fitted(_words(outcome, bound)))
     if is_interrupted:
         return INTERRUPTED
-    return _BAD_DATA if outcome.end in {End.FAILED, End.SLEPT} or written.dropped else 0
+    return _BAD_DATA if outcome.end in {End.FAILED, End.SLEPT} or written.dropped or not written.frames else 0
 
 
 def _words(outcome: Outcome, bound: _Bound) -> str:
@@ -239,5 +239,7 @@ def _words(outcome: Outcome, bound: _Bound) -> str:
     ended = _ENDS[outcome.end]
     if outcome.end is End.FAILED:
         ended += f" ({written.cause}): {written.remedy}"
+    if not written.frames and not ended:
+        ended = "; no image came: look at the camera with board-agent doctor"
     size = f"{written.size_bytes / 1e6:.1f} MB"
     return f"recorded: {counted(written.frames, 'image')}, {size} in {bound.name}{parts}{told}{ended}"

@@ -16,6 +16,7 @@ from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
 from common.recording.recorded import Recorded, Shown, period_ns, size_px
 from common.stamp import Stamp
+from common.words import listed
 
 _FAR_FUTURE: Final = 2**62
 _MOST_AT_ONCE: Final = 64
@@ -56,7 +57,7 @@ def _topic(settings: RecordedSettings, found: Recorded) -> str:
     if settings.topic in held or (not settings.topic and len(held) == 1):
         return settings.topic or held[0]
     what = f"has no images {settings.topic}" if settings.topic else "holds images of several cameras"
-    raise DataError(f"{settings.path} {what}", f"add ?topic= and one of: {', '.join(held)}")
+    raise DataError(f"{settings.path} {what}", f"add ?topic= and one of: {listed(held)}")
 
 
 class _Shower:
@@ -100,7 +101,7 @@ class _Shower:
         self._shown = []
 
     def _grab(self, shown: Shown, exposed_ns: int, now_ns: int) -> Grab:
-        image, sequence = shown.image, self._sequence
+        image, sequence = shown.image.loaded(), self._sequence
         self._sequence += 1
         fault = find_fault(image.pixel_format, image.payload)
         try:

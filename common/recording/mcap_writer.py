@@ -18,6 +18,9 @@ from common.recording.salvage import CHANNELS, MAGIC
 CHUNK_BYTES: Final = 256 * 1024
 """A crash loses one chunk at most; larger ones cost more per frame, smaller ones more overhead."""
 
+MOST_TOPICS: Final = 65_535
+"""Channels are numbered with 16 bits."""
+
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _CHUNK_INDEX = range(3, 9)
 _HEADER, _FOOTER = 1, 2
 _ATTACHMENT, _ATTACHMENT_INDEX, _STATISTICS, _METADATA, _METADATA_INDEX, _SUMMARY_OFFSET, _DATA_END = range(9, 16)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from common.errors import DataError
+from common.recording.inflate import inflate
 from common.recording.recorded import Recorded, read_recorded
 from common.recording.ros1 import EXTRA, ROS1_REASON
 from common.recording.salvage import is_mcap
@@ -66,54 +67,3 @@ def _refuse_without_images(path: Path, found: Recorded) -> NoReturn:
         f"{path} holds no images{held}{spoiled}",
         "give a file with sensor_msgs/msg/CompressedImage or Image in it",
     )
-
-
-MOST_CHUNK_BYTES: Final = 128 << 20
-"""Largest chunk that is decompressed: one message of 8K in colour is 100 MB. Usual ones have 1 to 4 MB."""
-
-_MOST_RATIO: Final = 1000
-"""A chunk that claims to be this many times larger than its bytes is not believed, if it is also larger than the next."""
-
-_ALWAYS_BYTES: Final = 8 << 20
-
-
-def inflate(compression: str, data: memoryview, size: int) -> memoryview:
-    """Undo a chunk's compression, with packages that another program's files need and ours do not.
-
-    No more memory is taken than the chunk may have, whatever its bytes become.
-
-    Args:
-        compression: its name.
-        data: the chunk.
-        size: how many bytes it claims to become.
-
-    Raises:
-        ValueError: it cannot be undone, becomes more than it claims, or claims more than any chunk has.
-    """
-    if size > MOST_CHUNK_BYTES or size > max(_ALWAYS_BYTES, _MOST_RATIO * len(data)):
-        raise ValueError(
-            f"a chunk claims to become {size / 1e6:.0f} MB of {len(data) / 1e6:.3f} MB: more than is believed"
-        )
-    try:
-        match compression:
-            case "zstd":
-                import zstandard  # noqa: PLC0415 - not ours to require
-
-                with zstandard.ZstdDecompressor(max_window_size=MOST_CHUNK_BYTES).stream_reader(data) as reader:
-                    plain = reader.read(size + 1)
-            case "lz4":
-                import lz4.frame  # noqa: PLC0415 - not ours to require
-
-                plain = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
-            case _:
-                raise ValueError(f"a chunk is compressed with {compression}, which nobody here knows")
-    except ImportError as error:
-        package = "zstandard" if compression == "zstd" else "lz4"
-        raise ValueError(f"a chunk is compressed with {compression}: pip install {package}") from error
-    except ValueError:
-        raise
-    except Exception as error:
-        raise ValueError(f"a chunk cannot be decompressed ({error})") from error
-    if len(plain) != size:
-        raise ValueError("a chunk cannot be decompressed (it has another length than it claims)")
-    return memoryview(plain)

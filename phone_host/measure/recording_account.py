@@ -56,5 +56,7 @@ class RecordingAccount:
             if count
         ]
         told = f"; not in it: {', '.join(missing)}" if missing else ""
-        ended = "" if self.failure is None else f"; {self.failure.problem}: {self.failure.remedy}"
+        ended = "" if self.frames or self.failure else "; no image came: look at the cameras with phone-host doctor"
+        if self.failure is not None:
+            ended = f"; {self.failure.problem}: {self.failure.remedy}"
         return f"recorded: {counted(self.frames, 'image')}, {self.size_bytes / 1e6:.1f} MB in {self.file}{told}{ended}"

@@ -6,6 +6,7 @@ from pathlib import Path
 from common.errors import DataError
 from common.protocol.message import CameraDescription
 from common.recording.recorded import Recorded, Shown, size_px
+from common.words import listed
 from phone_host.model import Side
 from phone_host.stereo.raw_images import EncodedImage
 
@@ -22,7 +23,7 @@ def topics_of(recorded: Recorded, file: Path) -> Mapping[Side, str]:
     """
     topics = {side: recorded.topic_of(side.value) for side in Side}
     if not all(topics.values()):
-        held = ", ".join(sorted(recorded.images))
+        held = listed(sorted(recorded.images))
         raise DataError(
             f"{file} holds the images of one camera only ({held})",
             "record both cameras, or join two recordings: phone-host sessions join",

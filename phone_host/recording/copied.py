@@ -4,9 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from common.errors import DataError
+from common.recording.inflate import inflate
 from common.recording.layout import topics
-from common.recording.mcap_writer import Topic
-from common.recording.opened import inflate, mapped
+from common.recording.mcap_writer import MOST_TOPICS, Topic
+from common.recording.opened import mapped
+from common.recording.recorded import image_kind
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import SCHEMAS
 from common.recording.salvage import CHANNELS, Attachment, Channel, Damage, Message, Metadata, Salvage
@@ -19,12 +22,13 @@ class CopyAccount:
 
     Attributes:
         messages: how many were copied.
+        images: how many of them are images.
         left_out: topics whose messages this program cannot write, with their number.
         damages: where something was missing.
     """
 
     def __init__(self) -> None:
-        self.messages = 0
+        self.messages = self.images = 0
         self.left_out: dict[str, int] = {}
         self.damages: list[Damage] = []
 
@@ -52,6 +56,10 @@ def copy_recording(
             topic = _topic(record.channel)
             if topic is not None:
                 channels[topic.name] = topic
+                if len(channels) > MOST_TOPICS:
+                    raise DataError(
+                        f"{source} has more than {MOST_TOPICS} topics, which no MCAP file can", "give another recording"
+                    )
     with written(out, tuple(channels.values())) as file:
         for record in Salvage(data, inflate).records():
             match record:
@@ -70,11 +78,17 @@ def copy_recording(
 
 def _copy(file: RecordingFile, message: Message, channels: dict[str, Topic], account: CopyAccount) -> None:
     topic = message.channel.topic if message.channel is not None else "unknown"
-    if message.channel is None or topic not in channels:
+    if message.channel is None or not _fits(message.channel, channels.get(topic)):
         account.left_out[topic] = account.left_out.get(topic, 0) + 1
         return
     file.add(topic, message.data, sequence=message.sequence, log_ns=message.log_ns, publish_ns=message.publish_ns)
     account.messages += 1
+    account.images += bool(image_kind(message.channel))
+
+
+def _fits(channel: Channel, topic: Topic | None) -> bool:
+    """Return whether a channel's messages are those of a topic that is written: its name may be used by other programs."""
+    return topic is not None and (topic.kind, topic.encoding) == (channel.kind, channel.encoding)
 
 
 def _topic(channel: Channel) -> Topic | None:

@@ -8,8 +8,9 @@ from typing import Final
 
 from common.errors import DataError, SettingsError
 from common.recording.capture_runs import CaptureRuns
+from common.recording.inflate import inflate
 from common.recording.layout import ABOUT, CAPTURE, CLOCK, camera_name, image_topic
-from common.recording.opened import inflate, mapped, open_recorded
+from common.recording.opened import mapped, open_recorded
 from common.recording.recorded import Recorded, Shown
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import RecordedImage, image_parts, image_type

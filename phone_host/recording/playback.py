@@ -189,7 +189,8 @@ class _Player:
             self._stop.wait(min(left_s, _TICK_NS / 1e9))
 
     def _bring(self, shown: Shown, *, is_board: bool) -> None:
-        image = shown.image
+        image = shown.image.loaded()
+        shown = replace(shown, image=image)
         fault = find_fault(image.pixel_format, image.payload)
         try:
             size = size_px(image) if fault is None else (0, 0)

@@ -1,6 +1,7 @@
 """What is in a recording, in figures: images, rates, gaps and how far the two cameras' exposures lie apart. Pure."""
 
 import statistics
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -80,6 +81,8 @@ class SessionInfo:
         streams: the cameras.
         skew: of the two; None: there are not two.
         messages: how many of each topic.
+        unused: why a topic is not used, by topic.
+        remarks: what is used instead of times that cannot be true, in words.
         attachments: names and sizes of the files in it.
         damages: where something is missing, in words.
     """
@@ -92,6 +95,8 @@ class SessionInfo:
     streams: tuple[StreamInfo, ...]
     skew: Skew | None
     messages: tuple[tuple[str, int], ...]
+    unused: Mapping[str, str]
+    remarks: tuple[str, ...]
     attachments: tuple[tuple[str, int], ...]
     damages: tuple[str, ...]
 
@@ -113,6 +118,8 @@ def session_info(recorded: Recorded) -> SessionInfo:
         streams=tuple(_stream(recorded, topic, first_ns) for topic in sorted(recorded.images)),
         skew=_skew(recorded),
         messages=tuple(sorted(recorded.kinds.items())),
+        unused={topic: each.reason for topic, each in sorted(recorded.unused.items())},
+        remarks=tuple(recorded.remarks),
         attachments=tuple((name, len(data)) for name, data in recorded.attachments.items()),
         damages=tuple(one.text for one in recorded.damages),
     )
@@ -150,7 +157,7 @@ def _stream(recorded: Recorded, topic: str, first_ns: int) -> StreamInfo:
         camera=camera.name,
         size_px=(camera.width_px, camera.height_px),
         images=len(shown),
-        image_bytes=sum(len(one.image.payload) for one in shown),
+        image_bytes=sum(len(one.image.content) for one in shown),
         from_s=(shown[0].image.stamp_ns - first_ns) / 1e9,
         to_s=(shown[-1].image.stamp_ns - first_ns) / 1e9,
         rate_hz=1e9 / period if len(shown) > 1 else 0.0,

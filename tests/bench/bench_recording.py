@@ -25,7 +25,7 @@ from rich.console import Console
 
 from common.frame import PixelFormat
 from common.protocol.message import CameraDescription, Pacing
-from common.recording.opened import inflate
+from common.recording.inflate import inflate
 from common.recording.recording_file import RecordingFile
 from common.recording.salvage import Message, Salvage
 from phone_host.model import Side

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from common.recording.opened import inflate
+from common.recording.inflate import inflate
 from common.recording.salvage import Message, Salvage
 from tests.bench.figures import Verdict
 from tests.bench.payloads import write_jpegs

@@ -15,7 +15,7 @@ from common.keys import KeyFolder
 from common.link.factory import parse_link
 from common.program.settings import resolve
 from common.protocol.wire import MAX_PAYLOAD_BYTES
-from common.recording.opened import inflate
+from common.recording.inflate import inflate
 from common.recording.recorded import read_recorded
 from phone_host.camera.factory import check_camera
 from phone_host.camera.jpegs import MAX_IMAGE_BYTES, JpegStream

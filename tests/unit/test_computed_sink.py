@@ -11,8 +11,9 @@ from common.errors import SettingsError
 from common.frame import PixelFormat
 from common.ledger import StageTimes
 from common.protocol.message import CameraDescription, Pacing
+from common.recording.inflate import inflate
 from common.recording.layout import CLOUD, DEPTH
-from common.recording.opened import inflate, mapped, open_recorded
+from common.recording.opened import mapped, open_recorded
 from common.recording.ros_messages import IMAGE, POINT_BYTES, POINT_CLOUD
 from common.recording.salvage import Message, Salvage
 from phone_host.model import FramePair, Processed, RectifiedPair, Result, Side

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from common.frame import PixelFormat, raw_bytes
 from common.recording.cdr import BrokenMessageError
-from common.recording.opened import inflate
+from common.recording.inflate import inflate
 from common.recording.recorded import read_recorded
 from common.recording.ros_messages import (
     COMPRESSED_IMAGE,

@@ -21,8 +21,9 @@ from common.recording.salvage import Message
 from phone_host.recording.copied import copy_recording
 from phone_host.recording.folders import export_folders, import_folders
 from phone_host.recording.opened import open_playback
-from phone_host.recording.other_topics import import_topics
+from phone_host.recording.other_topics import ImportOptions, import_topics
 from phone_host.recording.session_info import session_info
+from phone_host.recording.timed_images import TimeOptions
 from tests.support.recorded import LATE_NS, PERIOD_NS, ZERO_NS, payload, recording_file
 
 
@@ -162,13 +163,13 @@ def test_folders_hold_all_and_make_the_same_recording(tmp_path: Path) -> None:
     source = open_recorded(recording_file(tmp_path, 4))
     assert export_folders(source, tmp_path / "out") == {"left": 4, "right": 4}
     assert (tmp_path / "out" / "rig.yaml").read_bytes() == b"a: 1\n" * 50
-    import_folders([tmp_path / "out"], None, tmp_path / "again.mcap")
+    import_folders([tmp_path / "out"], TimeOptions(), tmp_path / "again.mcap")
     sides = [tmp_path / "out" / side for side in ("left", "right")]
     for folder in sides:
         (folder / "data.csv").unlink()
     times = tmp_path / "times.txt"
     times.write_text("".join(f"{(ZERO_NS + number * PERIOD_NS) / 1e9:.9f}\n" for number in range(4)))
-    import_folders(sides, times, tmp_path / "timed.mcap")
+    import_folders(sides, TimeOptions(times), tmp_path / "timed.mcap")
     again, timed = (open_recorded(tmp_path / f"{name}.mcap") for name in ("again", "timed"))
     for topic, images in source.images.items():
         assert [bytes(one.image.payload) for one in again.images[topic]] == [bytes(one.image.payload) for one in images]
@@ -177,21 +178,21 @@ def test_folders_hold_all_and_make_the_same_recording(tmp_path: Path) -> None:
     assert max(abs(stamp - ZERO_NS - number * PERIOD_NS) for number, stamp in enumerate(stamps)) < 1000
     times.write_text("1.0\n2.0\n")
     with pytest.raises(DataError, match="2 times"):
-        import_folders(sides, times, tmp_path / "no.mcap")
+        import_folders(sides, TimeOptions(times), tmp_path / "no.mcap")
 
 
 def test_two_topics_of_another_file(tmp_path: Path) -> None:
     """They may be exchanged; topics that are not there are named."""
     source = recording_file(tmp_path, 3)
     topics = ["/right/image/compressed", "/left/image/compressed"]
-    assert import_topics(source, topics, tmp_path / "two.mcap") == {"left": 3, "right": 3}
+    assert import_topics(source, ImportOptions(topics), tmp_path / "two.mcap").images == {"left": 3, "right": 3}
     left = open_recorded(tmp_path / "two.mcap").images["/left/image/compressed"]
     assert left[0].image.stamp_ns == ZERO_NS + LATE_NS
     with pytest.raises(DataError, match="no two such"):
-        import_topics(source, ["/left/image/compressed", "/x"], tmp_path / "no.mcap")
+        import_topics(source, ImportOptions(["/left/image/compressed", "/x"]), tmp_path / "no.mcap")
     copy_recording(source, tmp_path / "one.mcap", lambda m: m.channel is not None and "left" in m.channel.topic)
     with pytest.raises(DataError, match="one camera only"):
-        import_topics(tmp_path / "one.mcap", None, tmp_path / "no.mcap")
+        import_topics(tmp_path / "one.mcap", ImportOptions(), tmp_path / "no.mcap")
 
 
 def test_a_replay_needs_both_cameras(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def test_what_holds_nothing_is_not_repaired(tmp_path: Path, capsys: pytest.Captu
     writer.add("/chat", b"\0\1\0\0", sequence=0, log_ns=1, publish_ns=1)
     writer.finish()
     other.write_bytes(data)
-    assert "holds nothing that can be written: give a recording" in _error(
+    assert "holds no images that can be written: give a recording" in _error(
         ["repair", str(begun), "--out", str(out)], capsys
     )
     assert "(left out: 1 of /chat, a message that is not known here)" in _error(

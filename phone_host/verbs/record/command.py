@@ -108,4 +108,4 @@ def _tell(account: RecordingAccount, *, as_json: bool, is_interrupted: bool) -> 
         print(fitted(account.words))
     if is_interrupted:
         return INTERRUPTED
-    return 0 if account.is_whole else _BAD_DATA
+    return 0 if account.is_whole and account.frames else _BAD_DATA

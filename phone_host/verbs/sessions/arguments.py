@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from common.program.quantities import reading, seconds
+from common.program.quantities import frames_per_second, reading, seconds
 
 SUMMARY = "look into recordings, mend, cut and join them, and turn them into folders and back"
 
@@ -16,9 +16,12 @@ EXAMPLES = """  phone-host sessions info session.mcap --out info    # what is in
   phone-host sessions import kitti/sequences/00 --out kitti.mcap
   phone-host sessions import MH_01_easy/mav0 --out euroc.mcap
   phone-host sessions import left right --times times.txt --out two.mcap
+  phone-host sessions import left right --fps 30 --out two.mcap    # nothing tells their times
   phone-host sessions import bag.mcap --topics /cam0/image_raw /cam1/image_raw --out two.mcap
+  phone-host sessions import rosbag2_2026_11_28 --out two.mcap    # also a .bag of ROS 1
 """
 
+UNITS = ("s", "ms", "us", "ns")
 TASKS = ("info", "repair", "cut", "join", "export", "import")
 
 
@@ -58,7 +61,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--times",
         type=Path,
         metavar="FILE",
-        help="import: the times of the images, one a line: seconds, or whole nanoseconds",
+        help="import: the times of the images, one a line",
+    )
+    parser.add_argument(
+        "--stamps-in",
+        choices=UNITS,
+        help="import: the unit of the times in names, tables and --times (default: the one that is plausible)",
+    )
+    parser.add_argument(
+        "--fps",
+        type=reading(frames_per_second, "--fps"),
+        metavar="N",
+        help="import: the images came at N a second, whatever else tells their times",
     )
     parser.add_argument(
         "--topics",

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Final
 
 from rich.console import Console
 
@@ -15,20 +16,25 @@ from common.recording.layout import CAPTURE
 from common.recording.opened import is_recording, open_recorded
 from common.recording.recording_file import require_new
 from common.recording.salvage import Message
+from common.recording.stamps import MAX_HZ, MIN_HZ
 from common.versions import REPORT_FORMAT
-from common.words import counted
+from common.words import counted, listed
 from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
+from phone_host.recording.bags import as_recording
 from phone_host.recording.copied import CopyAccount, copy_recording
 from phone_host.recording.folders import export_folders, import_folders
+from phone_host.recording.given_times import Unit
 from phone_host.recording.joining import JoinAccount, join_recordings
-from phone_host.recording.other_topics import import_topics
+from phone_host.recording.other_topics import ImportOptions, import_topics
 from phone_host.recording.session_info import SessionInfo, session_info
+from phone_host.recording.timed_images import TimeOptions
 from phone_host.run.progress_bar import busy_bar, share_bar
 from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.sessions.page import info_page
 
+_MOST_LISTED: Final = 40
 Told = tuple[Mapping[str, object], str]
 """What is printed: as JSON, and as text."""
 
@@ -46,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     if options.task == "join":
         values, text = _join(options)
     else:
-        with busy_bar(f"sessions {options.task}"):
+        with busy_bar(f"sessions {options.task}"), as_recording(options.paths[0]) as options.source:
             values, text = tasks[options.task](options)
     if options.json:
         print(json_text({"format_version": REPORT_FORMAT, "command": "sessions", "task": options.task, **values}))
@@ -70,11 +76,17 @@ def _check(options: argparse.Namespace) -> None:
         raise SettingsError("--clock is for join", "leave it out")
     if options.task != "import" and (options.times is not None or options.topics is not None):
         raise SettingsError("--times and --topics are for import", "leave them out")
+    if options.task != "import" and (options.fps is not None or options.stamps_in is not None):
+        raise SettingsError("--fps and --stamps-in are for import", "leave them out")
+    if options.fps is not None and (options.times is not None or options.stamps_in is not None):
+        raise SettingsError("--fps leaves the times out that --times and --stamps-in tell of", "leave one of both out")
+    if options.fps is not None and not MIN_HZ <= options.fps <= MAX_HZ:
+        raise SettingsError(f"--fps is {options.fps:g}", "give 0.1 to 1000 images per second")
 
 
 def _info(options: argparse.Namespace) -> Told:
     path: Path = options.paths[0]
-    recorded = open_recorded(path)
+    recorded = open_recorded(options.source)
     info = session_info(recorded)
     page = None
     if options.out is not None:
@@ -103,8 +115,11 @@ def _lines(path: Path, info: SessionInfo) -> list[str]:
         lines.append(
             f"  time skew of the two cameras: {info.skew.median_ms:+.2f} ms, 95 % below {info.skew.far_ms:.2f} ms"
         )
-    others = [f"{topic} {count}" for topic, count in info.messages if topic not in {one.topic for one in info.streams}]
-    lines.append(f"  also: {', '.join([*others, *(name for name, _ in info.attachments)]) or 'nothing'}")
+    told = {*(one.topic for one in info.streams), *info.unused}
+    others = [f"{topic} {count}" for topic, count in info.messages if topic not in told]
+    lines.append(f"  also: {listed([*others, *(name for name, _ in info.attachments)], _MOST_LISTED) or 'nothing'}")
+    lines += _reasons(info.unused)
+    lines += [f"  {words}" for words in info.remarks]
     lines += [f"  missing: {words}" for words in info.damages]
     if not info.is_complete or info.damages:
         lines.append(
@@ -114,12 +129,12 @@ def _lines(path: Path, info: SessionInfo) -> list[str]:
 
 
 def _repair(options: argparse.Namespace) -> Told:
-    return _copied(options, copy_recording(options.paths[0], options.out))
+    return _copied(options, copy_recording(options.source, options.out))
 
 
 def _cut(options: argparse.Namespace) -> Told:
     path = options.paths[0]
-    recorded = open_recorded(path)
+    recorded = open_recorded(options.source)
     every = [shown for stream in recorded.images.values() for shown in stream]
     zero_ns = min(shown.image.stamp_ns for shown in every)
     first_ns = zero_ns + round(options.first * 1e9)
@@ -135,7 +150,7 @@ def _cut(options: argparse.Namespace) -> Told:
         topic = "" if message.channel is None else message.channel.topic
         return topic == CAPTURE or topic.endswith("camera_info") or first_ns <= message.log_ns < last_ns
 
-    return _copied(options, copy_recording(path, options.out, wanted))
+    return _copied(options, copy_recording(options.source, options.out, wanted))
 
 
 def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
@@ -148,10 +163,10 @@ def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
     told += [
         f"left out: {count} of {topic}, a message that is not known here" for topic, count in account.left_out.items()
     ]
-    if not account.messages:
+    if not account.images:
         options.out.unlink()
         why = f" ({'; '.join(told)})" if told else ""
-        raise DataError(f"{options.paths[0]} holds nothing that can be written{why}", "give a recording")
+        raise DataError(f"{options.paths[0]} holds no images that can be written{why}", "give a recording")
     written = f"{counted(account.messages, 'message')} written to {options.out}"
     values = {
         "file": str(options.out),
@@ -195,19 +210,33 @@ def _join_lines(out: Path, account: JoinAccount) -> list[str]:
 
 
 def _export(options: argparse.Namespace) -> Told:
-    recorded = open_recorded(options.paths[0])
+    recorded = open_recorded(options.source)
     counts = export_folders(recorded, options.out)
     text = f"{counts['left']} left and {counted(counts['right'], 'right image')} written to {options.out}"
-    return {"folder": str(options.out), "images": counts}, "\n  ".join(
-        [text, *(f"missing: {one.text}" for one in recorded.damages)]
-    )
+    told = [*(f"missing: {one.text}" for one in recorded.damages), *recorded.remarks]
+    return {"folder": str(options.out), "images": counts}, "\n  ".join([text, *told])
 
 
 def _import(options: argparse.Namespace) -> Told:
     first: Path = options.paths[0]
-    if len(options.paths) == 1 and is_recording(str(first)):
-        counts = import_topics(first, options.topics, options.out)
+    if len(options.paths) == 1 and (options.source.is_file() or is_recording(str(first))):
+        if options.times is not None or options.stamps_in is not None:
+            raise SettingsError("--times and --stamps-in are for folders of images", "leave them out")
+        account = import_topics(options.source, ImportOptions(options.topics, options.fps), options.out)
     else:
-        counts = import_folders(options.paths, options.times, options.out)
+        if options.topics is not None:
+            raise SettingsError(f"{first} is a folder and has no topics", "leave --topics out")
+        unit = None if options.stamps_in is None else Unit(options.stamps_in)
+        account = import_folders(options.paths, TimeOptions(options.times, options.fps, unit), options.out)
+    counts = account.images
     text = f"{counts['left']} left and {counted(counts['right'], 'right image')} written to {options.out}"
-    return {"file": str(options.out), "images": counts}, text
+    lines = [text, *(f"  {words}" for words in account.remarks), *_reasons(account.unused)]
+    values = {"file": str(options.out), "images": counts, "remarks": account.remarks, "unused": account.unused}
+    return values, "\n".join(lines)
+
+
+def _reasons(unused: Mapping[str, str]) -> list[str]:
+    """Return a line for each topic that is not used, but not more than can be read."""
+    lines = [f"  not used: {topic} ({reason})" for topic, reason in list(unused.items())[:_MOST_LISTED]]
+    more = len(unused) - _MOST_LISTED
+    return [*lines, f"  not used: {counted(more, 'more topic')}"] if more > 0 else lines

@@ -1,0 +1,83 @@
+"""Undoes the compression of other programs' files, with packages that ours do not need. Never takes more memory than the result may have."""
+
+from typing import Any, Final
+
+MOST_CHUNK_BYTES: Final = 128 << 20
+"""Largest chunk or message that is decompressed: one image of 8K in colour is 100 MB. Usual chunks have 1 to 4 MB."""
+
+ZSTD: Final = b"\x28\xb5\x2f\xfd"
+"""First bytes of what is compressed with zstd (RFC 8878, section 3.1.1)."""
+
+_PIECE_BYTES: Final = 1 << 20
+
+
+def inflate(compression: str, data: memoryview, size: int) -> memoryview:
+    """Undo a chunk's compression.
+
+    Args:
+        compression: its name: zstd or lz4.
+        data: the chunk.
+        size: how many bytes it claims to become.
+
+    Raises:
+        ValueError: it cannot be undone, becomes more than it claims, or claims more than any chunk has.
+    """
+    if size > MOST_CHUNK_BYTES:
+        raise ValueError(f"a chunk claims to become {size / 1e6:.0f} MB: more than is believed")
+    try:
+        match compression:
+            case "zstd":
+                plain = zstd_reader(data).read(size + 1)
+            case "lz4":
+                import lz4.frame  # noqa: PLC0415 - not ours to require
+
+                plain = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+            case _:
+                raise ValueError(f"a chunk is compressed with {compression[:40]}, which nobody here knows")
+    except ImportError as error:
+        package = "zstandard" if compression == "zstd" else compression
+        raise ValueError(f"a chunk is compressed with {compression}: pip install {package}") from error
+    except ValueError:
+        raise
+    except Exception as error:
+        raise ValueError(f"a chunk cannot be decompressed ({error})") from error
+    if len(plain) != size:
+        raise ValueError("a chunk cannot be decompressed (it has another length than it claims)")
+    return memoryview(plain)
+
+
+def unzstd(data: bytes) -> bytes:
+    """Undo the compression of a message, which does not claim a size.
+
+    Raises:
+        ImportError: the package zstandard is not installed.
+        ValueError: it cannot be undone, or becomes larger than any message.
+    """
+    parts: list[bytes] = []
+    size = 0
+    reader = zstd_reader(data)
+    try:
+        while part := reader.read(_PIECE_BYTES):
+            parts.append(part)
+            size += len(part)
+            if size > MOST_CHUNK_BYTES:
+                raise ValueError("a message becomes larger than is believed")
+    except ValueError:
+        raise
+    except Exception as error:
+        raise ValueError(f"a message cannot be decompressed ({error})") from error
+    return b"".join(parts)
+
+
+def zstd_reader(source: Any) -> Any:  # noqa: ANN401 - bytes or a file; the package has no types
+    """Return what gives the decompressed bytes of a source piece by piece.
+
+    Args:
+        source: bytes, or a file that is open for reading.
+
+    Raises:
+        ImportError: the package zstandard is not installed.
+    """
+    import zstandard  # noqa: PLC0415 - not ours to require
+
+    return zstandard.ZstdDecompressor(max_window_size=MOST_CHUNK_BYTES).stream_reader(source)

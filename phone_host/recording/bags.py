@@ -1,0 +1,274 @@
+"""Bags of ROS 1 and folders of rosbag2 as MCAP files, so that everything that takes a recording takes them.
+
+What is a bag is known by its first bytes, and so is compression, of a whole file as of each message: nothing depends on metadata.yaml. Messages
+with images are copied as they are; of others only that they are there. ROS 1 and sqlite3 are read with the library rosbags, an extra.
+"""
+
+import bz2
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, BinaryIO, Final
+
+from common.errors import DataError, UnavailableError
+from common.name_order import name_order
+from common.recording.inflate import MOST_CHUNK_BYTES, ZSTD, inflate, unzstd, zstd_reader
+from common.recording.mcap_writer import Topic
+from common.recording.opened import mapped
+from common.recording.recorded import image_kind
+from common.recording.recording_file import RecordingFile, written
+from common.recording.ros1 import EXTRA, ROS1
+from common.recording.salvage import MAGIC, Channel, Message, Salvage
+
+_ROS1_BAG: Final = b"#ROSBAG V2.0\n"
+_SQLITE: Final = b"SQLite format 3\0"
+_METADATA: Final = "metadata.yaml"
+_HEAD_BYTES: Final = 16
+_SUFFIXES: Final = frozenset({".db3", ".mcap", ".zstd"})
+_MOST_RATIO: Final = 64
+_ALWAYS_BYTES: Final = 64 << 20
+"""A compressed file may become this large, or so many times its size."""
+
+_PIECE_BYTES: Final = 1 << 20
+_MOST_TOPICS: Final = 4096
+_CHUNK_OP: Final = b"\x05"
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path is a bag: a folder with files of rosbag2, one of those, or a file of ROS 1."""
+    if path.is_dir():
+        return bool(_parts(path))
+    return path.is_file() and _head(path).startswith((_ROS1_BAG, _SQLITE, ZSTD))
+
+
+@contextmanager
+def as_recording(path: Path) -> Iterator[Path]:
+    """Give a bag as an MCAP file while the block runs; any other path as it is.
+
+    Args:
+        path: a bag, or a recording.
+
+    Raises:
+        DataError: it cannot be read, or is not believed.
+        UnavailableError: there is no room for the copy.
+    """
+    if not is_bag(path):
+        yield path
+        return
+    try:
+        folder = TemporaryDirectory(prefix="tandemscan-bag-")
+    except OSError as error:
+        raise UnavailableError(f"{path} cannot be copied ({error.strerror})", "make room in TMPDIR") from None
+    with folder as name:
+        copy = Path(name) / "bag.mcap"
+        try:
+            _copy(path, copy, Path(name))
+        except ImportError as error:
+            raise DataError(f"{path} needs the package {error.name}", f"install it: {EXTRA}") from None
+        try:
+            yield copy
+        except DataError as error:
+            error.problem = error.problem.replace(str(copy), str(path))  # the copy's name means nothing to a user
+            raise
+
+
+def _copy(path: Path, copy: Path, folder: Path) -> None:
+    """Write the messages of all parts of a bag into one file."""
+    parts = [_plain(part, folder) for part in (_parts(path) if path.is_dir() else [path])]
+    channels: dict[Channel, Topic] = {}
+    for part in parts:
+        for channel in _channels(part, path):
+            channels[channel] = Topic(channel.topic, channel.encoding, channel.kind, f"{channel.encoding}msg")
+    if len(channels) > _MOST_TOPICS:
+        raise DataError(f"{path} has {len(channels)} topics: more than is believed", "give a bag with fewer")
+    with written(copy, tuple(channels.values())) as file:
+        for part in parts:
+            for number, message in enumerate(_messages(part, path)):
+                _add(file, message, number)
+
+
+def _add(file: RecordingFile, message: Message, number: int) -> None:
+    channel, data = message.channel, bytes(message.data)
+    if channel is None:
+        return
+    if not image_kind(channel):
+        data = b""
+    elif data.startswith(ZSTD):
+        data = unzstd(data)
+    file.add(channel.topic, data, sequence=number & 0xFFFFFFFF, log_ns=message.log_ns, publish_ns=message.publish_ns)
+
+
+def _head(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(_HEAD_BYTES)
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror})", "name a recording, FILE.mcap, or a bag") from None
+
+
+def _parts(folder: Path) -> list[Path]:
+    """Return the files of a rosbag2 folder, in their order; none: it is none."""
+    try:
+        found = [path for path in folder.iterdir() if path.suffix in _SUFFIXES and path.is_file()]
+    except OSError as error:
+        raise DataError(f"{folder} cannot be read ({error.strerror})", "check its permissions") from None
+    names = {path.name for path in found}
+    is_bag = (folder / _METADATA).is_file() or any(".db3" in name for name in names)
+    return sorted(found, key=name_order) if is_bag else []
+
+
+def _plain(path: Path, folder: Path) -> Path:
+    """Return a file without compression: itself, or a copy.
+
+    Raises:
+        DataError: it cannot be decompressed, or becomes larger than is believed.
+    """
+    if not _head(path).startswith(ZSTD):
+        return path
+    out = folder / path.with_suffix("").name
+    most, size = max(_ALWAYS_BYTES, _MOST_RATIO * path.stat().st_size), 0
+    with path.open("rb") as packed, out.open("wb") as plain:
+        reader = zstd_reader(packed)
+        try:
+            while piece := reader.read(_PIECE_BYTES):
+                size += len(piece)
+                if size > most:
+                    raise DataError(f"{path} becomes larger than is believed", "undo its compression: unzstd FILE")
+                plain.write(piece)
+        except OSError as error:
+            raise UnavailableError(f"{path} cannot be decompressed ({error.strerror})", "make room in TMPDIR") from None
+        except DataError:
+            raise
+        except Exception as error:
+            raise DataError(f"{path} cannot be decompressed ({error})", "copy it again") from error
+    return out
+
+
+def _channels(part: Path, bag: Path) -> list[Channel]:
+    if _head(part).startswith(MAGIC):
+        records = Salvage(mapped(part), inflate).records()
+        return list({each.channel: None for each in records if isinstance(each, Message) and each.channel is not None})
+    with _opened(part, bag) as reader:
+        return [_channel(connection, part) for connection in reader.connections]
+
+
+def _messages(part: Path, bag: Path) -> Iterator[Message]:
+    """Return the messages of a file in their order."""
+    if _head(part).startswith(MAGIC):
+        yield from (each for each in Salvage(mapped(part), inflate).records() if isinstance(each, Message))
+        return
+    with _opened(part, bag) as reader:
+        channels = {connection.id: _channel(connection, part) for connection in reader.connections}
+        messages = iter(reader.messages(reader.connections))
+        while True:
+            try:
+                connection, log_ns, data = next(messages)
+            except StopIteration:
+                return
+            except Exception as error:
+                raise _broken(bag, error) from error
+            yield Message(channels[connection.id], connection.id, 0, log_ns, log_ns, memoryview(data))
+
+
+def _channel(connection: Any, part: Path) -> Channel:  # noqa: ANN401 - rosbags' own
+    encoding = ROS1 if _head(part).startswith(_ROS1_BAG) else "cdr"
+    return Channel(connection.topic, connection.msgtype, encoding)
+
+
+@contextmanager
+def _opened(part: Path, bag: Path) -> Iterator[Any]:
+    """Open a file with rosbags.
+
+    Raises:
+        ImportError: rosbags is not installed.
+        DataError: the file is broken, or not believed.
+    """
+    if _head(part).startswith(_ROS1_BAG):
+        import rosbags.rosbag1  # noqa: PLC0415 - an extra
+
+        _require_believable(part)
+        reader: Any = rosbags.rosbag1.Reader(part)
+    elif not _head(part).startswith(_SQLITE):
+        raise DataError(f"{part} is no file of a bag", "give a .bag, a rosbag2 folder, or FILE.mcap")
+    elif part.suffix != ".db3":
+        raise DataError(f"{part} is a file of sqlite3 without the ending .db3", "give it that ending")
+    else:
+        import rosbags.rosbag2  # noqa: PLC0415 - an extra
+
+        reader = rosbags.rosbag2.Reader(part)
+    try:
+        reader.open()
+    except Exception as error:
+        raise _broken(bag, error) from error
+    try:
+        yield reader
+    finally:
+        reader.close()
+
+
+def _broken(bag: Path, error: Exception) -> DataError:
+    words = " ".join(str(error).split())[:200]
+    return DataError(f"{bag} cannot be read ({words})", "mend it first: rosbag reindex, or ros2 bag reindex")
+
+
+def _require_believable(path: Path) -> None:
+    """Refuse a bag of ROS 1 whose chunks become larger than they say, before the library holds one of them.
+
+    Source: ROS Bag Format Version 2.0, section Records.
+
+    Raises:
+        DataError: so it is.
+    """
+    length = struct.Struct("<I")
+    total, most = 0, _MOST_RATIO * path.stat().st_size + _ALWAYS_BYTES
+    refusal = DataError(f"{path} becomes larger than is believed", "undo its compression: rosbag decompress FILE")
+    with path.open("rb") as file:
+        file.seek(len(_ROS1_BAG))
+        while len(head := file.read(length.size)) == length.size:
+            fields = _fields(file.read(min(length.unpack(head)[0], _PIECE_BYTES)))
+            size = length.unpack(file.read(length.size).ljust(length.size, b"\0"))[0]
+            behind = file.tell() + size
+            if fields.get(b"op") == _CHUNK_OP:
+                total += _chunk_bytes(file, size, fields, most - total, refusal)
+            file.seek(behind)
+
+
+def _fields(data: bytes) -> dict[bytes, bytes]:
+    """Return the fields of a record's header."""
+    fields, at = {}, 0
+    while at + 4 <= len(data):
+        size = int.from_bytes(data[at : at + 4], "little")
+        name, _, value = data[at + 4 : at + 4 + size].partition(b"=")
+        fields[name] = value
+        at += 4 + size
+    return fields
+
+
+def _chunk_bytes(file: BinaryIO, size: int, fields: dict[bytes, bytes], most: int, refusal: DataError) -> int:
+    """Return how many bytes a chunk becomes. None of them is kept.
+
+    Raises:
+        DataError: the refusal: it becomes more than it may.
+    """
+    name = fields.get(b"compression", b"none")
+    limit = min(most, MOST_CHUNK_BYTES)
+    if name == b"bz2":
+        decompressor: Any = bz2.BZ2Decompressor()
+    elif name == b"lz4":
+        import lz4.frame  # noqa: PLC0415 - rosbags brings it
+
+        decompressor = lz4.frame.LZ4FrameDecompressor()
+    else:
+        return size
+    total, packed = 0, file.read(size)
+    try:
+        while not decompressor.eof and (packed or not decompressor.needs_input):
+            total += len(decompressor.decompress(packed, _PIECE_BYTES))
+            packed = b""
+            if total > limit:
+                raise refusal
+    except (OSError, RuntimeError, EOFError, ValueError):
+        return total  # the library says what is wrong with it
+    return total
