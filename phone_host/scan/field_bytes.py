@@ -4,6 +4,7 @@ A head line, then a deflated npz of arrays: nothing in it is code, and whatever 
 """
 
 import io
+import struct
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -24,9 +25,35 @@ _HEAD: Final = b"tandemscan field 2\n"
 _LEVEL: Final = 1
 """Ten times as fast as the usual 6, for a tenth more bytes."""
 
-_MOST_BYTES: Final = 4 << 30
+_MOST_RATIO: Final = 64
+_ALWAYS_BYTES: Final = 96 << 20
+"""The arrays may take this much memory, or so many times the bytes of the file. Real fields are 2 to 10 times as large as theirs."""
+
+_FINEST_M: Final = 1e-5
+_FARTHEST_M: Final = 1000.0
+_MOST_PLACE: Final = 1 << 24
+"""Limits of what a scan with cameras can be: voxels of 10 um, depths of 1 km, and blocks that the native library can count."""
+
+_BROKEN: Final = (
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    EOFError,
+    OSError,
+    MemoryError,
+    RuntimeError,
+    struct.error,
+    zlib.error,
+    zipfile.BadZipFile,
+)
+"""What reading arrays raises for bytes that hold none."""
+
 Arrays = dict[str, NDArray[Any]]
 Read = TypeVar("Read")
+Kind = TypeVar("Kind", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,16 +126,28 @@ def unpacked(content: bytes, head: bytes, read: Callable[[Arrays], Read], refusa
         DataError: the refusal.
     """
     try:
-        if not content.startswith(head):
-            raise ValueError("another head")
-        inflater = zlib.decompressobj()
-        plain = inflater.decompress(content[len(head) :], _MOST_BYTES)
-        if not inflater.eof:
-            raise EOFError
-        with np.load(io.BytesIO(plain), allow_pickle=False) as found:
-            return read(dict(found))
-    except (ValueError, KeyError, IndexError, EOFError, OSError, zlib.error, zipfile.BadZipFile) as error:
+        return read(_arrays(content, head))
+    except _BROKEN as error:
         raise refusal from error
+
+
+def _arrays(content: bytes, head: bytes) -> Arrays:
+    """Return the arrays in some bytes. No more memory is taken on the way than they may have."""
+    if not content.startswith(head):
+        raise ValueError("another head")
+    inflater = zlib.decompressobj()
+    plain = inflater.decompress(memoryview(content)[len(head) :], _MOST_RATIO * len(content) + _ALWAYS_BYTES)
+    if not inflater.eof:
+        raise EOFError
+    with zipfile.ZipFile(io.BytesIO(plain)) as parts:
+        held = parts.infolist()
+    # Ours are stored as they are: others could become a thousand times larger, or lie over each other.
+    if any(part.compress_type != zipfile.ZIP_STORED or part.file_size != part.compress_size for part in held):
+        raise ValueError("compressed twice")
+    if sum(part.file_size for part in held) > len(plain):
+        raise ValueError("parts lie over each other")
+    with np.load(io.BytesIO(plain), allow_pickle=False) as found:
+        return dict(found)
 
 
 def arrays_of(field: KeptField) -> Arrays:
@@ -134,27 +173,42 @@ def field_in(held: Arrays) -> KeptField:
         ValueError, KeyError: they hold none.
     """
     voxel_m, far_m, most_bytes, truncation_voxels = held["model"].astype(np.float64).tolist()
-    if not (0 < voxel_m < 1 and far_m > 0 and 0 < most_bytes < 1e15 and 1 <= truncation_voxels < 100):
+    is_possible = _FINEST_M <= voxel_m < 1 and 0 < far_m <= _FARTHEST_M
+    if not (is_possible and 0 < most_bytes < 1e15 and 1 <= truncation_voxels < 100):
         raise ValueError("impossible settings")
     settings = VolumeSettings(
         voxel_m=voxel_m, far_m=far_m, most_bytes=int(most_bytes), truncation_voxels=truncation_voxels
     )
     count = len(held["block_places"])
     blocks = BlockValues(
-        held["block_places"].astype(np.int32).reshape(count, 3),
-        held["field"].astype(np.int16).reshape(count, VOXELS),
-        held["weights"].astype(np.uint16).reshape(count, VOXELS),
-        held["colours"].astype(np.uint8).reshape(count, VOXELS, 3),
+        _whole(held["block_places"], np.int32).reshape(count, 3),
+        _whole(held["field"], np.int16).reshape(count, VOXELS),
+        _whole(held["weights"], np.uint16).reshape(count, VOXELS),
+        _whole(held["colours"], np.uint8).reshape(count, VOXELS, 3),
     )
+    if np.any(np.abs(blocks.places.astype(np.int64)) > _MOST_PLACE):
+        raise ValueError("blocks beyond all distances")
+    if len(np.unique(blocks.places, axis=0)) != count:
+        raise ValueError("two blocks in one place")
     return KeptField(settings, blocks, _carved_in(held))
 
 
 def _carved_in(held: Arrays) -> Carved | None:
-    counts = held["carved"].astype(np.uint8)
+    counts = _whole(held["carved"], np.uint8)
     kinds, tall, deep, wide = counts.shape
     if kinds != 3:
         raise ValueError("cells")
     if not counts.size:
         return None
     x, y, z, voxels, views = held["cells"][:5].astype(np.int64).tolist()
-    return Carved(Cells((x, y, z), (wide, deep, tall), voxels, float(held["cells"][5])), counts, views)
+    voxel_m = float(held["cells"][5])
+    if not (_FINEST_M <= voxel_m < 1 and 0 < voxels < _MOST_PLACE and max(map(abs, (x, y, z))) < _MOST_PLACE):
+        raise ValueError("impossible cells")
+    return Carved(Cells((x, y, z), (wide, deep, tall), voxels, voxel_m), counts, views)
+
+
+def _whole(array: NDArray[Any], kind: type[Kind]) -> NDArray[Kind]:
+    """Return an array that must be of a kind. One that is converted would take memory twice."""
+    if array.dtype != kind:
+        raise ValueError("of another kind")
+    return array

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
+from common.imagesize.head import MOST_SIDE_PX
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.field_bytes import Arrays, KeptField, arrays_of, field_in, packed, unpacked
@@ -18,6 +19,9 @@ from phone_host.scan.tracking_words import Tracking, Weakness
 
 _HEAD: Final = b"tandemscan submap 2\n"
 _MAT_VALUES: Final = 6
+_RIGID: Final = 1e-4
+_FARTHEST_M: Final = 1e5
+"""Lengths of a pose that no scan has: how far a rotation may be from one, and 100 km."""
 
 
 def submap_bytes(submap: Submap) -> bytes:
@@ -70,6 +74,10 @@ def _read(held: Arrays) -> Submap:
     field, count = field_in(held), len(held["names"])
     focal_px, baseline_m, cx_px, cy_px, doffs_px = held["geometry"].tolist()
     width_px, height_px = held["size_px"].tolist()
+    if not (np.isfinite(held["geometry"]).all() and focal_px > 0 and baseline_m > 0):
+        raise ValueError("impossible geometry")
+    if not (0 < int(width_px) <= MOST_SIDE_PX and 0 < int(height_px) <= MOST_SIDE_PX):
+        raise ValueError("impossible size")
     numbers = held["numbers"].reshape(count, 5).tolist()
     pairs = tuple(
         ScannedPair(
@@ -101,6 +109,8 @@ def _read(held: Arrays) -> Submap:
 
 
 def _places(held: Arrays) -> tuple[Place, ...]:
+    if not np.isfinite(held["place_points"]).all():
+        raise ValueError("impossible points")
     ends = np.cumsum(held["place_sizes"])[:-1]
     points, descriptors = np.split(held["place_points"], ends), np.split(held["descriptors"], ends)
     poses = _poses(held["place_poses"])
@@ -126,4 +136,13 @@ def _rows(poses: list[SE3]) -> NDArray[np.float64]:
 
 
 def _poses(rows: NDArray[np.float64]) -> list[SE3]:
+    """Return poses.
+
+    Raises:
+        ValueError: one is no rigid motion, or of a length that no scan has.
+    """
+    rotations = rows[:, :, :3]
+    are_rigid = np.allclose(rotations @ rotations.transpose(0, 2, 1), np.eye(3), atol=_RIGID)
+    if not (are_rigid and np.all(np.abs(rows[:, :, 3]) < _FARTHEST_M)):
+        raise ValueError("impossible poses")
     return [SE3(row[:, :3].copy(), row[:, 3].copy()) for row in rows]

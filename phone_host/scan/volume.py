@@ -6,6 +6,7 @@ Sources: B. Curless and M. Levoy, "A Volumetric Method for Building Complex Mode
 """
 
 import ctypes
+import math
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Final
@@ -260,8 +261,10 @@ class Volume:
         if seeds_m is not None and seeds_m.shape != shape:
             raise ValueError(f"seeds {seeds_m.shape} for an image {shape}")
         seeds = None if seeds_m is None else np.ascontiguousarray(seeds_m, np.float32)
+        far_m = self._farthest_m(camera)
         if self._library is None:
-            return Surface(*volume_numpy.cast(self.blocks, self.settings, camera, seeds))
+            settings = replace(self.settings, far_m=far_m)
+            return Surface(*volume_numpy.cast(self.blocks, settings, camera, seeds))
         points, normals = np.empty((*shape, 3), np.float32), np.empty((*shape, 3), np.float32)
         arrays = self._arrays()
         job = CastJob(
@@ -271,13 +274,24 @@ class Volume:
             normals=normals.ctypes.data,
             world_camera=rows_of(camera.world_camera),
             near_m=self.settings.voxel_m,
-            far_m=self.settings.far_m,
+            far_m=far_m,
             search=int(seeds is None),
             threads=self._threads,
         )
         aim(job, camera.geometry, shape)
         self._library.cast(job)
         return Surface(points, normals)
+
+    def _farthest_m(self, camera: Camera) -> float:
+        """Return the depth behind which a camera can see no block, or the far limit: rays end there."""
+        places = self.blocks.places[: self.blocks.count]
+        if not len(places):
+            return 0.0
+        side_m = SIDE * self.settings.voxel_m
+        ends_m = np.array([places.min(axis=0) - 1.0, places.max(axis=0) + 2.0]) * side_m
+        corners_m = np.array(list(product(*ends_m.T)))
+        farthest_m = float(camera.world_camera.inverse().apply(corners_m)[:, 2].max())
+        return min(farthest_m, self.settings.far_m) if math.isfinite(farthest_m) else 0.0
 
     def _make_room(self, depth: Depth, camera: Camera) -> None:
         """Add the blocks that a depth image shows; grow while there is memory."""

@@ -26,6 +26,7 @@ _SEED_TRUNCATIONS: Final = F(1.5)
 _JUMP: Final = F(0.025)
 _KNOWN: Final = F(0.75)
 _ROOT_STEPS: Final = 2
+_MAX_STEPS: Final = 1 << 17
 _MEMORY: Final = 2
 
 
@@ -190,7 +191,9 @@ def _found(field: _Field, settings: VolumeSettings, rays: _Rays, start: Floats, 
     voxel, truncation, scale = F(settings.voxel_m), F(settings.truncation_m), F(1) / F(settings.voxel_m)
     depth, before, result = start.copy(), np.zeros(len(start), np.int64), np.full(len(start), F(np.nan))
     walking = np.flatnonzero(depth < end)
-    while len(walking):
+    for _ in range(_MAX_STEPS):
+        if not len(walking):
+            break
         at = rays.only(walking).at(depth[walking], scale)
         values, known, there = field.at(np.floor(at + F(0.5)).astype(np.int32))
         values = values / F(ONE)

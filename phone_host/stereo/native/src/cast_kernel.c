@@ -16,6 +16,7 @@
 #define KNOWN 0.75f /* least share of a place between eight voxels that must be known */
 
 enum {
+    MAX_STEPS = 1 << 17, /* of a ray: 130 m in voxels of 1 mm. Far from the volume, steps vanish in the rounding of the depth */
     ROOT_STEPS = 2, /* of the false position: the field is nearly linear there */
     MEMORY = 2      /* unknown voxels after one before the surface: at a slant, views leave single ones out */
 };
@@ -108,7 +109,7 @@ static float found(const struct tandem_cast_job *job, struct walk *walk, const f
     const float voxel = job->volume->voxel_m, truncation = job->volume->truncation_m;
     float depth = from;
     int before = 0;
-    while (depth < to) {
+    for (int step = 0; step < MAX_STEPS && depth < to; step++) {
         float at[3];
         point_at(job, ray, depth, at);
         const int64_t place = voxel_at(walk, floor_of(at[0] + 0.5f), floor_of(at[1] + 0.5f), floor_of(at[2] + 0.5f));
@@ -123,8 +124,8 @@ static float found(const struct tandem_cast_job *job, struct walk *walk, const f
             return before ? root(job, walk, ray, depth - 2 * voxel, depth + voxel) : NAN;
         }
         before = MEMORY;
-        const float step = 0.8f * value * truncation;
-        depth += step > voxel ? step : voxel;
+        const float stride = 0.8f * value * truncation;
+        depth += stride > voxel ? stride : voxel;
     }
     return NAN;
 }
