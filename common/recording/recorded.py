@@ -16,6 +16,7 @@ from common.imagesize.read import read_head
 from common.protocol.message import CameraDescription
 from common.recording.cdr import BrokenMessageError
 from common.recording.image_layouts import UnreadableEncodingError
+from common.recording.inflate import ZSTD
 from common.recording.layout import (
     ABOUT,
     CAPTURE,
@@ -286,6 +287,8 @@ def read_message(kind: str, encoding: str, message: Message) -> RecordedImage:
         NoRos1Error: it is a message of ROS 1, and what reads them is not installed.
         BrokenMessageError: it is no image.
     """
+    if bytes(message.data[: len(ZSTD)]) == ZSTD:
+        raise UnreadableEncodingError("each message is compressed: give the folder of the bag")
     read = read_ros1_image if encoding == ROS1 else read_image
     image, stored = read(kind, message.data), message.stored
     if stored is None:

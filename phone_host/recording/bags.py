@@ -66,7 +66,8 @@ def as_recording(path: Path) -> Iterator[Path]:
         try:
             _copy(path, copy, Path(name))
         except ImportError as error:
-            raise DataError(f"{path} needs the package {error.name}", f"install it: {EXTRA}") from None
+            package = (error.name or "rosbags").partition(".")[0]
+            raise DataError(f"{path} needs the package {package}", f"install it: {EXTRA}") from None
         try:
             yield copy
         except DataError as error:
@@ -191,9 +192,9 @@ def _opened(part: Path, bag: Path) -> Iterator[Any]:
         _require_believable(part)
         reader: Any = rosbags.rosbag1.Reader(part)
     elif not _head(part).startswith(_SQLITE):
-        raise DataError(f"{part} is no file of a bag", "give a .bag, a rosbag2 folder, or FILE.mcap")
+        raise DataError(f"{bag} is no bag, or broken ({part.name})", "give a .bag, a rosbag2 folder, or FILE.mcap")
     elif part.suffix != ".db3":
-        raise DataError(f"{part} is a file of sqlite3 without the ending .db3", "give it that ending")
+        raise DataError(f"{bag} is a file of sqlite3 without the ending .db3 ({part.name})", "give it that ending")
     else:
         import rosbags.rosbag2  # noqa: PLC0415 - an extra
 
