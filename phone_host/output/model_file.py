@@ -40,6 +40,22 @@ class Model:
     voxel_m: float
 
 
+def mesh_file(path: Path) -> Path:
+    """Return the mesh that a path names: the one in a scan's folder, or the path itself.
+
+    Raises:
+        DataError: there is none.
+    """
+    kind = kind_of(path)
+    if kind is Kind.MISSING:
+        raise DataError(f"{path} does not exist", "give the folder of a scan, or a mesh file")
+    if kind is not Kind.FOLDER:
+        return path
+    if kind_of(path / _MODEL) is Kind.MISSING:
+        raise DataError(f"{path} holds no {_MODEL}", "give the folder that phone-host scan wrote")
+    return path / _MODEL
+
+
 def read_model(path: Path, unit_m: float) -> Model:
     """Read a model.
 
@@ -50,13 +66,8 @@ def read_model(path: Path, unit_m: float) -> Model:
     Raises:
         DataError: there is none, it is no mesh, or a spoiled one.
     """
-    kind = kind_of(path)
-    if kind is Kind.MISSING:
-        raise DataError(f"{path} does not exist", "give the folder of a scan, or a mesh file")
-    is_scan = kind is Kind.FOLDER
-    file = path / _MODEL if is_scan else path
-    if is_scan and kind_of(file) is Kind.MISSING:
-        raise DataError(f"{path} holds no {_MODEL}", "give the folder that phone-host scan wrote")
+    file = mesh_file(path)
+    is_scan = file != path
     try:
         content = read_whole(file, _MOST_BYTES)
     except OSError as error:

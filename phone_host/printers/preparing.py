@@ -10,10 +10,12 @@ from typing import Final
 import numpy as np
 
 from common.errors import DataError, SettingsError, UnavailableError
+from common.places import Kind, kind_of
 from phone_host.output.atomic import write_bytes
 from phone_host.output.meshes.formats import mesh_bytes
 from phone_host.output.meshes.printable import Printer, problems
 from phone_host.output.meshes.solid import Solid
+from phone_host.output.model_file import mesh_file
 from phone_host.output.upright import Upright, upright_model
 from phone_host.printers.binary_gcode import text_gcode
 from phone_host.printers.door import Job
@@ -42,6 +44,21 @@ class Wanted:
 def is_gcode(what: Path) -> bool:
     """Return whether a name is one of G-code."""
     return what.suffix.lower() in _SUFFIXES
+
+
+def require_input(what: Path) -> None:
+    """Refuse what does not exist, before a printer is asked or a slicer is looked for.
+
+    Args:
+        what: G-code, a scan's folder or a mesh file.
+
+    Raises:
+        DataError: there is no such file, or no model in the folder.
+    """
+    if not is_gcode(what):
+        mesh_file(what)
+    elif kind_of(what) is Kind.MISSING:
+        raise DataError(f"{what} does not exist", "give the file that a slicer wrote")
 
 
 @contextmanager

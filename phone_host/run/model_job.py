@@ -18,7 +18,7 @@ from phone_host.printers.bed import Bed
 from phone_host.printers.door import Job, Wishes
 from phone_host.printers.doors import door_to, key_of
 from phone_host.printers.journal import Journal
-from phone_host.printers.preparing import Wanted, job_of
+from phone_host.printers.preparing import Wanted, job_of, require_input
 from phone_host.printers.printer_uri import ServerUri, read_uri
 from phone_host.printers.printing import Place, RunningPrint, printed
 from phone_host.printers.progress import Ended, Progress
@@ -215,7 +215,7 @@ def prepare_print(
     config: Path | None = None,
     tell: Callable[[str], None] = lambda _: None,
 ) -> PreparedPrint:
-    """Do all that comes before a print: ask the printer, check and slice the model. Nothing is heated or moved; it may take minutes.
+    """Do all that comes before a print: find the file, ask the printer, check and slice the model. Nothing is heated or moved; it may take minutes.
 
     Args:
         what: the folder of a scan, a mesh file, or G-code.
@@ -228,6 +228,7 @@ def prepare_print(
         TandemError: it cannot be printed, or the printer is not ready.
     """
     uri = read_uri(printer)
+    require_input(what)
     door = door_to(uri, key_of(uri, *printer_keys(config)) if isinstance(uri, ServerUri) else "")
     door.require_ready()
     with ExitStack() as kept:

@@ -100,11 +100,13 @@ def test_keys_are_asked_for_and_never_shown(gcode: Path, tmp_path: Path) -> None
 
 
 def test_refusals_come_before_the_slicing(tmp_path: Path) -> None:
-    """Offline, busy and in error: exit 3 in one line, though the model does not even exist."""
-    assert done(tmp_path, "none.stl", "--printer", "octoprint://127.0.0.1:9", "--yes").returncode == 3
+    """Offline, busy and in error: exit 3 in one line, though the model is no mesh and there may be no slicer."""
+    model = tmp_path / "empty.stl"
+    model.touch()
+    assert done(tmp_path, str(model), "--printer", "octoprint://127.0.0.1:9", "--yes").returncode == 3
     for faults, words in ((ServerFaults(condition="printing", rate=0.0), "is busy"), (ServerFaults(condition="error", words="Thermal runaway"), "Thermal runaway")):  # fmt: skip
         with print_server(ServerKind.MOONRAKER, faults) as there:
-            ended = done(tmp_path, "none.stl", *with_key(tmp_path, there.uri))
+            ended = done(tmp_path, str(model), *with_key(tmp_path, there.uri))
         assert ended.returncode == 3
         assert words in ended.stderr
         assert len(ended.stderr.splitlines()) == 1

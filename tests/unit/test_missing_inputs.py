@@ -26,6 +26,9 @@ def _logs_as_before() -> Iterator[None]:
         (("export", "none", "--to", "stl", *_OUT), 4),
         (("print", "none.stl", "--printer", "file:out.gcode"), 4),
         (("print", "none.gcode", "--printer", "file:out.gcode"), 4),
+        (("print", "none.stl", "--printer", "octoprint://127.0.0.1:9", "--yes"), 4),
+        (("print", "none.gcode", "--printer", "moonraker://127.0.0.1:9", "--yes"), 4),
+        (("print", "none.stl", "--slicer", "cura", "--printer", "serial:none", "--yes"), 4),
         (("printcheck", "none"), 4),
         (("sessions", "info", "none.mcap"), 4),
         (("sessions", "repair", "none.mcap", "--out", "out.mcap"), 4),
@@ -51,8 +54,9 @@ def test_what_is_missing_has_one_exit_code(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The line names the missing file, and nothing is left behind."""
+    """The line names the missing file, also on a machine without other programs such as slicers, and nothing is left behind."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
     assert main(words) == code
     printed = capsys.readouterr()
     assert not printed.out
