@@ -163,3 +163,16 @@ def smoothed(disparity: Disparity, window_px: int, step_px: float, reach_px: flo
     outside = np.float32(-16 * step_px)
     averaged = cv2.bilateralFilter(np.where(known, disparity, outside), window_px, step_px, reach_px)
     return np.where(known, averaged, np.float32(np.nan))
+
+
+def within_right_image(disparity: Disparity) -> Disparity:
+    """Drop values that point out of the right image: an average with larger neighbours can carry one there.
+
+    Args:
+        disparity: (H, W) float32, px, NaN = none.
+
+    Returns:
+        A new array. A pixel of column x has less than x + 1: a whole disparity of at most x, and what refines it.
+    """
+    columns = np.arange(disparity.shape[1], dtype=np.float32)
+    return np.where(disparity < columns + 1, disparity, np.float32(np.nan))

@@ -126,7 +126,8 @@ class SgbmMatcher:
         bridged = filters.bridged(kept, GAP_PX, GAP_STEP_PX)
         disparity = without_doubtful_bridges(bridged, kept, guide, grain)
         disparity = filters.unlocked(disparity, LOCKING_PX)
-        return filters.smoothed(disparity, SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX)
+        averaged = filters.smoothed(disparity, SMOOTH_WINDOW_PX, SMOOTH_STEP_PX, SMOOTH_REACH_PX)
+        return filters.within_right_image(averaged)
 
     def _guiding(self, left: Image, right: Image, factor: int) -> Disparity:
         """Match smaller images smoothly; the result has the full size."""

@@ -6,7 +6,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
@@ -149,6 +149,7 @@ def test_one_row_keeps_the_rules(name: MatcherName, width: int) -> None:
 @every_matcher
 @settings(deadline=None, max_examples=20)
 @given(size=st.tuples(st.integers(1, 40), st.integers(1, 70)), seed=st.integers(0, 1000), by_px=st.integers(0, 30))
+@example(size=(9, 34), seed=966, by_px=4)
 def test_no_value_points_out_of_the_right_image(
     name: MatcherName, size: tuple[int, int], seed: int, by_px: int
 ) -> None:
