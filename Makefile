@@ -19,7 +19,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
+.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow test-fresh coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -46,8 +46,11 @@ test: $(READY) ## run the unit, cases, scan, contract, native, system, hostile, 
 $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
 	@.ci/test $*
 
-test-slow: $(READY) ## run the tests with large samples, too slow for every day; the unit tests use small ones
-	@$(BIN)/python -m pytest -q -n 2 -m slow tests/unit tests/scan tests/contract tests/print
+test-slow: $(READY) ## run the tests with large samples, too slow for every day, and the properties with new random examples; the other tests use small, equal ones
+	@$(BIN)/python -m pytest -q -n 2 -m "slow or hypothesis" --hypothesis-profile=exploring tests/unit tests/scan tests/contract tests/print
+
+test-fresh: ## run `make test` in a root made by debootstrap that holds git, make, gcc and python3-venv, quiet and beside busy loops (root; BUSY=0 or 1: one of them, TARGETS="test-unit", REBUILD=1)
+	@.ci/fresh
 
 coverage: $(READY) ## run the unit, cases, scan, contract and print tests; lists branches of the pure modules that no test takes (CI requires 98 %)
 	@COVERAGE=1 .ci/test unit cases scan contract print
@@ -108,7 +111,7 @@ docs-run: $(READY) ## run every command line of the documentation that needs no 
 
 fuzz: .venv/.ready-fuzz ## feed pairs to the native matcher, requests to the page, and hostile bytes to every reader, guided by coverage (BYTES=1e9, MINUTES=10, TARGETS="match page wire")
 	@$(if $(TARGETS),$(if $(filter match,$(TARGETS)),,:)) $(BIN)/python -m tests.native.fuzz_match $(if $(MINUTES),--minutes $(MINUTES))
-	@$(if $(TARGETS),$(if $(filter page,$(TARGETS)),,:)) env EXAMPLES=500 $(BIN)/python -m pytest -q -o timeout=1800 tests/web/test_api_description.py
+	@$(if $(TARGETS),$(if $(filter page,$(TARGETS)),,:)) env EXAMPLES=500 $(BIN)/python -m pytest -q -o timeout=1800 --hypothesis-profile=exploring tests/web/test_api_description.py
 	@$(if $(TARGETS),$(if $(filter-out match page,$(TARGETS)),,:)) $(BIN)/python -m tests.fuzz $(if $(BYTES),--bytes $(BYTES)) $(if $(MINUTES),--minutes $(MINUTES)) $(filter-out match page,$(TARGETS))
 
 .venv/.ready-fuzz: $(READY) requirements/fuzz.txt
