@@ -83,19 +83,19 @@ def test_answers_that_are_lost_cost_time_and_nothing_else(wire: dict[str, float]
     assert there.resends > 10
 
 
-def test_cancelling_switches_the_heaters_off_within_a_second() -> None:
+def test_cancelling_switches_the_heaters_off_at_once() -> None:
     """In the middle of drawing, nothing of the print follows but what was under way."""
-    wishes, cancelled_s = Wishes(), list[float]()
+    wishes, cancelled_at = Wishes(), list[int]()
 
     def watch(progress: MarlinSender) -> None:
-        if progress.done > 100 and not cancelled_s:
-            cancelled_s.append(time.monotonic())
+        if progress.done > 100 and not cancelled_at:
+            cancelled_at.append(progress.done)
             wishes.cancel()
 
     with printer(Faults(delay_s=0.004)) as there:
         sender = printed(there, cube(1500), wishes, watch)
         assert (there.nozzle, there.bed) == (0.0, 0.0)
-        assert there.cooled_s - cancelled_s[0] < 1.0
+        assert len(there.done) - cancelled_at[0] < 50, "lines that were under way, and five that cool"
         assert there.done[-5:] == ["M108", "M104 S0", "M140 S0", "M107", "M84"]
     assert sender.phase is Phase.CANCELLED
 

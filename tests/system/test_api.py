@@ -94,7 +94,6 @@ def test_a_slow_program_gets_the_newest_and_holds_nobody_up(live: tuple[str, str
     (account,) = [sink for sink in snapshot.sinks if sink.name == "program"]
     assert account.written + account.dropped + account.waiting == snapshot.processed
     assert account.dropped >= 27
-    assert snapshot.delays.spread("write").p50_ns < 1e6
 
 
 def test_a_program_may_leave_at_any_time(live: tuple[str, str]) -> None:

@@ -96,7 +96,7 @@ def test_stamps_come_onto_the_hosts_clock_with_a_true_uncertainty() -> None:
         made.read(camera, lambda: len(made.frames) >= 20)
         for frame in made.frames:
             error_ns = abs(frame.exposed.ns - round(round(frame.exposed.ns * 30e-9) / 30 * 1e9))
-            assert error_ns <= frame.uncertainty_ns <= frame.bound_ns < 5_000_000
+            assert error_ns <= frame.uncertainty_ns <= frame.bound_ns
         origin = camera.health.origin
         assert origin is not None
         assert origin.epoch == "the browser's own clock"
@@ -325,7 +325,7 @@ def test_a_board_and_a_browser_are_paired(tmp_path: Path) -> None:
     numbers = saved_numbers(out)
     assert len(numbers) == 20
     assert [left for left, _ in numbers] == [right for _, right in numbers]
-    assert all(abs(ledger["time_skew_ns"]) < 5_000_000 for ledger in ledgers(out))
+    assert all(abs(ledger["time_skew_ns"]) < 500_000_000 / fps for ledger in ledgers(out)), "half a period"
     camera = json.loads((out / "report.json").read_text())["host_frames"]["camera"]
     assert camera["stamps"]["epoch"] == "CLOCK_MONOTONIC"
     remembered = json.loads((out / "cameras.json").read_text())

@@ -107,13 +107,15 @@ def test_every_sloppy_manner(film: Path, manner: str) -> None:
 def test_an_image_is_stamped_with_its_own_arrival(film: Path) -> None:
     """A server that sends the next boundary together with the previous image does not make stamps early: they follow the sending, minus the latency."""
     fps = 10
-    with serving(film, "early_boundary", fps=fps) as server, camera_of(f"{server.uri}?latency_ms=200") as camera:
-        came = frames(grabs(camera, lambda came: len(frames(came)) >= 20))
-        assert camera.health.latency_ns == 200_000_000
     period_ns = 1_000_000_000 // fps
-    # Sent at k / fps, arrived later: modulo the period the stamps lie just after the grid. The fastest ones show it.
-    late_ns = sorted((frame.exposed.ns + 200_000_000) % period_ns for frame in came)
-    assert late_ns[0] < period_ns // 2
+
+    def fastest_ns(came: list[Frame]) -> int:
+        # Sent at k / fps, arrived later: modulo the period the stamps lie just after the grid. The fastest ones show it, on a busy machine after a while.
+        return min((frame.exposed.ns + 200_000_000) % period_ns for frame in came)
+
+    with serving(film, "early_boundary", fps=fps) as server, camera_of(f"{server.uri}?latency_ms=200") as camera:
+        grabs(camera, lambda came: len(frames(came)) >= 20 and fastest_ns(frames(came)) < period_ns // 2)
+        assert camera.health.latency_ns == 200_000_000
 
 
 def test_truncated_images_are_told_of(film: Path) -> None:

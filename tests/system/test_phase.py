@@ -29,18 +29,21 @@ def test_cameras_out_of_step_are_steered(arguments: list[str], most_ms: float, t
         with host(run, tmp_path) as running:
             assert running.wait() == 0, running.stderr
             report = running.json()
-    skews_ms = [abs(line["time_skew_ns"]) / 1e6 for line in ledgers(out)]
-    assert 20 < skews_ms[0] < 22
-    assert max(skews_ms[-40:]) <= most_ms
+    records = ledgers(out)
+    # A busy machine knows its clocks less well, and says by how much.
+    skews_ms = [abs(line["time_skew_ns"]) / 1e6 for line in records]
+    doubts_ms = [line["uncertainty_ns"] / 1e6 for line in records]
+    assert abs(skews_ms[0] - PHASE_MS) < 1 + doubts_ms[0]
+    assert all(skew <= most_ms + doubt for skew, doubt in zip(skews_ms[-40:], doubts_ms[-40:], strict=True))
     phase = report["phase"]
-    assert abs(phase["time_skew_ms"]) <= most_ms
+    assert abs(phase["time_skew_ms"]) <= most_ms + max(doubts_ms[-40:])
     assert phase["period_ms"] == 1000 / FPS
     if arguments:
         assert phase["alignment"]["state"] == "aligned"
-        assert 20 < phase["alignment"]["before_ms"] < 22
+        assert abs(phase["alignment"]["before_ms"] - PHASE_MS) < 1 + max(doubts_ms)
         assert phase["alignment"]["corrections"] == 1
     else:
-        assert phase["time_skew_ms"] == pytest.approx(PHASE_MS, abs=1)
+        assert phase["time_skew_ms"] == pytest.approx(PHASE_MS, abs=1 + max(doubts_ms[-40:]))
         assert abs(phase["drift_ppm"]) < 100
         assert "alignment" not in phase
 
@@ -56,8 +59,10 @@ def test_the_boards_image_is_taken_to_the_hosts_moment(tmp_path: Path) -> None:
             assert running.wait() == 0, running.stderr
             report = running.json()
     records = ledgers(out)
-    # Reading the clock twice takes a microsecond; decoding and warping an image takes at least a hundred.
-    assert sum(record["stages_ns"]["interpolate"] > 50_000 for record in records) >= len(records) - 1
+    # Reading the clock twice takes next to nothing; the stage decodes an image and warps it, so it takes as long as decoding on any machine.
+    stages = [record["stages_ns"] for record in records]
+    assert sum(one["interpolate"] > one["decode"] / 10 for one in stages) >= len(records) - 1
     assert all(sum(record["stages_ns"].values()) <= record["processing_ns"] for record in records)
     assert report["stages_ms"]["interpolate"]["p50"] > 0
-    assert report["time_skew_ms"]["p50"] == pytest.approx(PHASE_MS, abs=1)
+    doubt_ms = max(record["uncertainty_ns"] for record in records) / 1e6
+    assert report["time_skew_ms"]["p50"] == pytest.approx(PHASE_MS, abs=1 + doubt_ms)

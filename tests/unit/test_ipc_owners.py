@@ -170,7 +170,6 @@ def test_a_folder_where_anybody_may_exchange_sockets_is_refused(
 
 
 @needs_root
-@pytest.mark.timeout(60)
 def test_a_listener_that_accepts_nobody_holds_up_nobody(shared: Path) -> None:
     """Another user's socket with a full queue is reported at once as taken, with the user's name."""
     path = shared / "board"

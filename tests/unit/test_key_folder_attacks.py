@@ -150,7 +150,6 @@ def test_a_hard_link_to_a_file_of_roots_is_replaced_not_written(place: Path, fol
 
 @pytest.mark.parametrize("name", ["key", "peers.json", "spent-codes"])
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir], ids=["pipe", "folder"])
-@pytest.mark.timeout(30)
 def test_a_pipe_or_folder_under_a_files_name_is_one_line(folder: Path, name: str, make: Callable[[Path], None]) -> None:
     """Root does not wait for the other end of a pipe, and says which path is no file."""
     as_nobody(lambda: make(folder / name))
@@ -225,7 +224,6 @@ def test_a_link_that_leads_to_itself_is_one_line(folder: Path) -> None:
         KeyFolder(folder / "a" / "b").own()
 
 
-@pytest.mark.timeout(60)
 def test_a_race_for_the_folder_gives_the_service_nothing(place: Path, folder: Path) -> None:
     """The service exchanges file and folder for links as fast as it can while root renews the key 300 times: root's files are unchanged."""
     (place / "roots").mkdir(mode=0o755)

@@ -97,7 +97,6 @@ def refused(out: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000007", LIST])
 @pytest.mark.parametrize("plant", [plant_link, plant_file, os.mkfifo, Path.mkdir])
-@pytest.mark.timeout(30)
 def test_what_is_not_ours_ends_the_first_run(name: str, plant: Callable[[Path], None], tmp_path: Path) -> None:
     """A link, file, pipe or folder under a name that the run needs is refused before anything is changed."""
     (tmp_path / "precious").write_text("precious")
@@ -108,7 +107,6 @@ def test_what_is_not_ours_ends_the_first_run(name: str, plant: Callable[[Path], 
 
 @pytest.mark.parametrize("name", ["delays.jsonl", "report.json", "index.html", "pair-000000", LIST])
 @pytest.mark.parametrize("plant", [plant_link, os.mkfifo])
-@pytest.mark.timeout(30)
 def test_a_link_or_pipe_in_place_of_ours_ends_a_later_run(
     name: str, plant: Callable[[Path], None], tmp_path: Path
 ) -> None:

@@ -22,7 +22,7 @@ def asked(program: Played) -> list[tuple[Do, dict[str, str]]]:
 
 def until_asked(program: Played, do: Do) -> None:
     """Wait until the page has asked for something."""
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 60
     while do not in [command.do for command in program.commands]:
         assert time.monotonic() < deadline, program.commands
         time.sleep(0.02)
