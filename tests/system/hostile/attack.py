@@ -44,6 +44,7 @@ class Outcome:
         gaps_s: time from the end of each cause to the first of many pairs.
         memory: peak of the attacked process, in multiples of its normal peak; 0: not measured.
         faults: everything else that must not happen, in words.
+        slow: limits of processor time that were missed, in words.
         figures: what else was measured, in words.
     """
 
@@ -53,6 +54,7 @@ class Outcome:
     gaps_s: list[float] = field(default_factory=list)
     memory: float = 0.0
     faults: list[str] = field(default_factory=list)
+    slow: list[str] = field(default_factory=list)
     figures: list[str] = field(default_factory=list)
 
     @property
@@ -76,9 +78,9 @@ class Outcome:
         return wrong + memory + self.faults
 
     def missed(self) -> list[str]:
-        """All failed checks, including the recovery times."""
+        """All failed checks, including the recovery times and processor time."""
         too_long = any(gap > limit for gap, limit in zip(self.gap_s, MOST_GAP_S, strict=True))
-        return self.broken() + (["back too late"] if too_long else [])
+        return self.broken() + self.slow + (["back too late"] if too_long else [])
 
 
 @dataclass(frozen=True, slots=True)
