@@ -52,6 +52,19 @@ class Joined:
     weakness: Weakness
 
 
+@dataclass(frozen=True, slots=True)
+class Joining:
+    """What came of joining a piece to the model.
+
+    Attributes:
+        views: its views, which are part of the model now; none: it stays apart.
+        is_refused: whether the piece's own surface does not fit the model where it would lie.
+    """
+
+    views: tuple[Joined, ...] = ()
+    is_refused: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """A piece to which a view belongs, where it was taken in its axes, and how it lies there."""
@@ -208,7 +221,18 @@ class Pieces:
                 self._loops.append(self._loop(number, other.pose @ pose.inverse()))
         return found
 
-    def join(self, view: View, pose: SE3, met: Found, *, least: int = 0) -> tuple[Joined, ...]:
+    def leave(self, number: int) -> None:
+        """Track the model from now on: a view of the piece that was tracked turned out to belong there, and the piece does not.
+
+        Args:
+            number: of the view.
+        """
+        of = self._apart.get(self._active)
+        if of is not None:
+            of.views = [each for each in of.views if each.number != number]
+        self._active = _MODEL
+
+    def join(self, view: View, pose: SE3, met: Found, *, least: int = 0, is_strict: bool = False) -> Joining:
         """Take the piece that is tracked, and those connected with it, into the model; that is tracked from now on.
 
         Args:
@@ -216,16 +240,18 @@ class Pieces:
             pose: where it was taken, in the piece's axes.
             met: the same in the model's.
             least: earlier views of the piece that must fit the model, too.
+            is_strict: whether a single view of the piece that does not fit refuses; else as many must as fit, and one more.
 
         Returns:
-            Their views; none: the piece contradicts the model, and stays apart, or the model is tracked already.
+            Their views; none: the piece stays apart, or the model is tracked already.
         """
         if self._active == _MODEL:
-            return ()
+            return Joining()
         loop = self._loop(_MODEL, met.pose @ pose.inverse())
-        others = self._also(view, loop)
-        if others is None or len(others) < least:
-            return ()
+        others, refused = self._also(view, loop)
+        is_refused = refused > (0 if is_strict else len(others))
+        if is_refused or len(others) < least:
+            return Joining(is_refused=is_refused)
         self._loops += [loop, *others]
         self._start(loop)
         poses = settled(
@@ -236,10 +262,10 @@ class Pieces:
             joined += self._taken_in(self._apart[number], poses[number])
             self._give_up(number)
         self._active = _MODEL
-        return tuple(sorted(joined, key=lambda each: each.number))
+        return Joining(tuple(sorted(joined, key=lambda each: each.number)))
 
-    def _also(self, view: View, loop: Loop) -> list[Loop] | None:
-        """Lay the piece's own surface, as its views saw it, against the model; None: most of what lies on the model does not fit."""
+    def _also(self, view: View, loop: Loop) -> tuple[list[Loop], int]:
+        """Lay the piece's own surface, as its views saw it, against the model; return the loops of the views that fit, and how many lie there and do not."""
         of = self._apart[self._active]
         while view.grey.shape[1] > _SMALL_PX:
             view = half_view(view)
@@ -257,7 +283,7 @@ class Pieces:
                 loops.append(self._loop(_MODEL, start @ fit.start_now @ seen.pose.inverse()))
             else:
                 refused += 1
-        return None if refused > len(loops) else loops
+        return loops, refused
 
     def _loop(self, here: int, here_active: SE3) -> Loop:
         return Loop(here=here, there=self._active, here_there=here_active, turn=_LOOP_TURN, shift_m=_LOOP_SHIFT_M)

@@ -3,7 +3,8 @@
 Odometry says how the camera moved since the last view; the depth is then laid against the model's surface as seen from there. A view that does
 not fit there is compared with the places that were seen. A gate judges what comes out. Only what passes it is fused, so a wrong pose never spoils the model.
 A camera that is lost goes on in a piece of its own, until one of its views shows a place of the model: then the piece is joined to it
-(`pieces`). Nothing that a view shows raises an exception.
+(`pieces`). Where the piece's own surface refuses that place, the next view decides: two in a row whose places agree with the motion between them
+belong to the model, and the piece stays apart (decision 0084). Nothing that a view shows raises an exception.
 """
 
 import math
@@ -17,7 +18,7 @@ from phone_host.scan.loop_closing import LoopCloser, LoopSettings
 from phone_host.scan.mat_pose import MatSaid
 from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
 from phone_host.scan.piece import Piece, PoseGate
-from phone_host.scan.pieces import Joined, Pieces
+from phone_host.scan.pieces import Found, Joined, Joining, Pieces
 from phone_host.scan.places import Place
 from phone_host.scan.registration import Registered
 from phone_host.scan.stretches import Placed
@@ -75,6 +76,15 @@ class Tracked:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Waiting:
+    """A view that shows a place of the model and waits for the next one to agree: its number, the view, and how it lies in the model."""
+
+    number: int
+    view: View
+    found: Found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class TrackerState:
     """What a tracker knows beside the model.
 
@@ -120,6 +130,7 @@ class Tracker:
         self._settings, self._odometry = settings, Odometry(_ODOMETRY)
         self._pose = SE3.identity() if start is None else start  # in the axes of the piece that is tracked
         self._was_lost = False
+        self._waiting: _Waiting | None = None
         self._count = 0
         self._stamp_s = float("nan")
 
@@ -194,27 +205,55 @@ class Tracker:
         found = self._pieces.recognised(view)
         if found is None:
             return None
-        weakness = Weakness.NONE if found.fit.told == _DIRECTIONS else Weakness.FLAT
         if found.piece is self._model:
             # The corners still tell where the view is in the piece that it leaves: its surface has to confirm that.
             is_followed = moved.is_known and moved.inliers >= self._gate.weak_inliers
-            joined = self._pieces.join(view, believed, found, least=_CONFIRMED) if is_followed else ()
-            self._pieces.go_on_in(found.piece)
-            self._was_lost = True
-            return self._fused(view, found.pose, moved, weakness, found.fit, joined=joined)
+            joining = self._pieces.join(view, believed, found, least=_CONFIRMED) if is_followed else Joining()
+            if joining.is_refused and not self._is_agreed(found, moved):
+                self._waiting = _Waiting(self._count, view, found)
+                return None
+            return self._back(view, found, moved, joining.views)
         self._pieces.go_on_in(found.piece)
-        return self._apart(view, found.pose, moved, weakness, found.fit)
+        return self._apart(view, found.pose, moved, _flatness(found), found.fit)
 
     def _apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         """Go on in a piece that is not part of the model yet; join it where the view shows a place of the model."""
         met = None if weakness is Weakness.FEW_CORNERS else self._pieces.met(view, pose)
-        if met is None or met.fit.told < _DIRECTIONS:  # later views tell more of where the piece is
+        if met is None:
             return self._still_apart(view, pose, moved, weakness, fit)
-        joined = self._pieces.join(view, pose, met)
-        if not joined:
-            return self._still_apart(view, pose, moved, weakness, fit)
+        is_agreed = self._is_agreed(met, moved)
+        joining = Joining()
+        if met.fit.told == _DIRECTIONS:
+            joining = self._pieces.join(view, pose, met)
+        elif is_agreed:  # depths that leave a direction open do not tell alone where the piece is
+            joining = self._pieces.join(view, pose, met, least=_CONFIRMED, is_strict=True)
+        if joining.views or (joining.is_refused and is_agreed):
+            return self._back(view, met, moved, joining.views)
+        self._waiting = _Waiting(self._count, view, met)
+        return self._still_apart(view, pose, moved, weakness, fit)
+
+    def _is_agreed(self, found: Found, moved: Moved) -> bool:
+        """Return whether the view before showed a place of the model, too, from where odometry has led to this one."""
+        before = self._waiting
+        if before is None or before.number != self._count - 1:
+            return False
+        if not moved.is_known or moved.inliers < self._gate.weak_inliers:
+            return False
+        apart = (moved.before_now.inverse() @ before.found.pose.inverse() @ found.pose).pose()
+        gate = self._gate
+        return bool(np.linalg.norm(apart[3:]) <= gate.most_shift_m and np.linalg.norm(apart[:3]) <= gate.most_turn)
+
+    def _back(self, view: View, found: Found, moved: Moved, joined: tuple[Joined, ...]) -> Tracked:
+        """Go on in the model with a view that shows a place of it, and with the view before that has waited for it."""
+        before = self._waiting
+        if before is not None and self._is_agreed(found, moved) and before.number not in {one.number for one in joined}:
+            self._pieces.leave(before.number)
+            self._pieces.fuse(before.view, before.found.pose, before.found.fit)
+            weakness = _flatness(before.found)
+            joined = (*joined, Joined(before.number, before.found.pose, Tracking.RELOCALISED, weakness))
+        self._pieces.go_on_in(found.piece)
         self._was_lost = True
-        return self._fused(view, met.pose, moved, weakness, met.fit, joined=joined)
+        return self._fused(view, found.pose, moved, _flatness(found), found.fit, joined=joined)
 
     def _still_apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
@@ -293,3 +332,7 @@ class Tracker:
     def _keep(self, view: View) -> None:
         if self._loops is not None:
             self._loops.keep(self._count, view, self._settings.most_bytes - self._pieces.held_bytes)
+
+
+def _flatness(found: Found) -> Weakness:
+    return Weakness.NONE if found.fit.told == _DIRECTIONS else Weakness.FLAT

@@ -13,7 +13,7 @@ from phone_host.scan.cells import Cells
 from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.piece import Piece, PoseGate
-from phone_host.scan.pieces import Pieces
+from phone_host.scan.pieces import Joining, Pieces
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracker import Tracked, Tracker
@@ -198,7 +198,7 @@ def test_pieces_that_met_each_other_are_joined_together(tracked: int) -> None:
     met = pieces.met(papered(0), in_axes(tracked, SEEN[0]))
     assert met is not None
     assert near(met.pose, SEEN[0])
-    joined = pieces.join(papered(0), in_axes(tracked, SEEN[0]), met)
+    joined = pieces.join(papered(0), in_axes(tracked, SEEN[0]), met, is_strict=True).views
     assert [view.number for view in joined] == [1, 2]
     assert all(near(view.world_camera, SEEN[view.number]) for view in joined)
     assert pieces.active is pieces.model
@@ -211,9 +211,22 @@ def test_a_piece_that_contradicts_the_model_stays_apart() -> None:
     met = pieces.met(papered(0), beside)
     assert met is not None
     before = pieces.model.volume.blocks.weights.copy()
-    assert pieces.join(papered(0), beside, met) == ()
+    assert pieces.join(papered(0), beside, met) == Joining(is_refused=True)
     assert pieces.active is known[2]
     assert np.array_equal(pieces.model.volume.blocks.weights, before)
+
+
+def test_a_view_that_belongs_to_the_model_leaves_its_piece() -> None:
+    """The model is tracked then; if the piece is joined later, the view is not counted a second time."""
+    pieces, known = three_papers()
+    pieces.fuse_apart(3, papered(2), in_axes(2, SEEN[0]), Weakness.NONE, None)
+    pieces.leave(3)
+    assert pieces.active is pieces.model
+    pieces.go_on_in(known[2])
+    pose = in_axes(2, SEEN[0])
+    met = pieces.met(papered(0), pose)
+    assert met is not None
+    assert [view.number for view in pieces.join(papered(0), pose, met).views] == [2]
 
 
 def test_only_surfaces_confirm_a_piece() -> None:
@@ -226,8 +239,8 @@ def test_only_surfaces_confirm_a_piece() -> None:
     pose = in_axes(2, SEEN[0])
     met = pieces.met(papered(0), pose)
     assert met is not None
-    assert pieces.join(doubled(papered(0)), pose, met, least=2) == ()
-    joined = pieces.join(doubled(papered(0)), pose, met, least=1)
+    assert pieces.join(doubled(papered(0)), pose, met, least=2) == Joining()
+    joined = pieces.join(doubled(papered(0)), pose, met, least=1).views
     assert [view.number for view in joined] == [2, 3]
     assert near(joined[0].world_camera, SEEN[2])
 
