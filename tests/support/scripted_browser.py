@@ -20,7 +20,10 @@ import aiohttp
 HEAD: Final = struct.Struct("<BBHHHIIdddddII")
 JPEG, LUMA = 0, 1
 
-SLOW_S: Final = 30.0
+SLOW_S: Final = 60.0
+
+_LAST_TURNS: Final = 5
+"""Turns of the loop in which aiohttp closes its sockets, after the session has ended."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,6 +157,8 @@ class ScriptedBrowser:
         await self._stop.wait()
         visits.cancel()
         await asyncio.gather(visits, return_exceptions=True)
+        for _ in range(_LAST_TURNS):
+            await asyncio.sleep(0)
 
     async def _visits(self) -> None:
         async with aiohttp.ClientSession(self._address) as client:

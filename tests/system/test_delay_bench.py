@@ -13,7 +13,7 @@ import pytest
 
 from phone_host.children.board_process import board_process
 from tests.support.numbered import write_film
-from tests.support.programs import Program, board, free_port, program, until
+from tests.support.programs import Program, board, children_of, command_of, free_port, program, until
 from tests.support.trace_format import checked
 
 SHORT = ["--links", "ipc", "--size", "160x120", "--fps", "15", "--seconds", "2"]
@@ -29,10 +29,8 @@ def boards_of(running: Program) -> list[int]:
 
 
 def boards_below(pid: int) -> list[int]:
-    listing = subprocess.run(
-        ["ps", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=False
-    ).stdout
-    return [int(line.split()[0]) for line in listing.splitlines() if "board_agent" in line]
+    """The same, of a process; from /proc, since a small machine has no `ps`."""
+    return [child for child in children_of(pid) if b"board_agent" in command_of(child)]
 
 
 def is_running(pid: int) -> bool:
@@ -277,7 +275,8 @@ def test_a_board_that_dies_is_one_clear_line(tmp_path: Path) -> None:
     """If the board process is killed during a run, the benchmark says so and exits 3."""
     with bench([*SHORT, "--seconds", "600"], tmp_path) as running:
         until(lambda: bool(boards_of(running)), "a board process of the benchmark")
-        subprocess.run(["kill", "-9", *(str(pid) for pid in boards_of(running))], check=True)
+        for pid in boards_of(running):
+            os.kill(pid, signal.SIGKILL)
         assert running.wait() == 3
     assert "board-agent ended" in running.stderr
 
