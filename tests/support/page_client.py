@@ -24,7 +24,7 @@ class PageClient:
 
     def get(self, path: str) -> bytes:
         """Get something."""
-        with urllib.request.urlopen(f"{self.address}{path}", timeout=20) as answer:
+        with urllib.request.urlopen(f"{self.address}{path}", timeout=60) as answer:
             return bytes(answer.read())
 
     def state(self) -> Any:
@@ -36,7 +36,7 @@ class PageClient:
         headers = {"Authorization": f"Bearer {self._token}", "Content-Type": "application/json"}
         asked = urllib.request.Request(f"{self.address}{path}", json.dumps(content).encode(), headers)
         try:
-            with urllib.request.urlopen(asked, timeout=20) as answer:
+            with urllib.request.urlopen(asked, timeout=60) as answer:
                 return json.loads(answer.read())
         except urllib.error.HTTPError as refused:
             return json.loads(refused.read())
