@@ -23,6 +23,7 @@ from typing import BinaryIO, Final
 
 from common.errors import DataError, UnavailableError
 from common.groups import group_of_one
+from common.temporary import open_temporary, remove_left_behind
 from common.unfinished import unfinished
 
 _TURN: Final = threading.RLock()
@@ -170,8 +171,9 @@ def replacing_in(folder: int, name: str, *, mode: int = 0o666, durable: bool = T
     Raises:
         OSError: as the operating system raises it; nothing remains of the partial file.
     """
-    temporary = f".{name}.{os.urandom(8).hex()}.part"
-    descriptor = os.open(temporary, _NEW, mode, dir_fd=folder)
+    if durable:  # the others are many, or lie in a folder that is removed as a whole
+        remove_left_behind(folder, name)
+    temporary, descriptor = open_temporary(folder, name, lambda new: os.open(new, _NEW, mode, dir_fd=folder))
     try:
         with unfinished(lambda: os.unlink(temporary, dir_fd=folder)):
             # Closed before the rename: a full disk may show only when the last buffer is flushed.

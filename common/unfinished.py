@@ -37,6 +37,6 @@ def remove_unfinished() -> None:
     From now on no block of `unfinished` ends: another thread that comes to its end waits there for the process's.
     """
     _LOCK.acquire(timeout=_PATIENCE_S)
-    for remove in list(_BEGUN.values()):
+    for remove in reversed(list(_BEGUN.values())):  # what was begun last lies within what was begun before
         with suppress(OSError):
             remove()

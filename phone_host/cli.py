@@ -121,7 +121,9 @@ def _run(options: argparse.Namespace) -> int:
         print(as_found(_NEXT_STEPS), end="")
         return 0
     command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
-    with interruptible(native=options.verb in _NATIVE):
+    from phone_host.output.folder_lock import command_locks  # noqa: PLC0415 - the help needs none
+
+    with interruptible(native=options.verb in _NATIVE), command_locks():
         code: int = command.run(options)
     return code
 

@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from common.appearing import new_file
 from common.errors import SettingsError, UnavailableError
 from common.frame import Buffer
 from common.recording.layout import topics
@@ -31,15 +32,18 @@ class RecordingFile:
     Args:
         path: the file; it must not exist.
         channels: its topics.
+        descriptor: of the empty file, open for writing, where somebody has made it; it may still have another name.
 
     Raises:
         UnavailableError: the file exists or cannot be made.
     """
 
-    def __init__(self, path: Path, channels: tuple[Topic, ...] | None = None) -> None:
+    def __init__(self, path: Path, channels: tuple[Topic, ...] | None = None, descriptor: int | None = None) -> None:
         self.path = path
         try:
-            self._file: BinaryIO = path.open("xb", buffering=0)
+            self._file: BinaryIO = (
+                path.open("xb", buffering=0) if descriptor is None else os.fdopen(descriptor, "wb", 0)
+            )
         except FileExistsError:
             raise _taken(path) from None
         except OSError as error:
@@ -185,21 +189,26 @@ def _behind(parts: list[Buffer], size: int) -> list[Buffer]:
 
 @contextmanager
 def written(path: Path, channels: tuple[Topic, ...] | None = None) -> Iterator[RecordingFile]:
-    """Write a recording while the block runs, and end it in order.
+    """Write a recording while the block runs, and end it in order. It appears whole or not at all.
 
     Args:
         path: the file; it must not exist.
         channels: its topics.
 
     Raises:
-        UnavailableError: it exists, or cannot be written; what was written until then can be read.
+        UnavailableError: it exists, or cannot be written; nothing of it is left then.
     """
-    file = RecordingFile(path, channels)
     try:
-        yield file
-        file.close()
+        with new_file(path) as descriptor:
+            file = RecordingFile(path, channels, os.dup(descriptor))
+            try:
+                yield file
+                file.close()
+            finally:
+                file.abandon()
+    except FileExistsError:
+        raise _taken(path) from None
     except OSError as error:
-        file.abandon()
         raise UnavailableError(
             f"{path} cannot be written ({error.strerror})", "make room, or name another disk"
         ) from None

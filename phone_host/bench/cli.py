@@ -46,7 +46,9 @@ def _run(options: argparse.Namespace) -> int:
     command = importlib.import_module(
         "phone_host.bench." + ("profile_list" if options.emulate == "list" else "command")
     )
-    with interruptible():
+    from phone_host.output.folder_lock import command_locks  # noqa: PLC0415 - the help needs none
+
+    with interruptible(), command_locks():
         code: int = command.run(options)
     return code
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -37,7 +38,8 @@ from phone_host.bench.tables import (
 )
 from phone_host.bench.trace import TracedRun, trace_json
 from phone_host.output.atomic import write_text
-from phone_host.output.listed import claim
+from phone_host.output.folder_lock import lock_for_command
+from phone_host.output.listed import claim, replacing_results
 from phone_host.run.progress_bar import busy_bar
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.matcher_names import matcher_named
@@ -154,6 +156,7 @@ def _settings(options: argparse.Namespace) -> RunSettings:
 
 def _make_folder(folder: Path) -> None:
     try:
+        lock_for_command(folder)
         claim(folder, *_FILES)
     except OSError as error:
         raise UnavailableError(
@@ -163,8 +166,9 @@ def _make_folder(folder: Path) -> None:
 
 def _write(out: Path, files: dict[str, str]) -> None:
     try:
-        for name, text in files.items():
-            write_text(out / name, text)
+        with replacing_results(out, "|".join(map(re.escape, _FILES)), files) as place:
+            for name, text in files.items():
+                write_text(place / name, text)
     except OSError as error:
         raise UnavailableError(
             f"results in {out} cannot be written ({error.strerror})",

@@ -101,7 +101,7 @@ class LiveCalibration:
         if not has_own_time(camera.description.pacing):
             raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
         self._settings, self._grow = settings, grow
-        self._folders = ViewFolders(settings.left, settings.right)
+        self._folders = ViewFolders(settings.left, settings.right, are_taken_live=True)
         self._lock = Lock()
         self._began_ns = now.monotonic_ns()
         self._guide: Guide | None = None

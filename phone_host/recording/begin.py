@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from common import now
-from common.errors import SettingsError
+from common.errors import SettingsError, UnavailableError
 from common.protocol.message import CameraDescription
 from common.recording.layout import ABOUT, About, camera_info_topic
 from common.recording.recording_file import RecordingFile
@@ -41,11 +41,32 @@ def begin_recording(
     if not has_own_time(camera.pacing):
         raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
     file = RecordingFile(path)
+    try:
+        return _begun(file, camera, board_side, rig, attached or {})
+    except OSError as error:
+        _drop(file)
+        raise UnavailableError(
+            f"{path} cannot be written ({error.strerror})", "make room, or name another file"
+        ) from None
+    except BaseException:
+        _drop(file)
+        raise
+
+
+def _drop(file: RecordingFile) -> None:
+    """Remove a recording that holds nothing yet: the next try may use its name again."""
+    file.abandon()
+    file.path.unlink(missing_ok=True)
+
+
+def _begun(
+    file: RecordingFile, camera: CameraDescription, board_side: Side, rig: Rig | None, attached: Mapping[str, bytes]
+) -> Recorder:
     unix_ns = now.unix_offset_ns()
     at_ns = unix_ns + now.monotonic_ns()
     about = About(unix_ns=unix_ns, board_side=board_side.value, host_boot_id=now.boot_id(), versions=all_versions())
     file.tell(ABOUT, about.values())
-    for name, data in (attached or {}).items():
+    for name, data in attached.items():
         file.attach(name, "application/octet-stream", data, at_ns)
     for side, info in () if rig is None else camera_infos(rig, rectify_rig(rig), at_ns):
         data = camera_info_message(info)

@@ -91,15 +91,17 @@ def choose_views(
     chosen = _chosen(left, right, pairs, most_pixels, advance)
     if not chosen:
         raise DataError(f"{file} has no two images of the same moment", "look at it: phone-host sessions info")
-    views = ViewFolders(folder / Side.LEFT.value, folder / Side.RIGHT.value)
+    views = ViewFolders(folder / Side.LEFT.value, folder / Side.RIGHT.value, are_taken_live=False)
     try:
         for place in chosen:
             at, mate = pairs[place]
             second = (left.stamps_ns[at] - left.stamps_ns[pairs[0][0]]) // NS
             pictures = left.decoded(at, most_pixels), right.decoded(mate, most_pixels)
             views.write(Pictures(f"{second:03d}", *pictures))
-    finally:
-        views.close(_cameras(recorded, left.camera, right.camera))
+    except BaseException:
+        views.abandon()
+        raise
+    views.close(_cameras(recorded, left.camera, right.camera))
     board_side = Side(recorded.about.board_side) if recorded.is_ours else None
     return ChosenViews(views.left, views.right, board_side)
 

@@ -10,9 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from common.appearing import new_folder
 from common.camera.imagefile import load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import PixelFormat
+from common.places import make_folder
 from common.recording.layout import ABOUT, About, image_topic
 from common.recording.recorded import Recorded
 from common.recording.recording_file import written
@@ -32,7 +34,7 @@ _PAIRS: Final = (("image_0", "image_1"), ("image_2", "image_3"), ("cam0/data", "
 
 
 def export_folders(recorded: Recorded, out: Path) -> dict[str, int]:
-    """Write the images of both sides.
+    """Write the images of both sides. The folder appears whole or not at all.
 
     Args:
         recorded: the recording.
@@ -46,13 +48,14 @@ def export_folders(recorded: Recorded, out: Path) -> dict[str, int]:
     """
     counts = {}
     try:
-        out.mkdir(parents=True)
-        for side in _SIDES:
-            topic = recorded.topic_of(side)
-            counts[side] = _export(recorded, topic, out / side) if topic else 0
-        for name, data in recorded.attachments.items():
-            if _is_plain(name):
-                write_bytes(out / name, data)
+        make_folder(out.parent)
+        with new_folder(out) as folder:
+            for side in _SIDES:
+                topic = recorded.topic_of(side)
+                counts[side] = _export(recorded, topic, folder / side) if topic else 0
+            for name, data in recorded.attachments.items():
+                if _is_plain(name):
+                    write_bytes(folder / name, data)
     except FileExistsError:
         raise UnavailableError(f"{out} exists already", "name another folder") from None
     except OSError as error:

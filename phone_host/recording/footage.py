@@ -5,7 +5,7 @@ cameras gave them; `board/orientation` holds the options that make them upright,
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -24,7 +24,7 @@ from common.recording.recorded import Recorded
 from phone_host.calibration.timing.shots import Shot
 from phone_host.model import BoardFrame, Side
 from phone_host.output.atomic import write_bytes
-from phone_host.output.listed import ListedFolder
+from phone_host.output.listed import replacing_results
 from phone_host.recording.both_sides import encoded, topics_of
 from phone_host.recording.filming import take_frames
 from phone_host.stereo.raw_images import EncodedImage
@@ -161,18 +161,18 @@ def keep(footage: Footage, folder: Path) -> None:
         OSError: the folder cannot be written to.
         UnavailableError: the folder holds images that an earlier call did not write.
     """
-    for side, shots in (("board", footage.board), ("host", footage.host)):
-        suffixes = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}
-        named = [(shot, f"{shot.exposed_ns}{suffixes.get(shot.image.pixel_format, '')}") for shot in shots]
-        files = {name: shot for shot, name in named if "." in name}
-        listed = ListedFolder(folder / side, rf"-?[0-9]+\.(jpg|png)|{_ORIENTATION}")
-        turn = str(shots[0].image.orientation) if shots else ""
-        listed.add(*files, *([_ORIENTATION] if turn else []))
-        listed.close()
-        if turn:
-            write_bytes(folder / side / _ORIENTATION, turn.encode())
-        for name, shot in files.items():
-            write_bytes(folder / side / name, bytes(shot.image.payload))
+    with ExitStack() as stack:  # both are whole before one of them replaces what was kept before
+        for side, shots in (("board", footage.board), ("host", footage.host)):
+            suffixes = {PixelFormat.MJPEG: ".jpg", PixelFormat.PNG: ".png"}
+            named = [(shot, f"{shot.exposed_ns}{suffixes.get(shot.image.pixel_format, '')}") for shot in shots]
+            files = {name: shot for shot, name in named if "." in name}
+            turn = str(shots[0].image.orientation) if shots else ""
+            names = [*files, *([_ORIENTATION] if turn else [])]
+            place = stack.enter_context(replacing_results(folder / side, rf"-?[0-9]+\.(jpg|png)|{_ORIENTATION}", names))
+            if turn:
+                write_bytes(place / _ORIENTATION, turn.encode())
+            for name, shot in files.items():
+                write_bytes(place / name, bytes(shot.image.payload))
 
 
 def read(folder: Path) -> Footage:

@@ -33,18 +33,19 @@ class Pictures:
 
 
 class ViewFolders:
-    """Writes the views of one calibration. What an earlier one left there is removed; other pictures are refused.
+    """Writes the views of one calibration. What an earlier one left there stays until this one has views and is closed; other pictures are refused.
 
     Args:
         left: folder for the left images.
         right: folder for the right ones.
+        are_taken_live: whether each view is worth something alone, because nobody can take it again; else all appear together.
 
     Raises:
         UnavailableError: a folder holds pictures that an earlier one did not write.
         OSError: as the operating system reports it.
     """
 
-    def __init__(self, left: Path, right: Path) -> None:
+    def __init__(self, left: Path, right: Path, *, are_taken_live: bool) -> None:
         self.left, self.right = left, right
         for folder in (left, right):
             _require_no_others(folder)
@@ -54,6 +55,14 @@ class ViewFolders:
         except BaseException:
             self._left.close()
             raise
+        self._are_taken_live, self._has_failed, self._count = are_taken_live, False, 0
+        try:
+            for listed in (self._left, self._right):
+                if not are_taken_live or self._left.earlier or self._right.earlier:
+                    listed.stage()
+        except BaseException:
+            self._release()
+            raise
 
     def write(self, pictures: Pictures) -> None:
         """Write a view.
@@ -61,23 +70,42 @@ class ViewFolders:
         Raises:
             OSError: as the operating system reports it.
         """
-        for listed, folder, image in (
-            (self._left, self.left, pictures.left),
-            (self._right, self.right, pictures.right),
-        ):
+        self._has_failed = True  # until both are written
+        for listed, image in ((self._left, pictures.left), (self._right, pictures.right)):
             name = f"{pictures.name}.png"
             listed.add(name)
-            write_bytes(folder / name, cv2.imencode(".png", image)[1].tobytes())
+            write_bytes(listed.place / name, cv2.imencode(".png", image)[1].tobytes())
+            if self._are_taken_live:
+                listed.spare_staged()
+        self._count += 1
+        self._has_failed = False
 
     def close(self, cameras: str) -> None:
         """Close both folders.
 
         Args:
             cameras: content of cameras.json, from which rig.yaml gets to know its cameras; empty: none.
+
+        Raises:
+            OSError: as the operating system reports it; the earlier views are there then.
         """
-        if cameras:
-            self._left.add(CAMERAS)
-            write_text(self.left / CAMERAS, cameras)
+        try:
+            if cameras:
+                self._left.add(CAMERAS)
+                write_text(self._left.place / CAMERAS, cameras)
+            for listed in (self._left, self._right) if self._count else ():
+                if not self._has_failed:
+                    listed.publish()
+                elif self._are_taken_live:
+                    listed.keep_staged()
+        finally:
+            self._release()
+
+    def abandon(self) -> None:
+        """Close both folders; the earlier views stay, and of these none that was not published."""
+        self._release()
+
+    def _release(self) -> None:
         self._left.close()
         self._right.close()
 

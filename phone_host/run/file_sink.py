@@ -5,8 +5,10 @@ in memory (bounded) and pairs are counted as unsaved. Once there is room again, 
 The exit code tells if anything is still missing at the end. If the disk is merely slower than the pairs, saved pairs
 are dropped, each counted as a drop of the sink `pairs`; lines are never dropped.
 
-Files that an earlier run listed as its own in the same folder are removed (`output/listed.py`). Anything else in the
-way ends the run before it begins. A saved pair survives a power cut as soon as it is there; lines and report do once
+Files that an earlier run listed as its own in the same folder are replaced (`output/listed.py`). Anything else in the
+way ends the run before it begins. Where there is nothing to replace, files appear under their names at once. Else they
+lie in the hidden folder `.tandemscan.new` until the run has written its report and all the rest: only then do the
+earlier results go (decision 0088). A saved pair survives a power cut as soon as it is there; lines and report do once
 the run has ended.
 """
 
@@ -22,12 +24,13 @@ from common import now
 from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.program.logs import event
+from common.words import counted
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import Result, Unwritten
 from phone_host.output.axes import Axes
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import ListedFolder
+from phone_host.output.listed import STAGED, ListedFolder
 from phone_host.output.overlay_yaml import OVERLAY_NAME
 from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
 from phone_host.run.sinks import NotWrittenError, SinkQueue
@@ -157,12 +160,16 @@ class FileSink:
         self._save_every, self._axes = save_every, axes
         self._unsaved_pairs = self._lost_lines = 0
         self._missing: tuple[str, ...] = ()
+        self._saved_pairs, self._stays = 0, ""
         self._own: ListedFolder | None = None
         self._file = -1
         if folder is None:
             return
+        self._folder = folder
         try:
             self._own = ListedFolder(folder, NAMES, inner=PAIR_NAMES)
+            if self._own.earlier:
+                self._own.stage()
             self._own.add("report.json")
             self._file = self._own.create("delays.jsonl")
             if settings is not None:
@@ -220,7 +227,13 @@ class FileSink:
     @property
     def missing(self) -> str:
         """The files of the run's end that could not be written, and why, in words; empty: none."""
-        return f"{', '.join(self._missing)} ({self._of_report.last})" if self._missing else ""
+        names = f"{', '.join(self._missing)} ({self._of_report.last})" if self._missing else ""
+        return names + self._stays
+
+    @property
+    def place(self) -> Path | None:
+        """The folder in which the files of the run lie until it is closed; None: nothing is written."""
+        return None if self._own is None else self._own.place
 
     @property
     def unwritten(self) -> Unwritten:
@@ -233,7 +246,15 @@ class FileSink:
             lines=lost + self._lines.unwritten, pairs=self._unsaved_pairs, cause=cause or ("it hangs" if lost else "")
         )
 
-    def close(self, report: dict[str, object], page: str = "", cameras: str = "", overlay: str = "") -> None:
+    def close(
+        self,
+        report: dict[str, object],
+        page: str = "",
+        cameras: str = "",
+        overlay: str = "",
+        *,
+        replaces_earlier: bool = True,
+    ) -> None:
         """Finish the queued work, write report.json and release the folder. May be called again.
 
         Args:
@@ -241,6 +262,7 @@ class FileSink:
             page: the HTML document to write as index.html beside it; empty: none.
             cameras: content of cameras.json; empty: none.
             overlay: content of overlay.yaml; empty: none.
+            replaces_earlier: whether the run gave anything that an earlier run's results may be replaced by.
         """
         if self._own is None:
             return
@@ -253,12 +275,41 @@ class FileSink:
         try:
             self.finish()
             troubles = self._write_last({name: text for name, text in texts.items() if text})
+            if not troubles and self.complete and (replaces_earlier or not self._own.is_staged):
+                troubles = self._published()
+            if troubles:
+                self._missing = tuple(troubles)
+                error = next(iter(troubles.values()))
+                self._of_report.begins(error, ",".join(troubles), "make room and run again")
+            if self._own.is_staged:
+                self._keep_earlier()
         finally:
             self._let_go()
-        if troubles:
-            self._missing = tuple(troubles)
-            error = next(iter(troubles.values()))
-            self._of_report.begins(error, ",".join(troubles), "make room and run again")
+
+    def abandon(self) -> None:
+        """Release the folder of a run that does not begin."""
+        if self._own is not None:
+            self.finish()
+            self._let_go()
+
+    def _published(self) -> dict[str, OSError]:
+        """Let the results take the place of the earlier ones; return what failed."""
+        assert self._own is not None
+        try:
+            self._own.publish()
+        except OSError as error:
+            return {"report.json": error}
+        return {}
+
+    def _keep_earlier(self) -> None:
+        """Leave an earlier run's results where they are, and what this one has saved where the next one finds it."""
+        assert self._own is not None
+        saved = f"{counted(self._saved_pairs, 'pair')} of this run in {self._folder / STAGED} until the next one"
+        self._stays = "; the earlier results stay" + (f", and {saved}" if self._saved_pairs else "")
+        if self._saved_pairs:
+            self._own.keep_staged()
+        if self.complete:
+            _LOG.warning(event("earlier_results_stay", folder=self._folder, why="this run has no pair"))
 
     def _write_last(self, texts: Mapping[str, str]) -> dict[str, OSError]:
         """Write the files of the run's end. One for which there is no room does not keep the others from being written.
@@ -322,4 +373,6 @@ class FileSink:
             self._unsaved_pairs += 1
             self._of_pairs.begins(error)
             raise NotWrittenError from None
+        self._saved_pairs += 1
+        self._own.spare_staged()
         self._of_pairs.ends()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
+from pathlib import Path
 from typing import Final
 
 from common import now
@@ -235,23 +236,29 @@ class Host:
 
     def abandon(self) -> None:
         """Release the results folder of a host that will not `run`."""
-        self._files.close({})
+        self._files.abandon()
         if self.recording is not None:
             self.recording.end()
 
-    def write_report(self, report: dict[str, object], page: str = "") -> bool:
+    def write_report(self, report: dict[str, object], page: str = "", *, replaces_earlier: bool = True) -> bool:
         """Write the report of the run into its results folder, if there is one. Call this after `run`.
 
         Args:
             report: content of report.json.
             page: content of index.html; empty: none.
+            replaces_earlier: whether the run gave anything that an earlier run's results may be replaced by.
 
         Returns:
             Whether all results of the run were written.
         """
         overlay = "" if self._keeper is None else self._keeper.overlay
-        self._files.close(report, page, self._cameras.text(), overlay)
+        self._files.close(report, page, self._cameras.text(), overlay, replaces_earlier=replaces_earlier)
         return self._files.complete
+
+    @property
+    def results_place(self) -> Path | None:
+        """The folder in which the files of the run lie until its report is written; None: nothing is written."""
+        return self._files.place
 
     def cameras_text(self) -> str:
         """Return the content of cameras.json: which cameras these are; empty if no board has said hello."""

@@ -1,6 +1,7 @@
 """The submaps of a scan in its results folder, so that another run can go on when this one is killed.
 
-Each is written whole or not at all when it is closed. They are removed once the model is written. A disk without room ends the keeping, not the scan.
+Each is written whole or not at all when it is closed. They are removed once the model is written. Those of an earlier scan are removed when the first
+one of this scan is on the disk. A disk without room ends the keeping, not the scan.
 """
 
 import re
@@ -8,16 +9,31 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from common.errors import DataError
+from common.errors import DataError, SettingsError
 from phone_host.output.atomic import write_bytes
-from phone_host.output.listed import ListedFolder
+from phone_host.output.listed import ListedFolder, remove_results
 from phone_host.report.stereo_report import Remark
 from phone_host.scan.scan import Scan
 from phone_host.scan.scanned import Submap
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 
 _NAMES: Final = r"submap-\d{4,}\.bin"
-_NONE: Final = "(?!)"
+
+
+def require_no_submaps(folder: Path) -> None:
+    """Refuse to begin a scan where the submaps of one that was ended would be lost.
+
+    Args:
+        folder: the results folder.
+
+    Raises:
+        SettingsError: it holds some.
+    """
+    if paths := _paths(folder):
+        raise SettingsError(
+            f"{folder} holds a scan that was ended before its end ({paths[-1].name})",
+            f"go on with it with --resume {folder}, or begin anew with --restart",
+        )
 
 
 def read_submaps(folder: Path) -> tuple[Submap, ...]:
@@ -60,9 +76,7 @@ class KeptSubmaps:
     def __init__(self, out: Path, scan: Scan, resumed: Sequence[Submap] = ()) -> None:
         self._out, self._scan = out, scan
         self._problem = ""
-        numbers = [_number(path) for path in _paths(out)] if resumed else []
-        self._next = max(numbers, default=-1) + 1
-        self._is_begun = bool(numbers)
+        self._next = max(map(_number, _paths(out)), default=-1) + 1
         self._must_be_whole = bool(resumed)
         if resumed:
             scan.go_on(resumed)
@@ -97,19 +111,19 @@ class KeptSubmaps:
         Raises:
             OSError: as the operating system reports it.
         """
-        if self._is_begun:
-            ListedFolder(self._out, _NAMES).close()
+        if _paths(self._out):
+            remove_results(self._out, _NAMES)
 
     def _write(self, submap: Submap) -> None:
-        name, earlier = f"submap-{self._next:04d}.bin", _paths(self._out) if self._is_begun else []
-        folder = ListedFolder(self._out, _NONE if self._is_begun else _NAMES, kept=_NAMES)
+        name, earlier = f"submap-{self._next:04d}.bin", _paths(self._out)
+        folder = ListedFolder(self._out, "(?!)", kept=_NAMES)
         try:
             folder.add(name)
             write_bytes(self._out / name, submap_bytes(submap))
         finally:
             folder.close()
-        self._next, self._is_begun, self._must_be_whole = self._next + 1, True, False
-        if submap.is_whole:  # the others are in it
+        self._next, self._must_be_whole = self._next + 1, False
+        if submap.is_whole:  # the others are in it, or of an earlier scan
             for path in earlier:
                 path.unlink()
 

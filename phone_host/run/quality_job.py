@@ -23,7 +23,7 @@ from phone_host.measure.trust import Doubt
 from phone_host.model import Crop, PlaneQuality, Processed, Seen
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import ListedFolder
+from phone_host.output.listed import replacing_results
 from phone_host.output.residual_view import residual_jpeg
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_page import quality_page
@@ -144,15 +144,10 @@ def _report(job: QualityJob, pairs: list[MeasuredPair | FailedPair]) -> QualityR
 
 
 def _write(out: Path, report: QualityReport) -> None:
-    folder = ListedFolder(out, NAMES)
-    try:
-        for name, text in zip(
-            ALWAYS, (json_text(quality_json(report), indent=2) + "\n", quality_page(report)), strict=True
-        ):
-            folder.add(name)
-            write_text(out / name, text)
-    finally:
-        folder.close()
+    texts = json_text(quality_json(report), indent=2) + "\n", quality_page(report)
+    with replacing_results(out, NAMES, ALWAYS) as place:
+        for name, text in zip(ALWAYS, texts, strict=True):
+            write_text(place / name, text)
 
 
 def _measured(job: QualityJob, cores: Cores, index: int, watcher: Watcher) -> MeasuredPair:

@@ -6,7 +6,7 @@ from typing import Final
 
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import ListedFolder
+from phone_host.output.listed import replacing_results
 from phone_host.output.ply import PointCloud, write_surface
 from phone_host.output.trajectory_text import Station, tum_text
 from phone_host.report.model_view import ShownModel
@@ -40,7 +40,7 @@ class FinishedScan:
 
 
 def write_scan(out: Path, scan: FinishedScan) -> None:
-    """Write model.ply, trajectory.txt, report.json and index.html; those of an earlier run are removed.
+    """Write model.ply, trajectory.txt, report.json and index.html, all or nothing; then they take the place of an earlier run's.
 
     Args:
         out: the folder.
@@ -51,20 +51,16 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
         OSError: as the operating system reports it.
     """
     report, mesh = scan.report, scan.model.mesh
-    folder = ListedFolder(out, NAMES)
-    try:
-        folder.add(MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else []))
+    with replacing_results(out, NAMES, (MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else []))) as place:
         seen = scan.model.seen if scan.model.is_closed else None
-        write_surface(out / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
-        write_text(out / TRAJECTORY, trajectory_of(report))
-        write_text(out / "report.json", json_text(scan_json(report), indent=2) + "\n")
+        write_surface(place / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
+        write_text(place / TRAJECTORY, trajectory_of(report))
+        write_text(place / "report.json", json_text(scan_json(report), indent=2) + "\n")
         if scan.field:
-            write_bytes(out / FIELD, scan.field)
+            write_bytes(place / FIELD, scan.field)
         voxel_m = report.settings.voxel_m if report.settings else 1.0
         shown = ShownModel(mesh, scan.model.noise_m, voxel_m, upright=report.axes if report.axes.is_upright else None)
-        write_text(out / "index.html", scan_page(report, shown, scan.commands))
-    finally:
-        folder.close()
+        write_text(place / "index.html", scan_page(report, shown, scan.commands))
 
 
 def trajectory_of(report: ScanReport) -> str:

@@ -106,11 +106,14 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         OSError: the results cannot be written.
     """
     keep_freed_memory()
-    with StereoResults(job.out) as results:
+    is_one = len(job.files.pairs) == 1
+    with StereoResults(job.out, is_one=is_one) as results:
         work = _Work(job, results, watcher)
-        if len(job.files.pairs) == 1:
+        if is_one:
             _, left, right = job.files.pairs[0]
-            return _set(job, (work.computed("", left, right),))
+            done = _set(job, (work.computed("", left, right),))
+            results.publish()
+            return done
         pairs: list[PairReport | FailedPair] = []
 
         def write_so_far() -> None:
@@ -133,6 +136,7 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
 def _write_set(job: StereoJob, results: StereoResults, work: "_Work", report: SetReport) -> None:
     results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
     results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
+    results.publish()
 
 
 def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...], drift: Drift | None = None) -> SetReport:

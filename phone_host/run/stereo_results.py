@@ -1,19 +1,18 @@
 """The results folder of `stereo`: one pair's files in it, or a folder for each of several pairs.
 
-What an earlier run left there is removed once the first pair's images are known to be sound, or an earlier result would be lost for
-nothing.
+What an earlier run left there stays until all of what replaces it is whole (decision 0088). Where there is nothing to replace, the folders of
+several pairs appear one by one.
 """
 
 import errno
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
 from common.places import nearest
-from phone_host.output.atomic import write_text
 from phone_host.output.listed import ListedFolder, RunAll
 from phone_host.output.pair_files import PAIR_NAMES, STEREO_NAMES
 
@@ -26,10 +25,11 @@ class StereoResults:
 
     Args:
         path: created with the first pair.
+        is_one: whether they are of one pair, which goes into the folder itself.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, *, is_one: bool) -> None:
+        self._path, self._is_one = path, is_one
         self._own: ListedFolder | None = None
 
     def __enter__(self) -> Self:
@@ -42,7 +42,7 @@ class StereoResults:
             self._own.close()
 
     def open(self) -> None:
-        """Remove what an earlier run left, unless that was done.
+        """Open the folder, unless that was done.
 
         Raises:
             UnavailableError: something there was not written by this program.
@@ -50,14 +50,25 @@ class StereoResults:
         """
         if self._own is None:
             self._own = ListedFolder(self._path, NAMES, inner=PAIR_NAMES)
+            if self._is_one or self._own.earlier:
+                self._own.stage()
+
+    def publish(self) -> None:
+        """Let the results, which are whole, take the place of an earlier run's.
+
+        Raises:
+            OSError: as the operating system reports it.
+        """
+        assert self._own is not None
+        self._own.publish()
 
     @contextmanager
     def folder_of(self, name: str, files: Sequence[str], run_all: RunAll) -> Iterator[Path]:
         """Give a pair a place for its files. The folder is open.
 
         Args:
-            name: of its own folder, which appears when the block ends; empty: its files go into the results folder. If
-                the block fails, nothing of them stays.
+            name: of its own folder, which appears when the block ends; empty: its files go into the results folder, where
+                they appear when they are published. If the block fails, nothing of them stays.
             files: names of its files.
             run_all: see `ListedFolder.new_folder`.
 
@@ -71,15 +82,10 @@ class StereoResults:
         if name:
             with self._own.new_folder(name, run_all) as folder:
                 yield folder
+            self._own.spare_staged()
         else:
             self._own.add(*files)
-            try:
-                yield self._path
-            except BaseException:  # a cloud without its report could be taken for a whole result
-                for file in files:
-                    with suppress(OSError):
-                        (self._path / file).unlink()
-                raise
+            yield self._own.place
 
     def write_text(self, name: str, text: str) -> None:
         """Write a file of all pairs together.
@@ -89,7 +95,7 @@ class StereoResults:
         """
         assert self._own is not None
         self._own.add(name)
-        write_text(self._path / name, text)
+        self._own.write_text(name, text)
 
 
 def require_writable(path: Path) -> None:

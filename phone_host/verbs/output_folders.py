@@ -3,8 +3,8 @@
 import os
 import re
 import sys
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -12,8 +12,9 @@ from common.errors import DataError, SettingsError, UnavailableError
 from common.files import read_whole
 from common.places import Kind, kind_of, nearest, resolved
 from common.program.terminal import say
+from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_value
-from phone_host.output.listed import ListedFolder, claim
+from phone_host.output.listed import ListedFolder, claim, remove_results, replacing_results
 
 REPORT: Final = "report.json"
 PAGE: Final = "index.html"
@@ -47,6 +48,65 @@ def require_folder(out: Path) -> None:
         UnavailableError: it, or a parent of it, is not a folder.
     """
     _require_folder(out, out, "--out")
+
+
+def require_alone(folder: Path, file: str = "", option: str = "--out") -> None:
+    """Keep other programs from writing into a folder, or to one file in it, until this command ends.
+
+    Args:
+        folder: the folder; created if missing, unless only a file in it is meant.
+        file: name of the file; empty: the whole folder.
+        option: with which the user gave it.
+
+    Raises:
+        UnavailableError: another program writes there, or the folder cannot be written to.
+    """
+    try:
+        lock_for_command(folder, file, option)
+    except OSError as error:
+        raise unwritable(folder / file, error, option) from error
+
+
+@contextmanager
+def written_together(out: Path, *names: str) -> Iterator[Path]:
+    """Write files that take the place of an earlier command's if the block ends without an error; else those stay as they are.
+
+    Args:
+        out: the folder that the user gave; created if missing.
+        names: names of the files.
+
+    Yields:
+        Where to write them.
+
+    Raises:
+        UnavailableError: such a file is not from an earlier command, another program writes there, or it cannot be written.
+    """
+    try:
+        with replacing_results(out, "|".join(map(re.escape, names)), names) as place:
+            yield place
+    except OSError as error:
+        raise unwritable(out, error) from error
+
+
+@contextmanager
+def written_beside(out: Path, *names: str) -> Iterator[Path]:
+    """Write a file that the user named, and others beside it, as `written_together` does. The file need not be from an earlier command.
+
+    Args:
+        out: the file that the user named; its folder is created if missing.
+        names: names of what is written beside it.
+
+    Yields:
+        The folder to write them in.
+
+    Raises:
+        UnavailableError: another program writes there, or it cannot be written.
+    """
+    try:
+        with replacing_results(out.parent, "|".join(map(re.escape, names)), names) as place:
+            yield place
+    except OSError as error:
+        raise unwritable(out.parent, error) from error
 
 
 def claim_names(folder: Path, out: Path, *names: str) -> None:
@@ -132,7 +192,7 @@ def drop_page(folder: Path, command: str) -> None:
         return
     try:
         with suppress(UnavailableError):  # the user's own
-            ListedFolder(folder, re.escape(PAGE)).close()
+            remove_results(folder, re.escape(PAGE))
     except OSError as error:
         raise unwritable(folder, error) from error
 
@@ -186,21 +246,20 @@ def spare_names(out: Path, *names: str, option: str = "--out") -> None:
         raise SettingsError(f"{option} {out} has the name of what is written beside it", f"name another {option}")
 
 
-def unwritable(out: Path, error: OSError, option: str = "--out", *, beside: Path | None = None) -> UnavailableError:
+def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableError:
     """Make the error for results that cannot be written.
 
     Args:
-        out: the path that the user gave, or that of one result.
-        error: the operating system's error.
+        out: the path that the user gave.
+        error: the operating system's error; it may name a file in that path.
         option: the option with which the path was given.
-        beside: what was written already.
 
     Returns:
         The error to raise.
     """
-    but = "" if beside is None or kind_of(beside) is Kind.MISSING else f"; {beside} is written"
+    named = Path(os.fsdecode(error.filename)) if isinstance(error.filename, str | bytes) else out
     return UnavailableError(
-        f"{out} cannot be written ({error.strerror}){but}",
+        f"{named if out in named.parents else out} cannot be written ({error.strerror})",
         f"check that the folder exists, that you may write to it and that the disk has room, or name another {option}",
     )
 

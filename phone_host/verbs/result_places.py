@@ -6,11 +6,11 @@ from common.errors import SettingsError
 from common.places import resolved
 from phone_host.run.stereo_results import require_writable
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
+from phone_host.verbs.output_folders import keep_other_report, require_alone, require_folder, spare_inputs, unwritable
 
 
 def require_place(out: Path, files: ViewFiles, names: str, command: str) -> None:
-    """Refuse a results folder that cannot be written to, holds the photographs or would lose them.
+    """Refuse a results folder that cannot be written to, holds the photographs or would lose them; keep other programs out of it.
 
     Args:
         out: the folder.
@@ -20,7 +20,7 @@ def require_place(out: Path, files: ViewFiles, names: str, command: str) -> None
 
     Raises:
         SettingsError: the photographs lie in it.
-        UnavailableError: it cannot be written to.
+        UnavailableError: it cannot be written to, or another program writes there.
     """
     require_folder(out)
     try:
@@ -35,4 +35,5 @@ def require_place(out: Path, files: ViewFiles, names: str, command: str) -> None
         )
     for _, left, right in files.pairs:
         spare_inputs(out, names, {"LEFT": left, "RIGHT": right})
+    require_alone(out)
     keep_other_report(out, command)

@@ -17,7 +17,7 @@ from phone_host.calibration.pose_only import solve_pose
 from phone_host.calibration.target import Board
 from phone_host.calibration.verdict import Verdict, judge
 from phone_host.geometry.se3 import rotations_of, vectors_of
-from phone_host.model import Lens, Rig, Side, TimeOffset
+from phone_host.model import Lens, Rectification, Rig, Side, TimeOffset
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
 from phone_host.stereo.rectify import rectify_rig
@@ -245,18 +245,28 @@ def test_the_command_adds_to_a_rig_and_solves_the_pose(tmp_path: Path, capsys: p
     assert "the earlier one is now new.yaml.old" in told
 
 
+def replaced(out: Path, rig: Rig | None, made: Rectification | None, views: RigViews | None = None) -> str:
+    """Replace a rig as the command does: the new files are written elsewhere, then they take their places."""
+    place = out.parent / "new"
+    place.mkdir(exist_ok=True)
+    name = replace_rig(place, out, rig, made, views)
+    for path in place.iterdir():
+        path.replace(out.parent / path.name)
+    return name
+
+
 def test_no_views_are_lost(tmp_path: Path) -> None:
     """A file whose views the new one does not hold is moved aside, and kept there from one without views; one whose views are all in the new one is replaced."""
     rig, out = unlike_rig(), _filed(tmp_path, BOARD)
     made, views = rectify_rig(rig), read_rig_views(out)
-    assert replace_rig(out, rig, made, views) == ""
-    assert replace_rig(out, rig, made) == "rig.yaml.old"
-    assert replace_rig(out, rig, made) == ""
-    assert replace_rig(out, rig, made, views) == ""
+    assert replaced(out, rig, made, views) == ""
+    assert replaced(out, rig, made) == "rig.yaml.old"
+    assert replaced(out, rig, made) == ""
+    assert replaced(out, rig, made, views) == ""
     rejected = replace(rig, verdict=Verdict.REJECT)
     out.write_text(out.read_text().partition("# what the rig was")[0])  # it loses its views
-    assert replace_rig(out, rejected, made) == "rig.yaml.old2"
-    assert replace_rig(out, rig, None) == replace_rig(out, None, None) == "rig.yaml"
+    assert replaced(out, rejected, made) == "rig.yaml.old2"
+    assert replaced(out, rig, None) == replaced(out, None, None) == "rig.yaml"
     assert read_rig(out).is_rejected
     kept = read_rig_views(tmp_path / "rig.yaml.old")
     assert kept is not None

@@ -1,6 +1,8 @@
 """Results folders into which others have put things: links, pipes, folders of their own."""
 
+import errno
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,8 +14,9 @@ import pytest
 
 from common.errors import DataError, SettingsError, TandemError, UnavailableError
 from common.files import read_whole
-from phone_host.output.atomic import write_bytes, write_text
-from phone_host.output.listed import LIST, ListedFolder, claim
+from phone_host.output.atomic import replacing, write_bytes, write_text
+from phone_host.output.folder_lock import LOCK, FolderLock
+from phone_host.output.listed import LIST, STAGED, ListedFolder, claim, remove_results, replacing_results
 from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.run.file_sink import NAMES, FileSink
 from phone_host.verbs.output_folders import spare_inputs
@@ -48,18 +51,25 @@ def tree(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_a_later_run_removes_what_an_earlier_one_left_and_nothing_else(tmp_path: Path) -> None:
-    """The earlier run's delays, report, page and pairs are gone, half-made ones too; a user's files and folders with similar names stay."""
+def test_a_later_run_replaces_what_an_earlier_one_left_and_nothing_else(tmp_path: Path) -> None:
+    """What is whole of the earlier run stays while the later one runs, and goes with its report; what was half made goes at once; a user's similar names stay."""
     earlier_run(tmp_path)
     mine = {"pair-000123-my-notes/a.txt": b"a", "pair-12/b": b"b", "report.json.bak": b"c", "notes.txt": b"d"}
     for name, content in mine.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_bytes(content)
+    before = {name: content for name, content in tree(tmp_path).items() if not name.endswith(".part") and name != LIST}
     results = FileSink(tmp_path, 1)
+    during = tree(tmp_path)
+    hidden = {name: during.pop(name) for name in list(during) if name.startswith(".tandemscan")}
+    assert hidden.keys() == {LIST, LOCK, f"{STAGED}/delays.jsonl"}
+    assert hidden[LOCK] == f"{os.getpid()}\n".encode()
+    assert during == before
+    results.close({"of": "a later run"})
     left = tree(tmp_path)
+    assert b"a later run" in left.pop("report.json")
     assert left.pop(LIST)
     assert left == {**mine, "delays.jsonl": b""}
-    results.close({})
 
 
 def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
@@ -68,9 +78,11 @@ def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
         FileSink(tmp_path, 1).close({"number": number})
     killed = FileSink(tmp_path, 1)
     assert killed._own is not None
-    with pytest.raises(UnavailableError, match="is being written by another run"):
+    with pytest.raises(UnavailableError, match=f"is being written by process {os.getpid()}: wait for its end"):
         FileSink(tmp_path, 1)
+    killed._own.keep_staged()
     killed._own.close()
+    assert (tmp_path / STAGED).is_dir()
     FileSink(tmp_path, 1).close({})
     assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
 
@@ -175,7 +187,7 @@ def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
         (tmp_path / name).write_text("of stereo")
     FileSink(tmp_path, 1).close({})
     assert (tmp_path / "disparity.pfm").read_text() == "of stereo"
-    ListedFolder(tmp_path, r"disparity\.pfm").close()
+    remove_results(tmp_path, r"disparity\.pfm")
     assert not (tmp_path / "disparity.pfm").exists()
 
 
@@ -236,7 +248,7 @@ def test_names_are_claimed_before_they_are_written(tmp_path: Path) -> None:
     for _ in range(2):
         claim(tmp_path, "report.json", "plot.svg")
         (tmp_path / "report.json").write_text("ours")
-    ListedFolder(tmp_path, r"report\.json|disparity\.pfm").close()
+    remove_results(tmp_path, r"report\.json|disparity\.pfm")
     assert not (tmp_path / "report.json").exists()
 
 
@@ -284,3 +296,108 @@ def test_a_run_does_not_write_among_the_photographs_it_replays(tmp_path: Path, r
             spare(out, str(tmp_path / replay), "")
     spare(tmp_path / "photos" / "scan", str(tmp_path / replay), "")
     spare(tmp_path, str(tmp_path / replay), "")
+
+
+def placed(folder: Path, **texts: str) -> None:
+    """A set of results: files by name, and a pair that holds the same."""
+    with replacing_results(folder, r"a\.txt|b\.txt|pair-\d{6}", [f"{name}.txt" for name in texts]) as place:
+        for name, text in texts.items():
+            write_text(place / f"{name}.txt", text)
+
+
+def test_results_take_their_places_together(tmp_path: Path) -> None:
+    """A set replaces the one before as a whole, and what nothing replaces goes; a set whose writing fails changes nothing and leaves nothing."""
+    placed(tmp_path, a="1", b="1")
+    placed(tmp_path, a="2")
+    kept = tree(tmp_path)
+    assert {name: kept[name] for name in kept if name != LIST} == {"a.txt": b"2"}
+    with pytest.raises(OSError, match="No space") as caught:
+        write_badly(tmp_path)
+    assert caught.value.filename == str(tmp_path / "b.txt")
+    assert {name: text for name, text in tree(tmp_path).items() if name != LIST} == {"a.txt": b"2"}
+
+
+def write_badly(folder: Path) -> None:
+    """The first file is written; for the second there is no room."""
+    with replacing_results(folder, r"a\.txt|b\.txt", ("a.txt", "b.txt")) as place:
+        write_text(place / "a.txt", "3")
+        raise OSError(errno.ENOSPC, "No space left on device", str(place / "b.txt"))
+
+
+@pytest.mark.parametrize("moved", [(), ("a.txt",)])
+def test_a_run_that_was_killed_while_it_moved_its_results_is_finished(moved: tuple[str, ...], tmp_path: Path) -> None:
+    """Results that were whole are moved up by whoever opens the folder next, those that are missing, too; what they replace goes."""
+    placed(tmp_path, a="1", b="1")
+    (tmp_path / ".tandemscan.whole").mkdir()
+    for name in {"a.txt", "c.txt"}.difference(moved):
+        (tmp_path / ".tandemscan.whole" / name).write_text("2")
+    for name in moved:
+        (tmp_path / name).write_text("2")
+    claim(tmp_path, "d.txt")
+    assert not (tmp_path / ".tandemscan.whole").exists()
+    assert [(tmp_path / name).read_text() for name in ("a.txt", "c.txt")] == ["2", "2"]
+
+
+_HOLDER = """
+import sys
+from pathlib import Path
+from phone_host.output.folder_lock import FolderLock
+with FolderLock(Path(sys.argv[1]), *sys.argv[2:]):
+    print("locked", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("file", [(), ("cup.mcap",)])
+def test_another_program_is_kept_out_as_long_as_one_writes(tmp_path: Path, file: tuple[str, ...]) -> None:
+    """It is told the number of the process that writes; when that one is killed, nothing is in the way any more and nothing stays."""
+    out = tmp_path / "out"
+    out.mkdir()
+    words = [sys.executable, "-c", _HOLDER, str(out), *file]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout is not None
+        holder.stdout.readline()
+        with pytest.raises(
+            UnavailableError, match=f"is being written by process {holder.pid}: wait for its end"
+        ) as caught:
+            FolderLock(out, *file)
+        assert caught.value.exit_code == 3
+        holder.kill()
+    assert len(list(out.iterdir())) == 1  # nobody was left to remove it
+    FolderLock(out, *file).release()
+    assert list(out.iterdir()) == []
+
+
+@pytest.mark.parametrize("plant", [plant_link, os.mkfifo, Path.mkdir])
+@pytest.mark.timeout(30)
+def test_a_foreign_lock_is_named(plant: Callable[[Path], None], tmp_path: Path) -> None:
+    """A link, pipe or folder under the lock's name is one line, and stays."""
+    (tmp_path / "precious").write_text("")
+    (tmp_path / "out").mkdir()
+    plant(tmp_path / "out" / LOCK)
+    with pytest.raises(UnavailableError, match=rf"out/{re.escape(LOCK)} is not a file of this program: move or delete"):
+        FolderLock(tmp_path / "out")
+    assert (tmp_path / "precious").read_text() == ""
+    assert (tmp_path / "out" / LOCK).exists()
+
+
+def test_a_lock_leaves_no_folder_behind(tmp_path: Path) -> None:
+    """Folders that it had to make go with it if nothing was written into them; others stay."""
+    FolderLock(tmp_path / "a" / "b").release()
+    assert list(tmp_path.iterdir()) == []
+    with FolderLock(tmp_path / "a" / "b"):
+        (tmp_path / "a" / "file").write_text("")
+    assert [path.name for path in tmp_path.rglob("*")] == ["a", "file"]
+
+
+def test_what_a_killed_writer_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
+    """A temporary that nobody writes any more goes; one that is being written stays, and so does a file with a similar name."""
+    left, other = tmp_path / f".report.json.{'a' * 16}.part", tmp_path / ".report.json.old.part"
+    left.write_text("half")
+    other.write_text("mine")
+    with replacing(tmp_path / "report.json") as file:
+        file.write(b"1")
+        write_text(tmp_path / "report.json", "2")
+        assert not left.exists()
+        assert other.read_text() == "mine"
+    assert (tmp_path / "report.json").read_bytes() == b"1"

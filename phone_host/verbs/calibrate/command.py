@@ -13,6 +13,7 @@ from phone_host.verbs.calibrate.given import require_pictures
 from phone_host.verbs.calibrate.importing import import_calibration
 from phone_host.verbs.calibrate.report_json import report_values
 from phone_host.verbs.orientation_arguments import orientations
+from phone_host.verbs.output_folders import require_alone
 
 _CHECK_FAILED = 4
 
@@ -25,6 +26,7 @@ def run(options: argparse.Namespace) -> int:
     asked = asked_of(options)
     orientations(options)
     require_rig_place(options.out)
+    require_alone(options.out.parent)
     live = None
     if options.live:
         from phone_host.verbs.calibrate.live import take_views  # noqa: PLC0415 - cameras and links: 0.2 s that pictures need not wait for

@@ -48,7 +48,7 @@ from phone_host.verbs.output_folders import (
     keep_other_report,
     require_file,
     spare_names,
-    unwritable,
+    written_beside,
 )
 from phone_host.verbs.units import baseline_mm
 
@@ -127,27 +127,32 @@ def calibrate_pictures(
     order = [name for name, _, _ in files.pairs]
     taken = Taken(order=order, views=views, pairs=solved.pairs, seen=solved.seen, board=series.board)
     lines = _file_notes(files, given)
-    if isinstance(result, DataError):
-        report = replace(report, earlier_rig=replace_rig(out, None, None))
-        page, more = series_of_failure(taken, result), []
-    else:
-        found = result.found
-        if beside is not None:
-            require_sizes(*beside, views.sizes_px)
-        rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
-        rig = replace(with_earlier_cameras(series, rig), verdict=report.verdict)
-        report = replace(
-            report,
-            rejected=(*views.rejected, *found.rejected),
-            earlier_rig=replace_rig(out, rig, found.rectification, saved_views(series, found, solved.seen)),
-            exported=() if found.rectification is None else write_exports(options, rig, found.rectification),
-        )
-        page = series_of_rig(taken, result, rig, report.rejected)
-        page = with_rectified(page, taken, files, mounted, _limit(options))
-        lines += notes(series, list(views.pairs), views.sizes_px)
-        more = [*export_lines(report.exported, found.rectification), *([] if live is None else live.as_lines(options))]
-    write_page(out, page)
-    _write_report(out, report)
+    with written_beside(out, REPORT, PAGE) as place:
+        if isinstance(result, DataError):
+            report = replace(report, earlier_rig=replace_rig(place, out, None, None))
+            page, more = series_of_failure(taken, result), []
+        else:
+            found = result.found
+            if beside is not None:
+                require_sizes(*beside, views.sizes_px)
+            rig = with_cameras(found.rig, None if beside is None else beside[1], mounted)
+            rig = replace(with_earlier_cameras(series, rig), verdict=report.verdict)
+            kept = saved_views(series, found, solved.seen)
+            report = replace(
+                report,
+                rejected=(*views.rejected, *found.rejected),
+                earlier_rig=replace_rig(place, out, rig, found.rectification, kept),
+                exported=() if found.rectification is None else write_exports(options, rig, found.rectification),
+            )
+            page = series_of_rig(taken, result, rig, report.rejected)
+            page = with_rectified(page, taken, files, mounted, _limit(options))
+            lines += notes(series, list(views.pairs), views.sizes_px)
+            more = [
+                *export_lines(report.exported, found.rectification),
+                *([] if live is None else live.as_lines(options)),
+            ]
+        write_page(place, page, out.name)
+        write_text(place / REPORT, json_text(report_values(report), indent=2) + "\n")
     return Made(report, [*lines, known.as_line(), *summary(report, out), *more])
 
 
@@ -192,11 +197,3 @@ def _judged(
 def _file_notes(files: ViewFiles, given: GivenPictures) -> list[str]:
     beside = tuple(path for side in (given.left, given.right) for path in passed_over(side))
     return [*passed_over_notes(beside), *pairing_notes(files)]
-
-
-def _write_report(out: Path, report: CalibrationReport) -> None:
-    path = out.with_name(REPORT)
-    try:
-        write_text(path, json_text(report_values(report), indent=2) + "\n")
-    except OSError as error:
-        raise unwritable(path, error, beside=out) from error

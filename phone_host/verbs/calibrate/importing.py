@@ -30,9 +30,10 @@ from phone_host.verbs.output_folders import (
     claim_names,
     drop_page,
     keep_other_report,
+    require_alone,
     require_file,
     spare_names,
-    unwritable,
+    written_beside,
 )
 from phone_host.verbs.units import baseline_mm, length_mm
 
@@ -45,6 +46,7 @@ def import_calibration(options: argparse.Namespace) -> int:
     """Read, check and write a calibration of another program."""
     require_import_alone(options)
     require_file(options.out)
+    require_alone(options.out.parent)
     spare_names(options.out, REPORT, PAGE, *EXPORTS)
     found = import_rig(tuple(options.imported), _unit_m(options.unit), _sizes_px(options.size))
     _require_baseline(found.rig, options.baseline)
@@ -63,12 +65,10 @@ def import_calibration(options: argparse.Namespace) -> int:
         claim_names(options.out.parent, options.out, options.out.name, REPORT)
     report = ImportReport(imported=found, exported=write_exports(options, found.rig, rectification, found.files))
     if not same:
-        try:
-            views = read_rig_views(found.files[0]) if found.kind is RigKind.RIG else None
-            report = replace(report, earlier_rig=replace_rig(options.out, found.rig, rectification, views))
-            write_text(options.out.with_name(REPORT), json_text(import_values(report), indent=2) + "\n")
-        except OSError as error:
-            raise unwritable(options.out, error) from error
+        views = read_rig_views(found.files[0]) if found.kind is RigKind.RIG else None
+        with written_beside(options.out, REPORT) as place:
+            report = replace(report, earlier_rig=replace_rig(place, options.out, found.rig, rectification, views))
+            write_text(place / REPORT, json_text(import_values(report), indent=2) + "\n")
     if options.json:
         print(json_text(import_values(report)))
     else:

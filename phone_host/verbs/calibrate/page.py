@@ -17,7 +17,7 @@ from phone_host.output.atomic import write_text
 from phone_host.report.calibration_page import calibration_page
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.report import Judged
-from phone_host.verbs.output_folders import PAGE, unwritable
+from phone_host.verbs.output_folders import PAGE
 
 
 def series_of_failure(taken: Taken, failure: DataError) -> CalibrationSeries:
@@ -67,22 +67,19 @@ def with_rectified(
     return replace(series, rectified=rectified_view(paths[one.name], one, rig, mounted, most_pixels))
 
 
-def write_page(out: Path, series: CalibrationSeries) -> None:
-    """Write the page beside the rig.
+def write_page(place: Path, series: CalibrationSeries, rig_file: str) -> None:
+    """Write the page.
 
     Args:
-        out: the rig's file.
-        series: what the page shows.
+        place: folder for it.
+        series: what it shows.
+        rig_file: name of the rig's file beside it, if one is written.
 
     Raises:
-        UnavailableError: it cannot be written.
+        OSError: it cannot be written.
     """
     is_written = series.found is not None and series.found.rectification is not None
-    page = out.with_name(PAGE)
-    try:
-        write_text(page, calibration_page(replace(series, rig_file=out.name if is_written else "")))
-    except OSError as error:
-        raise unwritable(out, error) from error
+    write_text(place / PAGE, calibration_page(replace(series, rig_file=rig_file if is_written else "")))
 
 
 def _board_words(board: Board) -> str:

@@ -4,47 +4,46 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, UnavailableError
-from common.places import Kind, kind_of, make_folder
+from common.places import Kind, kind_of
 from phone_host.calibration.earlier_views import new_ones, pairs_of
 from phone_host.model import Rectification, Rig
+from phone_host.output.atomic import replacing
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import is_rig, read_rig, read_rig_views, write_rig
-from phone_host.verbs.output_folders import unwritable
 
 REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
 
 
-def replace_rig(out: Path, rig: Rig | None, rectification: Rectification | None, views: RigViews | None = None) -> str:
+def replace_rig(
+    place: Path, out: Path, rig: Rig | None, rectification: Rectification | None, views: RigViews | None = None
+) -> str:
     """Write rig.yaml. Keep an earlier one that the new one does not replace: because it is of use and the new one is not, or because its views would be lost.
 
     If there is nothing to write, a mistake of the user's was found, not of the earlier rig: that stays where it is.
 
     Args:
-        out: the file.
+        place: folder for the new file, from which it takes the place of the earlier one later.
+        out: the earlier file.
         rig: the new rig; None: there is none.
         rectification: of the rig; None: it cannot be rectified, and is not written.
         views: what it was computed from; None: not known.
 
     Returns:
-        The name that the earlier rig has now, if it was not replaced; empty: there was none, or the new one is in its place.
+        The name that the earlier rig has then, if it is not replaced; empty: there was none, or the new one takes its place.
 
     Raises:
-        UnavailableError: a file cannot be written or moved.
+        OSError: a file cannot be written.
     """
-    moved = ""
-    try:
-        make_folder(out.parent)
-        if rig is None or rectification is None:
-            return "" if kind_of(out) is Kind.MISSING else out.name
-        is_of_use = not rig.is_rejected
-        if kind_of(out) is not Kind.MISSING and not _is_rejected(out) and not (is_of_use and _holds(views, out)):
-            aside = _aside(out)
-            out.replace(aside)
-            moved = aside.name
-        write_rig(out, rig, rectification, views)
-    except OSError as error:
-        raise unwritable(out, error) from error
-    return moved
+    if rig is None or rectification is None:
+        return "" if kind_of(out) is Kind.MISSING else out.name
+    write_rig(place / out.name, rig, rectification, views)
+    is_of_use = not rig.is_rejected
+    if kind_of(out) is Kind.MISSING or _is_rejected(out) or (is_of_use and _holds(views, out)):
+        return ""
+    aside = _aside(out)
+    with replacing(place / aside.name) as copy:
+        copy.write(out.read_bytes())
+    return aside.name
 
 
 def require_own(out: Path) -> None:

@@ -40,10 +40,19 @@ from phone_host.run.progress_bar import share_bar
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectifier import Rectifier
-from phone_host.verbs.output_folders import claim_names, keep_other_report, require_file, require_folder, unwritable
+from phone_host.verbs.output_folders import (
+    claim_names,
+    keep_other_report,
+    require_alone,
+    require_file,
+    require_folder,
+    unwritable,
+    written_together,
+)
 from phone_host.verbs.run.page_beside import camera_page
 
 _Reading = TypeVar("_Reading")
+_FILES = "report.json", "time-offset.svg"
 
 
 def run(options: argparse.Namespace) -> int:
@@ -55,8 +64,9 @@ def run(options: argparse.Namespace) -> int:
     rig = None if options.calibration is None else read_own_rig(options.calibration)
     if options.out is not None:
         require_folder(options.out)
+        require_alone(options.out)
         keep_other_report(options.out, "calibrate-time")
-        claim_names(options.out, options.out, "report.json", "time-offset.svg")
+        claim_names(options.out, options.out, *_FILES)
     signals = StopSignals()
     footage = _footage(options, signals)
     if signals.interrupted:
@@ -177,19 +187,17 @@ def _report(options: argparse.Namespace, measured: Measured, footage: Footage) -
 
 
 def _store(options: argparse.Namespace, measured: Measured, report: dict[str, Any]) -> None:
-    where, option = options.out, "--out"
+    if options.out is not None:
+        with written_together(options.out, *_FILES) as place:
+            write_text(place / "report.json", json_text(report, indent=2) + "\n")
+            write_text(place / "time-offset.svg", misfit_svg(measured))
+    if options.calibration is None:
+        print("phone-host: no --calibration: the result is stored nowhere", file=sys.stderr)
+        return
     try:
-        if options.out is not None:
-            write_text(options.out / "report.json", json_text(report, indent=2) + "\n")
-            write_text(options.out / "time-offset.svg", misfit_svg(measured))
-        if options.calibration is not None:
-            where, option = options.calibration, "--calibration"
-            write_time_offset(options.calibration, measured.offset)
-        else:
-            print("phone-host: no --calibration: the result is stored nowhere", file=sys.stderr)
+        write_time_offset(options.calibration, measured.offset)
     except OSError as error:
-        assert where is not None
-        raise unwritable(where, error, option) from error
+        raise unwritable(options.calibration, error, "--calibration") from error
 
 
 def _summary(report: dict[str, Any]) -> str:

@@ -21,7 +21,7 @@ from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
 from phone_host.measure.trouble import trouble_of
 from phone_host.model import Rig
-from phone_host.output.atomic import write_text
+from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
 from phone_host.output.pair_files import PAIR_NAMES
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     rig, scene = unlike_rig(), demo_scene()
 
     try:
-        _clear(out)
+        _claim(out)
         film = _render(scene, rig, out / "film", console, signals)
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
         with socket_folder() as sockets:
@@ -78,9 +78,9 @@ def run(options: argparse.Namespace) -> int:
         with busy_bar("comparing the depth with the known scene, writing the page", console):
             errors = demo.check(scene)
             report = build(snapshot, "demo") | {"truth": truth_json(errors)}
-            complete = demo.host.write_report(report)
+            page = demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film))
             demo.write_pictures(out)
-            write_text(out / "index.html", demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film)))
+            complete = demo.host.write_report(report, page, replaces_earlier=snapshot.processed > 0)
     except _StoppedError:
         if signals.interrupted:
             raise KeyboardInterrupt from None  # told as by every other command
@@ -97,17 +97,20 @@ def run(options: argparse.Namespace) -> int:
     return 0 if errors.pairs and not errors.wrong_pairs and complete else _CHECK_FAILED
 
 
-def _clear(out: Path) -> None:
-    """Remove an earlier demo's results from the folder, and report anything in the way before rendering.
+def _claim(out: Path) -> None:
+    """Take the folder for this demo alone, and report anything in the way before rendering. An earlier demo's results stay until they are replaced.
 
     Raises:
-        UnavailableError: something that is not ours is in the way.
+        UnavailableError: something that is not ours is in the way, or another program writes there.
         OSError: the folder cannot be used.
     """
-    names = rf"{NAMES}|rig\.yaml|cloud\.ply|disparity\.png"
-    folder = ListedFolder(out, names, kept="film", inner=PAIR_NAMES)
-    folder.add("film", "rig.yaml", "cloud.ply", "disparity.png", "index.html")
-    folder.close()
+    lock_for_command(out)
+    names = rf"{NAMES}|film|rig\.yaml|cloud\.ply|disparity\.png"
+    folder = ListedFolder(out, "(?!)", kept=names, inner=PAIR_NAMES)
+    try:
+        folder.add("film", "rig.yaml", "cloud.ply", "disparity.png", "index.html")
+    finally:
+        folder.close()
 
 
 class _StoppedError(Exception):

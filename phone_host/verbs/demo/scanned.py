@@ -23,8 +23,9 @@ from phone_host.demo.scan_demonstration import ScanDemo, render_pictures, with_t
 from phone_host.demo.scan_truth import ModelErrors
 from phone_host.live.scan_view import ScanPicture
 from phone_host.output.atomic import write_bytes, write_text
+from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import ListedFolder
+from phone_host.output.listed import claim
 from phone_host.output.meshes.formats import mesh_bytes
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.rig_yaml import write_rig
@@ -37,7 +38,7 @@ from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
 from phone_host.run.progress_bar import busy_bar, progress_bar, step_bar
-from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
+from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
 from phone_host.stereo.default_matcher import default_matcher
@@ -109,7 +110,7 @@ def _scanned(
         OSError: the folder cannot be written to.
         UnavailableError: something that is not ours is in the way, or the board process died.
     """
-    _clear(out)
+    _claim(out)
     views = scene.setting.views
     with progress_bar(console) as progress:
         task = progress.add_task(f"rendering {views} views of a thing for two cameras", total=2 * views)
@@ -130,18 +131,15 @@ def _scanned(
     return replace(with_truth(scan, errors), commands=_by_hand(out)), errors
 
 
-def _clear(out: Path) -> None:
-    """Remove an earlier demo's results from the folder, and report anything in the way before rendering.
+def _claim(out: Path) -> None:
+    """Take the folder for this demo alone, and report anything in the way before rendering. An earlier demo's results stay until they are replaced.
 
     Raises:
-        UnavailableError: something that is not ours is in the way.
+        UnavailableError: something that is not ours is in the way, or another program writes there.
         OSError: the folder cannot be used.
     """
-    folder = ListedFolder(out, rf"{NAMES}|rig\.yaml|model\.stl|model\.gcode", kept="film")
-    try:
-        folder.add("film", "rig.yaml", _STL, _GCODE)
-    finally:
-        folder.close()
+    lock_for_command(out)
+    claim(out, "film", "rig.yaml", _STL, _GCODE)
 
 
 def _printed(out: Path, console: Console) -> dict[str, Any]:

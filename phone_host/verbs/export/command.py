@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import SettingsError
-from common.places import make_folder
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.atomic import write_bytes
@@ -15,7 +14,7 @@ from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, me
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
 from phone_host.run.model_job import fewer_triangles, spare_model, usual_tolerance_m
-from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
+from phone_host.verbs.output_folders import require_alone, require_folder, written_together
 from phone_host.verbs.units import length_mm
 
 _UNITS_M: Final = {"m": 1.0, "mm": 0.001}
@@ -32,16 +31,13 @@ def run(options: argparse.Namespace) -> int:
     files = {f"{model.stem}.{kind}": kind for kind in kinds}
     spare_model(model, (options.out / name for name in files))
     solid, notes = fewer_triangles(model.solid, tolerance_m)
-    try:
-        make_folder(options.out)
-        claim_names(options.out, options.out, *files)
-        sizes = {}
+    require_alone(options.out)
+    sizes = {}
+    with written_together(options.out, *files) as place:
         for name, kind in files.items():
             content = mesh_bytes(solid, kind, model.axes)
-            write_bytes(options.out / name, content)
+            write_bytes(place / name, content)
             sizes[name] = len(content)
-    except OSError as error:
-        raise unwritable(options.out, error) from error
     if options.json:
         print(json_text(_told(options.out, solid, model, sizes, notes)))
     else:

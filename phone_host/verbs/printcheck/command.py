@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError
-from common.places import make_folder
 from common.program.terminal import say
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
@@ -23,7 +22,7 @@ from phone_host.output.model_file import Model
 from phone_host.output.upright import upright_model
 from phone_host.printers.bed import USUAL_BED
 from phone_host.run.progress_bar import step_bar
-from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
+from phone_host.verbs.output_folders import require_alone, require_folder, written_together
 from phone_host.verbs.printer_bed import bed_of
 from phone_host.verbs.units import length_mm
 
@@ -47,13 +46,10 @@ def run(options: argparse.Namespace) -> int:
     if mended is not None:
         solid = Solid((mended.points_mm / 1000).astype(np.float32), mended.triangles, np.zeros((0, 3), np.uint8))
         files[f"{model.stem}-fixed.stl"] = mesh_bytes(solid, "stl", None)
-    try:
-        make_folder(options.out)
-        claim_names(options.out, options.out, *files)
+    require_alone(options.out)
+    with written_together(options.out, *files) as place:
         for name, content in files.items():
-            write_bytes(options.out / name, content)
-    except OSError as error:
-        raise unwritable(options.out, error) from error
+            write_bytes(place / name, content)
     paths = [str(options.out / name) for name in files]
     if options.json:
         print(json_text(_told(model, found, left, mended, paths)))

@@ -34,6 +34,7 @@ from phone_host.recording.filming import take_alone, take_frames
 from phone_host.recording.unpaired import UnpairedFrames
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings
+from phone_host.verbs.output_folders import require_alone
 
 _BAD_DATA = 4
 
@@ -45,6 +46,9 @@ def run(options: argparse.Namespace) -> int:
     check(settings)
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    require_alone(
+        options.out.parent, options.out.name
+    )  # before the file that another program just writes is in the way
     require_new(options.out, "--out")
     if options.alone and options.link:
         raise SettingsError("--alone records without a board, and --link names one", "leave one of both out")

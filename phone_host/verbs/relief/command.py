@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from common.places import make_folder
 from common.program.terminal import say
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
@@ -18,7 +17,7 @@ from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import claim_names, require_folder, unwritable
+from phone_host.verbs.output_folders import require_alone, require_folder, written_together
 from phone_host.verbs.stereo_options import build_core, overlay_of
 from phone_host.verbs.units import bounded_mm
 
@@ -53,13 +52,10 @@ def run(options: argparse.Namespace) -> int:
         watcher.say("raising")
         relief = relief_of(processed.cloud, processed.pair.left, processed.geometry.focal_px, sizes)
         solid = _fewer(relief.solid)
-    try:
-        make_folder(options.out)
-        claim_names(options.out, options.out, *_NAMES)
+    require_alone(options.out)
+    with written_together(options.out, *_NAMES) as place:
         for name in _NAMES:
-            write_bytes(options.out / name, mesh_bytes(solid, name.rpartition(".")[2], None))
-    except OSError as error:
-        raise unwritable(options.out, error) from error
+            write_bytes(place / name, mesh_bytes(solid, name.rpartition(".")[2], None))
     doubts = [f"{one.sentence}; {one.remedy}" for one in pair.concerns]
     files = [str(options.out / name) for name in _NAMES]
     if options.json:

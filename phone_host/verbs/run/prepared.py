@@ -44,7 +44,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_note
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
-from phone_host.verbs.output_folders import keep_other_report, spare_inputs
+from phone_host.verbs.output_folders import keep_other_report, require_alone, spare_inputs
 from phone_host.verbs.run.budget import budget_wanted
 from phone_host.verbs.run.own_rig import with_own_rig
 from phone_host.verbs.stereo_options import build_core, depth_wanted, output_options, overlay_of
@@ -178,8 +178,9 @@ class PreparedRun:
     def _written(self, snapshot: RunSnapshot) -> Ended:
         report = build(snapshot)
         recording = snapshot.recording
-        page = "" if self.out is None else _page(self.host, snapshot, self.board_side, self.out)
-        is_complete = self.host.write_report(report, page)
+        place = self.host.results_place
+        page = "" if place is None else _page(self.host, snapshot, self.board_side, place)
+        is_complete = self.host.write_report(report, page, replaces_earlier=snapshot.processed > 0)
         missing = [self.host.missing_files] if self.host.missing_files else []
         if recording is not None and not recording.is_whole:
             missing.append(f"the whole of {recording.file}")
@@ -229,6 +230,7 @@ def open_run(
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     if getattr(options, "record", None) is not None:
+        require_alone(options.record.parent, options.record.name, "--record")
         require_new(options.record, "--record")
     if options.out is not None:
         spare(options.out, replayed(settings.camera), settings.calibration, options.overlay)

@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_image_arguments(parser)
     add_model_arguments(parser)
     add_turntable_arguments(parser)
-    _add_resume_argument(parser)
+    _add_resume_arguments(parser)
     parser.add_argument(
         "--out",
         type=Path,
@@ -136,11 +136,16 @@ def add_turntable_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_resume_argument(parser: argparse.ArgumentParser) -> None:
+def _add_resume_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resume",
         type=Path,
         metavar="DIR",
         help="go on with a scan that was killed, from the last submap that it has written into its folder, one every 20 pairs of the model;"
         " DIR may be that of --out",
+    )
+    parser.add_argument(
+        "--restart",
+        action="store_true",
+        help="begin anew where --out holds what a scan that was killed has written; without it that is refused",
     )

@@ -9,7 +9,7 @@ from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
-from phone_host.report.scan_report import MODEL, ScanReport
+from phone_host.report.scan_report import ScanReport
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES
 from phone_host.run.scan_job import ScanJob, run_scan
@@ -73,4 +73,4 @@ def _scan_pictures(options: argparse.Namespace) -> ScanReport:
         with step_bar("reading", len(files.pairs)) as watcher:
             return run_scan(job, watcher)
     except OSError as error:
-        raise unwritable(options.out, error, beside=options.out / MODEL) from error
+        raise unwritable(options.out, error) from error

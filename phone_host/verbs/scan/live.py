@@ -25,7 +25,7 @@ from phone_host.run.stereo_results import require_writable
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import keep_other_report, require_folder, spare_inputs, unwritable
+from phone_host.verbs.output_folders import keep_other_report, require_alone, require_folder, spare_inputs, unwritable
 from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run
 from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
 from phone_host.verbs.serve.choices import run_options
@@ -157,6 +157,7 @@ def _require_place(options: argparse.Namespace) -> None:
         raise unwritable(options.out, error) from error
     inputs = {"--calibration": options.calibration, "--replay": options.replay, "--overlay": options.overlay}
     spare_inputs(options.out, NAMES, {name: path for name, path in inputs.items() if path})
+    require_alone(options.out)
     keep_other_report(options.out, "scan")
 
 

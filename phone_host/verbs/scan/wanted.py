@@ -13,7 +13,7 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.output.axes import Axes
 from phone_host.run.kept_field import read_field
-from phone_host.run.kept_submaps import read_submaps
+from phone_host.run.kept_submaps import read_submaps, require_no_submaps
 from phone_host.run.scan_result import own_axes
 from phone_host.scan.box import Box
 from phone_host.scan.field_bytes import KeptField
@@ -104,11 +104,17 @@ def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
 
     Raises:
         DataError: there are none, or they are damaged.
-        SettingsError: they were made with another --voxel.
+        SettingsError: they were made with another --voxel; or others lie in --out and --restart is not given.
         UnavailableError: they cannot be read.
     """
     if options.resume is None:
+        if not options.restart:
+            require_no_submaps(options.out)
         return ()
+    if options.restart:
+        raise SettingsError("--resume beside --restart", "leave one of them out")
+    if options.resume.resolve() != options.out.resolve():
+        require_no_submaps(options.out)
     if options.turntable:
         raise SettingsError(
             "--resume beside --turntable: the end needs all of its pairs", "scan the pictures or the recording again"

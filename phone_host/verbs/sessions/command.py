@@ -31,7 +31,7 @@ from phone_host.recording.other_topics import ImportOptions, import_topics
 from phone_host.recording.session_info import SessionInfo, session_info
 from phone_host.recording.timed_images import TimeOptions
 from phone_host.run.progress_bar import busy_bar, share_bar
-from phone_host.verbs.output_folders import unwritable
+from phone_host.verbs.output_folders import require_alone, unwritable
 from phone_host.verbs.sessions.page import info_page
 
 _MOST_LISTED: Final = 40
@@ -68,6 +68,8 @@ def _check(options: argparse.Namespace) -> None:
         raise SettingsError(f"sessions {options.task} takes one recording", "name one")
     if options.task != "info" and options.out is None:
         raise SettingsError(f"sessions {options.task} needs --out", "add --out PATH")
+    if options.task not in {"info", "export"} and is_recording(options.out.name):
+        require_alone(options.out.parent, options.out.name)
     if options.task not in {"info", "export"}:
         require_new(options.out, "--out")
     if options.last is not None and options.last <= options.first:
