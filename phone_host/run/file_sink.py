@@ -178,7 +178,8 @@ class FileSink:
         except OSError as error:
             self._let_go()
             raise UnavailableError(
-                f"results folder {folder} cannot be used ({error.strerror})", "give another with --out"
+                f"results folder {folder} cannot be used ({error.strerror})",
+                "check that you may write to it and that the disk has room, or give another with --out",
             ) from None
         except BaseException:
             self._let_go()

@@ -137,19 +137,24 @@ def test_marks_of_another_board_are_told_while_it_is_shown() -> None:
         check.missed(shown, shown)
 
 
-def test_pictures_replace_those_of_an_earlier_session_only(tmp_path: Path) -> None:
-    """Pictures are exact and numbered; a second session removes them; pictures of other names are refused."""
+@pytest.mark.parametrize("live", [True, False])
+def test_pictures_replace_those_of_an_earlier_session_only(tmp_path: Path, *, live: bool) -> None:
+    """Pictures are exact and numbered; a second session that has some replaces them, one that has none does not; pictures of other names are refused."""
     left, right = tmp_path / "left", tmp_path / "right"
-    folders = ViewFolders(left, right)
+    folders = ViewFolders(left, right, are_taken_live=live)
     folders.write(Pictures("01", *_PAIR))
     folders.close("{}")
     assert np.array_equal(np.asarray(cv2.imread(str(right / "01.png"), cv2.IMREAD_GRAYSCALE)), _PAIR[1])
     assert (left / "cameras.json").read_text() == "{}"
-    ViewFolders(left, right).close("")
-    assert not list(left.glob("*.png"))
+    ViewFolders(left, right, are_taken_live=live).close("")
+    folders = ViewFolders(left, right, are_taken_live=live)
+    folders.write(Pictures("02", *_PAIR))
+    assert [path.name for path in sorted(left.glob("*.png"))] == ["01.png"]
+    folders.close("")
+    assert [path.name for path in sorted(left.glob("*.*")) if path.suffix] == ["02.png"]
     (right / "holiday.jpg").write_bytes(b"")
     with pytest.raises(UnavailableError, match="holds other pictures"):
-        ViewFolders(left, right)
+        ViewFolders(left, right, are_taken_live=live)
 
 
 def test_only_the_newest_thing_is_worked_on() -> None:
