@@ -12,6 +12,7 @@ import random
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -171,17 +172,30 @@ def _tree(disk: Path) -> dict[str, bytes]:
 
 @contextlib.contextmanager
 def _filled(disk: Path, left_bytes: int) -> Iterator[None]:
-    filler = disk / "filler"
+    """Fill the disk; where nothing is left, somebody else takes at once whatever becomes free."""
+    filler, is_over = disk / "filler", threading.Event()
     with filler.open("wb", buffering=0) as file:
-        for size in (1 << 20, 1 << 12):
+
+        def fill(size: int) -> None:
             with contextlib.suppress(OSError):
                 while file.write(b"x" * size) == size:
                     pass
+
+        def take_all() -> None:
+            while not is_over.wait(0.0005):
+                fill(1 << 12)
+
+        fill(1 << 20)
+        fill(1 << 12)
         file.truncate(max(0, file.tell() - left_bytes))
-    try:
-        yield
-    finally:
-        filler.unlink()
+        other = threading.Thread(target=(lambda: None) if left_bytes else take_all)
+        other.start()
+        try:
+            yield
+        finally:
+            is_over.set()
+            other.join()
+            filler.unlink()
 
 
 def faults_of(verb: Verb, given: Path, disk: Path, left_bytes: int) -> list[str]:
