@@ -39,7 +39,7 @@ from phone_host.bench.tables import (
 from phone_host.bench.trace import TracedRun, trace_json
 from phone_host.output.atomic import write_text
 from phone_host.output.folder_lock import lock_for_command
-from phone_host.output.listed import claim, replacing_results
+from phone_host.output.result_files import claim, replacing_results
 from phone_host.run.progress_bar import busy_bar
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.matcher_names import matcher_named

@@ -127,6 +127,19 @@ class ListedFolder:
         else:
             self.remove_earlier()
 
+    def publish_alone(self, name: str) -> bool:
+        """Move one new result up, where nothing is replaced, and leave the others; return whether it was there.
+
+        Args:
+            name: of a file that is whole.
+        """
+        if not self.is_staged or self.earlier or name not in entries_of(self._into):
+            return False
+        with suppress(OSError):
+            os.rename(name, name, src_dir_fd=self._into, dst_dir_fd=self.descriptor)
+            return True
+        return False
+
     def remove_earlier(self) -> None:
         """Remove the results of an earlier run.
 
@@ -344,73 +357,6 @@ class ListedFolder:
 
     def _in_the_way(self, problem: str) -> UnavailableError:
         return UnavailableError(problem, "move or delete it, or give another folder with --out")
-
-
-@contextmanager
-def replacing_results(path: Path, names: str, files: Iterable[str], *, inner: str = "(?!)") -> Iterator[Path]:
-    """Write results that take the place of an earlier run's if the block ends without an error; else those stay as they are.
-
-    Args:
-        path: the folder, created if missing.
-        names: pattern of the names that are removed if they are ours.
-        files: names of what is written.
-        inner: see `ListedFolder`.
-
-    Yields:
-        Where to write the files.
-
-    Raises:
-        UnavailableError: such a name belongs to a foreign file, or to a link; or another program writes there.
-        OSError: as the operating system reports it; it names the file as it would be called in the end.
-    """
-    folder = ListedFolder(path, names, inner=inner)
-    try:
-        folder.add(*files)
-        folder.stage()
-        yield folder.place
-        folder.publish()
-    except OSError as error:
-        if error.filename and (name := Path(os.fsdecode(error.filename)).name):
-            error.filename = str(path / name)
-        raise
-    finally:
-        folder.close()
-
-
-def remove_results(path: Path, names: str) -> None:
-    """Remove files that an earlier run has left.
-
-    Args:
-        path: the folder.
-        names: pattern of their names.
-
-    Raises:
-        UnavailableError: such a name belongs to a foreign file, or to a link; or another program writes there.
-        OSError: as the operating system reports it.
-    """
-    folder = ListedFolder(path, names)
-    try:
-        folder.remove_earlier()
-    finally:
-        folder.close()
-
-
-def claim(path: Path, *names: str) -> None:
-    """List names in a folder as ours before they are written; they must be free or left by an earlier run.
-
-    Args:
-        path: the folder, created if missing.
-        names: names of what will be written there.
-
-    Raises:
-        UnavailableError: such a name belongs to a foreign file, or to a link.
-        OSError: as the operating system reports it.
-    """
-    folder = ListedFolder(path, "(?!)", kept="|".join(re.escape(name) for name in names))
-    try:
-        folder.add(*names)
-    finally:
-        folder.close()
 
 
 def plain_name(name: str) -> str:

@@ -24,7 +24,7 @@ from common.recording.recorded import Recorded
 from phone_host.calibration.timing.shots import Shot
 from phone_host.model import BoardFrame, Side
 from phone_host.output.atomic import write_bytes
-from phone_host.output.listed import replacing_results
+from phone_host.output.result_files import replacing_results
 from phone_host.recording.both_sides import encoded, topics_of
 from phone_host.recording.filming import take_frames
 from phone_host.stereo.raw_images import EncodedImage

@@ -11,7 +11,8 @@ from typing import Final
 
 from common.errors import DataError, SettingsError
 from phone_host.output.atomic import write_bytes
-from phone_host.output.listed import ListedFolder, remove_results
+from phone_host.output.listed import ListedFolder
+from phone_host.output.result_files import remove_results
 from phone_host.report.stereo_report import Remark
 from phone_host.scan.scan import Scan
 from phone_host.scan.scanned import Submap

@@ -23,8 +23,8 @@ from phone_host.measure.trust import Doubt
 from phone_host.model import Crop, PlaneQuality, Processed, Seen
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import replacing_results
 from phone_host.output.residual_view import residual_jpeg
+from phone_host.output.result_files import replacing_results
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import MeasuredPair, QualityReport

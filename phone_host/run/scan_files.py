@@ -6,8 +6,8 @@ from typing import Final
 
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import replacing_results
 from phone_host.output.ply import PointCloud, write_surface
+from phone_host.output.result_files import replacing_results
 from phone_host.output.trajectory_text import Station, tum_text
 from phone_host.report.model_view import ShownModel
 from phone_host.report.page_links import NextCommand
@@ -40,7 +40,9 @@ class FinishedScan:
 
 
 def write_scan(out: Path, scan: FinishedScan) -> None:
-    """Write model.ply, trajectory.txt, report.json and index.html, all or nothing; then they take the place of an earlier run's.
+    """Write model.ply, trajectory.txt, report.json and index.html; when all are whole they take the place of an earlier run's.
+
+    Where there is no earlier run, a model that is whole stays even if the others have no room.
 
     Args:
         out: the folder.
@@ -51,7 +53,8 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
         OSError: as the operating system reports it.
     """
     report, mesh = scan.report, scan.model.mesh
-    with replacing_results(out, NAMES, (MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else []))) as place:
+    files = MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else [])
+    with replacing_results(out, NAMES, files, first=MODEL) as place:
         seen = scan.model.seen if scan.model.is_closed else None
         write_surface(place / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
         write_text(place / TRAJECTORY, trajectory_of(report))

@@ -14,7 +14,8 @@ from common.places import Kind, kind_of, nearest, resolved
 from common.program.terminal import say
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_value
-from phone_host.output.listed import ListedFolder, claim, remove_results, replacing_results
+from phone_host.output.listed import ListedFolder
+from phone_host.output.result_files import claim, remove_results, replacing_results
 
 REPORT: Final = "report.json"
 PAGE: Final = "index.html"

@@ -97,3 +97,47 @@ def test_a_damaged_submap_is_one_line(walk: Path, tmp_path: Path) -> None:
     assert done.returncode == 4
     assert len(done.stderr.strip().splitlines()) == 1
     assert f"{out / 'submap-0000.bin'} is damaged" in done.stderr
+
+
+def test_the_same_command_does_not_drop_a_killed_scan(walk: Path, tmp_path: Path) -> None:
+    """After SIGKILL the same command changes nothing and names --resume and --restart; with --restart all pairs are scanned anew and no submap stays."""
+    out = tmp_path / "out"
+    assert until_killed(walk, out)[0] == -signal.SIGKILL
+    kept = {path.name: path.read_bytes() for path in out.glob("submap-*.bin")}
+    assert kept
+    again = subprocess.run(command(walk, out), capture_output=True, text=True, check=False, timeout=WAIT_S)
+    assert again.returncode == 2
+    (line,) = again.stderr.strip().splitlines()
+    assert f"go on with it with --resume {out}, or begin anew with --restart" in line
+    assert {path.name: path.read_bytes() for path in out.glob("submap-*.bin")} == kept
+    anew = subprocess.run(command(walk, out, "--restart"), capture_output=True, text=True, check=False, timeout=WAIT_S)
+    assert anew.returncode == 0, anew.stderr
+    assert "going on" not in anew.stderr
+    assert json.loads(anew.stdout)["in_model"] == 30
+    assert not [path.name for path in out.iterdir() if path.name.startswith((".tandemscan.", "submap"))]
+
+
+def test_resume_and_restart_contradict_each_other(walk: Path, tmp_path: Path) -> None:
+    """Exit code 2, and one line."""
+    words = command(walk, tmp_path / "out", "--resume", str(tmp_path), "--restart")
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, len(done.stderr.strip().splitlines())) == (2, 1)
+
+
+def test_a_second_scan_into_the_same_folder_is_refused(walk: Path, tmp_path: Path) -> None:
+    """While a scan works, another one into its folder ends with exit code 3 and the number of the first one's process; the first one ends well."""
+    out = tmp_path / "out"
+    with subprocess.Popen(command(walk, out), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as first:
+        end = time.monotonic() + WAIT_S
+        while not (out / ".tandemscan.lock").exists() and time.monotonic() < end and first.poll() is None:
+            time.sleep(0.005)
+        first.send_signal(signal.SIGSTOP)  # it does not end before the second one has begun
+        second = subprocess.run(command(walk, out), capture_output=True, text=True, check=False, timeout=WAIT_S)
+        first.send_signal(signal.SIGCONT)
+        told = first.communicate(timeout=WAIT_S)[0]
+    assert second.returncode == 3
+    (line,) = second.stderr.strip().splitlines()
+    assert f"{out} is being written by process {first.pid}: wait for its end, or give another --out" in line
+    assert first.returncode == 0
+    assert json.loads(told)["in_model"] == 30
+    assert not (out / ".tandemscan.lock").exists()

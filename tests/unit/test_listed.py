@@ -16,8 +16,9 @@ from common.errors import DataError, SettingsError, TandemError, UnavailableErro
 from common.files import read_whole
 from phone_host.output.atomic import replacing, write_bytes, write_text
 from phone_host.output.folder_lock import LOCK, FolderLock
-from phone_host.output.listed import LIST, STAGED, ListedFolder, claim, remove_results, replacing_results
+from phone_host.output.listed import LIST, STAGED, ListedFolder
 from phone_host.output.pair_files import PAIR_NAMES
+from phone_host.output.result_files import claim, remove_results, replacing_results
 from phone_host.run.file_sink import NAMES, FileSink
 from phone_host.verbs.output_folders import spare_inputs
 from phone_host.verbs.run.prepared import spare

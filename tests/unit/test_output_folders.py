@@ -9,7 +9,7 @@ import pytest
 
 from phone_host.cli import main
 from phone_host.model import CameraModel, Rig
-from phone_host.output.listed import claim
+from phone_host.output.result_files import claim
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.verbs.output_folders import drop_page, keep_other_report, unwritable

@@ -25,9 +25,9 @@ from phone_host.live.scan_view import ScanPicture
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import claim
 from phone_host.output.meshes.formats import mesh_bytes
 from phone_host.output.meshes.solid import Solid
+from phone_host.output.result_files import claim
 from phone_host.output.rig_yaml import write_rig
 from phone_host.output.upright import upright_model
 from phone_host.printers.bed import Bed
