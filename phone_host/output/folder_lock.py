@@ -161,7 +161,10 @@ class FolderLock:
         except OSError as error:
             if error.errno in {errno.ELOOP, errno.EMLINK, errno.EISDIR, errno.ENXIO}:
                 raise self._in_the_way() from None
-            raise
+            if error.errno != errno.EACCES:
+                raise
+            # Another user's, who writes there or was killed; it can be locked all the same.
+            descriptor = os.open(self._name, _OPEN & ~(os.O_RDWR | os.O_CREAT), dir_fd=self._folder)
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             os.close(descriptor)
             raise self._in_the_way()

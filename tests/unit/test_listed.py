@@ -1,11 +1,13 @@
 """Results folders into which others have put things: links, pipes, folders of their own."""
 
 import errno
+import fcntl
 import os
 import re
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -380,6 +382,26 @@ def test_a_foreign_lock_is_named(plant: Callable[[Path], None], tmp_path: Path) 
         FolderLock(tmp_path / "out")
     assert (tmp_path / "precious").read_text() == ""
     assert (tmp_path / "out" / LOCK).exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can make another user's lock")
+def test_what_a_killed_root_left_locks_nobody_out() -> None:
+    """A lock file of root's that nobody holds is no obstacle for the user whose folder it is, and goes with his own lock; one that is held is told."""
+    with tempfile.TemporaryDirectory() as name:
+        out = Path(name)
+        (out / LOCK).write_text("1\n")
+        out.chmod(0o777)
+        held = os.open(out / LOCK, os.O_RDONLY)
+        fcntl.flock(held, fcntl.LOCK_EX)
+        os.seteuid(65534)
+        try:
+            with pytest.raises(UnavailableError, match="is being written by process 1:"):
+                FolderLock(out)
+            os.close(held)
+            FolderLock(out).release()
+            assert list(out.iterdir()) == []
+        finally:
+            os.seteuid(0)
 
 
 def test_a_lock_leaves_no_folder_behind(tmp_path: Path) -> None:
