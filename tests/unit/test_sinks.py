@@ -20,7 +20,7 @@ from common.ledger import BoardMarks, HostMarks, StageTimes
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Processed, RectifiedPair, Result
 from phone_host.output.axes import Axes
-from phone_host.output.listed import LIST
+from phone_host.output.listed import LIST, STAGED
 from phone_host.output.ply import read_ply
 from phone_host.run.file_sink import FileSink
 from phone_host.run.sinks import FunctionSink, SinkQueue
@@ -256,6 +256,52 @@ def test_a_full_disk_is_told_once_and_counted(tmp_path: Path, caplog: pytest.Log
     told = [record.getMessage() for record in caplog.records if "results_not_written" in record.getMessage()]
     assert sorted(text.partition("what=")[2].split()[0] for text in told) == ["lines", "pairs", "report.json"]
     FileSink(tmp_path, 0).close({})  # nobody has it locked any more
+
+
+def test_a_run_that_is_not_whole_replaces_no_earlier_one(tmp_path: Path) -> None:
+    """Of two pairs the second has no room: the earlier results stay, the last line says so and names where the first pair lies; the next whole run replaces all."""
+    first = FileSink(tmp_path, 1, waits=True)
+    first.offer(result(0))
+    first.close({"number": 1})
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    sink = FileSink(tmp_path, 1, waits=True)
+    sink.offer(result(0))
+    sink.finish()
+    noise = np.random.default_rng(1).integers(0, 256, (100, 100), np.uint8)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, hard))
+    try:
+        sink.offer(replace(result(1), processed=replace(result(1).processed, pair=RectifiedPair(noise, noise))))
+        sink.close({"number": 2})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, ignored)
+    assert not sink.complete
+    assert sink.missing.endswith(
+        f"the earlier results stay, and 1 pair of this run in {tmp_path / STAGED} until the next one"
+    )
+    assert {path: path.read_bytes() for path in before if path.name != LIST} == {
+        path: content for path, content in before.items() if path.name != LIST
+    }
+    assert (tmp_path / STAGED / "pair-000000").is_dir()
+    FileSink(tmp_path, 0).close({"number": 3})
+    assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
+
+
+@pytest.mark.parametrize("is_earlier", [True, False])
+def test_a_run_without_a_pair_replaces_no_earlier_one(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, *, is_earlier: bool
+) -> None:
+    """If no board came, an earlier report stays, and a line in the log says so; in a new folder the report says what happened."""
+    if is_earlier:
+        FileSink(tmp_path, 0).close({"number": 1})
+    sink = FileSink(tmp_path, 0)
+    sink.close({"number": 2}, replaces_earlier=False)
+    assert ('"number": 1' in (tmp_path / "report.json").read_text()) == is_earlier
+    assert ("earlier_results_stay" in caplog.text) == is_earlier
+    assert sink.complete
+    assert not (tmp_path / STAGED).exists()
 
 
 def test_a_page_that_has_no_room_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
