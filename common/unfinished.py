@@ -38,5 +38,5 @@ def remove_unfinished() -> None:
     """
     _LOCK.acquire(timeout=_PATIENCE_S)
     for remove in reversed(list(_BEGUN.values())):  # what was begun last lies within what was begun before
-        with suppress(OSError):
+        with suppress(Exception):  # whatever fails, the process has to end
             remove()
