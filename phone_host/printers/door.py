@@ -30,10 +30,15 @@ class Wishes:
 
     def __init__(self) -> None:
         self._cancelled, self._paused = threading.Event(), threading.Event()
+        self._is_left = False
 
     def cancel(self) -> None:
         """End it, and switch the heaters off."""
         self._cancelled.set()
+
+    def leave(self) -> None:
+        """End it, ask for the heaters to be switched off, and do not wait for the answer. It takes no lock: a signal's handler may call it."""
+        self._is_left = True
 
     def pause(self) -> None:
         """Pause it."""
@@ -52,12 +57,17 @@ class Wishes:
 
     def wait_cancelled(self, wait_s: float) -> bool:
         """Wait some time, or until it shall end; return whether it shall."""
-        return self._cancelled.wait(wait_s)
+        return self._cancelled.wait(wait_s) or self._is_left
 
     @property
     def is_cancelled(self) -> bool:
         """Whether it shall end."""
-        return self._cancelled.is_set()
+        return self._is_left or self._cancelled.is_set()
+
+    @property
+    def is_left(self) -> bool:
+        """Whether nobody waits for the printer's answer any more."""
+        return self._is_left
 
     @property
     def is_paused(self) -> bool:

@@ -15,18 +15,22 @@ from phone_host.printers.sending import LineDoor
 from phone_host.printers.server_door import ServerDoor
 
 _MOST_KEY: Final = 200
+_BUSY_KEY: Final = "max_busy_minutes"
+_BUSY_MIN: Final = 60.0
+_MAX_BUSY_MIN: Final = 100_000
 
 
-def door_to(uri: PrinterUri, key: str = "") -> PrinterDoor:
+def door_to(uri: PrinterUri, key: str = "", max_busy_s: float = 3600.0) -> PrinterDoor:
     """Return the door to a printer. Nothing is opened yet.
 
     Args:
         uri: where it is.
         key: of its server; empty: none.
+        max_busy_s: the longest time that a printer on a line may take for one line of the print, s.
     """
     match uri:
         case LineUri():
-            return LineDoor(uri)
+            return LineDoor(uri, max_busy_s)
         case FileUri():
             return FileDoor(Path(uri.path))
         case ServerUri():
@@ -41,6 +45,26 @@ def door_to(uri: PrinterUri, key: str = "") -> PrinterDoor:
                     assert_never(uri.kind)
         case _:
             assert_never(uri)
+
+
+def configured_door(uri: PrinterUri, table: object, file: Path) -> PrinterDoor:
+    """Return the door to a printer, with what the settings file says of it. Nothing is opened yet.
+
+    Args:
+        uri: where it is.
+        table: [printers] of the settings file.
+        file: its name, for messages.
+
+    Raises:
+        SettingsError: see `key_of`; or the longest time for a line is no number of minutes.
+    """
+    key = key_of(uri, table, file)
+    minutes = table.get(_BUSY_KEY, _BUSY_MIN) if isinstance(table, Mapping) else _BUSY_MIN
+    if type(minutes) not in {int, float} or not 0 < minutes <= _MAX_BUSY_MIN:
+        raise SettingsError(
+            f"{_BUSY_KEY} in [printers] of {file} is {minutes!r}", f"give minutes, above 0 and up to {_MAX_BUSY_MIN}"
+        )
+    return door_to(uri, key, minutes * 60.0)
 
 
 def key_of(uri: PrinterUri, table: object, file: Path | None) -> str:
@@ -60,6 +84,8 @@ def key_of(uri: PrinterUri, table: object, file: Path | None) -> str:
         )
     found = ""
     for name, value in table.items():
+        if name == _BUSY_KEY:
+            continue
         try:
             there = read_uri(str(name))
         except SettingsError:

@@ -14,6 +14,7 @@ from typing import Final
 from common.errors import DataError
 from phone_host.printers.bed import Bed, stated_bed
 from phone_host.printers.nozzle_path import Place, PrintPath, words_of
+from phone_host.printers.cooling import MAX_TOOL
 
 MOST_FOR_LINES: Final = 90
 """Marlin's lines hold 96 (MAX_CMD_SIZE), number and checksum included."""
@@ -72,6 +73,8 @@ class GcodeFacts:
         seconds: time that the slicer tells, s; NaN: it tells none.
         heats: whether anything is heated.
         leaves_hot: whether a heater is still on at its end.
+        tools: numbers of the tools whose nozzles are heated.
+        has_chamber: whether a chamber is heated.
     """
 
     lines: int
@@ -86,6 +89,8 @@ class GcodeFacts:
     seconds: float
     heats: bool
     leaves_hot: bool
+    tools: tuple[int, ...] = ()
+    has_chamber: bool = False
 
 
 def lines_of(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINES) -> Iterator[Line]:
@@ -169,6 +174,8 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
         seconds=comments.seconds,
         heats=heaters.heats,
         leaves_hot=heaters.are_on,
+        tools=heaters.tools,
+        has_chamber=heaters.has_chamber,
     )
 
 
@@ -238,9 +245,15 @@ class _Heaters:
     """Follows what is heated. A command of one firmware alone (a macro) may cool: after one, nothing is said to be on."""
 
     def __init__(self) -> None:
-        self.heats = False
+        self.heats = self.has_chamber = False
         self._tool = 0.0
         self._on: set[tuple[str, float]] = set()
+        self._tools: set[int] = set()
+
+    @property
+    def tools(self) -> tuple[int, ...]:
+        """Numbers of the tools whose nozzles are heated."""
+        return tuple(sorted(self._tools))
 
     @property
     def are_on(self) -> bool:
@@ -259,5 +272,8 @@ class _Heaters:
             words = words_of(text)
             goal = words.get("S", words.get("R"))
             heater = (_HEATING[name], words.get("T", self._tool) if _HEATING[name] == "nozzle" else 0.0)
+            if heater[0] == "nozzle" and 0 <= heater[1] <= MAX_TOOL:
+                self._tools.add(int(heater[1]))
+            self.has_chamber = self.has_chamber or heater[0] == "chamber"
             if goal is not None:
                 (self._on.add if goal > 0 else self._on.discard)(heater)

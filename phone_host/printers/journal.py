@@ -1,17 +1,30 @@
-"""What is being printed, on disk, so that the next start can say what became of a print whose program was killed."""
+"""What is being printed, on disk: one entry for each print, so that the next start can say what became of one whose program was killed.
 
+- A print has an entry of its own (`ID.json`), and holds the lock of its printer (`PRINTER.lock`) until it ends. The kernel lets go of a lock
+  when its process dies, whatever kills it: a print whose printer is not locked by its process has been left.
+- Two prints of this machine never go to one printer.
+"""
+
+import fcntl
+import hashlib
 import json
 import os
+import secrets
+import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Self, assert_never
 
+from common.errors import SettingsError, TakenError
 from common.places import make_folder
-from phone_host.output.atomic import write_text
+from phone_host.printers.printer_uri import FileUri, LineKind, LineUri, ServerUri, read_uri
 
 _MOST_BYTES: Final = 10_000
+_MAX_ENTRIES: Final = 100
+_TRIES: Final = 4
+_AGAIN_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,39 +46,137 @@ class Entry:
     pid: int
 
 
-class Journal:
-    """Keeps the entry of the print that goes on.
+class JournalEntry:
+    """The entry of one print. Close it when the print has ended: whoever started it is told how.
 
     Args:
-        path: of its file.
+        path: of its file; there is none before the first note.
+        lock: descriptor that holds the printer's lock; -1: there is none.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def left(self) -> Entry | None:
-        """Return the print that a program has left unfinished, killed or with its machine; None: there is none."""
-        try:
-            with self._path.open() as file:
-                values = json.loads(file.read(_MOST_BYTES))
-        except (OSError, ValueError, RecursionError):
-            return None
-        entry = _entry(values)
-        return entry if entry is not None and not _is_alive(entry.pid) else None
+    def __init__(self, path: Path, lock: int) -> None:
+        self._path, self._lock = path, lock
 
     def note(self, entry: Entry) -> None:
-        """Keep how far a print is. A disk that is full does not end a print."""
+        """Keep how far the print is. A disk that is full does not end a print."""
+        part = self._path.with_suffix(".part")
         with suppress(OSError):
-            make_folder(self._path.parent)
-            write_text(self._path, json.dumps(asdict(entry)) + "\n")
+            # Not by `replacing`: where the process leaves at once, that waits for its end, and a print has to be cooled first.
+            with part.open("w", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(entry)) + "\n")
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(self._path)
 
-    def forget(self) -> None:
-        """The print has ended, and whoever started it was told how."""
+    def close(self) -> None:
+        """Remove the entry, and let the printer go."""
+        for path in (self._path, self._path.with_suffix(".part")):
+            with suppress(OSError):
+                path.unlink()
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Journal:
+    """The entries of all prints of this machine.
+
+    Args:
+        folder: for them.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def begin(self, printer: str) -> JournalEntry:
+        """Begin the entry of a print.
+
+        Args:
+            printer: its address.
+
+        Raises:
+            TakenError: another print of this machine goes to that printer.
+        """
+        path = self._folder / f"{secrets.token_hex(8)}.json"
+        for _ in range(_TRIES):  # another start may look at the lock just now
+            try:
+                make_folder(self._folder)
+                lock = self._locked(printer)
+            except OSError:  # a folder that cannot be written keeps nobody from printing
+                return JournalEntry(path, -1)
+            if lock >= 0:
+                return JournalEntry(path, lock)
+            time.sleep(_AGAIN_S)
+        raise TakenError(f"another print goes to {printer}", "wait until it has ended, or cancel it")
+
+    def take_left(self) -> list[Entry]:
+        """Return the prints that programs have left unfinished, killed or with the machine, and forget them."""
+        left = []
         with suppress(OSError):
-            self._path.unlink()
+            for path in sorted(self._folder.glob("*.json"))[:_MAX_ENTRIES]:
+                entry = _read(path)
+                if entry is not None and not self._goes_on(entry):
+                    left.append(entry)
+                    path.unlink(missing_ok=True)
+        return left
+
+    def _goes_on(self, entry: Entry) -> bool:
+        lock = self._locked(entry.printer)
+        if lock >= 0:
+            os.close(lock)
+        return lock < 0 and _is_alive(entry.pid)
+
+    def _locked(self, printer: str) -> int:
+        """Return a descriptor that holds a printer's lock until it is closed; -1: another one has it.
+
+        Raises:
+            OSError: the folder cannot be written.
+        """
+        name = hashlib.sha256(_same(printer).encode()).hexdigest()[:32]
+        descriptor = os.open(
+            self._folder / f"{name}.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600
+        )
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            return -1
+        except OSError:
+            os.close(descriptor)
+            raise
+        return descriptor
 
 
-def _entry(values: object) -> Entry | None:
+def _same(printer: str) -> str:
+    """Return one name for a printer, however its address is written: a port has several names (/dev/serial/by-id)."""
+    try:
+        uri = read_uri(printer)
+    except SettingsError:
+        return printer
+    match uri:
+        case LineUri():
+            place = os.path.realpath(uri.place) if uri.kind is LineKind.SERIAL else uri.place.lower()
+            return f"{uri.kind.value} {place} {uri.port}"
+        case ServerUri():
+            return f"{uri.kind.value} {uri.host.lower()} {uri.port}"
+        case FileUri():
+            return f"file {os.path.realpath(uri.path)}"
+        case _:
+            assert_never(uri)
+
+
+def _read(path: Path) -> Entry | None:
+    try:
+        with path.open() as file:
+            values = json.loads(file.read(_MOST_BYTES))
+    except (OSError, ValueError, RecursionError):
+        return None
     if not isinstance(values, Mapping) or set(values) != {"file", "printer", "done", "lines", "pid"}:
         return None
     texts, numbers = [values["file"], values["printer"]], [values["done"], values["lines"], values["pid"]]

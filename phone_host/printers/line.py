@@ -3,6 +3,7 @@
 import os
 import select
 import socket
+import time
 from contextlib import suppress
 from typing import Final, Protocol
 
@@ -14,6 +15,9 @@ from phone_host.printers.printer_uri import LineKind, LineUri
 
 _CONNECT_S: Final = 5.0
 _AT_ONCE: Final = 4096
+_GOODBYE_S: Final = 0.5
+"""Until a peer has closed its end of a connection, too."""
+
 _RFCOMM: Final = 3
 _BAD_NEWS: Final = {13: "you may not use it", 16: "another program has it"}
 
@@ -39,8 +43,16 @@ class Line(Protocol):
             PrinterGoneError: the printer is gone.
         """
 
+    def offer(self, data: bytes, wait_s: float) -> bool:
+        """Send the last bytes, as many as the machine takes within the time; return whether it took all. It never raises.
+
+        Args:
+            data: to send.
+            wait_s: the longest time to wait for room, s.
+        """
+
     def close(self) -> None:
-        """Close it. May be called again."""
+        """Close it. May be called again. What was sent still goes out."""
 
 
 def open_line(uri: LineUri) -> Line:
@@ -105,6 +117,13 @@ class _SerialLine:
         except (OSError, ValueError) as error:
             raise _gone(self._name) from error
 
+    def offer(self, data: bytes, wait_s: float) -> bool:
+        """See Line."""
+        try:
+            return _offered(self._port.fileno(), data, wait_s)
+        except (OSError, ValueError):
+            return False
+
     def close(self) -> None:
         with suppress(OSError):
             self._port.close()
@@ -136,8 +155,41 @@ class _SocketLine:
         except OSError as error:
             raise _gone(self._name) from error
 
+    def offer(self, data: bytes, wait_s: float) -> bool:
+        """See Line."""
+        try:
+            self._socket.setblocking(False)  # noqa: FBT003 - the standard library's own signature
+            return _offered(self._socket.fileno(), data, wait_s)
+        except (OSError, ValueError):
+            return False
+
     def close(self) -> None:
+        # Answers that nobody has read would make the kernel reset the connection, and drop what is still on its way to the printer.
+        with suppress(OSError, ValueError):
+            self._socket.setblocking(False)  # noqa: FBT003
+            self._socket.shutdown(socket.SHUT_WR)
+            end_s = time.monotonic() + _GOODBYE_S
+            while (left_s := end_s - time.monotonic()) > 0 and select.select([self._socket], [], [], left_s)[0]:
+                if not self._socket.recv(_AT_ONCE):
+                    break
         self._socket.close()
+
+
+def _offered(descriptor: int, data: bytes, wait_s: float) -> bool:
+    """Write to a descriptor that does not block until all is taken or the time is up; return whether all is taken.
+
+    Raises:
+        OSError: the printer is gone.
+    """
+    end_s = time.monotonic() + wait_s
+    while data:
+        try:
+            data = data[os.write(descriptor, data) :]
+        except BlockingIOError:
+            left_s = end_s - time.monotonic()
+            if left_s <= 0 or not select.select([], [descriptor], [], left_s)[1]:
+                return False
+    return True
 
 
 def _connected(uri: LineUri) -> socket.socket:

@@ -1,49 +1,35 @@
 """Marlin's serial protocol: numbered lines with checksums, one under way, resent until it has arrived. Pure: text and times in, text out.
 
 - A line is sent again when the printer asks for it, or when no answer came for some seconds. Its number keeps it from being done twice.
-- Heating, homing and waiting may be silent for minutes; whatever the printer says meanwhile is a sign of life.
+- Heating, homing and waiting may be silent for minutes. Otherwise only `busy`, and temperatures while it heats, extend the wait.
 - After a line was sent twice the printer may answer twice. What it asks for then because of the second one is not taken for an error.
-- Cancelling sends nothing more of the print, and switches heaters, fan and motors off.
-Source: the RepRap wiki, "G-code", sections Line number, Checksum, Replies; Marlin's queue.cpp; print.md 6 of the project's studies (measured
-against OctoPrint's and Printrun's senders).
+- Every wait and every repetition is bounded: a line that makes no progress ends the print.
+- Cancelling, here or at the printer, sends nothing more of the print, and switches heaters, fan and motors off.
+- A print begins with M85: a printer whose host has died switches itself off. The clock starts again with every command.
+Source: the RepRap wiki, "G-code", sections Line number, Checksum, Replies; Marlin's queue.cpp and MarlinCore.cpp (manage_inactivity, kill);
+print.md 6 of the project's studies (measured against OctoPrint's and Printrun's senders).
 """
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, assert_never
 
+from phone_host.printers.cooling import wake
 from phone_host.printers.gcode import Line, name_of
-from phone_host.printers.progress import Heat, Phase
-
-SECOND_NS: Final = 1_000_000_000
-
-_USUAL_NS: Final = 4 * SECOND_NS
-"""Marlin says that it is busy every 2 s; what is silent for twice that has lost a line or an answer."""
-
-_LONG_NS: Final = 600 * SECOND_NS
-_LONG: Final = frozenset(
-    {
-        "G4",
-        "G28",
-        "G29",
-        "G30",
-        "G33",
-        "G34",
-        "G76",
-        "M0",
-        "M1",
-        "M109",
-        "M116",
-        "M190",
-        "M191",
-        "M226",
-        "M303",
-        "M400",
-        "M600",
-    }
+from phone_host.printers.marlin_reply import HostAction, Reply, ReplyKind, read_reply
+from phone_host.printers.marlin_rules import (
+    ALIVE_NS,
+    SECOND_NS,
+    USUAL_NS,
+    Attempts,
+    SenderOptions,
+    framed,
+    is_done_now,
+    is_long,
+    may_outlast_guard,
+    patience_ns,
 )
-"""What may take minutes without a word."""
+from phone_host.printers.progress import Heat, Phase
 
 _START_NS: Final = 3 * SECOND_NS
 """A board that restarts when its port is opened says `start` within this; others say nothing."""
@@ -51,17 +37,22 @@ _START_NS: Final = 3 * SECOND_NS
 _AFTER_RESEND_NS: Final = SECOND_NS * 3 // 20
 """Most firmware says `ok` behind `Resend`, some do not."""
 
-_MOST_TRIES: Final = 4
-_KEPT: Final = 200
-_OFF: Final = ("M104 S0", "M140 S0", "M107", "M84")
-_WAKE: Final = "M108"
-"""Ends waiting for a temperature, where the firmware hears it at once."""
+_MAX_TRIES: Final = 4
+"""Of a printer that says nothing at all."""
 
-_FATAL: Final = re.compile(r"halted|kill\(\)|thermal|heating failed|maxtemp|mintemp|stopped|emergency", re.IGNORECASE)
-_ASKED: Final = re.compile(r"(?:resend|rs)[: ]+N?(\d{1,9})(?!\d)", re.IGNORECASE)
-_ORDER: Final = re.compile(r"line number is not|expected line", re.IGNORECASE)
-_HEAT: Final = re.compile(r"\b(T|B)\d?:\s*(-?\d{1,5}(?:\.\d+)?)\s*/\s*(-?\d{1,5}(?:\.\d+)?)")
-"""A cable spoils what the printer says, too: only numbers are taken for numbers."""
+_SAVED: Final = 200
+_ASK_NS: Final = 300 * SECOND_NS
+"""Between questions for temperatures while it waits: they keep M85 from its end, and find out whether the printer is still there."""
+
+_UNGUARD: Final = "M85 S0"
+
+
+@dataclass(frozen=True, slots=True)
+class _Text:
+    """A line as it may be requested again."""
+
+    text: str
+    is_print: bool = False
 
 
 @dataclass(slots=True)
@@ -69,19 +60,10 @@ class _Sent:
     """The line that is under way."""
 
     number: int
-    text: str
+    line: _Text
     due_ns: int = 0
     tries: int = 0
-    is_asked_again: bool = False
-
-
-def framed(number: int, text: str) -> bytes:
-    """Return a line as it travels: with its number and the exclusive or of its bytes."""
-    numbered = f"N{number} {text}".encode()
-    checksum = 0
-    for byte in numbered:
-        checksum ^= byte
-    return numbered + b"*%d\n" % checksum
+    is_requested: bool = False
 
 
 class MarlinSender:
@@ -89,34 +71,43 @@ class MarlinSender:
 
     Attributes:
         phase: how far it is.
-        done: lines that the printer has taken.
+        done: lines of the print that the printer has taken.
         resent: lines that were sent again.
-        heat: the last temperatures that were told.
+        heat: the last temperatures that were reported.
+        message: what the printer shows or waits for; empty: nothing.
         problem: why it failed, in words; empty: it did not.
         remedy: what to do about it.
+        off: lines that switch off what the print heats.
+        is_cold: whether the printer has confirmed them.
 
     Args:
         lines: of the print.
         now_ns: when its port was opened.
+        options: how they are sent.
     """
 
-    def __init__(self, lines: Iterator[Line], now_ns: int) -> None:
-        self._lines = lines
+    def __init__(self, lines: Iterator[Line], now_ns: int, options: SenderOptions | None = None) -> None:
+        self._lines, self._options = lines, options or SenderOptions()
+        self.off, self.is_cold = self._options.off, False
         self._opened_ns = now_ns
-        self._queue: list[str] = []
-        self._kept: dict[int, str] = {}
-        self._number = 0
+        self._queue: list[_Text] = []
+        self._saved: dict[int, _Text] = {}
+        self._number = self._ghosts = 0
+        self._attempts = Attempts()
         self._under_way: _Sent | None = None
-        self._ghosts = 0
-        self._refused_order = False
+        self._began_ns = self._last_sent_ns = now_ns
+        self._refused_order = self._swallow_ok = self._is_deaf = False
         self._awaited_ok_ns = 0
-        self._swallow_ok = False
         self._again: list[int] = []
         self._last_heard_ns = now_ns
+        self._urgent = b""
+        self._ended_there = ""
+        self._guard = f"M85 S{self._options.inactivity_s}" if self._options.inactivity_s else ""
+        self._is_guarded = False
         self.phase = Phase.OPENING
         self.done = self.resent = 0
         self.heat = Heat()
-        self.problem = self.remedy = ""
+        self.message = self.problem = self.remedy = ""
 
     @property
     def may_pause(self) -> bool:
@@ -137,37 +128,49 @@ class MarlinSender:
         """End the print; return what must be sent at once."""
         if self.phase.is_over or self.phase is Phase.CANCELLING:
             return b""
+        begin = ("M110 N0",) if self.phase is Phase.OPENING else ()
+        guard = (_UNGUARD,) if self._is_guarded else ()
         self.phase = Phase.CANCELLING
-        self._queue = list(_OFF)
-        if self._under_way is not None:  # should it be asked for again, nothing of the print goes out any more
-            self._kept[self._under_way.number] = _OFF[0]
+        self._queue = [_Text(text) for text in (*begin, *self._options.off, "M107", "M84", *guard)]
+        # A printer that waits for a temperature hears later: a second copy would make it drop what stands behind the first.
+        self._is_deaf = self._under_way is not None and is_long(self._under_way.line.text)
+        self._saved = dict.fromkeys(
+            self._saved, _Text(self._options.off[0])
+        )  # whatever is requested, nothing of the print goes out any more
         self._under_way, self._again, self._awaited_ok_ns = None, [], 0
-        self._ghosts = 0
-        return f"{_WAKE}\n".encode()
+        self._ghosts, self._attempts = 0, Attempts()
+        return wake()
 
-    def heard(self, text: str, now_ns: int) -> None:
-        """Take a line of the printer.
+    def heard(self, text: str, now_ns: int) -> HostAction:
+        """Take a line of the printer; return what its display wants, which is already done here.
 
         Args:
             text: without its end.
             now_ns: when it came.
         """
-        said = text.strip()
-        if not said or self.phase.is_over:
-            return
+        reply = read_reply(text)
+        if not (reply.text or reply.name) or self.phase.is_over:
+            return HostAction.NONE
         self._last_heard_ns = now_ns
-        self._note_heat(said)
-        lower = said.lower()
-        if lower.startswith("start"):
-            self._started(now_ns)
-        elif lower.startswith(("error", "!!")):
-            self._complained(said)
-        elif found := _ASKED.match(said):
-            self._asked(int(found[1]), now_ns)
-        elif lower.startswith("ok"):
-            self._acknowledged(now_ns)
-        elif self._under_way is not None:  # busy, temperatures, echoes: it lives
-            self._under_way.due_ns = now_ns + _patience_ns(self._under_way.text)
+        self._note_heat(reply)
+        match reply.kind:
+            case ReplyKind.START:
+                self._started(now_ns)
+            case ReplyKind.FATAL:
+                self._fail(f"the printer says: {reply.text}", "see what its display says; it has to be restarted")
+            case ReplyKind.ERROR:
+                self._refused_order = reply.is_about_order
+            case ReplyKind.RESEND:
+                self._resend(reply.number, now_ns)
+            case ReplyKind.OK:
+                self._acknowledged(now_ns)
+            case ReplyKind.ACTION:
+                self._act(reply)
+            case ReplyKind.BUSY | ReplyKind.OTHER:
+                self._note_life(reply, now_ns)
+            case _:
+                assert_never(reply.kind)
+        return reply.action
 
     def to_send(self, now_ns: int) -> bytes:
         """Return what is to be sent now; empty: nothing.
@@ -175,14 +178,15 @@ class MarlinSender:
         Args:
             now_ns: the time.
         """
-        if self.phase.is_over:
-            return b""
+        urgent, self._urgent = self._urgent, b""
+        if self.phase.is_over or urgent:
+            return urgent
         if self.phase is Phase.OPENING:
             if now_ns - self._opened_ns < _START_NS:
                 return b""
             self._begin()
         if self._under_way is not None:
-            return self._sent_again(now_ns)
+            return self._sent_again(self._under_way, now_ns)
         if now_ns < self._awaited_ok_ns:
             return b""
         return self._sent_next(now_ns)
@@ -193,12 +197,15 @@ class MarlinSender:
         if self.phase is Phase.OPENING:
             return self._opened_ns + _START_NS
         if self._under_way is not None:
-            return self._awaited_ok_ns if self._under_way.is_asked_again else self._under_way.due_ns
+            return self._awaited_ok_ns if self._under_way.is_requested else self._under_way.due_ns
+        if self.phase is Phase.PAUSED and not self._again:
+            return self._last_sent_ns + _ASK_NS
         return self._awaited_ok_ns
 
     def _begin(self) -> None:
         self.phase = Phase.PRINTING
-        self._queue = ["M110 N0"]
+        self._is_guarded = bool(self._guard)
+        self._queue = [_Text(text) for text in ("M110 N0", self._guard) if text]
 
     def _started(self, now_ns: int) -> None:
         if self.phase is Phase.OPENING:
@@ -209,13 +216,44 @@ class MarlinSender:
                 "see whether its power supply or its cable is at fault; its heaters are off",
             )
 
-    def _complained(self, said: str) -> None:
-        if _FATAL.search(said) or said.startswith("!!"):
-            self._fail(f"the printer says: {said[:120]}", "see what its display says; it has to be restarted")
-        else:
-            self._refused_order = bool(_ORDER.search(said))
+    def _act(self, reply: Reply) -> None:
+        """Do what the printer's display wants."""
+        match reply.action:
+            case HostAction.CANCEL:
+                if self.phase is not Phase.CANCELLING:
+                    words = "" if reply.name == "cancel" else f" ({reply.name})"
+                    self._ended_there = f"the print was ended at the printer{words}"
+                    self._urgent = self.cancel()
+            case HostAction.PAUSE:
+                self.message = "paused at the printer" if reply.name.startswith("pause") else reply.name
+                self.pause()
+            case HostAction.RESUME:
+                self.message = ""
+                self.resume()
+            case HostAction.SHOW:
+                self.message = reply.text
+            case HostAction.NONE:
+                return
+            case _:
+                assert_never(reply.action)
 
-    def _asked(self, number: int, now_ns: int) -> None:
+    def _note_life(self, reply: Reply, now_ns: int) -> None:
+        """Wait longer for the line under way where the printer shows that it is being done."""
+        under_way = self._under_way
+        if under_way is None:
+            return
+        text = under_way.line.text
+        if text == self._guard and "unknown command" in reply.text.lower():
+            self._guard, self._is_guarded = "", False
+            self.message = "this printer has no M85: if this machine fails, its heaters stay on"
+        if is_done_now(text, reply):
+            under_way.due_ns = now_ns + ALIVE_NS
+            self._attempts.timeouts = 0
+        if reply.kind is ReplyKind.BUSY:
+            minutes = (now_ns - self._began_ns) // (60 * SECOND_NS)
+            self.message = f"{reply.text} ({name_of(text) or text}, {minutes} min)"
+
+    def _resend(self, number: int, now_ns: int) -> None:
         """The printer wants a line: the one under way, an older one, or, if that had arrived, the next."""
         under_way, refused_order = self._under_way, self._refused_order
         self._refused_order = False
@@ -229,8 +267,8 @@ class MarlinSender:
             self._swallow_ok, self._awaited_ok_ns = True, now_ns + _AFTER_RESEND_NS
         elif number == under_way.number and self._ghosts and refused_order:
             self._ghosts, self._swallow_ok = self._ghosts - 1, True
-        elif number in self._kept or number == under_way.number:
-            self._go_back(number, now_ns)
+        elif number in self._saved or number == under_way.number:
+            self._go_back(under_way, number, now_ns)
         elif number > under_way.number:
             self._fail(
                 f"the printer asks for line {number}, which was not sent yet",
@@ -242,21 +280,22 @@ class MarlinSender:
                 "see whether its heaters are off, and its cable sound",
             )
 
-    def _go_back(self, number: int, now_ns: int) -> None:
-        under_way = self._under_way
-        assert under_way is not None
+    def _go_back(self, under_way: _Sent, number: int, now_ns: int) -> None:
+        is_new = not under_way.is_requested
         if number < under_way.number:
             self._again = [*range(number + 1, under_way.number + 1), *self._again]
-            self.done -= under_way.number - number
-            self._under_way = under_way = _Sent(number, self._kept[number], tries=under_way.tries)
-        under_way.is_asked_again = True
+            self.done -= sum(self._saved[back].is_print for back in range(number, under_way.number))
+            self._under_way = under_way = _Sent(number, self._saved[number], tries=under_way.tries)
         self._swallow_ok = True
-        self._awaited_ok_ns = now_ns + _AFTER_RESEND_NS
+        under_way.is_requested = True
+        if is_new:  # served once, however often it is repeated meanwhile
+            self._attempts.requests += 1
+            self._awaited_ok_ns = max(now_ns + _AFTER_RESEND_NS, self._attempts.not_before_ns(self._last_sent_ns))
 
     def _acknowledged(self, now_ns: int) -> None:
         if self._swallow_ok:
             self._swallow_ok = False
-            self._awaited_ok_ns = now_ns
+            self._awaited_ok_ns = max(now_ns, self._attempts.not_before_ns(self._last_sent_ns))
             return
         if self._under_way is not None:
             self._arrived(now_ns)
@@ -266,24 +305,38 @@ class MarlinSender:
         assert under_way is not None
         self._under_way = None
         self._awaited_ok_ns = now_ns
-        self.done += under_way.number > 0 and self.phase is not Phase.CANCELLING
+        self.done += under_way.line.is_print
+        if self._attempts.note_arrival(under_way.number) and self.message.startswith("busy: "):
+            self.message = ""
 
-    def _sent_again(self, now_ns: int) -> bytes:
-        under_way = self._under_way
-        assert under_way is not None
-        if under_way.is_asked_again:
+    def _sent_again(self, under_way: _Sent, now_ns: int) -> bytes:
+        if now_ns - self._began_ns > self._options.max_busy_ns:
+            self._fail(
+                f"the printer has not finished {under_way.line.text} within {self._options.max_busy_ns // (60 * SECOND_NS)} min",
+                "see what its display says; max_busy_minutes in the table [printers] of the settings file allows more",
+            )
+            return b""
+        if under_way.is_requested:
             if now_ns < self._awaited_ok_ns:
                 return b""
-            under_way.is_asked_again = self._swallow_ok = False
-        elif now_ns < under_way.due_ns:
+            under_way.is_requested = self._swallow_ok = False
+        elif now_ns < under_way.due_ns or (self._is_deaf and self.phase is Phase.CANCELLING):
             return b""
         else:
             self._ghosts += 1
+            self._attempts.timeouts += 1
         under_way.tries += 1
-        if under_way.tries >= _MOST_TRIES and now_ns - self._last_heard_ns > _USUAL_NS:
+        if under_way.tries >= _MAX_TRIES and now_ns - self._last_heard_ns > USUAL_NS:
             self._fail(
                 "the printer does not answer",
                 "see whether it is on and its cable is plugged in, whether the baud rate is right, and whether its heaters are off",
+            )
+            return b""
+        if self._attempts.are_too_many:
+            times = self._attempts.requests + self._attempts.timeouts
+            self._fail(
+                f"the printer does not take line {under_way.number}, which was sent {times} times",
+                "see whether its cable is sound and its baud rate right, and whether its heaters are off",
             )
             return b""
         self.resent += 1
@@ -293,38 +346,55 @@ class MarlinSender:
         self._swallow_ok = False
         if self._again:
             number = self._again.pop(0)
-            self._under_way = _Sent(number, self._kept[number])
-            return self._on_its_way(self._under_way, now_ns)
+            return self._on_its_way(_Sent(number, self._saved[number]), now_ns)
+        line = self._next_line(now_ns)
+        return b"" if line is None else self._sent_new(line, now_ns)
+
+    def _next_line(self, now_ns: int) -> _Text | None:
+        """Return the line that follows; None: nothing, because it waits or is over."""
         if self.phase is Phase.PAUSED:
-            return b""
+            return _Text("M105") if now_ns - self._last_sent_ns >= _ASK_NS else None
         if self._queue:
-            text = self._queue.pop(0)
-        elif self.phase is Phase.CANCELLING:
-            self.phase = Phase.CANCELLED
-            return b""
+            return self._queue.pop(0)
+        if self.phase is Phase.CANCELLING:
+            self._cancelled()
         elif (line := next(self._lines, None)) is not None:
-            text = line.text
+            if not (self._is_guarded and may_outlast_guard(line.text)):
+                return _Text(line.text, is_print=True)
+            self._queue = [_Text(line.text, is_print=True), _Text(self._guard)]
+            return _Text(_UNGUARD)
+        elif self._is_guarded:
+            self._is_guarded = False
+            return _Text(_UNGUARD)
         else:
             self.phase = Phase.DONE
-            return b""
-        self._under_way = _Sent(self._number, text)
+        return None
+
+    def _cancelled(self) -> None:
+        self.is_cold = True
+        if self._ended_there:
+            self._fail(self._ended_there, "heaters, fan and motors are off; start it again")
+        else:
+            self.phase = Phase.CANCELLED
+
+    def _sent_new(self, line: _Text, now_ns: int) -> bytes:
+        sent = _Sent(self._number, line)
         self._number += 1
-        return self._on_its_way(self._under_way, now_ns)
+        self._began_ns = now_ns
+        return self._on_its_way(sent, now_ns)
 
     def _on_its_way(self, sent: _Sent, now_ns: int) -> bytes:
-        self._kept[sent.number] = sent.text
-        self._kept.pop(sent.number - _KEPT, None)
-        sent.due_ns = now_ns + _patience_ns(sent.text)
-        return framed(sent.number, sent.text)
+        self._under_way = sent
+        self._saved[sent.number] = sent.line
+        self._saved.pop(sent.number - _SAVED, None)
+        sent.due_ns = now_ns + patience_ns(sent.line.text)
+        self._last_sent_ns = now_ns
+        return framed(sent.number, sent.line.text)
 
-    def _note_heat(self, said: str) -> None:
-        told = {letter: (float(now), float(goal)) for letter, now, goal in _HEAT.findall(said)}
-        if told:
-            self.heat = Heat(told.get("T", self.heat.nozzle), told.get("B", self.heat.bed))
+    def _note_heat(self, reply: Reply) -> None:
+        read = {letter: (now, goal) for letter, now, goal in reversed(reply.heat)}  # the tool in use comes first
+        if read:
+            self.heat = Heat(read.get("T", self.heat.nozzle), read.get("B", self.heat.bed))
 
     def _fail(self, problem: str, remedy: str) -> None:
         self.phase, self.problem, self.remedy = Phase.FAILED, problem, remedy
-
-
-def _patience_ns(text: str) -> int:
-    return _LONG_NS if name_of(text) in _LONG else _USUAL_NS

@@ -8,11 +8,14 @@ from typing import Final
 
 from common import now
 from common.errors import TandemError, UnavailableError
+from common.unfinished import unfinished
 from phone_host.printers.door import Job, PrinterDoor, Wishes
-from phone_host.printers.journal import Entry, Journal
+from phone_host.printers.journal import Entry, Journal, JournalEntry
 from phone_host.printers.progress import Ended, Phase, Progress
 
 _NOTE_NS: Final = 5_000_000_000
+_ABANDON_S: Final = 5.0
+"""For the last lines to a printer; a line that does not move is given up after this, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,23 +46,29 @@ def printed(
         journal: keeps how far it is, so that a later start can say what became of a killed print; None: nobody does.
 
     Raises:
-        TandemError: it cannot be printed, or the printer is gone.
+        TandemError: it cannot be printed, or the printer is gone; or another print goes to it.
     """
+    if journal is None:
+        return place.door.send(job, wishes, tell)
+    with journal.begin(place.text) as entry:
+        return place.door.send(job, wishes, _noting(place, job, tell, entry))
+
+
+def _noting(
+    place: Place, job: Job, tell: Callable[[Progress], None], entry: JournalEntry
+) -> Callable[[Progress], None]:
+    """Return what tells how far a print is, and notes it every few seconds."""
     noted_ns = -_NOTE_NS
 
     def watched(progress: Progress) -> None:
         nonlocal noted_ns
         tell(progress)
-        if journal is not None and now.monotonic_ns() - noted_ns >= _NOTE_NS:
+        if now.monotonic_ns() - noted_ns >= _NOTE_NS:
             noted_ns = now.monotonic_ns()
             done = 0 if progress.phase is Phase.SENDING else round(progress.share * job.facts.lines)
-            journal.note(Entry(place.source, place.text, done, job.facts.lines, os.getpid()))
+            entry.note(Entry(place.source, place.text, done, job.facts.lines, os.getpid()))
 
-    try:
-        return place.door.send(job, wishes, watched)
-    finally:
-        if journal is not None:
-            journal.forget()
+    return watched
 
 
 class RunningPrint:
@@ -83,7 +92,7 @@ class RunningPrint:
     ) -> None:
         self._place, self._job, self._journal = place, job, journal
         self._tell, self._told_over = tell, over
-        self._wishes = Wishes()
+        self._wishes, self._is_over = Wishes(), threading.Event()
         self._progress = Progress(phase=Phase.OPENING)
         self._outcome: Ended | TandemError | None = None
         self._thread = threading.Thread(target=self._run, name="print", daemon=False)
@@ -114,6 +123,10 @@ class RunningPrint:
         """End it, and switch the heaters off."""
         self._wishes.cancel()
 
+    def toggle_pause(self) -> None:
+        """Pause it, or go on."""
+        self._wishes.toggle_pause()
+
     def join(self, wait_s: float | None = None) -> bool:
         """Wait until it has ended; return whether it has. The only method that waits."""
         self._thread.join(wait_s)
@@ -121,7 +134,8 @@ class RunningPrint:
 
     def _run(self) -> None:
         try:
-            outcome: Ended | TandemError = printed(self._place, self._job, self._wishes, self._heard, self._journal)
+            with unfinished(self._abandon):
+                outcome: Ended | TandemError = self._printed()
         except TandemError as error:
             outcome = error
         except Exception as error:  # noqa: BLE001 - a thread's root: whoever started it is told
@@ -129,6 +143,17 @@ class RunningPrint:
         self._outcome = outcome
         if self._told_over is not None:
             self._told_over(outcome)
+
+    def _printed(self) -> Ended:
+        try:
+            return printed(self._place, self._job, self._wishes, self._heard, self._journal)
+        finally:
+            self._is_over.set()
+
+    def _abandon(self) -> None:
+        """Let the printer get the lines that cool it: the process ends next, whatever goes on."""
+        self._wishes.leave()
+        self._is_over.wait(_ABANDON_S)
 
     def _heard(self, progress: Progress) -> None:
         self._progress = progress

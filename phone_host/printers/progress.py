@@ -46,6 +46,7 @@ class Progress:
         seconds_left: until it is done, s; NaN: nobody knows.
         heat: temperatures.
         resent: lines that were sent again.
+        message: what the printer shows or waits for; empty: nothing.
     """
 
     phase: Phase
@@ -53,6 +54,7 @@ class Progress:
     seconds_left: float = math.nan
     heat: Heat = Heat()
     resent: int = 0
+    message: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

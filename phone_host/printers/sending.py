@@ -1,18 +1,24 @@
-"""Brings a print to a printer on a line: the protocol says what and when, the line carries it."""
+"""Brings a print to a printer on a line: the protocol says what and when, the line carries it.
+
+Rule: whatever ends a print, an answer, an error, a signal or a failure of this program, goes through `send`, and so through its `finally`: unless
+the printer itself has confirmed the end, the lines that switch its heaters off are written before anything else is done.
+"""
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from itertools import chain
 from typing import Final
 
 from common import now
-from common.errors import DataError
+from common.errors import DataError, TandemError
+from phone_host.printers.cooling import heaters_off, last_lines
 from phone_host.printers.door import Job, Wishes
 from phone_host.printers.gcode import GcodeFacts, lines_of
 from phone_host.printers.gcode import Line as GcodeLine
 from phone_host.printers.line import Line, PrinterGoneError, open_line, require_allowed
-from phone_host.printers.marlin import SECOND_NS, MarlinSender
+from phone_host.printers.marlin import MarlinSender
+from phone_host.printers.marlin_reply import HostAction
+from phone_host.printers.marlin_rules import SECOND_NS, SenderOptions
 from phone_host.printers.printer_uri import LineUri
 from phone_host.printers.progress import Ended, Phase, Progress
 
@@ -22,11 +28,18 @@ _MOST_LINE: Final = 4096
 """A printer whose words have no end says nothing."""
 
 _CANCEL_NS: Final = 5 * SECOND_NS
-"""Heaters are switched off within a second; a printer that is deaf for so long will not hear it."""
+"""A printer that hears switches its heaters off within a second; for one that waits for a temperature the lines lie in its buffer then."""
 
-_COLD: Final = ("M104 S0", "M140 S0")
-_COLD_NOW: Final = "".join(f"{text}\n" for text in ("M108", *_COLD)).encode()
-"""After a failure, without numbers: the printer takes them even where it and we count differently. Whether it hears them, nobody knows."""
+_LAST_S: Final = 1.0
+"""For the lines that cool, where even the machine's own buffer is full."""
+
+_INACTIVITY_S: Final = 900
+"""A printer that gets no command for so long kills itself (M85): longer than any wait of ours (10 min) and than the pause between two
+questions while a print is paused (5 min), so that only a dead host, a dead cable or a stopped process lets it come to that."""
+
+_UNPROVED: Final = (
+    "the lines that switch heaters off were written, and their answer was not awaited: see that the printer cools"
+)
 
 
 class LineDoor:
@@ -34,10 +47,11 @@ class LineDoor:
 
     Args:
         uri: where it is.
+        max_busy_s: the longest time that it may take for one line, s.
     """
 
-    def __init__(self, uri: LineUri) -> None:
-        self._uri = uri
+    def __init__(self, uri: LineUri, max_busy_s: float = 3600.0) -> None:
+        self._uri, self._max_busy_ns = uri, round(max_busy_s * SECOND_NS)
 
     def require_ready(self) -> None:
         """See PrinterDoor. The port is not opened: that restarts many boards."""
@@ -45,29 +59,39 @@ class LineDoor:
 
     def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
         """See PrinterDoor."""
-        line = open_line(self._uri)
+        off = heaters_off(job.facts.tools, has_chamber=job.facts.has_chamber)
+        options = SenderOptions(off, _INACTIVITY_S if job.facts.heats else 0, self._max_busy_ns)
         try:
-            with job.gcode.open(encoding="utf-8", errors="replace") as file:
-                cooling = _COLD if job.facts.leaves_hot else ()
+            file = job.gcode.open(encoding="utf-8", errors="replace")
+        except OSError as error:
+            raise _unreadable(error) from None
+        with file:
+            line = open_line(self._uri)
+            try:
+                cooling = off if job.facts.leaves_hot else ()
                 lines = chain(lines_of(file, str(job.gcode)), (GcodeLine(0, text) for text in cooling))
-                sender = MarlinSender(lines, now.monotonic_ns())
+                sender = MarlinSender(lines, now.monotonic_ns(), options)
                 send(line, sender, wishes, _telling(sender, job.facts, tell))
-        finally:
-            line.close()
-        done = min(sender.done, job.facts.lines)
-        left = f"; {done} of {job.facts.lines} lines were done"
-        return Ended(
-            phase=sender.phase,
-            share=done / job.facts.lines,
-            resent=sender.resent,
-            problem=sender.problem,
-            remedy=sender.remedy + left if sender.phase is Phase.FAILED else "",
-            notes=_notes(job.facts) if sender.phase is Phase.DONE else (),
-        )
+            finally:
+                line.close()
+        return _ended(sender, job.facts)
 
 
-def _notes(facts: GcodeFacts) -> tuple[str, ...]:
-    return ("its G-code leaves heaters on: they were switched off",) if facts.leaves_hot else ()
+def _ended(sender: MarlinSender, facts: GcodeFacts) -> Ended:
+    done = min(sender.done, facts.lines)
+    is_left = not sender.phase.is_over
+    notes = (_UNPROVED,) if is_left else ()
+    if sender.phase is Phase.DONE and facts.leaves_hot:
+        notes = ("its G-code leaves heaters on: they were switched off",)
+    left = f"; {done} of {facts.lines} lines were done"
+    return Ended(
+        phase=Phase.CANCELLED if is_left else sender.phase,
+        share=done / facts.lines,
+        resent=sender.resent,
+        problem=sender.problem,
+        remedy=sender.remedy + left if sender.phase is Phase.FAILED else "",
+        notes=notes,
+    )
 
 
 def _unreadable(error: OSError) -> DataError:
@@ -83,13 +107,22 @@ def _telling(sender: MarlinSender, facts: GcodeFacts, tell: Callable[[Progress],
             began_ns.append(now_ns)
         passed_s = (now_ns - began_ns[0]) / SECOND_NS if began_ns else math.nan
         left_s = passed_s * (1 - share) / share if share > 0 else math.nan
-        tell(Progress(phase=sender.phase, share=share, seconds_left=left_s, heat=sender.heat, resent=sender.resent))
+        tell(
+            Progress(
+                phase=sender.phase,
+                share=share,
+                seconds_left=left_s,
+                heat=sender.heat,
+                resent=sender.resent,
+                message=sender.message,
+            )
+        )
 
     return told
 
 
 def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], None]) -> Phase:
-    """Send a print until it is done, cancelled or has failed.
+    """Send a print until it is done, cancelled or has failed. Unless the printer has confirmed the end, the lines that cool it are written.
 
     Args:
         line: to the printer; it is not closed.
@@ -98,34 +131,42 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], No
         tell: called several times a second.
 
     Returns:
-        How it ended.
+        How it ended; CANCELLING: the user did not wait for the printer's answer.
 
     Raises:
-        PrinterGoneError: the printer is gone.
+        PrinterGoneError: the printer is gone, or does not answer.
         DataError: a line of the file is none of G-code, or cannot be read any more; the heaters are off.
     """
-    told_ns, rest, cancelled_ns, failure = 0, b"", 0, None
-    while not sender.phase.is_over:
+    try:
+        _exchange(line, sender, wishes, tell)
+    finally:
+        if sender.phase not in {Phase.DONE, Phase.CANCELLED} and not sender.is_cold:
+            line.offer(last_lines(sender.off), _LAST_S)
+    tell()
+    return sender.phase
+
+
+def _exchange(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], None]) -> None:
+    """Exchange lines with the printer until the print is over, or the user leaves.
+
+    Raises:
+        PrinterGoneError: the printer is gone, or does not answer.
+        DataError: see `send`; the print was cancelled.
+    """
+    told_ns, rest, cancelled_ns = 0, b"", 0
+    failure: TandemError | None = None
+    while not sender.phase.is_over and not wishes.is_left:
         now_ns = now.monotonic_ns()
-        if wishes.is_cancelled and not cancelled_ns:
-            cancelled_ns = now_ns
-            line.write(sender.cancel())
-        if cancelled_ns and now_ns - cancelled_ns > _CANCEL_NS:
-            raise PrinterGoneError(
-                "the printer does not answer any more: nobody knows whether its heaters are off",
-                "go and look; switch it off if its display does not say that they are cold",
-            )
-        if wishes.is_paused:
-            sender.pause()
-        else:
-            sender.resume()
+        if wishes.is_cancelled and (wake := sender.cancel()):
+            line.write(wake)
+        if sender.phase is Phase.CANCELLING:
+            cancelled_ns = cancelled_ns or now_ns
+            _require_answer(now_ns - cancelled_ns)
+        (sender.pause if wishes.is_paused else sender.resume)()
         try:
             data = sender.to_send(now_ns)
-        except DataError as error:
-            failure, data = error, b""
-            wishes.cancel()
-        except OSError as error:  # of the file: the protocol opens nothing else
-            failure, data = _unreadable(error), b""
+        except (DataError, OSError) as error:  # the protocol opens nothing but the file
+            failure, data = error if isinstance(error, DataError) else _unreadable(error), b""
             wishes.cancel()
         if data:
             line.write(data)
@@ -135,12 +176,23 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], No
         wait_s = min(max((sender.due_ns - now_ns) / SECOND_NS, 0.0 if data else _LEAST_WAIT_S), _MOST_WAIT_S)
         *lines, rest = (rest + line.read(wait_s)).split(b"\n")
         for each in lines:
-            sender.heard(each.decode("ascii", "replace"), now.monotonic_ns())
+            _obey(sender.heard(each.decode("ascii", "replace"), now.monotonic_ns()), wishes)
         rest = rest[-_MOST_LINE:]
     if failure is not None:
         raise failure
-    if sender.phase is Phase.FAILED:
-        with suppress(PrinterGoneError):
-            line.write(_COLD_NOW)
-    tell()
-    return sender.phase
+
+
+def _require_answer(passed_ns: int) -> None:
+    if passed_ns > _CANCEL_NS:
+        raise PrinterGoneError(
+            "the printer does not answer any more: the lines that switch its heaters off were written, and nobody knows whether it has read them",
+            "go and look; switch it off if its display does not say that they are cold",
+        )
+
+
+def _obey(action: HostAction, wishes: Wishes) -> None:
+    """Take a pause at the printer's display as one of the user's, so that either can end it."""
+    if action is HostAction.PAUSE:
+        wishes.pause()
+    elif action is HostAction.RESUME:
+        wishes.go_on()

@@ -191,9 +191,16 @@ class _Watch:
                 self._end_and_cool()
             if self._is_cold():
                 return Ended(phase=Phase.CANCELLED, share=share, notes=notes)
+            if self._wishes.is_left:
+                self._end_and_cool()
+                break
             self._tell(Phase.CANCELLING)
             _pause(_SOON_S)
-        while (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS + _HALTED_NS and (remedy := self._halted()):
+        while (
+            (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS + _HALTED_NS
+            and not self._wishes.is_left
+            and (remedy := self._halted())
+        ):
             if self._is_cold():
                 said = f"the printer did not obey within {_OBEY_NS // _SECOND_NS} s and was stopped at once: {remedy}"
                 return Ended(phase=Phase.CANCELLED, share=share, notes=(said,))

@@ -16,10 +16,10 @@ from phone_host.output.model_file import Model, read_model
 from phone_host.output.upright import upright_model
 from phone_host.printers.bed import Bed
 from phone_host.printers.door import Job, Wishes
-from phone_host.printers.doors import door_to, key_of
+from phone_host.printers.doors import configured_door, door_to
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, job_of, require_input
-from phone_host.printers.printer_uri import ServerUri, read_uri
+from phone_host.printers.printer_uri import FileUri, read_uri
 from phone_host.printers.printing import Place, RunningPrint, printed
 from phone_host.printers.progress import Ended, Progress
 from phone_host.printers.slicing import SlicingWanted
@@ -229,7 +229,7 @@ def prepare_print(
     """
     uri = read_uri(printer)
     require_input(what)
-    door = door_to(uri, key_of(uri, *printer_keys(config)) if isinstance(uri, ServerUri) else "")
+    door = door_to(uri) if isinstance(uri, FileUri) else configured_door(uri, *printer_keys(config))
     door.require_ready()
     with ExitStack() as kept:
         job = kept.enter_context(job_of(what, wanted, uri, tell))

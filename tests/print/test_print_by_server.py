@@ -49,7 +49,7 @@ def test_a_print_by_a_server(kind: ServerKind, gcode: Path, tmp_path: Path) -> N
         told = json.loads(done(tmp_path, str(gcode), *with_key(tmp_path, there.uri), "--json").stdout)
     assert (told["ended"], told["share"], told["printer"]) == ("done", 1.0, there.uri)
     assert [content for _, content in there.files] == [gcode.read_bytes()] * 2
-    assert not list(tmp_path.rglob("printing.json"))
+    assert not list(tmp_path.rglob("printing/*.json"))
 
 
 def test_ctrl_c_and_a_kill(gcode: Path, tmp_path: Path) -> None:
@@ -65,7 +65,8 @@ def test_ctrl_c_and_a_kill(gcode: Path, tmp_path: Path) -> None:
         assert there.goal == 0.0
         with subprocess.Popen(asked, env=environment(tmp_path), stdout=subprocess.DEVNULL) as killed:
             until(
-                lambda: there.condition == "printing" and bool(list(tmp_path.rglob("printing.json"))), "it prints again"
+                lambda: there.condition == "printing" and bool(list(tmp_path.rglob("printing/*.json"))),
+                "it prints again",
             )
             killed.kill()
             killed.wait(60)

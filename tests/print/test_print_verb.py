@@ -65,7 +65,7 @@ def test_a_print_is_sent_whole(gcode: Path, tmp_path: Path) -> None:
     assert (told["ended"], told["done"], told["lines"]) == ("done", 600, 600)
     assert told["resent"] == there.resends > 0
     assert there.done == cube(600)
-    assert not list(tmp_path.rglob("printing.json"))
+    assert not list(tmp_path.rglob("printing/*.json"))
 
 
 def test_ctrl_c_cools_the_printer(gcode: Path, tmp_path: Path) -> None:

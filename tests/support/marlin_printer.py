@@ -7,6 +7,8 @@ import os
 import pty
 import random
 import re
+import socket
+import termios
 import threading
 import time
 import tty
@@ -36,6 +38,14 @@ class Faults:
         silent: commands that take so many seconds without a word.
         dies_after: lines after which the plug is pulled.
         says: to be said once before a line of this number is answered.
+        heating_s: that M109 and M190 wait, with a temperature every tenth of a second; M108 ends the wait of firmware that hears it at once.
+        hears_at_once: whether M108 is heard while it waits (EMERGENCY_PARSER); else what comes meanwhile is done afterwards.
+        has_m85: whether it knows M85.
+        busy: commands that it is busy with for ever, or until it hears M108.
+        lost_answers: numbers of lines whose answer never arrives, once each.
+        chatter: said again and again, whatever is done: reports of M155, `wait` of Repetier.
+        chatter_s: between two of these.
+        greets: whether it says `start` once its port has been opened, as a board that restarts then; it always does on a socket.
     """
 
     corrupted: float = 0.0
@@ -46,16 +56,28 @@ class Faults:
     silent: dict[str, float] = field(default_factory=dict)
     dies_after: int = 1 << 60
     says: dict[int, str] = field(default_factory=dict)
+    heating_s: float = 0.0
+    hears_at_once: bool = True
+    has_m85: bool = True
+    busy: frozenset[str] = frozenset()
+    lost_answers: set[int] = field(default_factory=set)
+    chatter: str = ""
+    chatter_s: float = 0.2
+    greets: bool = False
 
 
 class MarlinPrinter:
     """The printer.
 
     Attributes:
-        path: of the pseudo terminal.
+        path: of the pseudo terminal; empty: it has none.
+        uri: of it, or of the TCP port.
         done: commands that were done, in order.
-        nozzle: where the nozzle's heater shall go, degrees C.
+        nozzle: where the heater of the tool in use shall go, degrees C.
+        tools: where the heaters of tools that were named shall go, likewise.
         bed: likewise.
+        inactivity_s: after which it kills itself without a command (M85), s; 0: never.
+        guards: every value that M85 has set.
         cooled_s: when the last heater was switched off, time.monotonic().
         resends: how often it asked for a line again.
         lost: answers of it that never arrived.
@@ -63,54 +85,106 @@ class MarlinPrinter:
     Args:
         faults: what goes wrong.
         seed: of the faults.
+        on_socket: whether it is behind a TCP port, as with ser2net.
     """
 
-    def __init__(self, faults: Faults, seed: int = 1) -> None:
+    def __init__(self, faults: Faults, seed: int = 1, *, on_socket: bool = False) -> None:
         self._faults, self._random = faults, random.Random(seed)
-        self._master, slave = pty.openpty()
-        tty.setraw(slave)
-        self.path = os.ttyname(slave)
-        self._slave = slave
+        self._listener: socket.socket | None = None
+        if on_socket:
+            self._listener = socket.create_server(("127.0.0.1", 0))
+            self.path, self._master, self._slave = "", -1, -1
+            self.uri = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+        else:
+            self._master, self._slave = pty.openpty()
+            tty.setraw(self._slave)
+            self.path = os.ttyname(self._slave)
+            self.uri = f"serial:{self.path}?baud=115200"
         self.done: list[str] = []
         self.nozzle = self.bed = 0.0
+        self.tools: dict[int, float] = {}
+        self.inactivity_s, self.guards = 0, list[int]()
         self.cooled_s = 0.0
         self.resends = self.lost = 0
         self._last = 0
+        self._waiting = b""
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def start(self) -> None:
         """Switch it on."""
         self._thread.start()
-        self._say("start")
+        if self._listener is None and not self._faults.greets:
+            self._say("start")
 
     def stop(self) -> None:
         """Switch it off."""
         self._is_over.set()
         self._thread.join(10)
+        if self._listener is not None:
+            self._listener.close()
         for descriptor in (self._master, self._slave):
             try:
                 os.close(descriptor)
             except OSError:
                 continue
 
+    @property
+    def is_cold(self) -> bool:
+        """Whether no heater shall be warm."""
+        return not self.nozzle and not self.bed and not any(self.tools.values())
+
     def _run(self) -> None:
-        waiting = b""
-        while not self._is_over.is_set():
-            if not select([self._master], [], [], 0.02)[0]:
-                continue
-            try:
-                data = os.read(self._master, 4096)
-            except OSError:
-                return
-            if self._faults.baud:
-                self._is_over.wait(len(data) * _BITS / self._faults.baud)
-            *lines, waiting = (waiting + data).split(b"\n")
-            for line in lines:
-                if len(self.done) >= self._faults.dies_after:
-                    os.close(self._master)
+        chatter = threading.Thread(target=self._chat, daemon=True)
+        try:
+            self._open()
+            chatter.start()
+            while not self._is_over.is_set():
+                self._read(0.02)
+                while b"\n" in self._waiting:
+                    line, _, self._waiting = self._waiting.partition(b"\n")
+                    if len(self.done) >= self._faults.dies_after:
+                        os.close(self._master)
+                        return
+                    self._take(self._on_the_way(line))
+        except OSError:
+            return
+        finally:
+            self._is_over.set()
+            if chatter.is_alive():
+                chatter.join(10)
+
+    def _open(self) -> None:
+        """Wait until a host has opened the port, where that is told from outside."""
+        if self._listener is not None:
+            while not select([self._listener], [], [], 0.05)[0]:
+                if self._is_over.is_set():
                     return
-                self._take(self._on_the_way(line))
+            connection, _ = self._listener.accept()
+            self._master = connection.detach()
+            self._say("start")
+        elif self._faults.greets:
+            # pyserial sets the port up for reading without waiting, then drops what came before; were this dropped, too, the host waits 3 s.
+            while termios.tcgetattr(self._slave)[6][termios.VMIN] not in {0, b"\0"} and not self._is_over.wait(0.02):
+                pass
+            self._is_over.wait(0.1)
+            self._say("start")
+
+    def _read(self, wait_s: float) -> bytes:
+        """Take what has come into the buffer."""
+        if not select([self._master], [], [], wait_s)[0]:
+            return b""
+        data = os.read(self._master, 4096)
+        if not data:
+            raise OSError("the host has closed the connection")
+        if self._faults.baud:
+            self._is_over.wait(len(data) * _BITS / self._faults.baud)
+        self._waiting += data
+        return data
+
+    def _chat(self) -> None:
+        while self._faults.chatter and not self._is_over.wait(self._faults.chatter_s):
+            self._say(self._faults.chatter)
 
     def _on_the_way(self, line: bytes) -> bytes:
         if self._random.random() >= self._faults.corrupted or not line:
@@ -143,20 +217,50 @@ class MarlinPrinter:
             if number in self._faults.says:
                 self._say(self._faults.says.pop(number))
             self._do(text)
+        if number in self._faults.lost_answers:
+            self._faults.lost_answers.discard(number)
+            self.lost += 1
+            return
         self._ok()
 
     def _do(self, text: str) -> None:
         name = text.split(maxsplit=1)[0]
+        if name == "M85":
+            self._guard(text)
+            return
         self.done.append(text)
+        while name in self._faults.busy and not self._is_over.is_set():
+            self._say("echo:busy: paused for user")
+            if b"M108" in self._read(0.2) and self._faults.hears_at_once:
+                break
         if (seconds := self._faults.silent.get(name)) is not None:
             self._is_over.wait(seconds)
-        target = re.search(r"S(\d+)", text)
-        if name in {"M104", "M109"} and target:
+        target, tool = re.search(r"S(\d+)", text), re.search(r"T(\d+)", text)
+        if name in {"M104", "M109"} and target and tool:
+            self.tools[int(tool[1])] = float(target[1])
+        elif name in {"M104", "M109"} and target:
             self.nozzle = float(target[1])
         if name in {"M140", "M190"} and target:
             self.bed = float(target[1])
-        if name in {"M104", "M140"} and not self.nozzle and not self.bed:
+        if name in {"M104", "M140"} and self.is_cold:
             self.cooled_s = time.monotonic()
+        if name in {"M109", "M190"}:
+            self._heat()
+
+    def _guard(self, text: str) -> None:
+        if not self._faults.has_m85:
+            self._say(f'echo:Unknown command: "{text}"')
+            return
+        self.inactivity_s = int(text.partition("S")[2])
+        self.guards.append(self.inactivity_s)
+
+    def _heat(self) -> None:
+        """Wait for a temperature; what comes meanwhile stays in the buffer."""
+        end_s = time.monotonic() + self._faults.heating_s
+        while time.monotonic() < end_s and not self._is_over.is_set():
+            self._say(f"T:21.0 /{self.nozzle:.1f} B:21.0 /{self.bed:.1f} W:?")
+            if b"M108" in self._read(0.1) and self._faults.hears_at_once:
+                return
 
     def _ask(self, why: str) -> None:
         self.resends += 1
@@ -181,9 +285,9 @@ class MarlinPrinter:
 
 
 @contextmanager
-def printer(faults: Faults | None = None, seed: int = 1) -> Iterator[MarlinPrinter]:
+def printer(faults: Faults | None = None, seed: int = 1, *, on_socket: bool = False) -> Iterator[MarlinPrinter]:
     """A printer that is on while the block runs."""
-    made = MarlinPrinter(faults or Faults(), seed)
+    made = MarlinPrinter(faults or Faults(), seed, on_socket=on_socket)
     made.start()
     try:
         yield made

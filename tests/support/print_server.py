@@ -63,7 +63,8 @@ class PrintServerStandIn:
         files: that were handed over: name and content.
         asked: methods and paths of all that changes something, in order.
         goal: where the nozzle's heater shall go, degrees C.
-        cooled_s: when it was switched off, time.monotonic().
+        bed: where the bed's shall go, likewise.
+        cooled_s: when they were switched off, time.monotonic().
         paused: how often it was.
         answers: how often it was asked.
     """
@@ -72,7 +73,7 @@ class PrintServerStandIn:
         self.kind, self.faults = kind, faults
         self.files: list[tuple[str, bytes]] = []
         self.asked: list[str] = []
-        self.goal = 0.0
+        self.goal = self.bed = 0.0
         self.cooled_s = 0.0
         self.paused = 0
         self.condition = faults.condition
@@ -102,7 +103,8 @@ class PrintServerStandIn:
         """Take a file, and begin."""
         self.files.append((name, content))
         if self.faults.starts:
-            self.condition, self.share, self.goal, self._at_s = "printing", 0.0, 205.0, time.monotonic()
+            self.condition, self.share, self._at_s = "printing", 0.0, time.monotonic()
+            self.goal, self.bed = 205.0, 60.0
 
     def go(self) -> None:
         """Let the time pass."""
@@ -114,13 +116,14 @@ class PrintServerStandIn:
             elif self.share >= self.faults.ends_at:
                 self.condition = "cancelled"
             elif self.share >= 1:
-                self.condition, self.goal = "done", 0.0
+                self.condition, self.goal, self.bed = "done", 0.0, 0.0
         self._at_s = now_s
 
-    def cool(self) -> None:
-        """Switch the heater off, if that can be done."""
+    def cool(self, *, nozzle: bool = True, bed: bool = True) -> None:
+        """Switch the heaters off, if that can be done."""
         if self.faults.cools:
-            self.goal, self.cooled_s = 0.0, time.monotonic()
+            self.goal, self.bed = 0.0 if nozzle else self.goal, 0.0 if bed else self.bed
+            self.cooled_s = time.monotonic()
 
     def may_answer(self) -> bool:
         """Count an answer; return whether it is given."""
@@ -226,7 +229,7 @@ def _octoprint(there: PrintServerStandIn, handler: _Handler, path: str, body: by
             if not is_there:
                 return 409, {"error": "Printer is not operational"}
             flags = {"operational": True, condition: True, "printing": condition == "printing"}
-            heat = {"tool0": {"actual": 204.9, "target": there.goal}, "bed": {"actual": 22.0, "target": 0.0}}
+            heat = {"tool0": {"actual": 204.9, "target": there.goal}, "bed": {"actual": 22.0, "target": there.bed}}
             return 200, {"temperature": heat, "state": {"flags": flags}}
         case "POST", "/api/files/local":
             if there.faults.refuses:
@@ -238,8 +241,8 @@ def _octoprint(there: PrintServerStandIn, handler: _Handler, path: str, body: by
         case "POST", "/api/job":
             return _ordered(there, json.loads(body).get("action") or json.loads(body)["command"])
         case "POST", "/api/printer/command":
-            if "M104 S0" in json.loads(body)["commands"]:
-                there.cool()
+            commands = json.loads(body)["commands"]
+            there.cool(nozzle="M104 S0" in commands, bed="M140 S0" in commands)
             return 204, None
     return 404, None
 
@@ -260,7 +263,7 @@ def _moonraker(there: PrintServerStandIn, handler: _Handler, path: str, body: by
                 "print_stats": {"state": state, "print_duration": 3.0, "message": there.faults.words},
                 "virtual_sdcard": {"progress": there.share},
                 "extruder": {"temperature": 204.9, "target": there.goal},
-                "heater_bed": {"temperature": 22.0, "target": 0.0},
+                "heater_bed": {"temperature": 22.0, "target": there.bed},
                 "heater_generic oven": {"temperature": 22.0, "target": 0.0},
             }
             asked = parse_qs(urlsplit(handler.path).query, keep_blank_values=True)
@@ -276,7 +279,8 @@ def _moonraker(there: PrintServerStandIn, handler: _Handler, path: str, body: by
             there.cool()
             return 200, {"result": "ok"}
         case "POST", "/printer/emergency_stop":
-            there.condition, there.goal, there.faults.words = "error", 0.0, "Shutdown due to webhooks request"
+            there.condition, there.faults.words = "error", "Shutdown due to webhooks request"
+            there.goal = there.bed = 0.0
             return 200, {"result": "ok"}
     return _ordered(there, path.removeprefix("/printer/print/"))
 
@@ -287,7 +291,7 @@ def _prusalink(there: PrintServerStandIn, handler: _Handler, path: str, body: by
         return 200, {"storage_list": stores}
     if path == "/api/v1/status":
         state = {"ready": "IDLE", "done": "FINISHED", "cancelled": "STOPPED", "offline": "BUSY"}
-        heat = {"temp_nozzle": 204.9, "target_nozzle": there.goal, "temp_bed": 22.0, "target_bed": 0.0}
+        heat = {"temp_nozzle": 204.9, "target_nozzle": there.goal, "temp_bed": 22.0, "target_bed": there.bed}
         printer = {"state": state.get(there.condition, there.condition.upper()), **heat}
         if there.faults.words:
             printer["status_printer"] = {"ok": False, "message": there.faults.words}
@@ -306,7 +310,7 @@ def _prusalink(there: PrintServerStandIn, handler: _Handler, path: str, body: by
 
 
 def _ordered(there: PrintServerStandIn, order: str) -> tuple[int, Any]:
-    if there.condition not in {"printing", "paused"}:
+    if there.condition not in {"printing", "paused", "finishing"}:
         return 409, {"error": "no print goes on"}
     match order:
         case "pause":

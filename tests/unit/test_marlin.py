@@ -1,15 +1,17 @@
 """Marlin's protocol, and the files and addresses that lead to it: pure, so the test is the printer."""
 
 import math
+import os
 from pathlib import Path
 
 import pytest
 
-from common.errors import DataError, SettingsError, UnavailableError
+from common.errors import DataError, SettingsError, TakenError, UnavailableError
 from phone_host.printers.gcode import GcodeFacts, Line, examine, lines_of, name_of
 from phone_host.printers.journal import Entry, Journal
 from phone_host.printers.line import require_allowed
-from phone_host.printers.marlin import MarlinSender, framed
+from phone_host.printers.marlin import MarlinSender
+from phone_host.printers.marlin_rules import framed
 from phone_host.printers.printer_uri import FileUri, LineKind, LineUri, ServerKind, ServerUri, read_uri
 from phone_host.printers.progress import Phase
 
@@ -364,17 +366,40 @@ def test_a_file_tells_whether_it_leaves_heaters_on() -> None:
     assert not facts("M104", "G1 X1 E1").leaves_hot
 
 
-def test_the_journal_tells_of_a_print_whose_program_is_gone(tmp_path: Path) -> None:
-    """Not of one that goes on, nor of a file that is none."""
-    journal = Journal(tmp_path / "deep" / "printing.json")
-    assert journal.left() is None
-    entry = Entry("cup.gcode", "serial:x", 50, 100, 2**22 + 1)
-    journal.note(entry)
-    assert journal.left() == entry
-    journal.note(Entry("cup.gcode", "serial:x", 50, 100, 1))
-    assert journal.left() is None
+def test_the_journal_tells_of_prints_whose_programs_are_gone(tmp_path: Path) -> None:
+    """Each of them once; not of one that goes on, nor of a file that is none."""
+    folder = tmp_path / "deep"
+    journal = Journal(folder)
+    assert journal.take_left() == []
+    left = Entry("cup.gcode", "serial:x", 50, 100, 2**22 + 1)
+    for entry in (left, left, Entry("mug.gcode", "octoprint://h", 1, 2, 0)):
+        begun = journal.begin(entry.printer)
+        begun.note(entry)
+        os.close(begun._lock)  # as the kernel does when the process dies
+    assert sorted(each.file for each in journal.take_left()) == ["cup.gcode", "cup.gcode", "mug.gcode"]
+    assert journal.take_left() == []
+    with journal.begin("serial:x") as begun:
+        begun.note(Entry("cup.gcode", "serial:x", 50, 100, os.getpid()))
+        assert journal.take_left() == []
+        assert len(list(folder.glob("*.json"))) == 1
+    assert list(folder.glob("*.json")) == []
     for text in ("{}", "[", "[" * 9000, '{"file": 1, "printer": "", "done": 0, "lines": 0, "pid": 1}'):
-        (tmp_path / "deep" / "printing.json").write_text(text)
-        assert journal.left() is None
-    journal.forget()
-    journal.forget()
+        (folder / "0.json").write_text(text)
+        assert journal.take_left() == []
+
+
+def test_two_prints_never_go_to_one_printer(tmp_path: Path) -> None:
+    """However its address is written; another printer is free, and a folder that cannot be written keeps nobody away."""
+    (tmp_path / "by-id").symlink_to("/dev/ttyUSB7")
+    journal = Journal(tmp_path / "printing")
+    with journal.begin("serial:/dev/ttyUSB7?baud=250000"), journal.begin("octoprint://H"):
+        for printer in (f"serial:{tmp_path}/by-id", "serial:ttyUSB7", "octoprint://h:80"):
+            with pytest.raises(TakenError, match="another print goes to"):
+                journal.begin(printer)
+        with journal.begin("serial:/dev/ttyUSB8"):
+            pass
+    with journal.begin("serial:/dev/ttyUSB7"):
+        pass
+    (tmp_path / "file").write_text("")
+    with Journal(tmp_path / "file" / "no").begin("serial:x") as begun:
+        begun.note(Entry("cup.gcode", "serial:x", 1, 2, 1))

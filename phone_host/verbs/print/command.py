@@ -3,9 +3,11 @@
 import argparse
 import math
 import sys
-from contextlib import ExitStack, closing
+import termios
+from contextlib import ExitStack, closing, suppress
+from typing import Final
 
-from common.errors import DataError, SettingsError, UnavailableError
+from common.errors import DataError, SettingsError, TandemError, UnavailableError
 from common.program.commandline import INTERRUPTED
 from common.program.signals import StopSignals
 from common.program.terminal import say
@@ -15,7 +17,7 @@ from phone_host.printers.door import Job, Wishes
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, is_gcode
 from phone_host.printers.printer_uri import FileUri, PrinterUri, ServerUri, read_uri
-from phone_host.printers.printing import printed
+from phone_host.printers.printing import RunningPrint, printed
 from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import Slicer, SlicingWanted
 from phone_host.run.model_job import PreparedPrint, prepare_print
@@ -24,6 +26,8 @@ from phone_host.verbs.print.finding import find
 from phone_host.verbs.print.keypad import keypad
 from phone_host.verbs.printer_bed import bed_of
 from phone_host.verbs.serve.places import data_folder
+
+_STEP_S: Final = 0.1
 
 
 def run(options: argparse.Namespace) -> int:
@@ -44,29 +48,55 @@ def run(options: argparse.Namespace) -> int:
             )
         if isinstance(uri, FileUri):
             return _told(printed(prepared.place, prepared.job, Wishes(), lambda _: None), options, uri, prepared.job)
-        journal = Journal(data_folder() / "printing.json")
+        journal = Journal(data_folder() / "printing")
         _tell_left(journal)
         _ask(options, prepared.job)
         return _told(_sent(prepared, journal), options, uri, prepared.job)
 
 
 def _sent(prepared: PreparedPrint, journal: Journal) -> Ended:
-    """Send the print; show how far it is, and take keys and signals."""
-    signals, wishes, job = StopSignals(), Wishes(), prepared.job
+    """Send the print in a thread of its own; show how far it is, and take keys and signals.
 
-    def tell(progress: Progress) -> None:
+    A terminal that is held or gone stops what is shown, never what is sent: a print must end cold.
+    """
+    signals, name = StopSignals(), prepared.job.name
+
+    def heed_signals(_: Progress) -> None:
         if signals.stop:
-            wishes.cancel()
-        match pressed():
-            case "p":
-                wishes.toggle_pause()
-            case "c":
-                wishes.cancel()
-        bar(progress.share)
-        bar.say(_words(job.name, progress))
+            running.cancel()
 
-    with keypad() as pressed, share_bar(f"{job.name}: waiting for the printer") as bar:
-        return printed(prepared.place, job, wishes, tell, journal)
+    running = RunningPrint(prepared.place, prepared.job, journal, heed_signals)
+    running.start()
+    try:
+        with suppress(OSError, termios.error):
+            _show(running, name)
+    finally:
+        while not running.join(_STEP_S):
+            if sys.exception() is not None:
+                running.cancel()
+    outcome = running.outcome
+    if isinstance(outcome, TandemError):
+        raise outcome
+    assert outcome is not None
+    return outcome
+
+
+def _show(running: RunningPrint, name: str) -> None:
+    """Show how far a print is until it has ended.
+
+    Raises:
+        OSError: the terminal is gone.
+        termios.error: likewise.
+    """
+    with keypad() as pressed, share_bar(f"{name}: waiting for the printer") as bar:
+        while not running.join(_STEP_S):
+            match pressed():
+                case "p":
+                    running.toggle_pause()
+                case "c":
+                    running.cancel()
+            bar(running.progress.share)
+            bar.say(_words(name, running.progress))
 
 
 def _words(name: str, progress: Progress) -> str:
@@ -74,7 +104,8 @@ def _words(name: str, progress: Progress) -> str:
         return f"{name}: sending"
     heat = progress.heat
     left = "" if math.isnan(progress.seconds_left) else f", {progress.seconds_left / 60:.0f} min left"
-    words = f"{name}: {progress.phase.value}, nozzle {heat.nozzle[0]:.0f}/{heat.nozzle[1]:.0f}, bed {heat.bed[0]:.0f}/{heat.bed[1]:.0f} C{left}"
+    message = f" ({progress.message})" if progress.message else ""
+    words = f"{name}: {progress.phase.value}{message}, nozzle {heat.nozzle[0]:.0f}/{heat.nozzle[1]:.0f}, bed {heat.bed[0]:.0f}/{heat.bed[1]:.0f} C{left}"
     return f"{words}; p goes on" if progress.phase is Phase.PAUSED else f"{words}; p pauses, c cancels"
 
 
@@ -111,22 +142,20 @@ def _sentence(ended: Ended, uri: PrinterUri, done: int, lines: int) -> str:
 
 
 def _tell_left(journal: Journal) -> None:
-    left = journal.left()
-    if left is None:
-        return
-    what = f"{left.file} on {left.printer}"
-    if isinstance(read_uri(left.printer), ServerUri):
-        lines = [
-            f"phone-host: nobody watches the last print any more: {what}, near {left.done / max(left.lines, 1):.0%} when last seen",
-            "phone-host: its server may still be printing it: look there",
-        ]
-    else:
-        lines = [
-            f"phone-host: the last print was not finished: {what} ended near line {left.done} of {left.lines}",
-            "phone-host: nothing was sent since, and its heaters may be on; it does not go on by itself",
-        ]
-    say(lines, sys.stderr)
-    journal.forget()
+    """Say what became of prints whose programs were killed."""
+    for left in journal.take_left():
+        what = f"{left.file} on {left.printer}"
+        if isinstance(read_uri(left.printer), ServerUri):
+            lines = [
+                f"phone-host: nobody watches the last print any more: {what}, near {left.done / max(left.lines, 1):.0%} when last seen",
+                "phone-host: its server may still be printing it: look there",
+            ]
+        else:
+            lines = [
+                f"phone-host: the last print was not finished: {what} ended near line {left.done} of {left.lines}",
+                "phone-host: nothing was sent since, and its heaters may be on; it does not go on by itself",
+            ]
+        say(lines, sys.stderr)
 
 
 def _ask(options: argparse.Namespace, job: Job) -> None:

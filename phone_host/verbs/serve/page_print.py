@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from phone_host.printers.bed import parse_bed
-from phone_host.printers.doors import door_to, key_of
+from phone_host.printers.doors import configured_door
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted
 from phone_host.printers.printer_uri import read_uri
@@ -25,8 +25,8 @@ def asked_print(values: Choices, file: Path | None) -> PrintWanted:
     """
     text = values.get("printer", "").strip()
     bed = parse_bed(words) if (words := values.get("bed", "").strip()) else None
-    how, journal = Wanted(SlicingWanted(bed)), Journal(data_folder() / "printing.json")
+    how, journal = Wanted(SlicingWanted(bed)), Journal(data_folder() / "printing")
     if not text:
         return PrintWanted("", None, None, how, journal)
     uri = read_uri(text)
-    return PrintWanted(uri.text, uri, door_to(uri, key_of(uri, *printer_keys(file))), how, journal)
+    return PrintWanted(uri.text, uri, configured_door(uri, *printer_keys(file)), how, journal)

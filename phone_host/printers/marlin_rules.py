@@ -1,0 +1,128 @@
+"""How long a printer is waited for, how often a line is repeated, and what shows that it works. Pure.
+
+Every limit is one of time or count, so that no printer, whatever it says, is waited for without an end.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from phone_host.printers.cooling import heaters_off
+from phone_host.printers.gcode import name_of
+from phone_host.printers.marlin_reply import Reply, ReplyKind
+
+SECOND_NS: Final = 1_000_000_000
+
+USUAL_NS: Final = 4 * SECOND_NS
+"""Marlin says that it is busy every 2 s; what is silent for twice that has lost a line or an answer."""
+
+ALIVE_NS: Final = 9 * SECOND_NS
+"""After a sign that the line is being done: M113 sets how often Marlin says so, 2 s unless somebody changes it."""
+
+LONG_NS: Final = 600 * SECOND_NS
+_HEATING: Final = frozenset({"M109", "M116", "M190", "M191", "M303"})
+_LONG: Final = _HEATING | {"G4", "G28", "G29", "G30", "G33", "G34", "G76", "M0", "M1", "M226", "M400", "M600"}
+"""What may take minutes without a word."""
+
+_FOR_PEOPLE: Final = frozenset({"M0", "M1", "M226", "M600", "M601"})
+_DWELL: Final = re.compile(r"G0*4\s*([SP])\s*(\d+)", re.IGNORECASE)
+_LONG_DWELL_S: Final = 300
+
+_FREE_REQUESTS: Final = 2
+_SLOWER_NS: Final = SECOND_NS // 10
+_SLOWEST_NS: Final = SECOND_NS
+"""Requests beyond the free ones are served after a wait that doubles from the one to the other: 20 of them take 15 s."""
+
+_MAX_REQUESTS: Final = 20
+"""Without progress. On a cable that spoils every third line, one line of 10^9 needs as many."""
+
+_MAX_TIMEOUTS: Final = 8
+
+
+def framed(number: int, text: str) -> bytes:
+    """Return a line as it travels: with its number and the exclusive or of its bytes."""
+    numbered = f"N{number} {text}".encode()
+    checksum = 0
+    for byte in numbered:
+        checksum ^= byte
+    return numbered + b"*%d\n" % checksum
+
+
+def is_long(text: str) -> bool:
+    """Return whether a line may take minutes without a word."""
+    return name_of(text) in _LONG
+
+
+def patience_ns(text: str) -> int:
+    """Return how long the answer to a line is waited for, ns."""
+    return LONG_NS if is_long(text) else USUAL_NS
+
+
+def is_done_now(text: str, reply: Reply) -> bool:
+    """Return whether a reply shows that a line is being done: it says `busy`, or a heater that the line waits for is on its way.
+
+    Temperatures alone show nothing: M155 reports them whatever is done, and so does `wait`.
+    """
+    name = name_of(text)
+    is_heating = reply.is_heating or (name == "M303" and bool(reply.heat))
+    return reply.kind is ReplyKind.BUSY or (name in _HEATING and is_heating)
+
+
+def may_outlast_guard(text: str) -> bool:
+    """Return whether a line may wait for longer than the printer's own guard against a dead host: for people, or by its number."""
+    if name_of(text) in _FOR_PEOPLE:
+        return True
+    dwell = _DWELL.match(text)
+    return dwell is not None and int(dwell[2]) > _LONG_DWELL_S * (1000 if dwell[1].upper() == "P" else 1)
+
+
+@dataclass(frozen=True, slots=True)
+class SenderOptions:
+    """How a print is sent.
+
+    Attributes:
+        off: lines that switch off what the print heats.
+        inactivity_s: the printer stops and switches its heaters off when no command came for so long, s; 0: that is left alone.
+        max_busy_ns: the longest time that one line may take, ns.
+    """
+
+    off: tuple[str, ...] = heaters_off()
+    inactivity_s: int = 0
+    max_busy_ns: int = 3600 * SECOND_NS
+
+
+@dataclass(slots=True)
+class Attempts:
+    """How often the lines since the last progress were sent again.
+
+    Attributes:
+        requests: times that the printer requested one.
+        timeouts: times that no answer came.
+        highest: number of the last line that arrived for the first time.
+    """
+
+    requests: int = 0
+    timeouts: int = 0
+    highest: int = -1
+
+    def note_arrival(self, number: int) -> bool:
+        """Take a line that has arrived; return whether that is progress. An older line that arrives again is none."""
+        if number <= self.highest:
+            return False
+        self.highest = number
+        self.requests = self.timeouts = 0
+        return True
+
+    def not_before_ns(self, sent_ns: int) -> int:
+        """Return when a line that was requested may go again: later and later, so that a mad printer gets some copies, not thousands.
+
+        Args:
+            sent_ns: when it went the last time.
+        """
+        extra = self.requests - _FREE_REQUESTS
+        return sent_ns + min(_SLOWER_NS << extra, _SLOWEST_NS) if extra > 0 else 0
+
+    @property
+    def are_too_many(self) -> bool:
+        """Whether there were so many that the printer will not take the line."""
+        return self.requests > _MAX_REQUESTS or self.timeouts > _MAX_TIMEOUTS

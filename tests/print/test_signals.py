@@ -1,0 +1,76 @@
+"""Whatever ends `phone-host print`, the printer ends cold: every signal, in every state, by every door."""
+
+import itertools
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from tests.print.test_print_verb import environment
+from tests.support.print_doors import Door, Scene, State, gcode_of, scene, until_or_over
+from tests.support.programs import until
+
+INT, TERM, HUP, QUIT = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
+SIGNALS: Final = {"int": [INT], "int twice": [INT, INT], "term": [TERM], "hup": [HUP], "quit": [QUIT]}
+CODES: Final = {"hup": 129}
+"""Of the others: 130."""
+
+_NAMES, _STATES, _DOORS = list(SIGNALS), list(State), list(Door)
+
+
+def _cases() -> list[object]:
+    """All combinations. Every day run those that hold each signal in each state, and each signal and each state by each door."""
+    cases = []
+    for (row, name), (column, state), (number, door) in itertools.product(
+        enumerate(_NAMES), enumerate(_STATES), enumerate(_DOORS)
+    ):
+        marks = [] if number == (row + column) % len(_DOORS) else [pytest.mark.slow]
+        cases.append(pytest.param(name, state, door, id=f"{name} {state.value} {door.value}", marks=marks))
+    return cases
+
+
+def _reset_signals() -> None:
+    """Give the signals their usual meaning: whoever runs the tests may have ignored them."""
+    for number in (INT, TERM, HUP, QUIT):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def _started(home: Path, state: State, there: Scene) -> "subprocess.Popen[str]":
+    gcode = home / "cube.gcode"
+    gcode.write_text(gcode_of(state))
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "phone_host.start", "print", str(gcode), *there.options, "--yes"],
+        env=environment(home),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=_reset_signals,  # noqa: PLW1509 - no thread of ours holds a lock then
+    )
+
+
+@pytest.mark.parametrize(("name", "state", "door"), _cases())
+def test_a_print_ends_cold(name: str, state: State, door: Door, tmp_path: Path) -> None:
+    """Both heaters were on, and are off after the signal; one line at most, no traceback, and the exit code of the signal."""
+    with scene(door, state, tmp_path) as there, _started(tmp_path, state, there) as process:
+        until_or_over(process, there.is_there, f"it is {state.value}")
+        assert there.is_hot()
+        if state is State.CANCELLING:
+            process.send_signal(TERM)
+            until_or_over(process, there.is_cancelling, "it is being cancelled")
+        first, *second = SIGNALS[name]
+        process.send_signal(first)
+        if second:
+            until_or_over(process, there.is_cancelling, "it is being cancelled")
+            if process.poll() is None:
+                process.send_signal(second[0])
+        there.obey()
+        _, errors = process.communicate(timeout=60)
+        until(there.is_cold, "both heaters are off")
+    codes = {CODES.get(name, 130)} | ({130} if state is State.CANCELLING else set())
+    assert process.returncode in codes, errors
+    assert len(errors.splitlines()) <= 1, errors
+    assert "Traceback" not in errors
