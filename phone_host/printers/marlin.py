@@ -11,7 +11,6 @@ print.md 6 of the project's studies (measured against OctoPrint's and Printrun's
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, assert_never
 
 from phone_host.printers.cooling import wake
@@ -22,7 +21,9 @@ from phone_host.printers.marlin_rules import (
     SECOND_NS,
     USUAL_NS,
     Attempts,
+    PlannedLine,
     SenderOptions,
+    SentLine,
     framed,
     is_done_now,
     is_long,
@@ -40,30 +41,12 @@ _AFTER_RESEND_NS: Final = SECOND_NS * 3 // 20
 _MAX_TRIES: Final = 4
 """Of a printer that says nothing at all."""
 
+_MAX_LATE_STARTS: Final = 3
 _SAVED: Final = 200
 _ASK_NS: Final = 300 * SECOND_NS
 """Between questions for temperatures while it waits: they keep M85 from its end, and find out whether the printer is still there."""
 
 _UNGUARD: Final = "M85 S0"
-
-
-@dataclass(frozen=True, slots=True)
-class _Text:
-    """A line as it may be requested again."""
-
-    text: str
-    is_print: bool = False
-
-
-@dataclass(slots=True)
-class _Sent:
-    """The line that is under way."""
-
-    number: int
-    line: _Text
-    due_ns: int = 0
-    tries: int = 0
-    is_requested: bool = False
 
 
 class MarlinSender:
@@ -90,13 +73,13 @@ class MarlinSender:
         self._lines, self._options = lines, options or SenderOptions()
         self.off, self.is_cold = self._options.off, False
         self._opened_ns = now_ns
-        self._queue: list[_Text] = []
-        self._saved: dict[int, _Text] = {}
-        self._number = self._ghosts = 0
+        self._queue: list[PlannedLine] = []
+        self._saved: dict[int, PlannedLine] = {}
+        self._number = self._ghosts = self._late_starts = 0
         self._attempts = Attempts()
-        self._under_way: _Sent | None = None
+        self._under_way: SentLine | None = None
         self._began_ns = self._last_sent_ns = now_ns
-        self._refused_order = self._swallow_ok = self._is_deaf = False
+        self._refused_order = self._swallow_ok = self._is_deaf = self._is_first = False
         self._awaited_ok_ns = 0
         self._again: list[int] = []
         self._last_heard_ns = now_ns
@@ -128,18 +111,25 @@ class MarlinSender:
         """End the print; return what must be sent at once."""
         if self.phase.is_over or self.phase is Phase.CANCELLING:
             return b""
-        begin = ("M110 N0",) if self.phase is Phase.OPENING else ()
-        guard = (_UNGUARD,) if self._is_guarded else ()
+        self._is_first = self._is_first or self.phase is Phase.OPENING
+        self._number = 0 if self._is_first else self._number
+        begin, guard = ("M110 N0",) * self._is_first, (_UNGUARD,) * self._is_guarded
         self.phase = Phase.CANCELLING
-        self._queue = [_Text(text) for text in (*begin, *self._options.off, "M107", "M84", *guard)]
+        self._queue = [PlannedLine(text) for text in (*begin, *self.off, "M107", "M84", *guard)]
         # A printer that waits for a temperature hears later: a second copy would make it drop what stands behind the first.
         self._is_deaf = self._under_way is not None and is_long(self._under_way.line.text)
-        self._saved = dict.fromkeys(
-            self._saved, _Text(self._options.off[0])
-        )  # whatever is requested, nothing of the print goes out any more
+        # Whatever is requested, nothing of the print goes out any more.
+        self._saved = dict.fromkeys(self._saved, PlannedLine(self.off[0]))
         self._under_way, self._again, self._awaited_ok_ns = None, [], 0
         self._ghosts, self._attempts = 0, Attempts()
         return wake()
+
+    def finish_cancelling(self) -> None:
+        """End it: what cools was confirmed, and the rest is not waited for."""
+        if self._ended_there:
+            self._fail(self._ended_there, "heaters, fan and motors are off; start it again")
+        else:
+            self.phase = Phase.CANCELLED
 
     def heard(self, text: str, now_ns: int) -> HostAction:
         """Take a line of the printer; return what its display wants, which is already done here.
@@ -205,11 +195,17 @@ class MarlinSender:
     def _begin(self) -> None:
         self.phase = Phase.PRINTING
         self._is_guarded = bool(self._guard)
-        self._queue = [_Text(text) for text in ("M110 N0", self._guard) if text]
+        self._is_first = True
+        self._queue = [PlannedLine(text) for text in ("M110 N0", self._guard) if text]
 
     def _started(self, now_ns: int) -> None:
         if self.phase is Phase.OPENING:
             self._opened_ns = now_ns - _START_NS
+        elif self._is_first and self._late_starts < _MAX_LATE_STARTS:  # it was still starting when the first line went
+            self._late_starts += 1
+            if self._under_way is not None:
+                self._queue, self._under_way = [self._under_way.line, *self._queue], None
+            self._number = 0
         else:
             self._fail(
                 "the printer has restarted",
@@ -280,12 +276,12 @@ class MarlinSender:
                 "see whether its heaters are off, and its cable sound",
             )
 
-    def _go_back(self, under_way: _Sent, number: int, now_ns: int) -> None:
+    def _go_back(self, under_way: SentLine, number: int, now_ns: int) -> None:
         is_new = not under_way.is_requested
         if number < under_way.number:
             self._again = [*range(number + 1, under_way.number + 1), *self._again]
             self.done -= sum(self._saved[back].is_print for back in range(number, under_way.number))
-            self._under_way = under_way = _Sent(number, self._saved[number], tries=under_way.tries)
+            self._under_way = under_way = SentLine(number, self._saved[number], tries=under_way.tries)
         self._swallow_ok = True
         under_way.is_requested = True
         if is_new:  # served once, however often it is repeated meanwhile
@@ -305,11 +301,14 @@ class MarlinSender:
         assert under_way is not None
         self._under_way = None
         self._awaited_ok_ns = now_ns
+        self._is_first = False
         self.done += under_way.line.is_print
+        if self.phase is Phase.CANCELLING and under_way.line.text in self.off:
+            self.is_cold = not self._again and not any(line.text in self.off for line in self._queue)
         if self._attempts.note_arrival(under_way.number) and self.message.startswith("busy: "):
             self.message = ""
 
-    def _sent_again(self, under_way: _Sent, now_ns: int) -> bytes:
+    def _sent_again(self, under_way: SentLine, now_ns: int) -> bytes:
         if now_ns - self._began_ns > self._options.max_busy_ns:
             self._fail(
                 f"the printer has not finished {under_way.line.text} within {self._options.max_busy_ns // (60 * SECOND_NS)} min",
@@ -346,44 +345,37 @@ class MarlinSender:
         self._swallow_ok = False
         if self._again:
             number = self._again.pop(0)
-            return self._on_its_way(_Sent(number, self._saved[number]), now_ns)
+            return self._on_its_way(SentLine(number, self._saved[number]), now_ns)
         line = self._next_line(now_ns)
         return b"" if line is None else self._sent_new(line, now_ns)
 
-    def _next_line(self, now_ns: int) -> _Text | None:
+    def _next_line(self, now_ns: int) -> PlannedLine | None:
         """Return the line that follows; None: nothing, because it waits or is over."""
         if self.phase is Phase.PAUSED:
-            return _Text("M105") if now_ns - self._last_sent_ns >= _ASK_NS else None
+            return PlannedLine("M105") if now_ns - self._last_sent_ns >= _ASK_NS else None
         if self._queue:
             return self._queue.pop(0)
         if self.phase is Phase.CANCELLING:
-            self._cancelled()
+            self.finish_cancelling()
         elif (line := next(self._lines, None)) is not None:
             if not (self._is_guarded and may_outlast_guard(line.text)):
-                return _Text(line.text, is_print=True)
-            self._queue = [_Text(line.text, is_print=True), _Text(self._guard)]
-            return _Text(_UNGUARD)
+                return PlannedLine(line.text, is_print=True)
+            self._queue = [PlannedLine(line.text, is_print=True), PlannedLine(self._guard)]
+            return PlannedLine(_UNGUARD)
         elif self._is_guarded:
             self._is_guarded = False
-            return _Text(_UNGUARD)
+            return PlannedLine(_UNGUARD)
         else:
             self.phase = Phase.DONE
         return None
 
-    def _cancelled(self) -> None:
-        self.is_cold = True
-        if self._ended_there:
-            self._fail(self._ended_there, "heaters, fan and motors are off; start it again")
-        else:
-            self.phase = Phase.CANCELLED
-
-    def _sent_new(self, line: _Text, now_ns: int) -> bytes:
-        sent = _Sent(self._number, line)
+    def _sent_new(self, line: PlannedLine, now_ns: int) -> bytes:
+        sent = SentLine(self._number, line)
         self._number += 1
         self._began_ns = now_ns
         return self._on_its_way(sent, now_ns)
 
-    def _on_its_way(self, sent: _Sent, now_ns: int) -> bytes:
+    def _on_its_way(self, sent: SentLine, now_ns: int) -> bytes:
         self._under_way = sent
         self._saved[sent.number] = sent.line
         self._saved.pop(sent.number - _SAVED, None)

@@ -91,6 +91,38 @@ class SenderOptions:
     max_busy_ns: int = 3600 * SECOND_NS
 
 
+@dataclass(frozen=True, slots=True)
+class PlannedLine:
+    """A line as it may be requested again.
+
+    Attributes:
+        text: without its number.
+        is_print: whether it is of the print, and not of ours.
+    """
+
+    text: str
+    is_print: bool = False
+
+
+@dataclass(slots=True)
+class SentLine:
+    """The line that is under way.
+
+    Attributes:
+        number: its own.
+        line: what it says.
+        due_ns: when it is sent again without an answer.
+        tries: times that it was sent again.
+        is_requested: whether the printer has requested it.
+    """
+
+    number: int
+    line: PlannedLine
+    due_ns: int = 0
+    tries: int = 0
+    is_requested: bool = False
+
+
 @dataclass(slots=True)
 class Attempts:
     """How often the lines since the last progress were sent again.

@@ -5,7 +5,7 @@ the printer itself has confirmed the end, the lines that switch its heaters off 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from typing import Final
 
@@ -69,7 +69,7 @@ class LineDoor:
             line = open_line(self._uri)
             try:
                 cooling = off if job.facts.leaves_hot else ()
-                lines = chain(lines_of(file, str(job.gcode)), (GcodeLine(0, text) for text in cooling))
+                lines = chain(_whole(file, job), (GcodeLine(0, text) for text in cooling))
                 sender = MarlinSender(lines, now.monotonic_ns(), options)
                 send(line, sender, wishes, _telling(sender, job.facts, tell))
             finally:
@@ -92,6 +92,22 @@ def _ended(sender: MarlinSender, facts: GcodeFacts) -> Ended:
         remedy=sender.remedy + left if sender.phase is Phase.FAILED else "",
         notes=notes,
     )
+
+
+def _whole(file: Iterable[str], job: Job) -> Iterator[GcodeLine]:
+    """Yield the lines of a file.
+
+    Raises:
+        DataError: a line is none of G-code, or the file is another than the one that was examined: nobody knows whether it ends cold.
+    """
+    count = 0
+    for line in lines_of(file, str(job.gcode)):
+        count += 1
+        if count > job.facts.lines:
+            break
+        yield line
+    if count != job.facts.lines:
+        raise DataError(f"{job.gcode} was changed while it was printed", "print it again, from a copy")
 
 
 def _unreadable(error: OSError) -> DataError:
@@ -161,7 +177,10 @@ def _exchange(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[
             line.write(wake)
         if sender.phase is Phase.CANCELLING:
             cancelled_ns = cancelled_ns or now_ns
-            _require_answer(now_ns - cancelled_ns)
+            if now_ns - cancelled_ns > _CANCEL_NS:
+                _require_cold(sender)
+                sender.finish_cancelling()
+                break
         (sender.pause if wishes.is_paused else sender.resume)()
         try:
             data = sender.to_send(now_ns)
@@ -182,8 +201,8 @@ def _exchange(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[
         raise failure
 
 
-def _require_answer(passed_ns: int) -> None:
-    if passed_ns > _CANCEL_NS:
+def _require_cold(sender: MarlinSender) -> None:
+    if not sender.is_cold:
         raise PrinterGoneError(
             "the printer does not answer any more: the lines that switch its heaters off were written, and nobody knows whether it has read them",
             "go and look; switch it off if its display does not say that they are cold",

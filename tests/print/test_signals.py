@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 import pytest
+from _pytest.mark import ParameterSet
 
 from tests.print.test_print_verb import environment
 from tests.support.print_doors import Door, Scene, State, gcode_of, scene, until_or_over
@@ -21,7 +22,7 @@ CODES: Final = {"hup": 129}
 _NAMES, _STATES, _DOORS = list(SIGNALS), list(State), list(Door)
 
 
-def _cases() -> list[object]:
+def _cases() -> list[ParameterSet]:
     """All combinations. Every day run those that hold each signal in each state, and each signal and each state by each door."""
     cases = []
     for (row, name), (column, state), (number, door) in itertools.product(

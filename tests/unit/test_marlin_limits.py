@@ -186,8 +186,8 @@ def test_a_pause_at_the_display_is_obeyed(said: str) -> None:
     assert bench.sender.message
     assert bench.sender.heard("//action:resumed", bench.now_ns) is HostAction.RESUME
     bench.run(fine, 60)
-    assert bench.sender.phase is Phase.DONE
     assert bench.texts[1:] == DRAWN
+    assert bench.sender.done == len(DRAWN)
 
 
 def test_other_words_of_the_display_are_told() -> None:
@@ -315,3 +315,37 @@ def test_a_file_tells_which_tools_it_heats() -> None:
 def test_what_a_printer_says_is_read(text: str, kind: ReplyKind) -> None:
     """Zero bytes of a starting port, echoes of our own lines and words that only begin like others are not mistaken."""
     assert read_reply(text).kind is kind
+
+
+def test_a_board_that_starts_late_is_begun_with_again() -> None:
+    """Its loader takes longer than the usual wait: nothing was taken yet, so nothing is lost; one that starts again and again is given up."""
+    for is_cancelled in (False, True):
+        bench = Bench(DRAWN[:5])
+        assert bench.sender.to_send(4 * S)
+        if is_cancelled:
+            bench.sender.cancel()
+            assert bench.sender.to_send(4 * S)
+        bench.sender.heard("start", 5 * S)
+        bench.now_ns = 5 * S
+        bench.run(fine, 60)
+        assert bench.sender.phase is (Phase.CANCELLED if is_cancelled else Phase.DONE)
+        assert bench.texts[0] == "M110 N0"
+        assert bench.sent[0][1].startswith("N0 ")
+    again = Bench(DRAWN)
+    again.run(lambda _: ["start"], 60)
+    assert again.sender.phase is Phase.FAILED
+    assert "restarted" in again.sender.problem
+    assert len(again.sent) == 4
+
+
+def test_what_cools_counts_and_not_what_follows() -> None:
+    """The heaters are confirmed to be off; the answer to M84 never comes: it is cold, and the print can be ended."""
+    bench = Bench(DRAWN)
+    bench.run(
+        lambda text: [] if "M84" in text else ["ok", *(["//action:cancel"] if text.startswith("N10 ") else [])], 3
+    )
+    assert bench.texts[-1] == "M84"
+    assert bench.sender.is_cold
+    bench.sender.finish_cancelling()
+    assert bench.sender.phase is Phase.FAILED
+    assert "ended at the printer" in bench.sender.problem
