@@ -1,11 +1,13 @@
 """OctoPrint, by its REST API. Source: OctoPrint's documentation, "REST API" (https://docs.octoprint.org/en/master/api/)."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 from common.errors import UnavailableError
+from phone_host.printers.cooling import heaters_off
 from phone_host.printers.printer_uri import ServerUri
 from phone_host.printers.progress import Heat
 from phone_host.printers.server import (
@@ -20,7 +22,7 @@ from phone_host.printers.server_answer import Answer, Value, or_zero
 from phone_host.printers.server_talk import ServerTalk
 
 _WHERE: Final = "OctoPrint shows it under User settings, Application keys"
-_COLD: Final = ("M104 S0", "M140 S0", "M107", "M84")
+_TOOL: Final = re.compile(r"tool(\d{1,2})")
 _WHOLE: Final = 0.9999
 _NOT_OPERATIONAL: Final = 409
 
@@ -35,6 +37,7 @@ class OctoPrint:
 
     def __init__(self, uri: ServerUri, key: str) -> None:
         self._talk, self._key, self._example = ServerTalk(uri), key, f'"{uri.text}" = "KEY"'
+        self._heaters: tuple[str, ...] = ()
         self.title = self._talk.server
 
     def state(self) -> ServerState:
@@ -55,6 +58,7 @@ class OctoPrint:
             )
         require_good(printer_answer, "to tell how its printer is")
         printer = printer_answer.json()
+        self._heaters = printer["temperature"].keys
         heat, is_hot = _heat(printer["temperature"])
         condition = _condition(printer["state"]["flags"], share)
         return ServerState(condition=condition, share=share, seconds_left=left_s, heat=heat, is_hot=is_hot, words=said)
@@ -83,7 +87,9 @@ class OctoPrint:
 
     def cool(self) -> bool:
         """See PrintServer."""
-        note_refusal(self._command("/api/printer/command", {"commands": list(_COLD)}), "cooling")
+        tools = [int(found[1]) for name in self._heaters if (found := _TOOL.fullmatch(name))]
+        cold = [*heaters_off(tools, has_chamber="chamber" in self._heaters), "M107", "M84"]
+        note_refusal(self._command("/api/printer/command", {"commands": cold}), "cooling")
         return True
 
     def halt(self) -> str:

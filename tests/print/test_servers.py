@@ -266,3 +266,34 @@ def test_a_print_runs_in_a_thread_of_its_own(job: Job) -> None:
     assert isinstance(outcomes[0], Ended)
     assert outcomes[0].phase is Phase.CANCELLED
     assert isinstance(outcomes[1], SettingsError)
+
+
+def test_every_tool_of_a_server_s_printer_is_switched_off(job: Job) -> None:
+    """OctoPrint lists two nozzles: both are off after cancelling, without stopping the printer in an emergency."""
+    wishes = Wishes()
+
+    def watch(progress: Progress) -> None:
+        if progress.phase is Phase.PRINTING:
+            wishes.cancel()
+
+    with print_server(ServerKind.OCTOPRINT, ServerFaults(rate=0.01, second_nozzle=190.0)) as there:
+        ended = printed(there, job, wishes=wishes, tell=watch)
+        assert (there.goal, there.bed, there.faults.second_nozzle) == (0.0, 0.0, 0.0)
+    assert (ended.phase, ended.notes) == (Phase.CANCELLED, ())
+
+
+def test_a_user_who_leaves_asks_once_more(job: Job) -> None:
+    """The server does not obey at once: the last request is the one that cools, and nobody says that it is cold."""
+    wishes = Wishes()
+
+    def watch(progress: Progress) -> None:
+        if progress.phase is Phase.CANCELLING:
+            wishes.leave()
+        elif progress.phase is Phase.PRINTING:
+            wishes.cancel()
+
+    with print_server(ServerKind.MOONRAKER, ServerFaults(rate=0.01, cools=False)) as there:
+        with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
+            printed(there, job, wishes=wishes, tell=watch)
+        assert there.asked[-1] == "POST /printer/gcode/script"
+        assert "POST /printer/emergency_stop" not in there.asked

@@ -39,6 +39,7 @@ class ServerFaults:
         raw: sent in place of every answer; empty: the answer.
         forbids: end of the paths that the key does not open; empty: it opens all.
         silent_after: answers after which it hangs up on everybody.
+        second_nozzle: where the heater of a second tool shall go, degrees C; negative: it has none.
     """
 
     condition: str = "ready"
@@ -53,6 +54,7 @@ class ServerFaults:
     raw: bytes = b""
     forbids: str = ""
     silent_after: int = 1 << 30
+    second_nozzle: float = -1.0
 
 
 class PrintServerStandIn:
@@ -230,6 +232,8 @@ def _octoprint(there: PrintServerStandIn, handler: _Handler, path: str, body: by
                 return 409, {"error": "Printer is not operational"}
             flags = {"operational": True, condition: True, "printing": condition == "printing"}
             heat = {"tool0": {"actual": 204.9, "target": there.goal}, "bed": {"actual": 22.0, "target": there.bed}}
+            if there.faults.second_nozzle >= 0:
+                heat["tool1"] = {"actual": 204.9, "target": there.faults.second_nozzle}
             return 200, {"temperature": heat, "state": {"flags": flags}}
         case "POST", "/api/files/local":
             if there.faults.refuses:
@@ -243,6 +247,8 @@ def _octoprint(there: PrintServerStandIn, handler: _Handler, path: str, body: by
         case "POST", "/api/printer/command":
             commands = json.loads(body)["commands"]
             there.cool(nozzle="M104 S0" in commands, bed="M140 S0" in commands)
+            if "M104 T1 S0" in commands:
+                there.faults.second_nozzle = min(there.faults.second_nozzle, 0.0)
             return 204, None
     return 404, None
 
