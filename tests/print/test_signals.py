@@ -4,6 +4,7 @@ import itertools
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -39,7 +40,15 @@ def _reset_signals() -> None:
         signal.signal(number, signal.SIG_DFL)
 
 
-def _started(home: Path, state: State, there: Scene) -> "subprocess.Popen[str]":
+def _ignore_hang_up() -> None:
+    """Do as nohup does."""
+    _reset_signals()
+    signal.signal(HUP, signal.SIG_IGN)
+
+
+def _started(
+    home: Path, state: State, there: Scene, prepare: Callable[[], None] = _reset_signals
+) -> "subprocess.Popen[str]":
     gcode = home / "cube.gcode"
     gcode.write_text(gcode_of(state))
     return subprocess.Popen(
@@ -49,7 +58,7 @@ def _started(home: Path, state: State, there: Scene) -> "subprocess.Popen[str]":
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=_reset_signals,  # noqa: PLW1509 - no thread of ours holds a lock then
+        preexec_fn=prepare,  # noqa: PLW1509 - no thread of ours holds a lock then
     )
 
 
@@ -75,3 +84,20 @@ def test_a_print_ends_cold(name: str, state: State, door: Door, tmp_path: Path) 
     assert process.returncode in codes, errors
     assert len(errors.splitlines()) <= 1, errors
     assert "Traceback" not in errors
+
+
+def test_a_print_under_nohup_goes_on(tmp_path: Path) -> None:
+    """SIGHUP that the parent ignores stays ignored: lines follow after it; SIGTERM still cools."""
+    with (
+        scene(Door.SOCKET, State.PRINTING, tmp_path) as there,
+        _started(tmp_path, State.PRINTING, there, _ignore_hang_up) as process,
+    ):
+        until_or_over(process, there.is_there, "it prints")
+        process.send_signal(HUP)
+        before = there.count()
+        until_or_over(process, lambda: there.count() > before + 50, "it goes on")
+        assert process.poll() is None
+        process.send_signal(TERM)
+        _, errors = process.communicate(timeout=60)
+        until(there.is_cold, "both heaters are off")
+    assert process.returncode == 130, errors

@@ -43,6 +43,7 @@ class Scene:
         is_hot: whether both heaters are on.
         is_cold: whether both are off.
         is_cancelling: whether it was asked to end the print.
+        count: lines that it has done, or answers that it has given.
         obey: lets it do what it was asked, where it has not yet.
     """
 
@@ -51,6 +52,7 @@ class Scene:
     is_hot: Callable[[], bool]
     is_cold: Callable[[], bool]
     is_cancelling: Callable[[], bool]
+    count: Callable[[], int]
     obey: Callable[[], None]
 
 
@@ -93,6 +95,7 @@ def _line_scene(there: MarlinPrinter, state: State) -> Scene:
         is_hot=lambda: (there.nozzle, there.bed) == (200.0, 60.0),
         is_cold=lambda: there.is_cold,
         is_cancelling=lambda: "M108" in there.done,
+        count=lambda: len(there.done),
         obey=lambda: None,
     )
 
@@ -118,6 +121,7 @@ def _server_scene(there: PrintServerStandIn, state: State, folder: Path) -> Scen
         is_hot=lambda: (there.goal, there.bed) == (205.0, 60.0),
         is_cold=lambda: (there.goal, there.bed) == (0.0, 0.0),
         is_cancelling=lambda: any("cancel" in asked or asked.endswith("/job") for asked in there.asked),
+        count=lambda: there.answers,
         obey=obey,
     )
 

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import os
 import sys
 import termios
 from contextlib import ExitStack, closing, suppress
@@ -9,7 +10,7 @@ from typing import Final
 
 from common.errors import DataError, SettingsError, TandemError, UnavailableError
 from common.program.commandline import INTERRUPTED
-from common.program.signals import StopSignals
+from common.program.signals import HUNG_UP, StopSignals
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.json_text import json_text
@@ -51,15 +52,29 @@ def run(options: argparse.Namespace) -> int:
         journal = Journal(data_folder() / "printing")
         _tell_left(journal)
         _ask(options, prepared.job)
-        return _told(_sent(prepared, journal), options, uri, prepared.job)
+        signals = StopSignals()
+        ended = _sent(prepared, journal, signals)
+        if signals.hung_up and not _is_heard():
+            return HUNG_UP
+        code = _told(ended, options, uri, prepared.job)
+        return HUNG_UP if signals.hung_up and code == INTERRUPTED else code
 
 
-def _sent(prepared: PreparedPrint, journal: Journal) -> Ended:
+def _is_heard() -> bool:
+    """Return whether stdout leads anywhere: a terminal that was closed takes nothing, and says so even of nothing."""
+    try:
+        os.write(sys.stdout.fileno(), b"")
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _sent(prepared: PreparedPrint, journal: Journal, signals: StopSignals) -> Ended:
     """Send the print in a thread of its own; show how far it is, and take keys and signals.
 
     A terminal that is held or gone stops what is shown, never what is sent: a print must end cold.
     """
-    signals, name = StopSignals(), prepared.job.name
+    name = prepared.job.name
 
     def heed_signals(_: Progress) -> None:
         if signals.stop:
