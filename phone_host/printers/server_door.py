@@ -187,12 +187,12 @@ class _Watch:
         began_ns, asked_ns = now.monotonic_ns(), 0
         while (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS:
             if now_ns - asked_ns > _AGAIN_NS:
+                self._end_and_cool(is_first=not asked_ns)
                 asked_ns = now_ns
-                self._end_and_cool()
             if self._is_cold():
                 return Ended(phase=Phase.CANCELLED, share=share, notes=notes)
             if self._wishes.is_left:
-                self._end_and_cool()
+                self._end_and_cool(is_first=False)
                 break
             self._tell(Phase.CANCELLING)
             _pause(_SOON_S)
@@ -210,8 +210,10 @@ class _Watch:
             "go and look; switch the printer off if its display does not say that they are cold",
         )
 
-    def _end_and_cool(self) -> None:
-        for ask in (self._server.cancel, self._server.cool):
+    def _end_and_cool(self, *, is_first: bool) -> None:
+        """Ask for the end, again only where the print still goes on, and for cold heaters."""
+        ends = (self._server.cancel,) if is_first or self._last.condition.is_active else ()
+        for ask in (*ends, self._server.cool):
             with suppress(
                 TandemError
             ):  # one that is refused, with the key or without words, does not keep the other one away
