@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final, Self, assert_never
+from typing import Final, assert_never
 
 from common.errors import SettingsError, TakenError
 from common.places import make_folder
@@ -47,7 +47,7 @@ class Entry:
 
 
 class JournalEntry:
-    """The entry of one print. Close it when the print has ended: whoever started it is told how.
+    """The entry of one print. Close it when the print has ended.
 
     Args:
         path: of its file; there is none before the first note.
@@ -68,20 +68,18 @@ class JournalEntry:
                 os.fsync(file.fileno())
             part.replace(self._path)
 
-    def close(self) -> None:
-        """Remove the entry, and let the printer go."""
-        for path in (self._path, self._path.with_suffix(".part")):
+    def close(self, *, is_reported: bool = True) -> None:
+        """Let the printer go.
+
+        Args:
+            is_reported: whether whoever started the print knows how it ended: then the entry is removed, else the next start tells.
+        """
+        for path in (self._path, self._path.with_suffix(".part")) if is_reported else ():
             with suppress(OSError):
                 path.unlink()
         if self._lock >= 0:
             os.close(self._lock)
             self._lock = -1
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class Journal:

@@ -27,6 +27,7 @@ from phone_host.printers.marlin_rules import (
     framed,
     is_done_now,
     is_long,
+    is_unknown,
     may_outlast_guard,
     patience_ns,
 )
@@ -150,6 +151,7 @@ class MarlinSender:
                 self._fail(f"the printer says: {reply.text}", "see what its display says; it has to be restarted")
             case ReplyKind.ERROR:
                 self._refused_order = reply.is_about_order
+                self._note_unguarded(reply)
             case ReplyKind.RESEND:
                 self._resend(reply.number, now_ns)
             case ReplyKind.OK:
@@ -239,15 +241,20 @@ class MarlinSender:
         if under_way is None:
             return
         text = under_way.line.text
-        if text == self._guard and "unknown command" in reply.text.lower():
-            self._guard, self._is_guarded = "", False
-            self.message = "this printer has no M85: if this machine fails, its heaters stay on"
+        self._note_unguarded(reply)
         if is_done_now(text, reply):
             under_way.due_ns = now_ns + ALIVE_NS
             self._attempts.timeouts = 0
         if reply.kind is ReplyKind.BUSY:
             minutes = (now_ns - self._began_ns) // (60 * SECOND_NS)
             self.message = f"{reply.text} ({name_of(text) or text}, {minutes} min)"
+
+    def _note_unguarded(self, reply: Reply) -> None:
+        """Remember that the printer does not know M85."""
+        is_guard = self._under_way is not None and self._under_way.line.text == self._guard
+        if is_guard and is_unknown(reply):
+            self._guard, self._is_guarded = "", False
+            self.message = "this printer has no M85: if this machine fails, its heaters stay on"
 
     def _resend(self, number: int, now_ns: int) -> None:
         """The printer wants a line: the one under way, an older one, or, if that had arrived, the next."""

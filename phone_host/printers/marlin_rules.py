@@ -68,6 +68,12 @@ def is_done_now(text: str, reply: Reply) -> bool:
     return reply.kind is ReplyKind.BUSY or (name in _HEATING and is_heating)
 
 
+def is_unknown(reply: Reply) -> bool:
+    """Return whether a printer says that it does not know a command, as Marlin, Klipper or RepRapFirmware do."""
+    words = reply.text.lower()
+    return "unknown command" in words or "not supported" in words
+
+
 def may_outlast_guard(text: str) -> bool:
     """Return whether a line may wait for longer than the printer's own guard against a dead host: for people, or by its number."""
     if name_of(text) in _FOR_PEOPLE:

@@ -50,8 +50,11 @@ def printed(
     """
     if journal is None:
         return place.door.send(job, wishes, tell)
-    with journal.begin(place.text) as entry:
+    entry = journal.begin(place.text)
+    try:
         return place.door.send(job, wishes, _noting(place, job, tell, entry))
+    finally:
+        entry.close(is_reported=not wishes.is_left)
 
 
 def _noting(

@@ -254,7 +254,8 @@ class Workshop:
         stage = PrintStage.PAUSED if progress.phase is Phase.PAUSED else PrintStage.PRINTING
         heat = progress.heat
         left = "" if math.isnan(progress.seconds_left) else f", {progress.seconds_left / 60:.0f} min left"
-        words = f"{self._job.name}: {progress.phase.value}, nozzle {heat.nozzle[0]:.0f}, bed {heat.bed[0]:.0f} \u00b0C{left}"
+        message = f" ({progress.message})" if progress.message else ""
+        words = f"{self._job.name}: {progress.phase.value}{message}, nozzle {heat.nozzle[0]:.0f}, bed {heat.bed[0]:.0f} \u00b0C{left}"
         self._show(stage, words, share=progress.share)
 
     def _over(self, outcome: Ended | TandemError) -> None:

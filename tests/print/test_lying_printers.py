@@ -130,6 +130,9 @@ def test_a_printer_that_is_deaf_while_it_heats_cools_when_it_hears(twice: bool, 
     assert process.returncode == (130 if twice else 3)
     assert len(errors.splitlines()) == 1
     assert not any(text.startswith("G1") for text in there.done)
+    if twice:  # nobody has seen the end: the next start says so
+        told = done(tmp_path, str(gcode), "--printer", "serial:/dev/ttyNOPE", "--yes")
+        assert "its heaters may be on" in told.stderr
 
 
 def test_the_printer_s_own_guard_is_on_while_it_prints(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import os
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -378,7 +379,7 @@ def test_the_journal_tells_of_prints_whose_programs_are_gone(tmp_path: Path) -> 
         os.close(begun._lock)  # as the kernel does when the process dies
     assert sorted(each.file for each in journal.take_left()) == ["cup.gcode", "cup.gcode", "mug.gcode"]
     assert journal.take_left() == []
-    with journal.begin("serial:x") as begun:
+    with closing(journal.begin("serial:x")) as begun:
         begun.note(Entry("cup.gcode", "serial:x", 50, 100, os.getpid()))
         assert journal.take_left() == []
         assert len(list(folder.glob("*.json"))) == 1
@@ -392,14 +393,12 @@ def test_two_prints_never_go_to_one_printer(tmp_path: Path) -> None:
     """However its address is written; another printer is free, and a folder that cannot be written keeps nobody away."""
     (tmp_path / "by-id").symlink_to("/dev/ttyUSB7")
     journal = Journal(tmp_path / "printing")
-    with journal.begin("serial:/dev/ttyUSB7?baud=250000"), journal.begin("octoprint://H"):
+    with closing(journal.begin("serial:/dev/ttyUSB7?baud=250000")), closing(journal.begin("octoprint://H")):
         for printer in (f"serial:{tmp_path}/by-id", "serial:ttyUSB7", "octoprint://h:80"):
             with pytest.raises(TakenError, match="another print goes to"):
                 journal.begin(printer)
-        with journal.begin("serial:/dev/ttyUSB8"):
-            pass
-    with journal.begin("serial:/dev/ttyUSB7"):
-        pass
+        journal.begin("serial:/dev/ttyUSB8").close()
+    journal.begin("serial:/dev/ttyUSB7").close()
     (tmp_path / "file").write_text("")
-    with Journal(tmp_path / "file" / "no").begin("serial:x") as begun:
+    with closing(Journal(tmp_path / "file" / "no").begin("serial:x")) as begun:
         begun.note(Entry("cup.gcode", "serial:x", 1, 2, 1))
