@@ -41,6 +41,7 @@ ENDINGS: Final[dict[int, Ending]] = {
 """Signals that end a command, with 128 + their number, as shells report it. Daemons and streams end in order by all but Ctrl-C, with 0."""
 
 INTERRUPTED: Final = ENDINGS[signal.SIGINT].exit_code
+HUNG_UP: Final = ENDINGS[signal.SIGHUP].exit_code
 
 _OTHERS: Final = tuple(number for number in ENDINGS if number != signal.SIGINT)
 """Those that Python leaves to the system."""

@@ -113,8 +113,10 @@ def stated_bed(area: str, height_mm: float) -> Bed | None:
     width, depth = high[0] - low[0], high[1] - low[1]
     if not (0 < width <= 10_000 and 0 < depth <= 10_000 and 0 < height_mm <= 10_000):
         return None
-    middle = ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2)
-    is_round = len(corners) >= _ROUND_CORNERS and all(
-        abs(math.dist(each, middle) / (width / 2) - 1) < _ROUND_SLACK for each in corners
-    )
-    return Bed((width, depth, height_mm), (low[0], low[1]), is_round)
+    middle = tuple(sum(each[axis] for each in corners) / len(corners) for axis in range(2))
+    radius = max(math.dist(each, middle) for each in corners)
+    if len(corners) >= _ROUND_CORNERS and all(
+        math.dist(each, middle) > (1 - _ROUND_SLACK) * radius for each in corners
+    ):
+        return Bed((2 * radius, 2 * radius, height_mm), (middle[0] - radius, middle[1] - radius), is_round=True)
+    return Bed((width, depth, height_mm), (low[0], low[1]))

@@ -32,6 +32,23 @@ def is_binary(gcode: Path) -> bool:
         return False
 
 
+def require_readable(gcode: Path) -> None:
+    """Refuse binary G-code where there is no program that converts it.
+
+    Raises:
+        DataError: it is.
+    """
+    if is_binary(gcode):
+        _converter(gcode)
+
+
+def _converter(gcode: Path) -> str:
+    program = shutil.which(_PROGRAM)
+    if program is None:
+        raise DataError(f"{gcode} is binary G-code (it begins with GCDE), which is not read here", _REMEDY)
+    return program
+
+
 @contextmanager
 def text_gcode(gcode: Path) -> Iterator[Path]:
     """Give G-code as text, for as long as the block runs: the file itself, or what `bgcode` makes of a binary one.
@@ -45,9 +62,7 @@ def text_gcode(gcode: Path) -> Iterator[Path]:
     if not is_binary(gcode):
         yield gcode
         return
-    program = shutil.which(_PROGRAM)
-    if program is None:
-        raise DataError(f"{gcode} is binary G-code (it begins with GCDE), which is not read here", _REMEDY)
+    program = _converter(gcode)
     with tempfile.TemporaryDirectory(prefix="tandemscan-", ignore_cleanup_errors=True) as folder:
         given = Path(folder) / f"{gcode.stem}.bgcode"
         given.symlink_to(gcode.absolute())

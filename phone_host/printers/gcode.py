@@ -13,8 +13,8 @@ from typing import Final
 
 from common.errors import DataError
 from phone_host.printers.bed import Bed, stated_bed
-from phone_host.printers.nozzle_path import Place, PrintPath, words_of
 from phone_host.printers.cooling import MAX_TOOL
+from phone_host.printers.nozzle_path import Place, PrintPath, words_of
 
 MOST_FOR_LINES: Final = 90
 """Marlin's lines hold 96 (MAX_CMD_SIZE), number and checksum included."""

@@ -17,7 +17,7 @@ from phone_host.output.meshes.printable import Printer, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import mesh_file
 from phone_host.output.upright import Upright, upright_model
-from phone_host.printers.binary_gcode import text_gcode
+from phone_host.printers.binary_gcode import require_readable, text_gcode
 from phone_host.printers.door import Job
 from phone_host.printers.gcode import MOST_FOR_LINES, MOST_FOR_SERVERS
 from phone_host.printers.printer_uri import LineUri, PrinterUri
@@ -47,18 +47,20 @@ def is_gcode(what: Path) -> bool:
 
 
 def require_input(what: Path) -> None:
-    """Refuse what does not exist, before a printer is asked or a slicer is looked for.
+    """Refuse what does not exist, or cannot be read here, before a printer is asked or a slicer is looked for.
 
     Args:
         what: G-code, a scan's folder or a mesh file.
 
     Raises:
-        DataError: there is no such file, or no model in the folder.
+        DataError: there is no such file, or no model in the folder; or it is binary G-code, and there is no program that converts it.
     """
     if not is_gcode(what):
         mesh_file(what)
     elif kind_of(what) is Kind.MISSING:
         raise DataError(f"{what} does not exist", "give the file that a slicer wrote")
+    else:
+        require_readable(what)
 
 
 @contextmanager

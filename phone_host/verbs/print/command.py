@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import os
 import sys
 import termios
 from contextlib import ExitStack, closing, suppress
@@ -10,7 +9,8 @@ from typing import Final
 
 from common.errors import DataError, SettingsError, TandemError, UnavailableError
 from common.program.commandline import INTERRUPTED
-from common.program.signals import HUNG_UP, StopSignals
+from common.program.interrupts import HUNG_UP
+from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.json_text import json_text
@@ -53,20 +53,8 @@ def run(options: argparse.Namespace) -> int:
         _tell_left(journal)
         _ask(options, prepared.job)
         signals = StopSignals()
-        ended = _sent(prepared, journal, signals)
-        if signals.hung_up and not _is_heard():
-            return HUNG_UP
-        code = _told(ended, options, uri, prepared.job)
+        code = _told(_sent(prepared, journal, signals), options, uri, prepared.job)
         return HUNG_UP if signals.hung_up and code == INTERRUPTED else code
-
-
-def _is_heard() -> bool:
-    """Return whether stdout leads anywhere: a terminal that was closed takes nothing, and says so even of nothing."""
-    try:
-        os.write(sys.stdout.fileno(), b"")
-    except (OSError, ValueError):
-        return False
-    return True
 
 
 def _sent(prepared: PreparedPrint, journal: Journal, signals: StopSignals) -> Ended:

@@ -99,7 +99,7 @@ class Commands:
     def keep(self, choices: Choices) -> None:
         """See Program."""
         keep(self._file, choices, self._kept)
-        self._kept = choices
+        self._kept = dict(choices)
 
     def changed(self, choices: Choices, changes: Choices) -> Choices:
         """See Program."""
