@@ -7,7 +7,7 @@ from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
 from phone_host.report.scan_report import ScanReport, scan_verdict
 from phone_host.report.stereo_report import FailedPair
-from phone_host.scan.scanned import ScannedPair
+from phone_host.scan.scanned import PoseSource, ScannedPair
 
 
 def scan_json(report: ScanReport) -> dict[str, Any]:
@@ -74,6 +74,7 @@ def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
         "name": pair.name,
         "stamp_s": pair.stamp_s,
         "state": pair.state.value,
+        "pose": pair.pose_source.value,
         "weakness": pair.weakness.value,
         "density": round(pair.density, 4),
         "corners": pair.corners,
@@ -87,7 +88,9 @@ def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
             "rms_px": _number(pair.mat.rms_px),
             "sigma_m": _number(pair.mat.sigma_m),
         },
-        "place_m": [round(value, 6) for value in pair.world_camera.t_m.tolist()],
+        "place_m": None
+        if pair.pose_source is PoseSource.NONE
+        else [round(value, 6) for value in pair.world_camera.t_m.tolist()],
     }
 
 

@@ -17,6 +17,7 @@ from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
 from phone_host.run.kept_field import FIELD
 from phone_host.scan.scan_model import ScanModel
+from phone_host.scan.scanned import PoseSource
 
 NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html|field\.bin"
 """The names that `scan` writes into its folder."""
@@ -67,10 +68,10 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
 
 
 def trajectory_of(report: ScanReport) -> str:
-    """Return the content of trajectory.txt: the pairs in the model, in the axes of model.ply."""
+    """Return the content of trajectory.txt: the pairs whose pose is known, in the model or not, in the axes of model.ply."""
     stations = []
     for pair in report.scanned:
-        if pair.is_fused:
+        if pair.pose_source is not PoseSource.NONE:
             pose = pair.world_camera
             signs = report.axes.signs.astype(float)
             stations.append(Station(pair.stamp_s, signs[:, None] * pose.R, signs * pose.t_m))

@@ -173,6 +173,7 @@ class Scan:
                 overlap=math.nan if told.fit is None else told.fit.overlap,
                 off_m=math.nan if told.fit is None else told.fit.off_m,
                 mat=told.mat,
+                is_followed=told.is_followed,
             )
         self._pairs.append(pair)
         return pair
@@ -205,9 +206,16 @@ class Scan:
         if not views:
             return
         poses = {self._untracked + view.number - 1: view.world_camera for view in views}
-        for at in poses.keys() - {len(self._pairs)}:  # this pair is told so itself
-            self._pairs[at] = replace(self._pairs[at], world_camera=poses[at])
-            self._later[self._pairs[at].name] = self._pairs[at]
+        by = SE3.identity()
+        for at in range(self._untracked, len(self._pairs)):  # the pair after these is told so itself
+            pair = self._pairs[at]
+            if at in poses:
+                by = poses[at] @ pair.world_camera.inverse()
+            elif not pair.is_followed:
+                continue
+            # What is tracked only moves with the last pair in the model before it.
+            self._pairs[at] = replace(pair, world_camera=poses[at] if at in poses else (by @ pair.world_camera).exact())
+            self._later[pair.name] = self._pairs[at]
         self._is_changed = True
         self._depths.move(poses)
         if self._carving is not None:

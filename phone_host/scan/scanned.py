@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
@@ -11,6 +12,17 @@ from phone_host.scan.tracker import TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume import BlockValues
 from phone_host.scan.volume_settings import VolumeSettings
+
+
+class PoseSource(Enum):
+    """What tells the pose of a pair.
+
+    MODEL: the pair is fused. ODOMETRY: it is tracked, but not fused. NONE: it is lost, and its pose is not known.
+    """
+
+    MODEL = "fused"
+    ODOMETRY = "tracked only"
+    NONE = "lost"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -28,6 +40,7 @@ class ScannedPair:
         overlap: share of its depths that lie on the model, 0..1; NaN: not compared.
         off_m: mean distance of these from the model, m; NaN: not compared.
         mat: what the mat told; None: it was not seen, or nobody looked for it.
+        is_followed: whether odometry tells the pose of a pair that is not fused, without a gap since one that is.
     """
 
     name: str
@@ -40,11 +53,19 @@ class ScannedPair:
     overlap: float = math.nan
     off_m: float = math.nan
     mat: MatSaid | None = None
+    is_followed: bool = False
 
     @property
     def is_fused(self) -> bool:
         """Whether it became part of the model."""
         return self.state is not Tracking.LOST
+
+    @property
+    def pose_source(self) -> PoseSource:
+        """What tells its pose."""
+        if self.is_fused:
+            return PoseSource.MODEL
+        return PoseSource.ODOMETRY if self.is_followed else PoseSource.NONE
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -17,7 +17,7 @@ from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.tracker import TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 
-_HEAD: Final = b"tandemscan submap 2\n"
+_HEAD: Final = b"tandemscan submap 3\n"
 _MAT_VALUES: Final = 6
 _RIGID: Final = 1e-4
 _FARTHEST_M: Final = 1e5
@@ -39,6 +39,7 @@ def submap_bytes(submap: Submap) -> bytes:
         "numbers": np.array(
             [(pair.stamp_s, pair.density, pair.corners, pair.overlap, pair.off_m) for pair in pairs], np.float64
         ),
+        "followed": np.array([pair.is_followed for pair in pairs], np.bool_),
         "poses": _rows([pair.world_camera for pair in pairs]),
         "mats": np.array([_mat_row(pair.mat) for pair in pairs], np.float64).reshape(-1, _MAT_VALUES),
         "geometry": np.array([of.focal_px, of.baseline_m, of.cx_px, of.cy_px, of.doffs_px], np.float64),
@@ -91,6 +92,7 @@ def _read(held: Arrays) -> Submap:
             overlap=overlap,
             off_m=off_m,
             mat=_mat_of(held["mats"][at]),
+            is_followed=bool(held["followed"][at]),
         )
         for at, ((stamp_s, density, corners, overlap, off_m), pose) in enumerate(
             zip(numbers, _poses(held["poses"]), strict=True)

@@ -1,5 +1,6 @@
 """How fine a volume is, how far it sees, and how much memory it may take. Pure."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -13,6 +14,12 @@ MOST_WEIGHT: Final = 4096
 
 LEAST_WEIGHT: Final = 8
 """Of a voxel on the surface: an eighth of a sure depth. One view at a slant gives less, and is off by 5 mm where others are off by 4."""
+
+STREET_NEAR_M: Final = 5.0
+"""The nearest quarter of the depths ends here or beyond: in a street 8 to 11 m, in rooms up to 3 m."""
+
+_STREET_REACH_M: Final = math.sqrt(3) * STREET_NEAR_M
+"""So far the model of a street reaches at least (`fineness`): its truncation is three times the noise of the near depths."""
 
 _SURE_VOXELS: Final = 0.5
 
@@ -43,6 +50,11 @@ class VolumeSettings:
     def sure_m(self) -> float:
         """A depth whose noise is this or less, m, has the full weight."""
         return _SURE_VOXELS * self.voxel_m
+
+    @property
+    def is_of_street(self) -> bool:
+        """Whether the model reaches as far as that of a street: corners tell poses better there than its wide voxels do."""
+        return self.far_m >= _STREET_REACH_M
 
     @property
     def coarser(self) -> "VolumeSettings":

@@ -24,7 +24,7 @@ from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.stereo_options import output_options
 from phone_host.verbs.units import length_mm
 
-_LEAST_VOXEL_MM, _MOST_VOXEL_MM = 0.2, 200.0
+_LEAST_VOXEL_MM, _MOST_VOXEL_MM = 0.2, 250.0
 _USUAL: Final = "usual"
 """What `--mat` without a value is."""
 
