@@ -59,7 +59,10 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
     ]
     files = (
         FileLink(MODEL, f"the surface with its colours, metres; {_axes_words(report.axes)}"),
-        FileLink(TRAJECTORY, "where the camera was, a line a pair: s, m, quaternion x y z w (TUM's format)"),
+        FileLink(
+            TRAJECTORY,
+            "where the camera was, a line a pair whose pose is known: s, m, quaternion x y z w (TUM's format)",
+        ),
         FileLink("report.json", "all figures, with those of every pair"),
     )
     parts = [

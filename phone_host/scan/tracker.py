@@ -35,6 +35,13 @@ _STREET_ODOMETRY: Final = OdometrySettings(corners=400, apart_px=8, keyframe_sha
 """In a street odometry carries the accuracy, on the whole image: a depth at 15 m has 0.3 m of noise, and what was fused soon leaves the picture. On 24 pairs
 of KITTI the trajectory is 22 mm off, where half the image gives 131 mm; 1000 corners give 32 mm and take twice the time."""
 
+_POOR_NOISE_PER_M: Final = 0.006
+"""Noise of a depth 1 m away, m, from which a keyframe's new points are so far off that each view as a keyframe harms: with 0.010 (f = 400 px, b = 0.12 m) a
+rendered street's trajectory is 106 mm off, with every fifth view as a keyframe 29 mm; with 0.004 (b = 0.3 m) 17 and 22 mm."""
+
+_STREET_GATE: Final = PoseGate(most_shift_m=0.25, least_overlap=0.2)
+"""In a street a place tells the pose to some decimetres, and of what a car sees a fifth to a third lies on the model 1.2 m farther on; near 1.00 of it fits."""
+
 _SURE_SHARE, _SUREST_PX, _LEAST_SURE_PX = 0.1, 0.25, 1.0
 """How far off a view's pixels are after odometry: a share of the way of the corners, px, between the two. On real rooms and streets 1 px, 3 mm at 2 m. A camera at
 rest is surer: with 1 px, fifty times the same twelve views wander by 1.9 mm, with 0.25 px by 0.9 mm."""
@@ -130,11 +137,13 @@ class Tracker:
         coarsens: bool = False,
     ) -> None:
         found = native() if library is None else library
-        self._gate = PoseGate() if gate is None else gate
+        usual = _STREET_GATE if settings.is_of_street else PoseGate()
+        self._gate = usual if gate is None else gate
         self._pieces = Pieces(settings, threads, self._gate, found, coarsens=coarsens)
         self._loops = None if loops is None else LoopCloser(loops, self._pieces.model, threads, self._gate, found)
         self._settings = settings
-        self._odometry = Odometry(_STREET_ODOMETRY if settings.is_of_street else _ODOMETRY)
+        is_exact = settings.noise_per_m < _POOR_NOISE_PER_M
+        self._odometry = Odometry(_STREET_ODOMETRY if settings.is_of_street and is_exact else _ODOMETRY)
         self._pose = SE3.identity() if start is None else start  # in the axes of the piece that is tracked
         self._was_lost = False
         self._waiting: _Waiting | None = None

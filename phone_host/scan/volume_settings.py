@@ -57,6 +57,11 @@ class VolumeSettings:
         return self.far_m >= _STREET_REACH_M
 
     @property
+    def noise_per_m(self) -> float:
+        """Noise of a depth 1 m away, m, for which `fineness` chose the reach: at its end the noise is as large as the truncation."""
+        return self.truncation_m / self.far_m**2
+
+    @property
     def coarser(self) -> "VolumeSettings":
         """The same with voxels twice as wide, and a surface that is told over as many of them."""
         return replace(self, voxel_m=2 * self.voxel_m)

@@ -1,6 +1,6 @@
-"""Views of textured planes by a camera that moves, with exact depth: one plane, or the corner of a room."""
+"""Views of textured planes by a camera that moves, with exact depth: one plane, the corner of a room, or a street."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -53,19 +53,49 @@ def texture(seed: int = 1) -> NDArray[np.uint8]:
     return np.clip(128 + 35 * whole, 0, 255).astype(np.uint8)
 
 
+STREET = (
+    plane_at([0, 1.6, 0.0], [np.pi / 2, 0.0, 0.0]),
+    plane_at([-8.0, 0, 0.0], [0.0, -np.pi / 2, 0.0]),
+    plane_at([8.0, 0, 0.0], [0.0, np.pi / 2, 0.0]),
+    plane_at([0, 0, 90.0], [0.0, 0.0, 0.0]),
+)
+"""The road, houses on both sides, and what closes the street."""
+
+STREET_SIZE = (640, 240)
+
+
+def street_view(
+    world_camera: SE3, picture: NDArray[np.uint8], baseline_m: float, disparity_noise_px: float = 0.3
+) -> View:
+    """A street as a car sees it, its disparities with errors that reach over 16 px."""
+    geometry = StereoGeometry(focal_px=400.0, baseline_m=baseline_m, cx_px=319.5, cy_px=109.5)
+    view = plane_view(world_camera, picture, STREET, 0.5, geometry=geometry, size=STREET_SIZE, texel_m=0.05)
+    noise = cv2.GaussianBlur(np.random.default_rng(view.grey[::9].ravel()).normal(size=view.grey.shape), (0, 0), 8.0)
+    product = geometry.focal_px * baseline_m
+    disparity = product / view.depth_m + disparity_noise_px * noise / noise.std()
+    return replace(view, depth_m=np.where(disparity > 1.0, product / disparity, np.nan).astype(np.float32))
+
+
 def plane_view(
-    world_camera: SE3, picture: NDArray[np.uint8], planes: tuple[Plane, ...] = WALL, noise_px: float = 0.1
+    world_camera: SE3,
+    picture: NDArray[np.uint8],
+    planes: tuple[Plane, ...] = WALL,
+    noise_px: float = 0.1,
+    *,
+    geometry: StereoGeometry = GEOMETRY,
+    size: tuple[int, int] = SIZE,
+    texel_m: float = _TEXEL_M,
 ) -> View:
     """What a camera sees: of several planes the nearest, each with the picture on it."""
-    width, height = SIZE
+    width, height = size
     columns, rows = np.meshgrid(np.arange(width), np.arange(height))
-    slopes = ((columns - GEOMETRY.cx_px) / GEOMETRY.focal_px, (rows - GEOMETRY.cy_px) / GEOMETRY.focal_px)
+    slopes = ((columns - geometry.cx_px) / geometry.focal_px, (rows - geometry.cy_px) / geometry.focal_px)
     rays = np.stack([*slopes, np.ones(columns.shape)], axis=-1)
     depth, grey = np.full(columns.shape, np.inf), np.zeros(columns.shape, np.uint8)
     for plane in planes:
         there = (plane.axes[0] @ (plane.through_m - world_camera.t_m)) / (rays @ world_camera.R.T @ plane.axes[0])
         points = world_camera.apply(rays * there[..., np.newaxis]) - plane.through_m
-        texels = (points @ plane.axes[1:].T / _TEXEL_M + _TEXTURE_PX / 2).astype(np.float32)
+        texels = (points @ plane.axes[1:].T / texel_m + _TEXTURE_PX / 2).astype(np.float32)
         shown = np.asarray(
             cv2.remap(picture, texels[..., 0], texels[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
         )
@@ -75,7 +105,7 @@ def plane_view(
         grey=grey,
         colours=np.repeat(grey[..., np.newaxis], 3, axis=2),
         depth_m=depth.astype(np.float32),
-        geometry=GEOMETRY,
+        geometry=geometry,
         noise_px=noise_px,
     )
 
