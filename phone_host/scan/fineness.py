@@ -38,7 +38,7 @@ def fineness_for(view: View, voxel_m: float, most_bytes: int) -> VolumeSettings:
     Returns:
         Settings. Depths count as far as their noise is no greater than the distance to which the field tells the surface.
     """
-    near_m, reach_m = np.nanquantile(view.depth_m, (_NEAR_SHARE, _FAR_SHARE)).tolist()
+    near_m, reach_m = (float(np.nanquantile(view.depth_m, share)) for share in (_NEAR_SHARE, _FAR_SHARE))
     noise_m = view.noise_per_m * near_m**2
     far_noise_m = view.noise_per_m * reach_m**2 if near_m >= STREET_NEAR_M else 0.0
     if math.isnan(voxel_m):
