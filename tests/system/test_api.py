@@ -178,7 +178,7 @@ def test_what_was_opened_is_let_go_where_the_rest_cannot_be(film: Path, tmp_path
     link, camera, out = f"ipc://{tmp_path}/link", f"replay:{film}?loop=1", tmp_path / "out"
     scanner = open_scanner(link=link, camera=camera, out=out)
     before = len(list(Path("/proc/self/fd").iterdir()))
-    with pytest.raises(UnavailableError, match="another run"):
+    with pytest.raises(UnavailableError, match="is being written by process"):
         open_scanner(link=link, camera=camera, out=out)
     until(lambda: len(list(Path("/proc/self/fd").iterdir())) <= before, "what was opened is closed")
     with pytest.raises(RuntimeError):
