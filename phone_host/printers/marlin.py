@@ -318,7 +318,7 @@ class MarlinSender:
     def _sent_again(self, under_way: SentLine, now_ns: int) -> bytes:
         if now_ns - self._began_ns > self._options.max_busy_ns:
             self._fail(
-                f"the printer has not finished {under_way.line.text} within {self._options.max_busy_ns // (60 * SECOND_NS)} min",
+                f"the printer has not finished {under_way.line.text} within {self._options.max_busy_ns / (60 * SECOND_NS):g} min",
                 "see what its display says; max_busy_minutes in the table [printers] of the settings file allows more",
             )
             return b""

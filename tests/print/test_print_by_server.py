@@ -20,7 +20,7 @@ from phone_host.printers.gcode import examine
 from phone_host.printers.printer_uri import ServerKind, read_uri
 from phone_host.printers.server_door import name_there
 from tests.print.test_print_verb import _cube_file, command, done, environment
-from tests.support.marlin_printer import cube
+from tests.support.marlin_printer import Faults, cube, printer
 from tests.support.print_server import KEY, ServerFaults, print_server
 from tests.support.programs import until
 
@@ -192,6 +192,25 @@ def test_printers_that_announce_themselves_are_found(tmp_path: Path) -> None:
     ]
     assert [each.uri for each in printers_of(heard)] == ["moonraker://[fd00::7]:7125", "prusalink://10.0.0.5:80"]
     assert printers_of(heard)[1] == FoundPrinter("prusalink://10.0.0.5:80", "PrusaLink  [buddy-mk4]")
+
+
+def test_the_longest_time_for_one_line_is_a_setting(gcode: Path, tmp_path: Path) -> None:
+    """A printer that is busy for ever is given up after it, and cooled; what is no number of minutes is refused."""
+    file = tmp_path / "host.toml"
+    with printer(Faults(busy=frozenset({"G28"})), on_socket=True) as there:
+        options = ["--printer", there.uri, "--config", str(file), "--yes"]
+        for bad in ("0", "true", "nan"):
+            file.write_text(f"[printers]\nmax_busy_minutes = {bad}\n")
+            ended = done(tmp_path, str(gcode), *options)
+            assert (ended.returncode, len(ended.stderr.splitlines())) == (2, 1), ended.stderr
+            assert "max_busy_minutes" in ended.stderr
+        assert there.done == []
+        file.write_text("[printers]\nmax_busy_minutes = 0.1\n")
+        ended = done(tmp_path, str(gcode), *options)
+        until(lambda: there.is_cold and "M107" in there.done, "it is cooled")
+    assert ended.returncode == 3
+    assert "within 0.1 min" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
 
 
 def test_names_on_a_server_are_plain() -> None:
