@@ -14,7 +14,7 @@ from phone_host.output.meshes.formats import mesh_bytes, read_mesh
 from phone_host.output.meshes.solid import NO_COLOURS, Solid
 
 ROOT: Final = Path(__file__).resolve().parents[2]
-SIDE: Final = 260
+SIDE: Final = 210
 TEXTS: Final = (".obj", "-text.ply", "-text.stl")
 SLACK: Final = 4 << 20
 """What the interpreter and parts of fixed size take beside the file, bytes."""
@@ -29,7 +29,7 @@ def _header(form: str, vertices: int, faces: int) -> str:
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """A rough surface of 134 000 triangles in each format, and what takes most memory for its size."""
+    """A rough surface of 87 000 triangles in each format, and what takes most memory for its size."""
     folder = tmp_path_factory.mktemp("files")
     x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE))
     z = np.random.default_rng(1).random((SIDE, SIDE))
@@ -49,14 +49,14 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     count = 2 * len(four[::4])
     made["quads.ply"] = _header("binary_little_endian", len(points), len(quads)).encode() + packed + four.tobytes()
     made["mixed.ply"] = _header("binary_little_endian", len(points), count).encode() + packed + mixed
-    made["short-text.ply"] = (_header("ascii", 200_000, 200_000) + "1 2 3\n" * 200_000 + "3 1 2 3\n" * 200_000).encode()
-    made["claims-text.ply"] = (_header("ascii", 2_000_000_000, 9) + "1 2 3\n" * 400_000).encode()
-    made["short.obj"] = b"v 1 2 3\n" * 200_000 + b"f 1 2 3\n" * 200_000
+    made["short-text.ply"] = (_header("ascii", 120_000, 120_000) + "1 2 3\n" * 120_000 + "3 1 2 3\n" * 120_000).encode()
+    made["claims-text.ply"] = (_header("ascii", 2_000_000_000, 9) + "1 2 3\n" * 250_000).encode()
+    made["short.obj"] = b"v 1 2 3\n" * 120_000 + b"f 1 2 3\n" * 120_000
     text = b'{"asset":{},"extras":[' + b"[]," * 1_000_000 + b"0]}"
     lists = struct.pack("<II", len(text), 0x4E4F534A) + text
     made["lists.glb"] = struct.pack("<III", 0x46546C67, 2, 12 + len(lists)) + lists
     facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
-    made["same-text.stl"] = f"solid a\n{facet * 25_000}endsolid\n".encode()
+    made["same-text.stl"] = f"solid a\n{facet * 15_000}endsolid\n".encode()
     for name, content in made.items():
         (folder / name).write_bytes(content)
     return [folder / name for name in made]

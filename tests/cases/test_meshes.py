@@ -1,7 +1,11 @@
 """Meshes as other programs write them are read with their right answer, or refused in one line that names why (`make_meshes` wrote them)."""
 
+import io
 import json
 import re
+import struct
+import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,9 +13,10 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
+from phone_host.output.meshes.assembly import Part, assemble, require_count
 from phone_host.output.meshes.formats import FORMATS, READABLE, mesh_bytes, read_mesh
 from phone_host.output.meshes.printable import volume_mm3
-from phone_host.output.meshes.solid import Solid
+from phone_host.output.meshes.solid import NO_COLOURS, Solid
 from phone_host.output.model_file import read_model
 from tests.cases.make_meshes import all_cases
 
@@ -108,3 +113,104 @@ def test_the_documentation_names_every_case_and_no_other() -> None:
     assert sorted(named) == sorted(ANSWERS)
     for row in rows:
         assert all(f".{row[1].strip().lower()}`" in name for name in row[4].split())
+
+
+def changed_glb(change: Callable[[dict[str, Any]], object]) -> bytes:
+    """A GLB of a box whose JSON was changed."""
+    content = (FOLDER / "colours-u2.glb").read_bytes()
+    length = struct.unpack_from("<I", content, 12)[0]
+    tree = json.loads(content[20 : 20 + length])
+    change(tree)
+    text = json.dumps(tree).encode()
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + content[20 + length :]
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda tree: tree["bufferViews"][0].update(byteOffset=1 << 40), "cut short"),
+        (lambda tree: tree["accessors"][0].update(count=1 << 40), "cut short"),
+        (lambda tree: tree["accessors"][0].update(count=-1), "cut short"),
+        (lambda tree: tree["accessors"][0].pop("bufferView"), "cut short"),
+        (lambda tree: tree["accessors"][0].update(type="VEC4"), "cut short"),
+        (lambda tree: tree["accessors"][2].update(count=3), "cut short"),
+        (lambda tree: tree["accessors"][0].update(sparse={"count": 10**12}, count=10**12, bufferView=None), "cut short"),
+        (lambda tree: (tree["accessors"][0].update(sparse={}, count=10**9), tree["accessors"][0].pop("bufferView")), "cut short"),
+        (lambda tree: tree["nodes"][0].update(mesh=7), "cut short"),
+        (lambda tree: tree.update(meshes=[]), "cut short"),
+        (lambda tree: tree["nodes"][0].pop("mesh"), "no triangle"),
+        (lambda tree: tree["nodes"][0].update(scale=[1e200, 1, 1]), "no place"),
+        (lambda tree: tree.pop("asset"), "cut short"),
+        (lambda tree: tree.update(nodes=[{"mesh": 0}] * 100_001), "more than 100000 nodes"),
+        (lambda tree: tree.update(nodes=[{"mesh": 0, "children": [1] * 9}, *[{}] * 9]), None),
+        (lambda tree: tree.update(extras=json.loads("[" * 900 + "]" * 900)), None),
+        (lambda tree: (tree.pop("scenes"), tree.pop("scene")), None),
+        (lambda tree: tree["accessors"][0].update(count=True), "cut short"),
+    ],
+)  # fmt: skip
+def test_a_glb_that_contradicts_itself_is_refused(change: Callable[[dict[str, Any]], object], word: str | None) -> None:
+    """Whatever its JSON says: one line, or the box; None: that is no contradiction."""
+    content = changed_glb(change)
+    if word is None:
+        assert len(read_mesh(content, "a.glb").solid.triangles) == 12
+        return
+    with pytest.raises(DataError, match=word) as refused:
+        read_mesh(content, "a.glb")
+    assert "a.glb" in refused.value.problem
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "word"),
+    [
+        ("a.glb", b"glTF" + bytes(30), "version 0"),
+        ("a.glb", b"no glTF at all, whatever its name", "no GLB"),
+        ("a.glb", b"glTF\2\0\0\0" + struct.pack("<III", 60_032, 60_012, 0x4E4F534A) + b"[" * 60_012, "cut short"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nelement tristrips 1\nproperty int n\nend_header\n1 2 3\n4\n", "no triangle"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nelement face 1\nproperty list uchar int near\nend_header\n1 2 3\n1 0\n", "no triangle"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\nend_header\n-1\n", "cut short"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex -1\nend_header\n", "no PLY"),
+        ("a.ply", b"ply\nelement vertex 1\nend_header\n", "no PLY"),
+        ("a.ply", b"ply\nformat ascii 1.0\nproperty int x\nend_header\n", "no PLY"),
+    ],
+)  # fmt: skip
+def test_what_is_no_mesh_is_refused(name: str, content: bytes, word: str) -> None:
+    """In one line."""
+    with pytest.raises(DataError, match=word):
+        read_mesh(content, name)
+
+
+def test_a_3mf_that_contradicts_itself_is_refused() -> None:
+    """An object that is not there, and more objects than any thing has."""
+    with zipfile.ZipFile(FOLDER / "plain.3mf") as archive:
+        text = archive.read("3D/3dmodel.model").decode()
+    for changed, word in (
+        (text.replace('objectid="1"', 'objectid="2"'), "does not hold"),
+        (text.replace("<build>", "<build>" + '<item objectid="1"/>' * 110_000), "more than 100000"),
+        (text.replace('unit="millimeter"', 'unit="mile"'), "no 3MF"),
+        (text.replace("</mesh>", ""), "no 3MF"),
+    ):
+        held = io.BytesIO()
+        with zipfile.ZipFile(held, "w") as archive:
+            archive.writestr("3D/3dmodel.model", changed)
+        with pytest.raises(DataError, match=word):
+            read_mesh(held.getvalue(), "a.3mf")
+    with pytest.raises(DataError, match="no 3MF"):
+        read_mesh(b"PK\x03\x04 and no more", "a.3mf")
+
+
+def test_a_concave_face_of_thousands_of_corners_is_refused() -> None:
+    """Cutting it would take for ever."""
+    star = "".join(f"v {x % 2} {x} 0\n" for x in range(2000)) + "v 9 0 0\n"
+    with pytest.raises(DataError, match="concave faces"):
+        read_mesh(f"{star}f {' '.join(map(str, range(1, 2002)))}\n".encode(), "a.obj")
+
+
+def test_a_part_is_not_repeated_without_end() -> None:
+    """A small file may place a part often, but not more than memory holds."""
+    part = Part(np.eye(3), np.tile(np.arange(3, dtype=np.int32), (500_000, 1)), NO_COLOURS, np.eye(4))
+    assert len(assemble("a.glb", [part] * 2, 1.0).triangles) == 1_000_000
+    with pytest.raises(DataError, match="more than 4 million"):
+        assemble("a.glb", [part] * 9, 1.0)
+    with pytest.raises(DataError, match="more than 20 million"):
+        require_count("a.glb", 20_000_001)

@@ -11,7 +11,10 @@ from common.errors import DataError
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, require_corners, sound_solid
 
 _MAX_PLACED: Final = 20_000_000
-"""Triangles of one mesh, or its points: a part may be placed often, so that a small file names an endless mesh."""
+"""Triangles of one mesh, or its points."""
+
+_MAX_REPEATED: Final = 4_000_000
+"""The same where parts are placed more than once, by which a small file names an endless mesh: 400 MB of memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,18 +34,19 @@ class Part:
     transform: NDArray[np.float64]
 
 
-def require_count(name: str, count: int) -> None:
+def require_count(name: str, count: int, limit: int = _MAX_PLACED) -> None:
     """Check a number of points or triangles before there is room made for them.
 
     Args:
         name: of the file, for errors.
         count: of points or triangles.
+        limit: the most that is read.
 
     Raises:
-        DataError: it is beyond 20 million.
+        DataError: it is beyond the limit.
     """
-    if count > _MAX_PLACED:
-        raise DataError(f"{name} holds more than {_MAX_PLACED // 10**6} million points or triangles", "export fewer")
+    if count > limit:
+        raise DataError(f"{name} holds more than {limit / 1e6:.0f} million points or triangles", "export fewer")
 
 
 def assemble(name: str, parts: Sequence[Part], unit_m: float) -> Solid:
@@ -59,7 +63,8 @@ def assemble(name: str, parts: Sequence[Part], unit_m: float) -> Solid:
     Raises:
         DataError: they hold no sound triangle, or too many.
     """
-    require_count(name, max(sum(len(part.points) for part in parts), sum(len(part.triangles) for part in parts)))
+    limit = _MAX_REPEATED if len({id(part.triangles) for part in parts}) < len(parts) else _MAX_PLACED
+    require_count(name, max(sum(len(part.points) for part in parts), sum(len(part.triangles) for part in parts)), limit)
     has_colours = any(len(part.colours) for part in parts)
     points, triangles, colours, count = [], [], [], 0
     for part in parts:

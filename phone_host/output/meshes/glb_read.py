@@ -28,6 +28,7 @@ _UNREAD_EXTENSIONS: Final = (
     "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_mesh_gpu_instancing",
 )  # fmt: skip
 _MAX_DEPTH: Final = 64
+_MAX_NODES: Final = 100_000
 _FREE_LISTS, _BYTES_PER_LIST = 100_000, 16
 """Lists and maps that the JSON may have, and how many bytes the file must have for each further one: each takes 64 bytes of memory."""
 
@@ -95,7 +96,8 @@ class _File:
         if "bufferView" in accessor:
             values = self._rows(accessor["bufferView"], accessor.get("byteOffset", 0), (count, columns), kind)
         elif "sparse" in accessor:
-            require_count(self.name, count)
+            if count > sum(map(len, self.buffers)):
+                raise IndexError("more than any mesh leaves at zero")
             values = np.zeros((count, columns), kind)
         else:
             raise IndexError("numbers that are nowhere")
@@ -178,6 +180,8 @@ def _parts(file: _File) -> Iterator[Part]:
     nodes = file.tree.get("nodes", ())
     scenes = file.tree.get("scenes", ())
     roots = scenes[file.tree.get("scene", 0)].get("nodes", ()) if scenes else range(len(nodes) and 1)
+    if len(nodes) > _MAX_NODES:
+        raise DataError(f"{file.name} has more than {_MAX_NODES} nodes", "join its meshes")
     waiting, visits = [(root, np.eye(4), 0) for root in roots], 0
     while waiting:
         number, transform, depth = waiting.pop()
