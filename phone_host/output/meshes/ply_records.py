@@ -22,7 +22,7 @@ _TYPES: Final = {
     **dict.fromkeys(("float", "float32"), "f4"), **dict.fromkeys(("double", "float64"), "f8"),
 }  # fmt: skip
 _ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
-_END: Final = re.compile(rb"end_header[ \t]*(?:\r?\n|\r|$)", re.IGNORECASE)
+_END: Final = re.compile(rb"(?<=[\r\n])end_header[ \t]*(?:\r?\n|\r|$)", re.IGNORECASE)
 _MAX_HEADER: Final = 1 << 16
 _MAX_AT_ONCE: Final = 1 << 14
 

@@ -79,6 +79,8 @@ def _binary(content: bytes, name: str) -> NDArray[np.float32]:
             f"{name} is cut short: its header names {counted(count, 'triangle')}, {held} are there",
             "copy the file again",
         )
+    if body == held * _TRIANGLE.itemsize and any(content[_HEADER + 4 + count * _TRIANGLE.itemsize :]):
+        raise DataError(f"{name} holds {held} triangles, but its header names {count}", "export it anew")
     return np.frombuffer(content, _TRIANGLE, count, _HEADER + 4)["corners"].reshape(-1, 3)
 
 

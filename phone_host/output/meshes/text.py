@@ -1,5 +1,6 @@
 """Texts as other programs write them: with or without a byte order mark, with lines that end in any way. Pure."""
 
+import codecs
 import io
 from collections.abc import Iterator
 from typing import Final
@@ -7,16 +8,19 @@ from typing import Final
 from common.errors import DataError
 
 _MARK: Final = b"\xef\xbb\xbf"
+_WIDE_MARKS: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _MAX_BYTES: Final = 1 << 29
 """Of a text: some eight million triangles, which take ten times as much memory while they are read."""
 
 
 def without_mark(content: bytes) -> bytes:
-    """Return a file's bytes without the mark that some editors put before UTF-8.
+    """Return a text's bytes without the mark that some editors put before UTF-8, and UTF-16 as UTF-8.
 
     Args:
         content: of the file.
     """
+    if content.startswith(_WIDE_MARKS):
+        return content.decode("utf-16", "replace").encode()
     return content.removeprefix(_MARK)
 
 
