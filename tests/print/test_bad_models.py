@@ -32,13 +32,17 @@ def models(tmp_path: Path) -> Path:
     """A folder of bad models."""
     (tmp_path / "empty.stl").write_bytes(bytes(80) + struct.pack("<I", 0))
     (tmp_path / "nan.ply").write_bytes(NAN_PLY)
+    (tmp_path / "beyond.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999999\n")
     _cube_file(tmp_path / "open.stl", 20, is_open=True)
     _cube_file(tmp_path / "cube.stl", 20)
     return tmp_path
 
 
 @pytest.mark.parametrize("verb", ["export", "printcheck", "print"])
-@pytest.mark.parametrize(("name", "words"), [("empty.stl", "holds no triangle"), ("nan.ply", "is no place")])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("empty.stl", "holds no triangle"), ("nan.ply", "is no place"), ("beyond.obj", "line 4 is not read")],
+)
 def test_what_is_no_mesh_is_refused_in_one_line(models: Path, verb: str, name: str, words: str) -> None:
     """By each command, with exit 4, and nothing is written."""
     more = {
