@@ -72,10 +72,16 @@ def assemble(name: str, parts: Sequence[Part], unit_m: float) -> Solid:
         points_m = part.points.astype(np.float64) @ (part.transform[:3, :3].T * unit_m) + part.transform[:3, 3] * unit_m
         turned = part.triangles[:, ::-1] if np.linalg.det(part.transform[:3, :3]) < 0 else part.triangles
         points.append(points_m)
-        triangles.append(turned.astype(np.int32) + np.int32(count))
+        triangles.append(turned.astype(np.int32) + np.int32(count) if count else turned.astype(np.int32, copy=False))
         if has_colours:
             colours.append(part.colours if len(part.colours) else np.full((len(part.points), 3), 255, np.uint8))
         count += len(part.points)
     if not triangles:
         raise DataError(f"{name} holds no triangle", "give a mesh, not points alone")
-    return sound_solid(name, np.concatenate(points), np.concatenate(triangles), np.concatenate(colours) if colours else NO_COLOURS)  # fmt: skip
+    shades = _concatenate(colours) if colours else NO_COLOURS
+    return sound_solid(name, _concatenate(points), _concatenate(triangles), shades)
+
+
+def _concatenate(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+    """Return the rows of all; of one array itself, which most files have, no copy."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)

@@ -200,6 +200,11 @@ def weld_seams(solid: Solid) -> Solid:
     Args:
         solid: a mesh; one without open edges stays as it is.
     """
+    return welded(solid) if _has_open_edges(solid) else solid
+
+
+def _has_open_edges(solid: Solid) -> bool:
+    """Return whether an edge belongs to one triangle alone."""
     edges = np.empty((3, len(solid.triangles)), np.int64)
     for row, corner in zip(edges, range(3), strict=True):
         one, other = solid.triangles[:, corner], solid.triangles[:, (corner + 1) % 3]
@@ -210,4 +215,4 @@ def weld_seams(solid: Solid) -> Solid:
     sorted_edges.sort()
     is_new = np.ones(sorted_edges.size + 1, np.bool_)
     np.not_equal(sorted_edges[1:], sorted_edges[:-1], out=is_new[1:-1])
-    return welded(solid) if (is_new[1:] & is_new[:-1]).any() else solid
+    return bool((is_new[1:] & is_new[:-1]).any())
