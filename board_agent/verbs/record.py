@@ -239,7 +239,7 @@ def _words(outcome: Outcome, bound: _Bound) -> str:
     ended = _ENDS[outcome.end]
     if outcome.end is End.FAILED:
         ended += f" ({written.cause}): {written.remedy}"
-    if not written.frames and not ended:
-        ended = "; no image came: look at the camera with board-agent doctor"
+    if not written.frames and outcome.end is not End.FAILED:
+        ended += "; no image came: look at the camera with board-agent doctor"
     size = f"{written.size_bytes / 1e6:.1f} MB"
     return f"recorded: {counted(written.frames, 'image')}, {size} in {bound.name}{parts}{told}{ended}"

@@ -6,7 +6,6 @@ Sources: B. Curless and M. Levoy, "A Volumetric Method for Building Complex Mode
 """
 
 import ctypes
-import math
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Final
@@ -28,6 +27,9 @@ from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, To
 
 _LOOKS_A_BLOCK: Final = 3
 _NEARLY_FULL: Final = 0.9
+_MOST_VOXELS_OFF: Final = 1 << 24
+"""A camera farther off sees nothing: 32-bit numbers cannot count the voxels up to there."""
+
 _CUBE: Final = (-1, SIDE, SIDE, SIDE)
 _HALF, _EVEN = SIDE // 2, slice(None, None, 2)
 _MOST_STEP_PX: Final = 4
@@ -290,8 +292,10 @@ class Volume:
         side_m = SIDE * self.settings.voxel_m
         ends_m = np.array([places.min(axis=0) - 1.0, places.max(axis=0) + 2.0]) * side_m
         corners_m = np.array(list(product(*ends_m.T)))
-        farthest_m = float(camera.world_camera.inverse().apply(corners_m)[:, 2].max())
-        return min(farthest_m, self.settings.far_m) if math.isfinite(farthest_m) else 0.0
+        farthest_m = min(float(camera.world_camera.inverse().apply(corners_m)[:, 2].max()), self.settings.far_m)
+        most_m = _MOST_VOXELS_OFF * self.settings.voxel_m
+        is_near = farthest_m < most_m and float(np.abs(camera.world_camera.t_m).max()) < most_m
+        return farthest_m if is_near else 0.0
 
     def _make_room(self, depth: Depth, camera: Camera) -> None:
         """Add the blocks that a depth image shows; grow while there is memory."""

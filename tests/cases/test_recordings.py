@@ -115,6 +115,8 @@ READ: dict[str, tuple[str, Message, int]] = {
     "16UC1, high byte first": (RAW, _raw("16UC1", _grey16(">"), 6, big_endian=1), 0),
     "yuv422_yuy2": (RAW, _raw("yuv422_yuy2", _yuv(chroma_first=False), 16), 8),
     "yuv422": (RAW, _raw("yuv422", _yuv(chroma_first=True)), 8),
+    "yuyv": (RAW, _raw("yuyv", _yuv(chroma_first=False)), 8),
+    "uyvy": (RAW, _raw("UYVY", _yuv(chroma_first=True), 2), 8),
     "nv12": (RAW, _raw("nv12", _nv12), 8),
 }
 """What is read: the message's kind, the message, and by how much a value may be off."""
@@ -359,6 +361,53 @@ def test_equal_stamps_overwrite_no_picture(tmp_path: Path) -> None:
     assert [(tmp_path / "out" / "left" / name).read_bytes() for name in names] == [
         other.jpeg(picture(0, number)) for number in range(3)
     ]
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_compressed_chunks_are_read(tmp_path: Path, compression: str) -> None:
+    """Each picture, also when they are looked at out of order: the chunk is decompressed again."""
+    library = pytest.importorskip(
+        {"zstd": "zstandard", "lz4": "lz4.frame"}[compression], reason="the extra recordings is not installed"
+    )
+    body = b""
+    sent = other.stereo(_raw("bgr8", _plain, 16), RAW)
+    for part in (sent[:4], sent[4:]):
+        plain = other.records(part)
+        packed = library.ZstdCompressor().compress(plain) if compression == "zstd" else library.compress(plain)
+        body += other.chunk(compression, packed, len(plain))
+    path = tmp_path / "packed.mcap"
+    path.write_bytes(other.whole(body))
+    found = open_recorded(path)
+    for number in (3, 0, 2, 1):
+        for side, topic in enumerate(other.TOPICS):
+            shown = found.images[topic][number]
+            image = decode_frame(encoded(shown, found.camera(topic), "an image"))
+            assert np.array_equal(image, picture(side, number))
+
+
+def test_a_recording_without_an_image_is_not_done(tmp_path: Path) -> None:
+    """A camera all of whose images are spoiled: exit 4 and what to look at, of the host and of the board."""
+    sent = other.stereo(
+        lambda side, number, at: other.compressed("jpeg", other.jpeg(picture(side, number))[:-9], at), COMPRESSED
+    )
+    whole = other.stereo(_jpeg("jpeg"), COMPRESSED)
+    path = other.file_of(tmp_path, [whole[0], *sent[2:]])
+    camera = f"replay:{path}?topic=/cam1/image&pace=clock"
+    for program, words in (("phone_host.start", ["record", "--alone"]), ("board_agent.start", ["record"])):
+        command = [
+            sys.executable,
+            "-m",
+            program,
+            *words,
+            "--camera",
+            camera,
+            "--out",
+            str(tmp_path / f"{program}.mcap"),
+        ]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        assert ended.returncode == 4
+        assert "recorded: 0 images" in ended.stdout
+        assert "; no image came: look at the camera" in ended.stdout
 
 
 def _ros1_file(folder: Path) -> Path:
