@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, assert_never
 
-from common.frame import Buffer
+from common.frame import Buffer, SpoiledImageError
 from common.imagesize.read import read_head
 from common.protocol.message import CameraDescription
 from common.recording.cdr import BrokenMessageError
@@ -131,10 +131,10 @@ class Recorded:
             topic: one of `images`.
 
         Raises:
-            SpoiledImageError: the first image is none.
+            SpoiledImageError: none of its images is one.
         """
         shown = self.images[topic]
-        first, size = shown[0].image, size_px(shown[0].image)
+        first, size = _first_of_known_size(shown)
         told = self.metadata.get(camera_name(side_of(topic)), {})
         return camera_of(told, size, first.pixel_format, period_ns(shown))
 
@@ -149,6 +149,22 @@ def size_px(image: RecordedImage) -> tuple[int, int]:
         return image.size_px
     head = read_head(bytes(image.payload), f"an image of {image.frame_id}")
     return head.width_px, head.height_px
+
+
+def _first_of_known_size(shown: Sequence[Shown]) -> tuple[RecordedImage, tuple[int, int]]:
+    """Return the first image that tells its size, and that.
+
+    Raises:
+        SpoiledImageError: none does.
+    """
+    spoiled: SpoiledImageError | None = None
+    for each in shown:
+        try:
+            return each.image, size_px(each.image)
+        except SpoiledImageError as error:
+            spoiled = spoiled or error
+    assert spoiled is not None
+    raise spoiled
 
 
 def period_ns(shown: Sequence[Shown]) -> int:

@@ -44,6 +44,7 @@ def export_folders(recorded: Recorded, out: Path) -> dict[str, int]:
         How many images each side has.
 
     Raises:
+        SpoiledImageError: every image of a side is spoiled.
         UnavailableError: the folder is there already, or cannot be written.
     """
     counts = {}
@@ -72,6 +73,7 @@ def _is_plain(name: str) -> bool:
 
 
 def _export(recorded: Recorded, topic: str, folder: Path) -> int:
+    camera = recorded.camera(topic)
     folder.mkdir()
     rows: list[tuple[int, str]] = []
     taken: dict[int, int] = {}
@@ -81,7 +83,7 @@ def _export(recorded: Recorded, topic: str, folder: Path) -> int:
         again = taken[image.stamp_ns] = taken.get(image.stamp_ns, -1) + 1
         name = f"{image.stamp_ns}{f'-{again}' if again else ''}{suffix or '.png'}"
         if suffix is None:
-            write_png(folder / name, decode_frame(encoded(shown, recorded.camera(topic), name)))
+            write_png(folder / name, decode_frame(encoded(shown, camera, name)))
         else:
             write_bytes(folder / name, memoryview(image.payload))
         rows.append((image.stamp_ns, name))

@@ -42,7 +42,7 @@ def import_topics(source: Path, options: ImportOptions, out: Path) -> ImportAcco
         out: the recording; it must not exist.
 
     Raises:
-        DataError: the source cannot be read, there are no such topics, or no two at all, or no time can be true.
+        DataError: the source cannot be read, every image of a topic is spoiled, there are no such topics, or no two at all, or no time can be true.
         UnavailableError: the file cannot be made, or the disk is full.
     """
     found = open_recorded(source, needs_times=options.fps is None)
@@ -52,6 +52,8 @@ def import_topics(source: Path, options: ImportOptions, out: Path) -> ImportAcco
             f"{source} holds no two such image topics, but {listed(sorted(found.images))}",
             "give two of them as --topics LEFT RIGHT",
         )
+    for topic in chosen:
+        found.camera(topic)  # refuses a stream all of whose images are spoiled
     streams = [_timed(found.images[topic], options.fps) for topic in chosen]
     every = [(shown, side) for side, stream in zip(_SIDES, streams, strict=True) for shown in stream]
     with written(out) as file:

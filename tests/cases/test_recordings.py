@@ -385,6 +385,23 @@ def test_compressed_chunks_are_read(tmp_path: Path, compression: str) -> None:
             assert np.array_equal(image, picture(side, number))
 
 
+def test_spoiled_images_make_no_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Messages without a byte of image: one line, exit 4, nothing written. Where only the first is spoiled, the others are used, and names stay on a line."""
+    empty = other.stereo(lambda _, __, at_ns: other.compressed("jpeg", b"", at_ns), COMPRESSED)
+    path, out = other.file_of(tmp_path, empty), tmp_path / "out.mcap"
+    for task, target in (("info", tmp_path / "page"), ("import", out), ("export", tmp_path / "folder")):
+        assert main(["sessions", task, str(path), "--out", str(target)]) == 4
+        assert len(capsys.readouterr().err.splitlines()) == 1
+    assert not out.exists()
+    sound = other.stereo(_jpeg("jpeg"), COMPRESSED)
+    named = [Sent("/a\nb", "x\ny", "cdr", sent.log_ns, b"") for sent in sound[2:]]
+    mixed = other.file_of(tmp_path, [*empty[:2], *sound[2:], *named], "mixed.mcap")
+    assert main(["sessions", "info", str(mixed)]) == 0
+    printed = capsys.readouterr().out
+    assert "/cam0/image: 4 images 32x24" in printed
+    assert "not used: /a\\nb (x\\ny is no image)" in printed
+
+
 def test_a_recording_without_an_image_is_not_done(tmp_path: Path) -> None:
     """A camera all of whose images are spoiled: exit 4 and what to look at, of the host and of the board."""
     sent = other.stereo(

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from common.errors import DataError, SettingsError
 from common.places import make_folder
+from common.plain_text import printable
 from common.program.terminal import fitted
 from common.recording.layout import CAPTURE
 from common.recording.opened import is_recording, open_recorded
@@ -112,16 +113,19 @@ def _lines(path: Path, info: SessionInfo) -> list[str]:
             else ""
         )
         size = f"{one.size_px[0]}x{one.size_px[1]}"
-        lines.append(f"  {one.topic}: {counted(one.images, 'image')} {size}, {one.rate_hz:.2f} /s{gaps} ({one.camera})")
+        lines.append(
+            f"  {printable(one.topic)}: {counted(one.images, 'image')} {size}, {one.rate_hz:.2f} /s{gaps} ({one.camera})"
+        )
     if info.skew is not None:
         lines.append(
             f"  time skew of the two cameras: {info.skew.median_ms:+.2f} ms, 95 % below {info.skew.far_ms:.2f} ms"
         )
     told = {*(one.topic for one in info.streams), *info.unused}
     others = [f"{topic} {count}" for topic, count in info.messages if topic not in told]
-    lines.append(f"  also: {listed([*others, *(name for name, _ in info.attachments)], _MOST_LISTED) or 'nothing'}")
+    also = listed([*others, *(name for name, _ in info.attachments)], _MOST_LISTED)
+    lines.append(printable(f"  also: {also or 'nothing'}"))
     lines += _reasons(info.unused)
-    lines += [f"  {words}" for words in info.remarks]
+    lines += [printable(f"  {words}") for words in info.remarks]
     lines += [f"  missing: {words}" for words in info.damages]
     if not info.is_complete or info.damages:
         lines.append(
@@ -239,6 +243,6 @@ def _import(options: argparse.Namespace) -> Told:
 
 def _reasons(unused: Mapping[str, str]) -> list[str]:
     """Return a line for each topic that is not used, but not more than can be read."""
-    lines = [f"  not used: {topic} ({reason})" for topic, reason in list(unused.items())[:_MOST_LISTED]]
+    lines = [printable(f"  not used: {topic} ({reason})") for topic, reason in list(unused.items())[:_MOST_LISTED]]
     more = len(unused) - _MOST_LISTED
     return [*lines, f"  not used: {counted(more, 'more topic')}"] if more > 0 else lines
