@@ -114,8 +114,8 @@ def test_pairs_that_are_not_fused_keep_the_pose_of_odometry() -> None:
         rows = np.arange(views[at].depth_m.shape[0])[:, np.newaxis]
         views[at] = replace(views[at], depth_m=np.where(rows % 60 == 0, views[at].depth_m, np.float32(np.nan)))
     for at in (4, 5):
-        dark, none = np.zeros_like(views[at].grey), np.full_like(views[at].depth_m, np.nan)
-        views[at] = replace(views[at], grey=dark, colours=np.zeros_like(views[at].colours), depth_m=none)
+        dark, no_depth = np.zeros_like(views[at].grey), np.full_like(views[at].depth_m, np.nan)
+        views[at] = replace(views[at], grey=dark, colours=np.zeros_like(views[at].colours), depth_m=no_depth)
     scan = Scan(ScanWanted(voxel_m=0.02))
     for number, view in enumerate(views):
         scan.take(str(number), float(number), processed_of(view))
@@ -124,10 +124,10 @@ def test_pairs_that_are_not_fused_keep_the_pose_of_odometry() -> None:
     kept = submap_of(submap_bytes(scan.close_submap()), "a file").pairs
     assert [pair.pose_source for pair in kept] == [pair.pose_source for pair in scan.pairs]
     report = report_of(scan, scan.model(), scan.pairs, (), matcher="tandem", axes=Axes.CAMERA)
-    rows = np.loadtxt(trajectory_of(report).splitlines())
-    assert rows[:, 0].tolist() == [0, 1, 2, 3, 6]
-    there = np.array([poses[int(stamp)].t_m for stamp in rows[:, 0]])
-    assert np.linalg.norm(rows[:4, 1:4] - there[:4], axis=1).max() < 0.001
+    written = np.loadtxt(trajectory_of(report).splitlines())
+    assert written[:, 0].tolist() == [0, 1, 2, 3, 6]
+    there = np.array([poses[int(stamp)].t_m for stamp in written[:, 0]])
+    assert np.linalg.norm(written[:4, 1:4] - there[:4], axis=1).max() < 0.001
     told = scan_json(report)["pairs"]
     assert [each["pose"] for each in told] == [
         "fused",
