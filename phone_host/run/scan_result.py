@@ -13,11 +13,13 @@ from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.run.turn_remarks import keeps_field
+from phone_host.run.way_remarks import way_remarks
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
+from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 
 _EMPTY_BOX = Remark(
@@ -56,6 +58,7 @@ def report_of(
         matcher: its name.
         axes: of model.ply.
     """
+    certainty = scan.tracker.certainty if isinstance(scan.tracker, Tracker) else None
     report = ScanReport(
         pairs=tuple(pairs),
         model=figures_of(scan, model),
@@ -64,7 +67,7 @@ def report_of(
         rectified_px=scan.size_px,
         matcher=matcher,
         axes=axes,
-        remarks=(*remarks, *memory_remarks(scan), *_box_remarks(scan, model)),
+        remarks=(*remarks, *memory_remarks(scan), *way_remarks(certainty), *_box_remarks(scan, model)),
         keeps_field=keeps_field(scan),
         mat=scan.wanted.mat,
     )

@@ -57,6 +57,47 @@ def connected(loops: Sequence[Loop], first: int) -> set[int]:
     return found
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SettledGraph:
+    """Parts that were put where their loops agree.
+
+    Attributes:
+        poses: where each part is; those that no loop connects with the one that stays as they were.
+        loops: those that were used, without those that contradict the rest.
+    """
+
+    poses: dict[int, SE3]
+    loops: tuple[Loop, ...]
+
+
+def without_outliers(poses: dict[int, SE3], loops: Sequence[Loop], still: int, most_sigmas: float) -> SettledGraph:
+    """Move parts until the loops agree, and take out those that contradict the rest: all whose residual stays, again and again.
+
+    Args:
+        poses: where each part is believed to be, in the world.
+        loops: between them.
+        still: the part that stays where it is.
+        most_sigmas: residual of a loop at most, in its standard deviations; what tracking says is never taken out.
+    """
+    kept = list(loops)
+    while True:
+        found = settled(poses, kept, still)
+        worst = [_residual(loop, found) for loop in kept]
+        limit = max(most_sigmas, max(worst, default=0.0) / 2)  # the worst ones first: they pull the others away
+        left = [loop for loop, sigmas in zip(kept, worst, strict=True) if sigmas <= limit or loop.is_tracked]
+        if len(left) == len(kept):
+            return SettledGraph(found, tuple(kept))
+        kept = left
+
+
+def _residual(loop: Loop, poses: dict[int, SE3]) -> float:
+    """Return by how much a loop contradicts where its parts are, in its standard deviations."""
+    if loop.here not in poses or loop.there not in poses:
+        return 0.0
+    off = (loop.here_there.inverse() @ poses[loop.here].inverse() @ poses[loop.there]).pose()
+    return max(float(np.linalg.norm(off[:3])) / loop.turn, float(np.linalg.norm(off[3:])) / loop.shift_m)
+
+
 def settled(poses: dict[int, SE3], loops: Sequence[Loop], still: int) -> dict[int, SE3]:
     """Move pieces until the loops agree as well as they can.
 

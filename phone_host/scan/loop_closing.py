@@ -12,13 +12,10 @@ from typing import Final
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.kept_views import KeptViews
 from phone_host.scan.piece import Piece, PoseGate
-from phone_host.scan.stretches import Placed, Stretches
+from phone_host.scan.relocalisation import lies_alone, shown_place
+from phone_host.scan.stretches import ClosedLoop, Placed, Stretches, WayCertainty
 from phone_host.scan.view import View
 from phone_host.stereo.native.library import Library, Missing
-
-_ALL_DIRECTIONS: Final = 6
-_LEAST_OVERLAP: Final = 0.45
-"""Of a loop: at 0.39, a room's view was 35 mm and 2 degrees worse off than tracking had it; from 0.44 on loops were better."""
 
 _ALONE: Final = 3
 """Of the kept views of a stretch and its neighbours every third shows its surface."""
@@ -72,6 +69,16 @@ class LoopCloser:
         self._newest: View | None = None
         self._is_open = False  # whether there are loops that have not been looked at together
         self._is_coarse = False  # whether the model was built of some of the kept views only
+
+    @property
+    def closed(self) -> tuple[ClosedLoop, ...]:
+        """The loops that count."""
+        return self._stretches.closed
+
+    @property
+    def certainty(self) -> WayCertainty:
+        """How sure the camera's way is."""
+        return self._stretches.certainty
 
     def keep(self, number: int, view: View, room_bytes: int) -> None:
         """Keep a small copy of a view that is in the model, or in a piece that may become part of it.
@@ -160,16 +167,17 @@ class LoopCloser:
 
     def _is_loop(self, view: View, world_camera: SE3) -> bool:
         """Look whether a view shows a place of an older stretch, and lies on its surface."""
-        found = None
+        bounds = self._stretches.bounds()
         for among in self._older_places():
-            found = self._model.places.again(view, among, self._settings.compared) if among and found is None else found
-        if found is None:
+            limits = {place: bounds[self._stretch_of[place]] for place in among}
+            found = shown_place(self._model, view, world_camera, limits, self._settings.compared)
+            if found is not None:
+                break
+        else:
             return False
         stretch = self._stretch_of[found.number]
-        piece = self._piece(stretch)
-        # The corners' pose may be farther off than tracking is.
-        lying = piece.confirmed(view, found.world_camera) or piece.confirmed(view, world_camera)
-        if lying is None or lying.fit.told < _ALL_DIRECTIONS or lying.fit.overlap < _LEAST_OVERLAP:
+        lying = lies_alone(self._piece(stretch), view, (found.world_camera, world_camera))
+        if lying is None:
             return False
         return self._stretches.close(stretch, world_camera, lying.pose)
 

@@ -11,9 +11,12 @@ import numpy as np
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.blocks import BLOCK_BYTES
-from phone_host.scan.graph import Loop, connected, settled
+from phone_host.scan.graph import Loop, connected, without_outliers
+from phone_host.scan.motion_belief import Belief, UsualStep
+from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import STANDING, Piece, PoseGate
 from phone_host.scan.registration import Registered
+from phone_host.scan.relocalisation import Evidence, Sighting, are_independent, is_still_here, sighted
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view
 from phone_host.scan.volume_settings import VolumeSettings
@@ -33,6 +36,12 @@ _SMALL_PX: Final = 320
 _LOOP_SHIFT_M: Final = 0.01
 _LOOP_TURN: Final = 0.006
 """Standard deviations of a loop, m and rad: two registrations, each some 5 mm and 0.2 degrees off on real rooms."""
+
+_MOST_SIGMAS: Final = 12.0
+"""Of a loop that contradicts the others after they were settled: pieces are rigid, and true loops of one that drifted by 0.1 m are as far off."""
+
+_MOST_SIGHTINGS: Final = 32
+"""Of a piece that wait for a second one which agrees."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +98,9 @@ class _Apart:
     def __init__(self, piece: Piece, world_piece: SE3) -> None:
         self.piece, self.world_piece = piece, world_piece
         self.views: list[_Fused] = []
+        self.unconfirmed: list[
+            tuple[SE3, SE3]
+        ] = []  # views that saw the model where the piece can hardly be: their poses in either's axes
 
 
 class Pieces:
@@ -117,11 +129,17 @@ class Pieces:
         self._apart: dict[int, _Apart] = {}
         self._loops: list[Loop] = []
         self._active, self._next = _MODEL, _MODEL + 1
+        self._beliefs = {_MODEL: Belief.at(SE3.identity())}  # in the axes of each piece
+        self._last: dict[
+            int, tuple[SE3, dict[int, Belief]]
+        ] = {}  # where the camera was last in each piece, and what was believed then
+        self._usual = UsualStep()
+        self.is_ambiguous = False  # whether the last view shows a place, but not surely
 
     @property
     def active(self) -> Piece:
         """The piece that is tracked."""
-        return self.model if self._active == _MODEL else self._apart[self._active].piece
+        return self._piece(self._active)
 
     @property
     def held_bytes(self) -> int:
@@ -132,6 +150,49 @@ class Pieces:
     def in_world(self, pose: SE3) -> SE3:
         """Return a pose in the axes of the piece that is tracked, in the world's; where that is not known, as far as odometry tells."""
         return pose if self._active == _MODEL else self._apart[self._active].world_piece @ pose
+
+    def moved(self, moved: Moved, views: float) -> None:
+        """Note how the camera has moved.
+
+        Args:
+            moved: what odometry says.
+            views: of the usual steps, how many may have passed, >= 1.
+        """
+        self.is_ambiguous, is_followed = False, moved.is_known and moved.inliers >= self._gate.weak_inliers
+        if is_followed:
+            self._usual = self._usual.after(moved.before_now)
+        for number, belief in self._beliefs.items():
+            self._beliefs[number] = belief.moved(moved.before_now) if is_followed else belief.jumped(self._usual, views)
+
+    def followed(self, pose: SE3) -> None:
+        """Note where the camera is in the piece that is tracked: that tells how it has moved since it was last there, also where odometry does not.
+
+        Args:
+            pose: in the piece's axes.
+        """
+        before, beliefs = self._last.get(self._active, (pose, {}))
+        step = (before.inverse() @ pose).exact()
+        for number in beliefs.keys() & self._beliefs.keys() - {self._active}:
+            self._beliefs[number] = beliefs[number].moved(step)
+        self._beliefs[self._active] = Belief.at(pose)
+
+    def _note(self, pose: SE3) -> None:
+        self._beliefs[self._active] = Belief.at(pose)
+        self._last[self._active] = pose, dict(self._beliefs)
+
+    def go_on(self, pose: SE3) -> None:
+        """Note that the camera was last at a pose in the model, and that nobody knows what has happened since."""
+        self._beliefs = {_MODEL: replace(Belief.at(pose).jumped(UsualStep()), is_open=True)}
+
+    def is_here(self, view: View, fit: Registered) -> bool:
+        """Return whether a view that fits where it is expected in the piece that is tracked may be believed to be there.
+
+        Args:
+            view: with depth.
+            fit: how it lies there.
+        """
+        belief = self._beliefs[self._active]
+        return not belief.is_broken or is_still_here(self.active, view, belief, fit)
 
     def begin(self, number: int, view: View, believed: SE3, why: Weakness) -> SE3 | None:
         """Begin a piece.
@@ -172,6 +233,7 @@ class Pieces:
         """
         of = self._apart[self._active]
         of.piece.fuse(view, pose, fit)
+        self._note(pose)
         of.views.append(_Fused(number, pose, weakness))
 
     def fuse(self, view: View, pose: SE3, fit: Registered | None) -> None:
@@ -184,6 +246,8 @@ class Pieces:
         """
         volume, left_out = self.model.volume, self.model.volume.left_out
         self.model.fuse(view, pose, fit)
+        self.followed(pose)
+        self._note(pose)
         while self._coarsens and volume.is_nearly_full:
             self._coarsen()
             if volume.left_out > left_out:  # what the view showed beyond the memory has room now
@@ -196,12 +260,20 @@ class Pieces:
         """Track in another piece from now on."""
         self._active = next((number for number, of in self._apart.items() if of.piece is piece), _MODEL)
 
+    def placed(self, pose: SE3) -> None:
+        """Note that the model was moved, and the camera with it.
+
+        Args:
+            pose: of the camera in the model, which is tracked.
+        """
+        self._note(pose)
+
     def recognised(self, view: View) -> Found | None:
-        """Find a piece, the model first, one of whose places a view shows, and lay it there."""
-        for piece in (self.model, *(of.piece for of in self._apart.values())):
-            found = self._found_in(piece, view)
-            if found is not None:
-                return found
+        """Find a piece, one of whose places a view shows, and lay it there: first that which is tracked, where the camera is known best, then the model."""
+        for number in dict.fromkeys((self._active, _MODEL, *self._apart)):
+            found = self._sighted(number, view)
+            if found.evidence is Evidence.BELIEVED and found.lying is not None:
+                return Found(self._piece(number), found.lying.pose, found.lying.fit)
         return None
 
     def met(self, view: View, pose: SE3) -> Found | None:
@@ -213,13 +285,26 @@ class Pieces:
             view: with depth.
             pose: where it was taken, in the piece's axes.
         """
-        found = self._found_in(self.model, view)
-        others = [number for number in self._apart if number != self._active]
-        for number in others if found is None else []:
-            other = self._found_in(self._apart[number].piece, view)
-            if other is not None:
-                self._loops.append(self._loop(number, other.pose @ pose.inverse()))
-        return found
+        found = self._sighted(_MODEL, view)
+        if found.lying is not None and (found.evidence is Evidence.BELIEVED or self._is_seen_twice(found, pose)):
+            return Found(self.model, found.lying.pose, found.lying.fit)
+        for number in [number for number in self._apart if number != self._active]:
+            other = self._sighted(number, view)
+            if other.evidence is Evidence.BELIEVED and other.lying is not None:
+                self._loops.append(self._loop(number, other.lying.pose @ pose.inverse()))
+        return None
+
+    def _is_seen_twice(self, found: Sighting, pose: SE3) -> bool:
+        """Return whether a view that shows the model after a long loss agrees with an independent one before it."""
+        if found.evidence is not Evidence.UNCONFIRMED or found.lying is None:
+            return False
+        of, there = self._apart[self._active], found.lying.pose
+        for before, was_there in of.unconfirmed:
+            expected = Belief.at(was_there).moved(before.inverse() @ pose)
+            if are_independent(before, pose) and expected.admits(there, self._settings.voxel_m):
+                return True
+        of.unconfirmed = [*of.unconfirmed, (pose, there)][-_MOST_SIGHTINGS:]
+        return False
 
     def leave(self, number: int) -> None:
         """Track the model from now on: a view of the piece that was tracked turned out to belong there, and the piece does not.
@@ -254,12 +339,14 @@ class Pieces:
             return Joining(is_refused=is_refused)
         self._loops += [loop, *others]
         self._start(loop)
-        poses = settled(
-            {_MODEL: SE3.identity()} | {at: of.world_piece for at, of in self._apart.items()}, self._loops, _MODEL
-        )
+        believed = {_MODEL: SE3.identity()} | {at: of.world_piece for at, of in self._apart.items()}
+        graph = without_outliers(believed, self._loops, _MODEL, _MOST_SIGMAS)
+        self._loops = list(graph.loops)
+        if loop not in self._loops:
+            return Joining()
         joined: list[Joined] = []
         for number in sorted(connected(self._loops, _MODEL) - {_MODEL}):
-            joined += self._taken_in(self._apart[number], poses[number])
+            joined += self._taken_in(self._apart[number], graph.poses[number])
             self._give_up(number)
         self._active = _MODEL
         return Joining(tuple(sorted(joined, key=lambda each: each.number)))
@@ -320,16 +407,17 @@ class Pieces:
             result.append(Joined(view.number, exact, state, view.weakness))
         return result
 
-    def _found_in(self, piece: Piece, view: View) -> Found | None:
-        place = piece.places.recognised(view)
-        if place is None:
-            return None
-        lying = piece.confirmed(view, place.world_camera)
-        return None if lying is None else Found(piece, lying.pose, lying.fit)
+    def _sighted(self, number: int, view: View) -> Sighting:
+        found = sighted(self._piece(number), view, self._beliefs[number])
+        self.is_ambiguous |= found.evidence in {Evidence.AMBIGUOUS, Evidence.UNCONFIRMED}
+        return found
+
+    def _piece(self, number: int) -> Piece:
+        return self.model if number == _MODEL else self._apart[number].piece
 
     def _give_up_one(self) -> None:
         self._give_up(min(self._apart, key=lambda each: (len(self._apart[each].views), each)))
 
     def _give_up(self, number: int) -> None:
-        del self._apart[number]
+        del self._apart[number], self._beliefs[number], self._last[number]
         self._loops = [loop for loop in self._loops if number not in (loop.here, loop.there)]

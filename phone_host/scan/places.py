@@ -46,6 +46,18 @@ _VOTED: Final = 200
 _ALIKE_BITS: Final = 50
 """Of 256 that may differ in a vote; of two features of different corners 5 % differ in so few."""
 
+_MATCHED_ROWS: Final = 1 << 17
+"""Descriptors that are matched at once: OpenCV's matcher raises an exception from 2^18 on, which 1311 places have."""
+
+_UNLIKE: Final = 1.5
+"""Times as many features as agree on another pose must agree on a place: with fewer, two places look alike."""
+
+_OTHER_M, _OTHER_DEG = 0.5, 15.0
+"""Poses farther apart than this contradict each other: places of one region locate a view to some centimetres, along a corridor less well."""
+
+_AWAY_M: Final = 0.6
+"""Places that were seen from so far away, or turned by 15 degrees, may be rivals: those that are nearer show the same."""
+
 _APART_DEG: Final = 4.0
 _APART_SHARE: Final = 0.05
 """Of the median depth: as far apart as this, or turned by so much, a view is a place of its own."""
@@ -153,23 +165,47 @@ class Places:
         away_m = [float(np.linalg.norm(place.world_camera.t_m - world_camera.t_m)) for place in self._places[:first]]
         return int(np.argmin(away_m))
 
-    def recognised(self, view: View) -> Recognised | None:
+    def near(self, world_camera: SE3, within_m: float, within_deg: float) -> list[int]:
+        """Return the numbers of the places that were seen from near a pose.
+
+        Args:
+            world_camera: the pose.
+            within_m: farthest distance, m.
+            within_deg: most that they are turned against it.
+        """
+        return [
+            number for number in range(self.count) if self._is_seen_from(number, world_camera, within_m, within_deg)
+        ]
+
+    def recognised(self, view: View, among: Sequence[int] | None = None, most: int = _SHORT) -> Recognised | None:
         """Find the place on which most of a view's features agree; None: none has enough.
 
         Args:
             view: with depth.
+            among: numbers of the places that are asked; None: all.
+            most: of them are compared in full.
         """
-        return self._agreed(_features(view), view, range(self.count), _SHORT)
+        agreed = self.agreed(view, range(self.count) if among is None else among, most)
+        return max(agreed, key=lambda each: each.inliers, default=None)
 
-    def again(self, view: View, among: Sequence[int], most: int) -> Recognised | None:
-        """Find which of some places a view shows; None: no one.
+    def rivals(self, view: View, world_camera: SE3) -> list[Recognised]:
+        """Return what other places say of a view, if they explain it about as well as those around a pose do, by another pose.
 
         Args:
             view: with depth.
-            among: numbers of places.
-            most: of them are compared in full.
+            world_camera: where it is believed to have been taken.
         """
-        return self._agreed(_features(view), view, among, most)
+        away = [at for at in range(self.count) if not self._is_seen_from(at, world_camera, _AWAY_M, _OTHER_DEG)]
+        others = [each for each in self.agreed(view, away) if not are_one_pose(each.world_camera, world_camera)]
+        if not others:
+            return []
+        known = set(away)
+        own = self.recognised(view, [at for at in range(self.count) if at not in known])
+        least = 0.0 if own is None else own.inliers / _UNLIKE
+        return [each for each in others if each.inliers >= least]
+
+    def _is_seen_from(self, number: int, world_camera: SE3, within_m: float, within_deg: float) -> bool:
+        return _is_near(self._places[number].world_camera, world_camera, within_m, within_deg)
 
     def is_by(self, view: View, world_camera: SE3, among: Sequence[int]) -> bool:
         """Return whether a view was taken near one of some places: it shows it, if they are where they are believed to be.
@@ -183,10 +219,19 @@ class Places:
         places = [self._places[number].world_camera for number in among]
         return any(_is_near(place, world_camera, apart_m, _BY_DEG) for place in places)
 
-    def _agreed(self, seen: _Features, view: View, among: Sequence[int], most: int) -> Recognised | None:
-        """Return the place among some on which most of a view's features agree."""
+    def agreed(self, view: View, among: Sequence[int], most: int = _SHORT) -> list[Recognised]:
+        """Return the places among some on which enough of a view's features agree.
+
+        Args:
+            view: with depth.
+            among: numbers of the places that are asked.
+            most: of them are compared in full: those that most features vote for.
+        """
+        if not among:
+            return []
+        seen = _features(view)
         observer = Observer(view.geometry, max(view.noise_px, _DISPARITY_PX), pixel_px=_PIXEL_PX)
-        best: Recognised | None = None
+        agreed = []
         for number in self._shortlist(seen.descriptors, among, most):
             place = self._places[number]
             here, there = _matched(seen.descriptors, place.descriptors)
@@ -194,9 +239,9 @@ class Places:
                 continue
             found = located(place.points_m[there], seen.observed_px[here], observer, _DRAWS)
             inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
-            if found is not None and inliers >= LEAST_INLIERS and (best is None or inliers > best.inliers):
-                best = Recognised(found.camera_world.inverse(), inliers, number)
-        return best
+            if found is not None and inliers >= LEAST_INLIERS:
+                agreed.append(Recognised(found.camera_world.inverse(), inliers, number))
+        return agreed
 
     def _shortlist(self, descriptors: NDArray[np.uint8], among: Sequence[int], most: int) -> list[int]:
         """Return the places that most of a view's features vote for, in the order in which they were seen."""
@@ -204,16 +249,24 @@ class Places:
             return list(among)
         voted = [self._places[number].descriptors[:_VOTED] for number in among]
         whose = np.repeat(np.arange(len(voted)), [len(each) for each in voted])
-        found = cv2.BFMatcher(cv2.NORM_HAMMING).match(descriptors[:_VOTERS], np.concatenate(voted))
-        votes = np.bincount(
-            [whose[each.trainIdx] for each in found if each.distance <= _ALIKE_BITS], minlength=len(voted)
-        )
+        nearest = _nearest(descriptors[:_VOTERS], np.concatenate(voted))
+        votes = np.bincount(whose[nearest], minlength=len(voted))
         return [among[at] for at in sorted(np.argsort(-votes, kind="stable")[:most].tolist())]
 
 
 def _typical_m(view: View) -> float:
     """Return the median depth, m, of every fourth row and column: of all of them it takes 2 ms, a thirtieth of a view."""
     return float(np.nanmedian(view.depth_m[::4, ::4]))
+
+
+def are_one_pose(one: SE3, other: SE3) -> bool:
+    """Return whether two poses that features tell may be the same: each is off by some centimetres."""
+    return _is_near(one, other, _OTHER_M, _OTHER_DEG)
+
+
+def is_bare(view: View) -> bool:
+    """Return whether a view has too few features to show any place."""
+    return int(np.isfinite(_features(view).observed_px[:, 2]).sum()) < LEAST_INLIERS
 
 
 def _is_near(one: SE3, other: SE3, apart_m: float, apart_deg: float = _APART_DEG) -> bool:
@@ -243,3 +296,13 @@ def _matched(here: NDArray[np.uint8], there: NDArray[np.uint8]) -> tuple[NDArray
                 pairs.append((first.queryIdx, first.trainIdx))
     numbers = np.array(pairs, np.int64).reshape(-1, 2)
     return numbers[:, 0], numbers[:, 1]
+
+
+def _nearest(here: NDArray[np.uint8], there: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return, for those descriptors that have one alike, the row of the most alike: the first of several that are as alike."""
+    best, bits = np.zeros(len(here), np.int64), np.full(len(here), np.inf)
+    for first in range(0, len(there), _MATCHED_ROWS):
+        for match in cv2.BFMatcher(cv2.NORM_HAMMING).match(here, there[first : first + _MATCHED_ROWS]):
+            if match.distance < bits[match.queryIdx]:
+                best[match.queryIdx], bits[match.queryIdx] = first + match.trainIdx, match.distance
+    return best[bits <= _ALIKE_BITS]

@@ -78,6 +78,7 @@ class Registered:
         near: share of the partners within 3 standard deviations, 0..1.
         off_m: mean distance of the partners along the normals, m; NaN without any.
         told: directions that the surface told, 0..6.
+        least_told: information about the direction that the surface tells least, as a share of that about the one that it tells best.
     """
 
     start_now: SE3
@@ -85,6 +86,7 @@ class Registered:
     near: float
     off_m: float
     told: int
+    least_told: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,21 +111,21 @@ def registered(depth_m: Depth, surface: Surface, settings: RegistrationSettings,
     """
     if surface.points_m.shape != (*depth_m.shape, 3) or surface.normals.shape != surface.points_m.shape:
         raise ValueError(f"a surface {surface.points_m.shape} for a depth {depth_m.shape}")
-    motion, told = SE3.identity(), 0
+    motion, told, least = SE3.identity(), 0, 0.0
     for step, searches in _ROUNDS:
         for _ in range(searches):
             trial = Trial(motion, step)
             sums = summed(depth_m, surface, settings, trial, library)
             if sums[29] * step * step < _LEAST_PARTNERS:
-                return _told(motion, sums, 0)
-            move, told = _step(sums, settings, trial)
+                return _told(motion, sums, 0, 0.0)
+            move, told, least = _step(sums, settings, trial)
             motion = SE3.of(move) @ motion
             if np.abs(move).max() < _STILL:
                 break
-    return _told(motion, summed(depth_m, surface, settings, Trial(motion, _JUDGED_STEP), library), told)
+    return _told(motion, summed(depth_m, surface, settings, Trial(motion, _JUDGED_STEP), library), told, least)
 
 
-def _told(motion: SE3, sums: Floats, told: int) -> Registered:
+def _told(motion: SE3, sums: Floats, told: int, least: float) -> Registered:
     near, off_m, partners, visible = sums[27:]
     return Registered(
         start_now=motion,
@@ -131,11 +133,12 @@ def _told(motion: SE3, sums: Floats, told: int) -> Registered:
         near=float(near / max(partners, 1)),
         off_m=float(off_m / partners) if partners else float("nan"),
         told=told,
+        least_told=least,
     )
 
 
-def _step(sums: Floats, settings: RegistrationSettings, trial: Trial) -> tuple[Floats, int]:
-    """Solve the equations; return the motion (6,) and how many directions the surface tells."""
+def _step(sums: Floats, settings: RegistrationSettings, trial: Trial) -> tuple[Floats, int, float]:
+    """Solve the equations; return the motion (6,), how many directions the surface tells, and how well the least one, 0..1."""
     matrix = np.zeros((6, 6))
     matrix[_UPPER] = sums[:21]
     matrix += np.triu(matrix, 1).T
@@ -149,7 +152,11 @@ def _step(sums: Floats, settings: RegistrationSettings, trial: Trial) -> tuple[F
     prior = scale**2 * np.repeat([settings.start_turn**-2, settings.start_shift_m**-2], 3)
     right = along @ (along.T @ (share * scale * sums[21:27])) - prior * trial.motion.pose() / scale
     whole = (along * values[told]) @ along.T + np.diag(prior)
-    return scale * (np.linalg.pinv(whole, hermitian=True) @ right), int(np.count_nonzero(told))
+    return (
+        scale * (np.linalg.pinv(whole, hermitian=True) @ right),
+        int(np.count_nonzero(told)),
+        float(values[0] / max(values[-1], np.finfo(float).tiny)),
+    )
 
 
 def summed(

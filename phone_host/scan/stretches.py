@@ -13,7 +13,8 @@ from typing import Final
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.graph import Loop, settled
+from phone_host.scan.graph import Loop, without_outliers
+from phone_host.scan.motion_belief import MotionBound
 
 _VIEWS: Final = 5
 """Of a stretch: one second at five pairs a second. With ten, every third view of a room's clip had steps of 10 mm between its stretches."""
@@ -29,10 +30,9 @@ _LEAST_VOXELS, _LEAST_TURN = 0.1, 0.0005
 _LOOP_VOXELS, _LOOP_TURN = 1.0, 0.006
 """Standard deviations of a loop, voxels and rad: with a room's voxels of 10 mm, those of a loop between pieces."""
 
-_BELIEVED_SHARE: Final = 0.05
-"""Of the way and of the turn since then by which tracking may be off, beside the loop's own error: more is another place that looks alike."""
-
 _SIGMAS: Final = 4.0
+"""Of ties and loops, by which a view may be off; and most of a loop's residual after all were settled."""
+
 _UNSURE: Final = 0.5
 """Of a loop's variance: with less, two loops say no more than tracking does."""
 
@@ -51,6 +51,36 @@ class Placed:
 
     number: int
     world_camera: SE3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosedLoop:
+    """A loop that moves the model.
+
+    Attributes:
+        here: number of a view of the older part.
+        there: number of a view of the newer part.
+        here_there: takes points in the newer view's axes to the older one's, as the loop has it.
+    """
+
+    here: int
+    there: int
+    here_there: SE3
+
+
+@dataclass(frozen=True, slots=True)
+class WayCertainty:
+    """How sure the camera's way is.
+
+    Attributes:
+        length_m: of the way, m.
+        loops: that hold it together.
+        sigma_m: standard deviation of the part that is known least, as seen from the beginning, m.
+    """
+
+    length_m: float
+    loops: int
+    sigma_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +118,22 @@ class Stretches:
     def count(self) -> int:
         """How many there are."""
         return len(self._all)
+
+    @property
+    def closed(self) -> tuple[ClosedLoop, ...]:
+        """The loops that count, each between the first views of two stretches; a lost camera that was found by an older stretch closes one, too."""
+        result, found_again = [], [tie for tie in self._ties if not tie.is_tracked and tie.there - tie.here > 1]
+        for loop in (*found_again, *filter(self._is_confirmed, self._loops)):
+            here, there = self._all[loop.here].views[0], self._all[loop.there].views[0]
+            between = here.world_camera.inverse() @ loop.here_there @ there.world_camera
+            result.append(ClosedLoop(here.number, there.number, between))
+        return tuple(result)
+
+    @property
+    def certainty(self) -> WayCertainty:
+        """How sure the way is, by the surest ties and loops to each stretch."""
+        variance = max(self._unsure_of(0), default=0.0) if self._all else 0.0
+        return WayCertainty(self._way.length_m, len(self.closed), math.sqrt(variance) * self._loop_shift_m)
 
     def views(self, number: int) -> list[Placed]:
         """Return a stretch's views, and where they were taken in the world."""
@@ -136,11 +182,22 @@ class Stretches:
         last = self.count - 1
         if sum(loop.there == last for loop in self._loops) >= _LOOPS:
             return [], []
-        unsure = self._unsure_of_last()
+        unsure = self._unsure_of(self.count - 1)
         asked = [number for number in range(last - 1) if unsure[number] > _UNSURE]
         most = max((unsure[number] for number in asked), default=0.0)
         far = [number for number in asked if unsure[number] > most / 2]
         return far, [number for number in asked if unsure[number] <= most / 2]
+
+    def bounds(self) -> list[MotionBound]:
+        """Return, for each stretch, how far the last view may be off as seen from it: by tracking since then, or by the surest way of ties and loops."""
+        result = []
+        for of, variance in zip(self._all, self._unsure_of(self.count - 1), strict=True):
+            drift = MotionBound.drift(self._way.length_m - of.way.length_m, self._way.turned - of.way.turned)
+            sigmas = _SIGMAS * math.sqrt(variance)
+            result.append(
+                MotionBound(min(drift.shift_m, sigmas * self._loop_shift_m), min(drift.turn, sigmas * _LOOP_TURN))
+            )
+        return result
 
     def close(self, here: int, tracked: SE3, found: SE3) -> bool:
         """Note a loop between an older stretch and the last one.
@@ -154,10 +211,7 @@ class Stretches:
             Whether it counts now: it is believed, for tracking may be so far off, and another loop of the same stretch or the one before stands beside it.
         """
         of, last = self._all[here], self._all[-1]
-        off = (tracked.inverse() @ found).pose()
-        shift_m = _SIGMAS * self._loop_shift_m + _BELIEVED_SHARE * (self._way.length_m - of.way.length_m)
-        turn = _SIGMAS * _LOOP_TURN + _BELIEVED_SHARE * (self._way.turned - of.way.turned)
-        if not (np.linalg.norm(off[3:]) <= shift_m and np.linalg.norm(off[:3]) <= turn):
+        if not self.bounds()[here].admits(tracked, found, self._loop_shift_m):
             return False
         measured = of.world_stretch.inverse() @ found @ tracked.inverse() @ last.world_stretch
         self._loops.append(
@@ -166,10 +220,16 @@ class Stretches:
         return self._is_confirmed(self._loops[-1])
 
     def settled(self) -> list[SE3]:
-        """Return by which motion of the world each stretch comes to where ties and loops agree best; the first one stays."""
+        """Return by which motion of the world each stretch comes to where ties and loops agree best; the first one stays.
+
+        Loops that contradict the others even then are taken out.
+        """
         now = {number: of.world_stretch for number, of in enumerate(self._all)}
-        found = settled(now, [*self._ties, *filter(self._is_confirmed, self._loops)], 0)
-        return [(found[number] @ now[number].inverse()).exact() for number in now]
+        used = list(filter(self._is_confirmed, self._loops))
+        graph = without_outliers(now, [*self._ties, *used], 0, _SIGMAS)
+        wrong = {id(loop) for loop in used} - {id(loop) for loop in graph.loops}
+        self._loops = [loop for loop in self._loops if id(loop) not in wrong]
+        return [(graph.poses[number] @ now[number].inverse()).exact() for number in now]
 
     def farthest(self, by: list[SE3]) -> tuple[float, float]:
         """Return by how much, rad and m, such motions turn and shift a stretch at most."""
@@ -189,15 +249,15 @@ class Stretches:
         """Return whether a loop is not the only one thereabouts: one view may err by some centimetres."""
         return sum(abs(other.there - loop.there) <= 1 for other in self._loops) > 1
 
-    def _unsure_of_last(self) -> list[float]:
-        """Return, for each stretch, the variance of where the last one is as seen from it, by the surest way of ties and loops, in that of a loop."""
+    def _unsure_of(self, number: int) -> list[float]:
+        """Return, for each stretch, the variance of where one is as seen from it, by the surest way of ties and loops, in that of a loop."""
         ways: dict[int, list[tuple[int, float]]] = {number: [] for number in range(self.count)}
         loops = Counter((loop.here, loop.there) for loop in filter(self._is_confirmed, self._loops))
         told = [(tie.here, tie.there, self._in_loops(tie)) for tie in self._ties]
         for here, there, variance in (*told, *((here, there, 1 / count) for (here, there), count in loops.items())):
             ways[here].append((there, variance))
             ways[there].append((here, variance))
-        found, waiting = [math.inf] * self.count, [(0.0, self.count - 1)]
+        found, waiting = [math.inf] * self.count, [(0.0, number)]
         while waiting:
             variance, at = heapq.heappop(waiting)
             if variance < found[at]:

@@ -21,7 +21,7 @@ from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Found, Joined, Joining, Pieces
 from phone_host.scan.places import Place
 from phone_host.scan.registration import Registered
-from phone_host.scan.stretches import Placed
+from phone_host.scan.stretches import ClosedLoop, Placed, WayCertainty
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View, reduced
 from phone_host.scan.volume import Volume
@@ -149,12 +149,22 @@ class Tracker:
         self._waiting: _Waiting | None = None
         self._is_followed = True  # whether odometry has told every motion since the last view in the model
         self._count = 0
-        self._stamp_s = float("nan")
+        self._stamp_s = self._usual_s = float("nan")
 
     @property
     def volume(self) -> Volume:
         """The model."""
         return self._model.volume
+
+    @property
+    def closed_loops(self) -> tuple[ClosedLoop, ...]:
+        """Loops that have moved the model, or will; none where none are looked for."""
+        return () if self._loops is None else self._loops.closed
+
+    @property
+    def certainty(self) -> WayCertainty | None:
+        """How sure the camera's way is; None where no loops are looked for."""
+        return None if self._loops is None else self._loops.certainty
 
     @property
     def _model(self) -> Piece:
@@ -171,6 +181,7 @@ class Tracker:
         moved = self._odometry.step(small)
         self._is_followed &= self._count == 1 or self._is_sure(moved)
         shift_px = moved.shift_px * view.grey.shape[1] / small.grey.shape[1]
+        self._pieces.moved(moved, self._steps_since(view))
         view = self._as_sure_as_timed(view, shift_px)
         believed = (self._pose @ moved.before_now).exact()
         if not np.isfinite(view.depth_m).mean() >= self._gate.least_depths:
@@ -182,6 +193,8 @@ class Tracker:
         doubt = active.doubt(moved, fit)
         if doubt is Weakness.LITTLE_OVERLAP and self.volume.left_out and self.volume.is_nearly_full:
             doubt = Weakness.FULL
+        if doubt is Weakness.NONE and not self._pieces.is_here(view, fit):
+            doubt = Weakness.TOO_FAST
         if doubt is Weakness.NONE:
             pose, weakness = (believed @ fit.start_now).exact(), self._weakness(moved, fit)
             if active is self._model:
@@ -196,6 +209,7 @@ class Tracker:
         placed = self._loops.settled()
         if placed and self._pieces.active is self._model:
             self._pose = placed[-1].world_camera
+            self._pieces.placed(self._pose)
         return placed
 
     def kept(self, places_before: int) -> TrackerState:
@@ -215,6 +229,7 @@ class Tracker:
         """
         self._loops = None  # of what came before there are no copies to build the field again
         self._pose, self._was_lost, self._is_followed = state.pose, True, False
+        self._pieces.go_on(state.pose)
         self._model.usual_off_m = state.usual_off_m
         self._model.places.add(state.places)
 
@@ -236,6 +251,7 @@ class Tracker:
 
     def _apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         """Go on in a piece that is not part of the model yet; join it where the view shows a place of the model."""
+        self._pieces.followed(pose)
         met = None if weakness is Weakness.FEW_CORNERS else self._pieces.met(view, pose)
         if met is None:
             return self._still_apart(view, pose, moved, weakness, fit)
@@ -276,13 +292,25 @@ class Tracker:
     def _still_apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
         self._keep(view)
-        return self._lost(pose, moved, Weakness.APART, fit)
+        return self._lost(pose, moved, Weakness.AMBIGUOUS if self._pieces.is_ambiguous else Weakness.APART, fit)
 
     def _begun(self, view: View, believed: SE3, moved: Moved, why: Weakness, fit: Registered) -> Tracked:
         """Begin a piece with a view that belongs to none."""
+        why = Weakness.AMBIGUOUS if self._pieces.is_ambiguous else why
         pose = self._pieces.begin(self._count, view, believed, why)
         self._keep(view)
         return self._lost(believed if pose is None else pose, moved, why, fit)
+
+    def _steps_since(self, view: View) -> float:
+        """Return how many times longer than usual the last view lies back, >= 1."""
+        since_s = view.stamp_s - self._stamp_s
+        if not since_s > 0:
+            return 1.0
+        if math.isnan(self._usual_s):
+            self._usual_s = since_s
+        steps = since_s / self._usual_s
+        self._usual_s = 0.9 * self._usual_s + 0.1 * min(since_s, 2 * self._usual_s)
+        return max(steps, 1.0)
 
     def _as_sure_as_timed(self, view: View, shift_px: float) -> View:
         """Return a view with the noise that it gets where its images were not taken at the same moment and the camera moved."""
@@ -334,6 +362,7 @@ class Tracker:
         placed = self._looped(view, pose, joined)
         self._was_lost, self._pose = False, placed[-1].world_camera if placed else pose
         self._is_followed = True
+        self._pieces.placed(self._pose)
         return Tracked(
             world_camera=self._pose,
             state=state,

@@ -29,6 +29,7 @@ class Weakness(Enum):
     FLAT = "flat"
     RESTLESS = "something moves"
     APART = "apart"
+    AMBIGUOUS = "ambiguous"
     NO_MAT = "mat not seen"
     EMPTY_BOX = "nothing in the box"
     NO_TABLE = "no table"
@@ -49,6 +50,7 @@ class Weakness(Enum):
             Weakness.FULL: "the model has reached its greatest size: move back to where it was, or begin anew with a greater --memory or --voxel",
             Weakness.POOR_FIT: "the view does not fit the model: move back to where it was, and keep the scene still",
             Weakness.APART: "followed again, but apart from the model: move back to where it was",
+            Weakness.AMBIGUOUS: "looks like a place of the model, but others look alike, or it is too far away: move back to where it was, or to something that is there once only",
             Weakness.NO_MAT: "too little of the mat is seen: show more of it to both cameras, sharp and without glare",
             Weakness.EMPTY_BOX: "nothing that is seen lies in the box: move or enlarge --box, or leave it out",
             Weakness.NO_TABLE: "no table is found: show more of it around the object, from above, and give it some texture",

@@ -137,7 +137,7 @@ def test_the_same_views_close_the_same_loops(looped: Walk) -> None:
 def test_a_place_that_looks_alike_moves_nothing() -> None:
     """Opposite halves of the room have the same papers, so a view is located half a round away; tracking knows better: the field is bit for bit as without loops."""
     walk, without = (Walk(1.0, loops, ALIKE).go(30) for loops in (LoopSettings(), None))
-    found = walk.model.places.again(walk.view(20), range(3), 3)
+    found = walk.model.places.recognised(walk.view(20), range(3), 3)
     assert found is not None
     assert np.degrees(distance(found.world_camera, station(20 * STEP))[0]) > 170
     assert walk.moved == 0

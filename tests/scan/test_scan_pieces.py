@@ -12,6 +12,7 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.loop_closing import LoopSettings
+from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Joining, Pieces
 from phone_host.scan.scan import Scan
@@ -167,12 +168,17 @@ def papered(paper: int, pose: SE3 = SEEN[0]) -> View:
     return plane_view(pose, PAPERS[paper], CORNER)
 
 
+UNKNOWN = Moved(world_camera=SEEN[0], before_now=SEEN[0], is_known=False, followed=0, inliers=0)
+"""What odometry says where it has lost the camera."""
+
+
 def three_papers() -> tuple[Pieces, list[Piece]]:
     """A model and two pieces that know the same corner, each by a paper of its own; their axes are those of their first views. The last one is tracked."""
     pieces = Pieces(SETTINGS, 1, PoseGate(), native())
     pieces.fuse(papered(0), SEEN[0], None)
     known = [pieces.model]
     for number in (1, 2):
+        pieces.moved(UNKNOWN, 1.0)
         pieces.begin(number, papered(number, SEEN[number]), SE3.identity(), Weakness.TOO_FAST)
         known.append(pieces.active)
     return pieces, known

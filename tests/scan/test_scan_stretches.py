@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
+from phone_host.run.way_remarks import way_remarks
 from phone_host.scan.kept_views import KeptViews
 from phone_host.scan.stretches import Placed, Stretches
 from phone_host.scan.volume import Volume
@@ -155,3 +156,22 @@ def test_an_emptied_volume_is_as_new() -> None:
     there = used.blocks.find(new.blocks.places[: new.blocks.count])
     assert np.array_equal(used.blocks.field[there], new.blocks.field[: new.blocks.count])
     assert np.array_equal(used.blocks.weights[there], new.blocks.weights[: new.blocks.count])
+
+
+def test_it_is_said_how_sure_a_long_way_is() -> None:
+    """The end of a way is known the less the longer it is, and better with loops; of a short one nothing is said."""
+    stretches = there_and_back()
+    before = stretches.certainty
+    assert np.isclose(before.length_m, 1.92, atol=0.05)
+    assert before.loops == 0
+    end = stretches.views(stretches.count - 1)[-1].world_camera
+    for _ in range(3):
+        stretches.close(0, end, along(0.0))
+    after = stretches.certainty
+    assert after.loops == 3
+    assert 0 < after.sigma_m < before.sigma_m
+    assert way_remarks(None) == way_remarks(before) == ()
+    (open_way,), (closed_way,) = (way_remarks(replace(each, length_m=20.0)) for each in (before, after))
+    assert "no loop was closed" in open_way.problem
+    assert open_way.remedy
+    assert "3 loops were closed" in closed_way.problem

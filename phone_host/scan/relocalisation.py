@@ -1,0 +1,182 @@
+"""The one chain of checks through which every way back into a field leads: that of a lost camera, of a fragment beside the model, and of a loop. Pure.
+
+1. Votes: features choose places. 2. PnP: at least 25 of them agree on a pose. 3. Surface: the view's depth lies on the surface there, and the surface
+tells all six directions; along a corridor its walls do not tell where the camera is, there many features must. 4. Belief: the pose lies where the camera
+can be since it was last in the field (`motion_belief`); a place that only looks alike is farther away. Where odometry was lost, no other place that the
+camera can have reached may explain the view about as well, and after a long loss a second, independent view must agree.
+5. Residuals: what contradicts the rest after the pose graph was settled is taken out again (`graph.without_outliers`).
+
+Poses that a mat or the axis of a turntable tells are measurements in the world's axes: nothing adds up in them, and they do not come through here.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+
+from phone_host.geometry.se3 import SE3
+from phone_host.scan.motion_belief import Belief, MotionBound
+from phone_host.scan.piece import Lying, Piece
+from phone_host.scan.places import Recognised, are_one_pose, is_bare
+from phone_host.scan.registration import Registered
+from phone_host.scan.view import View
+
+ALL_DIRECTIONS: Final = 6
+
+_LEAST_OVERLAP: Final = 0.45
+"""Of a loop: at 0.39, a room's view was 35 mm and 2 degrees worse off than tracking had it; from 0.44 on loops were better."""
+
+_LEAST_TOLD: Final = 0.008
+"""Of a loop: information about the direction that the surface tells least, as a share of the best one's. In a corridor's corners loops with 0.003 to 0.005 were up to
+0.09 m and 3 degrees off, where tracking was 0.02 m off; with 0.011 and more 0.03 m and 0.7 degrees."""
+
+_SURE_INLIERS: Final = 60
+"""Features that tell a pose where the surface is a plane: they lie all over the picture then."""
+
+_WIDE_M: Final = 1.5
+"""Beyond such a bound a single view is not believed: doors and windows stand as near."""
+
+_SIGHT_M, _SIGHT_DEG = 1.0, 45.0
+"""Places that were seen from so near a pose show what a view from there shows."""
+
+_INDEPENDENT_M, _INDEPENDENT_TURN = 0.15, 0.17
+"""Two views are independent if they were taken so far apart, m, or turned by so much, rad: then most of their features are others, or lie elsewhere."""
+
+
+class Evidence(Enum):
+    """What a view tells of where it was taken in a field.
+
+    NONE: it shows no place where the camera can be. AMBIGUOUS: it shows one, but so does another place, or the surface tells too little. UNCONFIRMED: it shows
+    one, but the camera was lost for so long that a second view must confirm it. BELIEVED: it is there.
+    """
+
+    NONE = "none"
+    AMBIGUOUS = "ambiguous"
+    UNCONFIRMED = "unconfirmed"
+    BELIEVED = "believed"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """A place that a view shows.
+
+    Attributes:
+        evidence: how sure it is.
+        lying: where the view was taken, and how it lies there; None: no place is shown.
+    """
+
+    evidence: Evidence
+    lying: Lying | None = None
+
+
+def sighted(piece: Piece, view: View, belief: Belief) -> Sighting:
+    """Look which place of a field a view shows, of those where the camera can be, and how sure that is.
+
+    Args:
+        piece: with field and places.
+        view: with depth.
+        belief: where the camera can be in the field's axes.
+    """
+    places, bound, voxel_m = piece.places, belief.bound, piece.volume.settings.voxel_m
+    reach_m = bound.shift_m + bound.turn * float(np.linalg.norm(belief.since.t_m)) + _SIGHT_M
+    near = places.near(belief.pose, reach_m, math.degrees(bound.turn) + _SIGHT_DEG)
+    agreed = places.agreed(view, range(places.count) if belief.is_open else near)
+    agreed = [each for each in agreed if belief.is_open or belief.nearly_admits(each.world_camera, voxel_m)]
+    if not agreed:
+        return Sighting(Evidence.NONE)
+    best = max(agreed, key=lambda each: each.inliers)
+    lying = piece.confirmed(view, best.world_camera)
+    if lying is None or not (belief.is_open or belief.admits(lying.pose, voxel_m)):
+        return Sighting(Evidence.NONE)
+    return Sighting(_judged(piece, view, belief, lying, best.inliers), lying)
+
+
+def _judged(piece: Piece, view: View, belief: Belief, lying: Lying, inliers: int) -> Evidence:
+    """Judge a place at which the camera can be."""
+    if not belief.is_broken:
+        return Evidence.BELIEVED
+    if lying.fit.told < ALL_DIRECTIONS and inliers < _SURE_INLIERS:
+        return Evidence.AMBIGUOUS
+    if _has_rival(piece, view, belief, lying.pose):
+        return Evidence.AMBIGUOUS
+    is_close = belief.bound.shift_m <= _WIDE_M and belief.admits(lying.pose, piece.volume.settings.voxel_m)
+    return Evidence.BELIEVED if is_close else Evidence.UNCONFIRMED
+
+
+def is_still_here(piece: Piece, view: View, belief: Belief, fit: Registered) -> bool:
+    """Return whether a view that odometry does not follow is where the camera was last, because its depth lies on the surface there.
+
+    Rooms have equal corners and equal walls: the features must show what was seen from there, unless there are none.
+
+    Args:
+        piece: with field and places.
+        view: with depth.
+        belief: where the camera can be in the field's axes.
+        fit: how its depth lies against the surface, from where it was last.
+    """
+    pose, places = belief.pose @ fit.start_now, piece.places
+    if fit.told < ALL_DIRECTIONS or not np.isfinite(pose.pose()).all():
+        return False
+    near = places.near(pose, _SIGHT_M, _SIGHT_DEG)
+    agreed = places.agreed(view, near)
+    if not agreed:
+        return is_bare(view)
+    if not are_one_pose(max(agreed, key=lambda each: each.inliers).world_camera, pose):
+        return False
+    is_wide = belief.bound.shift_m > _WIDE_M or belief.is_open
+    return not (is_wide and _has_rival(piece, view, belief, pose))
+
+
+def shown_place(
+    piece: Piece, view: View, tracked: SE3, limits: Mapping[int, MotionBound], most: int
+) -> Recognised | None:
+    """Find which of some places a tracked view shows, where tracking can be so far off: what a loop begins with; None: no one.
+
+    Args:
+        piece: whose places they are.
+        view: with depth.
+        tracked: where it was taken, as tracking has it.
+        limits: how far that may be off as seen from each place, by the places' numbers.
+        most: of them are compared in full.
+    """
+    reach = max(limits.values(), key=lambda each: each.shift_m, default=MotionBound())
+    turn_deg = math.degrees(max((each.turn for each in limits.values()), default=0.0)) + _SIGHT_DEG
+    near = [at for at in piece.places.near(tracked, reach.shift_m + _SIGHT_M, turn_deg) if at in limits]
+    voxel_m = piece.volume.settings.voxel_m
+    agreed = [
+        each
+        for each in piece.places.agreed(view, near, most)
+        if limits[each.number].for_features.admits(tracked, each.world_camera, voxel_m)
+    ]
+    return max(agreed, key=lambda each: each.inliers, default=None)
+
+
+def lies_alone(piece: Piece, view: View, starts: Sequence[SE3]) -> Lying | None:
+    """Return how a view lies on the surface of an older part alone, which must tell all directions; None: it does not.
+
+    Args:
+        piece: that part.
+        view: with depth.
+        starts: poses from which that is tried, in turn: the features' pose may be farther off than tracking is.
+    """
+    tried = (piece.confirmed(view, start) for start in starts)
+    lying = next((each for each in tried if each is not None), None)
+    if lying is None or lying.fit.least_told < _LEAST_TOLD or lying.fit.overlap < _LEAST_OVERLAP:
+        return None
+    return lying
+
+
+def _has_rival(piece: Piece, view: View, belief: Belief, pose: SE3) -> bool:
+    """Return whether another place where the camera can be explains a view about as well as the one at a pose."""
+    voxel_m = piece.volume.settings.voxel_m
+    rivals = piece.places.rivals(view, pose)
+    return any(belief.is_open or belief.nearly_admits(each.world_camera, voxel_m) for each in rivals)
+
+
+def are_independent(one: SE3, other: SE3) -> bool:
+    """Return whether views from two poses confirm each other: they do not show the same picture."""
+    between = (one.inverse() @ other).pose()
+    return bool(np.linalg.norm(between[3:]) >= _INDEPENDENT_M or np.linalg.norm(between[:3]) >= _INDEPENDENT_TURN)
