@@ -15,7 +15,14 @@ MAX_MESSAGE: Final = 120
 _NEAR_C: Final = 3.0
 """A heater this near to its goal has reached it, degrees C; Marlin's own window is 1 to 3."""
 
-_FATAL: Final = re.compile(r"halted|kill\(\)|thermal|heating failed|maxtemp|mintemp|stopped|emergency", re.IGNORECASE)
+_FATAL: Final = re.compile(
+    r"halted|halt asserted|kill\(\)|killed|thermal|heating failed|maxtemp|mintemp|stopped|emergency|M999", re.IGNORECASE
+)
+_DEAD: Final = re.compile(
+    r"!!|fatal:|alarm:|//\s*klipper state: (?:shutdown|disconnect)|:.*(?:max|min)temp triggered", re.IGNORECASE
+)
+"""How the last words of Klipper, Repetier, Smoothieware and an old Marlin begin, which says `Error:0` on a line of its own before them."""
+
 _RESEND: Final = re.compile(r"(?:resend|rs)[: ]+N?(\d{1,9})(?!\d)", re.IGNORECASE)
 _ORDER: Final = re.compile(r"line number is not|expected line", re.IGNORECASE)
 _BUSY: Final = re.compile(r"(?:echo:\s*)?busy:\s*(.*)", re.IGNORECASE)
@@ -112,9 +119,10 @@ def read_reply(text: str) -> Reply:
         return Reply(ReplyKind.BUSY, f"busy: {found[1]}"[:MAX_MESSAGE])
     if found := _RESEND.match(said):
         return Reply(ReplyKind.RESEND, shown, number=int(found[1]))
-    if lower.startswith(("error", "!!")):
-        is_fatal = said.startswith("!!") or _FATAL.search(said) is not None
-        kind = ReplyKind.FATAL if is_fatal else ReplyKind.ERROR
+    if _DEAD.match(said):
+        return Reply(ReplyKind.FATAL, shown)
+    if lower.startswith("error"):
+        kind = ReplyKind.FATAL if _FATAL.search(said) else ReplyKind.ERROR
         return Reply(kind, shown, is_about_order=bool(_ORDER.search(said)))
     kind = ReplyKind.OK if lower.startswith("ok") else ReplyKind.START if _START.match(said) else ReplyKind.OTHER
     return Reply(kind, shown, heat=heat, is_heating=is_heating)
