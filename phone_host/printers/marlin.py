@@ -2,6 +2,7 @@
 
 - A line is sent again when the printer asks for it, or when no answer came for some seconds. Its number keeps it from being done twice.
 - Heating, homing and waiting may be silent for minutes. Otherwise only `busy`, and temperatures while it heats, extend the wait.
+- A printer that asks for what cannot be, a line of the future or its first one, is asked once more: cables spoil numbers, too.
 - After a line was sent twice the printer may answer twice. What it asks for then because of the second one is not taken for an error.
 - Every wait and every repetition is bounded: a line that makes no progress ends the print.
 - Cancelling, here or at the printer, sends nothing more of the print, and switches heaters, fan and motors off.
@@ -13,6 +14,7 @@ print.md 6 of the project's studies (measured against OctoPrint's and Printrun's
 from collections.abc import Iterator
 from typing import Final, assert_never
 
+from phone_host.printers import marlin_problems as problems
 from phone_host.printers.cooling import wake
 from phone_host.printers.gcode import Line, name_of
 from phone_host.printers.marlin_reply import HostAction, Reply, ReplyKind, read_reply
@@ -80,7 +82,7 @@ class MarlinSender:
         self._attempts = Attempts()
         self._under_way: SentLine | None = None
         self._began_ns = self._last_sent_ns = now_ns
-        self._refused_order = self._swallow_ok = self._is_deaf = self._is_first = False
+        self._refused_order = self._swallow_ok = self._is_deaf = self._is_first = self._is_doubted = False
         self._awaited_ok_ns = 0
         self._again: list[int] = []
         self._last_heard_ns = now_ns
@@ -128,7 +130,7 @@ class MarlinSender:
     def finish_cancelling(self) -> None:
         """End it: what cools was confirmed, and the rest is not waited for."""
         if self._ended_there:
-            self._fail(self._ended_there, "heaters, fan and motors are off; start it again")
+            self._fail(problems.ended_there(self._ended_there))
         else:
             self.phase = Phase.CANCELLED
 
@@ -148,7 +150,7 @@ class MarlinSender:
             case ReplyKind.START:
                 self._started(now_ns)
             case ReplyKind.FATAL:
-                self._fail(f"the printer says: {reply.text}", "see what its display says; it has to be restarted")
+                self._fail(problems.printer_says(reply.text))
             case ReplyKind.ERROR:
                 self._refused_order = reply.is_about_order
                 self._note_unguarded(reply)
@@ -209,10 +211,7 @@ class MarlinSender:
                 self._queue, self._under_way = [self._under_way.line, *self._queue], None
             self._number = 0
         else:
-            self._fail(
-                "the printer has restarted",
-                "see whether its power supply or its cable is at fault; its heaters are off",
-            )
+            self._fail(problems.RESTARTED)
 
     def _act(self, reply: Reply) -> None:
         """Do what the printer's display wants."""
@@ -264,24 +263,28 @@ class MarlinSender:
             if self._ghosts:
                 self._ghosts, self._swallow_ok = self._ghosts - 1, True
             return
-        if number == under_way.number + 1:  # it had arrived, its answer was lost
+        if under_way.number < number <= self._number:  # all before it had arrived, its answer was lost
             self._ghosts = max(self._ghosts - 1, 0)
-            self._arrived(now_ns)
+            self.done += sum(self._saved[old].is_print for old in self._again if old < number)
+            self._again = [old for old in self._again if old >= number]
+            self._arrived(now_ns, is_answered=False)
             self._swallow_ok, self._awaited_ok_ns = True, now_ns + _AFTER_RESEND_NS
         elif number == under_way.number and self._ghosts and refused_order:
             self._ghosts, self._swallow_ok = self._ghosts - 1, True
-        elif number in self._saved or number == under_way.number:
+        elif number in self._saved and not self._attempts.are_begun_again(number):
             self._go_back(under_way, number, now_ns)
-        elif number > under_way.number:
-            self._fail(
-                f"the printer asks for line {number}, which was not sent yet",
-                "another program may be using its port: end it; see whether its heaters are off",
-            )
+        elif not under_way.is_requested:
+            self._doubt(under_way, number, now_ns)
+
+    def _doubt(self, under_way: SentLine, number: int, now_ns: int) -> None:
+        """Ask a printer once more that wants what cannot be sent. The cable may have spoiled the number; an honest printer says another one then."""
+        if not self._is_doubted:
+            self._is_doubted = True
+            self._go_back(under_way, under_way.number, now_ns)
+        elif self._attempts.are_begun_again(number):
+            self._fail(problems.RESTARTED)
         else:
-            self._fail(
-                f"the printer asks for line {number}, long after it was sent",
-                "see whether its heaters are off, and its cable sound",
-            )
+            self._fail(problems.not_sent_yet(number) if number > self._number else problems.long_sent(number))
 
     def _go_back(self, under_way: SentLine, number: int, now_ns: int) -> None:
         is_new = not under_way.is_requested
@@ -296,14 +299,16 @@ class MarlinSender:
             self._awaited_ok_ns = max(now_ns + _AFTER_RESEND_NS, self._attempts.not_before_ns(self._last_sent_ns))
 
     def _acknowledged(self, now_ns: int) -> None:
-        if self._swallow_ok:
+        under_way = self._under_way
+        # A line that is to be sent again has not arrived, however often the printer says so.
+        if self._swallow_ok or (under_way is not None and under_way.is_requested):
             self._swallow_ok = False
             self._awaited_ok_ns = max(now_ns, self._attempts.not_before_ns(self._last_sent_ns))
             return
-        if self._under_way is not None:
+        if under_way is not None:
             self._arrived(now_ns)
 
-    def _arrived(self, now_ns: int) -> None:
+    def _arrived(self, now_ns: int, *, is_answered: bool = True) -> None:
         under_way = self._under_way
         assert under_way is not None
         self._under_way = None
@@ -312,15 +317,15 @@ class MarlinSender:
         self.done += under_way.line.is_print
         if self.phase is Phase.CANCELLING and under_way.line.text in self.off:
             self.is_cold = not self._again and not any(line.text in self.off for line in self._queue)
-        if self._attempts.note_arrival(under_way.number) and self.message.startswith("busy: "):
+        if not self._attempts.note_arrival(under_way.number, is_answered=is_answered):
+            return
+        self._is_doubted = False
+        if self.message.startswith("busy: "):
             self.message = ""
 
     def _sent_again(self, under_way: SentLine, now_ns: int) -> bytes:
         if now_ns - self._began_ns > self._options.max_busy_ns:
-            self._fail(
-                f"the printer has not finished {under_way.line.text} within {self._options.max_busy_ns / (60 * SECOND_NS):g} min",
-                "see what its display says; max_busy_minutes in the table [printers] of the settings file allows more",
-            )
+            self._fail(problems.not_finished(under_way.line.text, self._options.max_busy_ns))
             return b""
         if under_way.is_requested:
             if now_ns < self._awaited_ok_ns:
@@ -333,26 +338,25 @@ class MarlinSender:
             self._attempts.timeouts += 1
         under_way.tries += 1
         if under_way.tries >= _MAX_TRIES and now_ns - self._last_heard_ns > USUAL_NS:
-            self._fail(
-                "the printer does not answer",
-                "see whether it is on and its cable is plugged in, whether the baud rate is right, and whether its heaters are off",
-            )
+            self._fail(problems.SILENT)
             return b""
-        if self._attempts.are_too_many:
-            times = self._attempts.requests + self._attempts.timeouts
-            self._fail(
-                f"the printer does not take line {under_way.number}, which was sent {times} times",
-                "see whether its cable is sound and its baud rate right, and whether its heaters are off",
-            )
+        if self._is_given_up(under_way):
             return b""
         self.resent += 1
         return self._on_its_way(under_way, now_ns)
+
+    def _is_given_up(self, sent: SentLine) -> bool:
+        """Return whether lines were repeated too often, which ends the print."""
+        if self._attempts.are_too_many:
+            self._fail(problems.no_progress(sent, self._attempts))
+        return self._attempts.are_too_many
 
     def _sent_next(self, now_ns: int) -> bytes:
         self._swallow_ok = False
         if self._again:
             number = self._again.pop(0)
-            return self._on_its_way(SentLine(number, self._saved[number]), now_ns)
+            sent = SentLine(number, self._saved[number])
+            return b"" if self._is_given_up(sent) else self._on_its_way(sent, now_ns)
         line = self._next_line(now_ns)
         return b"" if line is None else self._sent_new(line, now_ns)
 
@@ -395,5 +399,5 @@ class MarlinSender:
         if read:
             self.heat = Heat(read.get("T", self.heat.nozzle), read.get("B", self.heat.bed))
 
-    def _fail(self, problem: str, remedy: str) -> None:
-        self.phase, self.problem, self.remedy = Phase.FAILED, problem, remedy
+    def _fail(self, problem: problems.Problem) -> None:
+        self.phase, self.problem, self.remedy = Phase.FAILED, problem.words, problem.remedy

@@ -38,6 +38,9 @@ _MAX_REQUESTS: Final = 20
 
 _MAX_TIMEOUTS: Final = 8
 
+_MOST_AHEAD: Final = 8
+"""Lines that we may be ahead of a printer that has answered too often before its first line came."""
+
 
 def framed(number: int, text: str) -> bytes:
     """Return a line as it travels: with its number and the exclusive or of its bytes."""
@@ -135,7 +138,7 @@ class Attempts:
 
     Attributes:
         requests: times that the printer requested one.
-        timeouts: times that no answer came.
+        timeouts: times that no answer came, since the last one that did.
         highest: number of the last line that arrived for the first time.
     """
 
@@ -143,12 +146,18 @@ class Attempts:
     timeouts: int = 0
     highest: int = -1
 
-    def note_arrival(self, number: int) -> bool:
-        """Take a line that has arrived; return whether that is progress. An older line that arrives again is none."""
+    def note_arrival(self, number: int, *, is_answered: bool) -> bool:
+        """Take a line that has arrived; return whether that is progress. An older line that arrives again is none.
+
+        Args:
+            number: its own.
+            is_answered: whether the printer has said `ok`; else only what it asked for showed that the line was there.
+        """
         if number <= self.highest:
             return False
         self.highest = number
-        self.requests = self.timeouts = 0
+        self.requests = 0
+        self.timeouts = 0 if is_answered else self.timeouts
         return True
 
     def not_before_ns(self, sent_ns: int) -> int:
@@ -159,6 +168,14 @@ class Attempts:
         """
         extra = self.requests - _FREE_REQUESTS
         return sent_ns + min(_SLOWER_NS << extra, _SLOWEST_NS) if extra > 0 else 0
+
+    def are_begun_again(self, number: int) -> bool:
+        """Return whether a request shows that the printer has restarted without a word: its first line is wanted long after it was taken.
+
+        Args:
+            number: of the line that is requested.
+        """
+        return number <= 1 and self.highest > _MOST_AHEAD
 
     @property
     def are_too_many(self) -> bool:

@@ -121,6 +121,16 @@ def test_a_pause_sends_nothing_until_it_ends() -> None:
     assert sender.phase is Phase.DONE
 
 
+@pytest.mark.parametrize("said", ["Resend: 9000", "Resend: 1", "Resend: 17"])
+def test_a_request_that_the_cable_has_spoiled_harms_nothing(said: str) -> None:
+    """It names a line of the future, the first or an old one: every line is done once, in order."""
+    lines = cube(100)
+    with printer(Faults(says={50: said})) as there:
+        sender = printed(there, lines)
+    assert sender.phase is Phase.DONE
+    assert there.done == lines
+
+
 def test_a_printer_that_is_unplugged_cannot_be_cooled_from_here() -> None:
     """At half of the print its plug is pulled: one line says so."""
     with printer(Faults(dies_after=200)) as there, pytest.raises(PrinterGoneError, match="cannot be cooled from here"):
@@ -134,7 +144,6 @@ def test_a_printer_that_is_unplugged_cannot_be_cooled_from_here() -> None:
         ("Error:Thermal Runaway, system stopped! Heater_ID: 0", "Thermal Runaway"),
         ("Error:Printer halted. kill() called!", "kill"),
         ("start", "restarted"),
-        ("Resend: 9000", "asks for line 9000"),
     ],
 )
 def test_a_printer_that_fails_is_told(said: str, words: str) -> None:

@@ -105,6 +105,8 @@ def test_an_older_line_is_sent_again_with_all_that_followed() -> None:
         other.hear("ok")
     other.sent()
     other.hear("Resend: 3")
+    assert other.sent(S) == framed(251, "G1 X1")  # the cable may have spoiled the number
+    other.hear("Resend: 3")
     assert "long after" in other.sender.problem
 
 
@@ -175,7 +177,6 @@ def test_it_is_told_when_there_is_something_to_send() -> None:
         ("start", "has restarted"),
         ("Error:Printer halted. kill() called!", "the printer says"),
         ("!! hot", "the printer says"),
-        ("Resend: 7", "line 7, which was not sent yet"),
     ],
 )
 def test_what_a_printer_says_ends_a_print(said: str, problem: str) -> None:

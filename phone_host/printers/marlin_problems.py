@@ -1,0 +1,75 @@
+"""Why a print on a line has failed, and what to do about it. Pure: words alone."""
+
+from typing import Final, NamedTuple
+
+from phone_host.printers.marlin_rules import SECOND_NS, Attempts, SentLine
+
+
+class Problem(NamedTuple):
+    """Why a print has failed.
+
+    Attributes:
+        words: what happened.
+        remedy: what to do about it.
+    """
+
+    words: str
+    remedy: str
+
+
+RESTARTED: Final = Problem(
+    "the printer has restarted",
+    "see whether its power supply or its cable is at fault, and whether its heaters are off",
+)
+SILENT: Final = Problem(
+    "the printer does not answer",
+    "see whether it is on and its cable is plugged in, whether the baud rate is right, and whether its heaters are off",
+)
+_CABLE: Final = "see whether its cable is sound and its baud rate right, and whether its heaters are off"
+
+
+def ended_there(words: str) -> Problem:
+    """Return what somebody has done at the printer, which is cold."""
+    return Problem(words, "heaters, fan and motors are off; start it again")
+
+
+def printer_says(words: str) -> Problem:
+    """Return the printer's own last words."""
+    return Problem(f"the printer says: {words}", "see what its display says; it has to be restarted")
+
+
+def not_sent_yet(number: int) -> Problem:
+    """Return that the printer wants a line of the future."""
+    return Problem(
+        f"the printer asks for line {number}, which was not sent yet",
+        "another program may be using its port: end it; see whether its heaters are off",
+    )
+
+
+def long_sent(number: int) -> Problem:
+    """Return that the printer wants a line which is not kept any more."""
+    return Problem(
+        f"the printer asks for line {number}, long after it was sent",
+        "see whether its heaters are off, and its cable sound",
+    )
+
+
+def no_progress(sent: SentLine, attempts: Attempts) -> Problem:
+    """Return that a line was sent so often in vain, or that line after line arrives and is not answered.
+
+    Args:
+        sent: the line under way.
+        attempts: how often it, and those before it, were sent again.
+    """
+    times = attempts.requests + attempts.timeouts
+    if attempts.timeouts > sent.tries:  # lines before it were not answered, either
+        return Problem(f"the printer takes the lines, and {attempts.timeouts} answers in a row were lost", _CABLE)
+    return Problem(f"the printer does not take line {sent.number}, which was sent {times} times", _CABLE)
+
+
+def not_finished(text: str, max_busy_ns: int) -> Problem:
+    """Return that the printer is busy with a line for too long."""
+    return Problem(
+        f"the printer has not finished {text} within {max_busy_ns / (60 * SECOND_NS):g} min",
+        "see what its display says; max_busy_minutes in the table [printers] of the settings file allows more",
+    )
