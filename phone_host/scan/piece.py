@@ -49,6 +49,8 @@ class PoseGate:
         most_off: times the usual mean distance to the model.
         least_depths: share of the pixels that must have a depth.
         weak_inliers: corners that agree; with fewer the pose is weak.
+        is_turned_by_others: whether what is seen may have turned to anywhere while it was not followed: a thing on a turntable, whose axis
+            judges its views afterwards. Then no pose is too far from the last one.
     """
 
     most_shift_m: float = 0.08
@@ -59,6 +61,7 @@ class PoseGate:
     most_off: float = 2.0
     least_depths: float = 0.02
     weak_inliers: int = 30
+    is_turned_by_others: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

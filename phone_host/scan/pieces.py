@@ -191,7 +191,7 @@ class Pieces:
             view: with depth.
             fit: how it lies there.
         """
-        belief = self._beliefs[self._active]
+        belief = self._belief(self._active)
         return not belief.is_broken or is_still_here(self.active, view, belief, fit)
 
     def begin(self, number: int, view: View, believed: SE3, why: Weakness) -> SE3 | None:
@@ -270,7 +270,8 @@ class Pieces:
 
     def recognised(self, view: View) -> Found | None:
         """Find a piece, one of whose places a view shows, and lay it there: first that which is tracked, where the camera is known best, then the model."""
-        for number in dict.fromkeys((self._active, _MODEL, *self._apart)):
+        known_best = _MODEL if self._gate.is_turned_by_others else self._active
+        for number in dict.fromkeys((known_best, _MODEL, *self._apart)):
             found = self._sighted(number, view)
             if found.evidence is Evidence.BELIEVED and found.lying is not None:
                 return Found(self._piece(number), found.lying.pose, found.lying.fit)
@@ -408,9 +409,13 @@ class Pieces:
         return result
 
     def _sighted(self, number: int, view: View) -> Sighting:
-        found = sighted(self._piece(number), view, self._beliefs[number])
+        found = sighted(self._piece(number), view, self._belief(number))
         self.is_ambiguous |= found.evidence in {Evidence.AMBIGUOUS, Evidence.UNCONFIRMED}
         return found
+
+    def _belief(self, number: int) -> Belief:
+        belief = self._beliefs[number]
+        return replace(belief, is_open=True, is_broken=False) if self._gate.is_turned_by_others else belief
 
     def _piece(self, number: int) -> Piece:
         return self.model if number == _MODEL else self._apart[number].piece

@@ -6,7 +6,8 @@ can be since it was last in the field (`motion_belief`); a place that only looks
 camera can have reached may explain the view about as well, and after a long loss a second, independent view must agree.
 5. Residuals: what contradicts the rest after the pose graph was settled is taken out again (`graph.without_outliers`).
 
-Poses that a mat or the axis of a turntable tells are measurements in the world's axes: nothing adds up in them, and they do not come through here.
+Poses that a mat tells are measurements in the world's axes: nothing adds up in them, and they do not come through here. A thing on a turntable may turn to
+anywhere while it is not followed, so step 4 is left out for it (`PoseGate.is_turned_by_others`); its axis judges all views afterwards.
 """
 
 import math
@@ -109,7 +110,7 @@ def _judged(piece: Piece, view: View, belief: Belief, lying: Lying, inliers: int
 def is_still_here(piece: Piece, view: View, belief: Belief, fit: Registered) -> bool:
     """Return whether a view that odometry does not follow is where the camera was last, because its depth lies on the surface there.
 
-    Rooms have equal corners and equal walls: the features must show what was seen from there, unless there are none.
+    Rooms have equal corners and equal walls: the features must show what was seen from there, unless there are none; such a view is weak.
 
     Args:
         piece: with field and places.
@@ -118,12 +119,14 @@ def is_still_here(piece: Piece, view: View, belief: Belief, fit: Registered) -> 
         fit: how its depth lies against the surface, from where it was last.
     """
     pose, places = belief.pose @ fit.start_now, piece.places
+    if is_bare(view):  # a plain wall: nothing tells that the camera has moved along it, nor that it has not
+        return True
     if fit.told < ALL_DIRECTIONS or not np.isfinite(pose.pose()).all():
         return False
     near = places.near(pose, _SIGHT_M, _SIGHT_DEG)
     agreed = places.agreed(view, near)
     if not agreed:
-        return is_bare(view)
+        return False
     if not are_one_pose(max(agreed, key=lambda each: each.inliers).world_camera, pose):
         return False
     is_wide = belief.bound.shift_m > _WIDE_M or belief.is_open

@@ -268,7 +268,9 @@ class TurntableScan(Scan):
         thing = _masked(cropped, own)
         if self.tracker is None:
             self.tracker = Tracker(
-                fineness_for(thing, self._wanted.voxel_m, self._wanted.most_bytes), self._wanted.threads
+                fineness_for(thing, self._wanted.voxel_m, self._wanted.most_bytes),
+                self._wanted.threads,
+                gate=PoseGate(is_turned_by_others=True),
             )
         self._tracked_pairs.append(number)
         told = self.tracker.track(thing)
