@@ -2,8 +2,7 @@
 
 from typing import Any, Final
 
-MOST_CHUNK_BYTES: Final = 128 << 20
-"""Largest chunk or message that is decompressed: one image of 8K in colour is 100 MB. Usual chunks have 1 to 4 MB."""
+from common.recording.salvage import MOST_CHUNK_BYTES
 
 ZSTD: Final = b"\x28\xb5\x2f\xfd"
 """First bytes of what is compressed with zstd (RFC 8878, section 3.1.1)."""

@@ -1,10 +1,10 @@
 """Opens a recording that is a file. Its bytes stay on the disk until somebody wants them."""
 
-import mmap
 from pathlib import Path
 from typing import Final, NoReturn
 
 from common.errors import DataError
+from common.recording.file_bytes import FileBytes
 from common.recording.inflate import inflate
 from common.recording.recorded import Recorded, read_recorded
 from common.recording.ros1 import EXTRA, ROS1_REASON
@@ -19,19 +19,18 @@ def is_recording(path: str) -> bool:
     return path.lower().endswith(SUFFIX)
 
 
-def mapped(path: Path) -> memoryview:
-    """Return the bytes of a file.
+def stored_data(path: Path) -> FileBytes:
+    """Return the bytes of a file, which stay there.
 
     Raises:
         DataError: it cannot be read, or is no MCAP file.
     """
     try:
-        with path.open("rb") as file:
-            data = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
-    except ValueError:
-        raise DataError(f"{path} is empty", "give a recording") from None
+        data = FileBytes.whole(path)
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", "name a recording, FILE.mcap") from None
+    if not len(data):
+        raise DataError(f"{path} is empty", "give a recording")
     if not is_mcap(data):
         raise DataError(f"{path} is no MCAP file", "give a recording of phone-host record, or another MCAP file")
     return data
@@ -47,7 +46,7 @@ def open_recorded(path: Path, *, needs_times: bool = True) -> Recorded:
     Raises:
         DataError: it cannot be read, is no MCAP file, or holds no images, or none of which the time is known.
     """
-    found = read_recorded(mapped(path), inflate)
+    found = read_recorded(stored_data(path), inflate)
     if not found.images:
         _refuse_without_images(path, found)
     if found.time_fault and needs_times:

@@ -15,6 +15,7 @@ from common.frame import Buffer, SpoiledImageError
 from common.imagesize.read import read_head
 from common.protocol.message import CameraDescription
 from common.recording.cdr import BrokenMessageError
+from common.recording.file_bytes import StoredData
 from common.recording.image_layouts import UnreadableEncodingError
 from common.recording.inflate import ZSTD
 from common.recording.layout import (
@@ -104,7 +105,7 @@ class Recorded:
     remarks: list[str] = field(default_factory=list)
     time_fault: str = ""
     metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
-    attachments: dict[str, memoryview] = field(default_factory=dict)
+    attachments: dict[str, StoredData] = field(default_factory=dict)
     damages: list[Damage] = field(default_factory=list)
     is_complete: bool = False
     is_ours: bool = False
@@ -173,7 +174,7 @@ def period_ns(shown: Sequence[Shown]) -> int:
     return max(1, round(statistics.median(between))) if between else _NEVER_NS
 
 
-def read_recorded(data: memoryview, inflate: Inflate) -> Recorded:
+def read_recorded(data: StoredData, inflate: Inflate) -> Recorded:
     """Read all that is whole.
 
     Args:
@@ -291,7 +292,7 @@ def image_kind(channel: Channel) -> str:
 
 
 def read_message(kind: str, encoding: str, message: Message) -> RecordedImage:
-    """Read the image of a message. One from a compressed chunk is read from there again whenever its bytes are wanted.
+    """Read the image of a message. One that is not in memory is read from its file again whenever its bytes are wanted.
 
     Args:
         kind: COMPRESSED_IMAGE or IMAGE.
@@ -313,7 +314,7 @@ def read_message(kind: str, encoding: str, message: Message) -> RecordedImage:
 
 
 def _read_again(read: Callable[[str, memoryview], RecordedImage], kind: str, stored: StoredMessage) -> Buffer:
-    return read(kind, stored.chunk.records()[stored.at : stored.at + stored.size]).payload
+    return read(kind, stored.read()).payload
 
 
 def _leave_out(found: Recorded, channel: Channel, reason: str) -> None:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from common.recording.file_bytes import FileBytes, StoredData, pieces
 from common.words import counted
 
 MAGIC: Final = b"\x89MCAP0\r\n"
@@ -47,6 +48,13 @@ _MOST_TRIED_BYTES: Final = 16 << 20
 """As many may always be."""
 
 
+_MOST_AT_ONCE_BYTES: Final = 16 << 20
+"""Longest chunk that is read at once. Ours have 1 MB, those of other programs up to 4."""
+
+MOST_CHUNK_BYTES: Final = 128 << 20
+"""Largest chunk that is decompressed, and largest message: one image of 8K in colour is 100 MB. Usual chunks have 1 to 4 MB."""
+
+
 @dataclass(frozen=True, slots=True)
 class Channel:
     """What the messages of a channel are.
@@ -72,8 +80,8 @@ class Message:
         sequence: as its writer counted.
         log_ns: when it was received.
         publish_ns: when it was sent.
-        data: its bytes: a view of the file, or of a chunk that was decompressed, which stays in memory as long as this view.
-        stored: where its bytes can be had again; None: they are the file's own.
+        data: its bytes: a view of its chunk, which stays in memory as long as this view.
+        stored: where its bytes can be had again; None: the whole file is in memory.
     """
 
     channel: Channel | None
@@ -91,11 +99,11 @@ class Attachment:
 
     Attributes:
         name: its name.
-        data: its content: a view of the file.
+        data: its content: a part of the file.
     """
 
     name: str
-    data: memoryview
+    data: StoredData
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +151,7 @@ class Chunk:
     """
 
     def __init__(
-        self, latest: "dict[Chunk, memoryview]", inflate: "Inflate", compression: str, packed: memoryview, size: int
+        self, latest: "dict[Chunk, memoryview]", inflate: "Inflate", compression: str, packed: StoredData, size: int
     ) -> None:
         self._latest, self._inflate = latest, inflate
         self._compression, self._packed, self._size = compression, packed, size
@@ -157,7 +165,7 @@ class Chunk:
         records = self._latest.get(self)
         if records is None:
             self._latest.clear()  # first: so that no two are held
-            records = self._inflate(self._compression, self._packed, self._size)
+            records = self._inflate(self._compression, memoryview(bytes(self._packed)), self._size)
             self._latest[self] = records
         return records
 
@@ -167,14 +175,24 @@ class StoredMessage:
     """Where a message stands.
 
     Attributes:
-        chunk: in which it is.
-        at: place of its bytes in the chunk's records.
+        place: the compressed chunk in which it is, or a part of the file.
+        at: where its bytes begin in the chunk's records, or in the part.
         size: how many they are.
     """
 
-    chunk: Chunk
+    place: Chunk | FileBytes
     at: int
     size: int
+
+    def read(self) -> memoryview:
+        """Return its bytes.
+
+        Raises:
+            ValueError: the compression of its chunk cannot be undone.
+            DataError: the file became shorter.
+        """
+        records = self.place.records() if isinstance(self.place, Chunk) else self.place
+        return memoryview(bytes(records[self.at : self.at + self.size]))
 
 
 Record = Message | Attachment | Metadata | Damage
@@ -195,9 +213,9 @@ class _SpoiledError(ValueError):
         self.tried_bytes = tried_bytes
 
 
-def is_mcap(data: memoryview) -> bool:
+def is_mcap(data: StoredData) -> bool:
     """Return whether this is an MCAP file, even one of whose first bytes some are wrong."""
-    return sum(one == other for one, other in zip(data[: len(MAGIC)], MAGIC, strict=False)) > len(MAGIC) // 2
+    return sum(one == other for one, other in zip(bytes(data[: len(MAGIC)]), MAGIC, strict=False)) > len(MAGIC) // 2
 
 
 class Salvage:
@@ -213,7 +231,7 @@ class Salvage:
         inflate: for chunks that are compressed.
     """
 
-    def __init__(self, data: memoryview, inflate: Inflate) -> None:
+    def __init__(self, data: StoredData, inflate: Inflate) -> None:
         self._data, self._inflate = data, inflate
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, Channel] = {}
@@ -240,11 +258,11 @@ class Salvage:
                 self.is_complete = True
                 return
 
-    def _record(self, at: int) -> tuple[int, memoryview]:
+    def _record(self, at: int) -> tuple[int, StoredData]:
         """Return the opcode and content of the record at a place."""
         if at + _HEAD.size > len(self._data):
             raise _SpoiledError("the file ends in the middle of a record")
-        opcode, length = _HEAD.unpack_from(self._data, at)
+        opcode, length = _HEAD.unpack(bytes(self._data[at : at + _HEAD.size]))
         if not 0 < opcode <= _LAST_OPCODE:
             raise _SpoiledError("no record begins here")
         content = self._data[at + _HEAD.size : at + _HEAD.size + length]
@@ -252,7 +270,7 @@ class Salvage:
             raise _SpoiledError("the file ends in the middle of a record")
         return opcode, content
 
-    def _top(self, opcode: int, content: memoryview) -> Iterator[Record]:
+    def _top(self, opcode: int, content: StoredData) -> Iterator[Record]:
         """Take in a record outside of chunks."""
         match opcode:
             case 0x06:
@@ -265,9 +283,9 @@ class Salvage:
                     self._tell_channels(metadata.values)
                 yield metadata
             case _:
-                yield from self._inner(opcode, content)
+                yield from self._inner(opcode, content, content, 0)
 
-    def _chunk(self, content: memoryview) -> Iterator[Record]:
+    def _chunk(self, content: StoredData) -> Iterator[Record]:
         _, _, size, checksum = _unpacked(_CHUNK, content, 0)
         compression, at = _text(content, _CHUNK.size, _LONGEST_NAME_BYTES)
         (length,) = _unpacked(_LENGTH, content, at)
@@ -280,11 +298,12 @@ class Salvage:
             if self.inflated_bytes > _MOST_INFLATED * len(self._data) + _ALWAYS_INFLATED_BYTES:
                 raise _SpoiledError("the chunks become larger than is believed: undo their compression first")
         try:
-            records = packed if chunk is None else chunk.records()
+            records = chunk.records() if chunk is not None else _in_memory(packed)
         except ValueError as error:
-            raise _SpoiledError(str(error), size) from error
-        if len(records) != size or (checksum and zlib.crc32(records) != checksum):
-            raise _SpoiledError("the checksum of a chunk is wrong", size)
+            raise _SpoiledError(str(error), max(size, length)) from error
+        if len(records) != size or (checksum and _crc32(records) != checksum):
+            raise _SpoiledError("the checksum of a chunk is wrong", max(size, length))
+        place = chunk if chunk is not None else packed
         at = 0
         try:
             while at < size:
@@ -293,13 +312,13 @@ class Salvage:
                 taken = records[at : at + inner]
                 if len(taken) != inner or opcode not in _IN_CHUNKS:
                     raise _SpoiledError("a chunk contradicts itself")
-                yield from self._inner(opcode, taken, chunk, at)
+                yield from self._inner(opcode, taken, place, at)
                 at += inner
         except _SpoiledError as spoiled:
             raise _SpoiledError(str(spoiled), size) from None
 
-    def _inner(self, opcode: int, content: memoryview, chunk: "Chunk | None" = None, at: int = 0) -> Iterator[Message]:
-        """Take in a record that may stand in a chunk: at this place of one that is compressed, or in the file."""
+    def _inner(self, opcode: int, content: StoredData, place: Chunk | StoredData, begin: int) -> Iterator[Message]:
+        """Take in a record that may stand in a chunk. It can be had again there, from where it begins."""
         if opcode == _SCHEMA:
             (number,) = _unpacked(_SHORT, content, 0)
             self._schemas[number] = _text(content, _SHORT.size)[0]
@@ -309,8 +328,11 @@ class Salvage:
             self._channels[number] = Channel(topic, self._schemas.get(schema, ""), _text(content, at)[0])
         elif opcode == _MESSAGE_OPCODE:
             number, sequence, log_ns, publish_ns = _unpacked(_MESSAGE, content, 0)
-            data = content[_MESSAGE.size :]
-            where = None if chunk is None else StoredMessage(chunk, at + _MESSAGE.size, len(data))
+            if len(content) > MOST_CHUNK_BYTES:
+                raise _SpoiledError("a message is larger than is believed")
+            body = content[_MESSAGE.size :]
+            data = body if isinstance(body, memoryview) else memoryview(bytes(body))
+            where = None if isinstance(place, memoryview) else StoredMessage(place, begin + _MESSAGE.size, len(data))
             yield Message(self._channels.get(number), number, sequence, log_ns, publish_ns, data, where)
 
     def _tell_channels(self, values: Mapping[str, str]) -> None:
@@ -323,11 +345,12 @@ class Salvage:
     def _next_start(self, at: int) -> int:
         """Return where the next record that is whole by its form begins; the file's end, if there is none."""
         most = MOST_TRIED * len(self._data) + _MOST_TRIED_BYTES
-        for found in _STARTS.finditer(self._data, at):
-            if self._may_start(found.start()):
-                return found.start()
-            if self.tried_bytes > most:
-                break
+        for begin, piece in pieces(self._data, at):
+            for found in _STARTS.finditer(piece):
+                if self._may_start(begin + found.start()):
+                    return begin + found.start()
+                if self.tried_bytes > most:
+                    return len(self._data)
         return len(self._data)
 
     def _may_start(self, at: int) -> bool:
@@ -353,13 +376,29 @@ _TWO_SHORTS: Final = struct.Struct("<HH")
 _SUM: Final = struct.Struct("<I")
 
 
-def _unpacked(form: struct.Struct, data: memoryview, at: int) -> tuple[int, ...]:
+def _unpacked(form: struct.Struct, data: StoredData, at: int) -> tuple[int, ...]:
     if at + form.size > len(data):
         raise _SpoiledError("a record is shorter than its kind")
-    return form.unpack_from(data, at)
+    return form.unpack(bytes(data[at : at + form.size]))
 
 
-def _text(data: memoryview, at: int, longest: int = _LONGEST_TEXT) -> tuple[str, int]:
+def _in_memory(packed: StoredData) -> StoredData:
+    """Return the records of a chunk: in memory, as it is faster, unless they are so many that they are better read one by one."""
+    if isinstance(packed, memoryview) or len(packed) > _MOST_AT_ONCE_BYTES:
+        return packed
+    return memoryview(bytes(packed))
+
+
+def _crc32(data: StoredData) -> int:
+    if isinstance(data, memoryview):
+        return zlib.crc32(data)
+    checksum = 0
+    for _, piece in pieces(data):
+        checksum = zlib.crc32(piece, checksum)
+    return checksum
+
+
+def _text(data: StoredData, at: int, longest: int = _LONGEST_TEXT) -> tuple[str, int]:
     """Return a text, and where what follows begins."""
     (length,) = _unpacked(_SUM, data, at)
     if length > longest or at + _SUM.size + length > len(data):
@@ -370,7 +409,7 @@ def _text(data: memoryview, at: int, longest: int = _LONGEST_TEXT) -> tuple[str,
         raise _SpoiledError("a name is not UTF-8", length) from None
 
 
-def _attachment(content: memoryview) -> Attachment:
+def _attachment(content: StoredData) -> Attachment:
     name, at = _text(content, 16, _LONGEST_NAME_BYTES)
     _, at = _text(content, at, _LONGEST_NAME_BYTES)
     (length,) = _unpacked(_LENGTH, content, at)
@@ -382,12 +421,12 @@ def _attachment(content: memoryview) -> Attachment:
         or not 0 < len(name) <= _LONGEST_NAME
     ):
         raise _SpoiledError("an attachment contradicts itself")
-    if checksum and zlib.crc32(content[: -_SUM.size]) != checksum:
+    if checksum and _crc32(content[: -_SUM.size]) != checksum:
         raise _SpoiledError(f"the checksum of the attachment {name!r} is wrong", len(content))
     return Attachment(name, data)
 
 
-def _metadata(content: memoryview) -> Metadata:
+def _metadata(content: StoredData) -> Metadata:
     name, at = _text(content, 0, _LONGEST_NAME_BYTES)
     (length,) = _unpacked(_SUM, content, at)
     at += _SUM.size

@@ -14,13 +14,13 @@ from typing import Any, BinaryIO, Final
 
 from common.errors import DataError, UnavailableError
 from common.name_order import name_order
-from common.recording.inflate import MOST_CHUNK_BYTES, ZSTD, inflate, unzstd, zstd_reader
+from common.recording.inflate import ZSTD, inflate, unzstd, zstd_reader
 from common.recording.mcap_writer import Topic
-from common.recording.opened import mapped
+from common.recording.opened import stored_data
 from common.recording.recorded import image_kind
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros1 import EXTRA, ROS1
-from common.recording.salvage import MAGIC, Channel, Message, Salvage
+from common.recording.salvage import MAGIC, MOST_CHUNK_BYTES, Channel, Message, Salvage
 
 _ROS1_BAG: Final = b"#ROSBAG V2.0\n"
 _SQLITE: Final = b"SQLite format 3\0"
@@ -149,7 +149,7 @@ def _plain(path: Path, folder: Path) -> Path:
 
 def _channels(part: Path, bag: Path) -> list[Channel]:
     if _head(part).startswith(MAGIC):
-        records = Salvage(mapped(part), inflate).records()
+        records = Salvage(stored_data(part), inflate).records()
         return list({each.channel: None for each in records if isinstance(each, Message) and each.channel is not None})
     with _opened(part, bag) as reader:
         return [_channel(connection, part) for connection in reader.connections]
@@ -158,7 +158,7 @@ def _channels(part: Path, bag: Path) -> list[Channel]:
 def _messages(part: Path, bag: Path) -> Iterator[Message]:
     """Return the messages of a file in their order."""
     if _head(part).startswith(MAGIC):
-        yield from (each for each in Salvage(mapped(part), inflate).records() if isinstance(each, Message))
+        yield from (each for each in Salvage(stored_data(part), inflate).records() if isinstance(each, Message))
         return
     with _opened(part, bag) as reader:
         channels = {connection.id: _channel(connection, part) for connection in reader.connections}

@@ -8,7 +8,7 @@ from common.errors import DataError
 from common.recording.inflate import inflate
 from common.recording.layout import topics
 from common.recording.mcap_writer import MOST_TOPICS, Topic
-from common.recording.opened import mapped
+from common.recording.opened import stored_data
 from common.recording.recorded import image_kind
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import SCHEMAS
@@ -48,7 +48,7 @@ def copy_recording(
         UnavailableError: the file cannot be made, or the disk is full.
         DataError: the source cannot be read, or is no MCAP file.
     """
-    data = mapped(source)
+    data = stored_data(source)
     channels = {topic.name: topic for topic in topics()}
     account = CopyAccount()
     for record in Salvage(data, inflate).records():

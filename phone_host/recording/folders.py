@@ -56,7 +56,7 @@ def export_folders(recorded: Recorded, out: Path) -> dict[str, int]:
                 counts[side] = _export(recorded, topic, folder / side) if topic else 0
             for name, data in recorded.attachments.items():
                 if _is_plain(name):
-                    write_bytes(folder / name, data)
+                    write_bytes(folder / name, bytes(data))
     except FileExistsError:
         raise UnavailableError(f"{out} exists already", "name another folder") from None
     except OSError as error:

@@ -10,7 +10,7 @@ from common.errors import DataError, SettingsError
 from common.recording.capture_runs import CaptureRuns
 from common.recording.inflate import inflate
 from common.recording.layout import ABOUT, CAPTURE, CLOCK, camera_name, image_topic
-from common.recording.opened import mapped, open_recorded
+from common.recording.opened import open_recorded, stored_data
 from common.recording.recorded import Recorded, Shown
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import RecordedImage, image_parts, image_type
@@ -210,7 +210,7 @@ def _write_begin(file: RecordingFile, host: Opened, board: Opened, relation: Rel
     if "settings.json" in board.recorded.attachments:
         settings = bytes(board.recorded.attachments["settings.json"])
         file.attach("board-settings.json", "application/json", settings, at_ns)
-    for record in Salvage(mapped(host.path), inflate).records():
+    for record in Salvage(stored_data(host.path), inflate).records():
         if isinstance(record, Message) and record.channel is not None and record.channel.topic.endswith("camera_info"):
             file.add(record.channel.topic, record.data, sequence=0, log_ns=record.log_ns, publish_ns=record.publish_ns)
     text = clock_text(relation.clock, board_about.board_boot_id).encode()

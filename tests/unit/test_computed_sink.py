@@ -13,7 +13,7 @@ from common.ledger import StageTimes
 from common.protocol.message import CameraDescription, Pacing
 from common.recording.inflate import inflate
 from common.recording.layout import CLOUD, DEPTH
-from common.recording.opened import mapped, open_recorded
+from common.recording.opened import open_recorded, stored_data
 from common.recording.ros_messages import IMAGE, POINT_BYTES, POINT_CLOUD
 from common.recording.salvage import Message, Salvage
 from phone_host.model import FramePair, Processed, RectifiedPair, Result, Side
@@ -42,7 +42,7 @@ def _result(at_ns: int, cloud: "np.ndarray[tuple[int, ...], np.dtype[np.float32]
 
 
 def _messages(path: Path, topic: str) -> list[Message]:
-    records = Salvage(mapped(path), inflate).records()
+    records = Salvage(stored_data(path), inflate).records()
     return [each for each in records if isinstance(each, Message) and each.channel and each.channel.topic == topic]
 
 
