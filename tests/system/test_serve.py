@@ -238,6 +238,15 @@ def test_two_pages_on_one_settings_file_lose_nothing(tmp_path: Path) -> None:
     assert "right" not in text
 
 
+def test_a_settings_file_that_links_to_itself_is_told(tmp_path: Path) -> None:
+    """A choice cannot be kept in it: one line names the file and the remedy, and the page lives on."""
+    link = tmp_path / "host.toml"
+    link.symlink_to(link)
+    with page(["serve", "127.0.0.1:0", "--config", str(link)], tmp_path, "one") as (serving, one):
+        assert f"settings file {link} cannot be written" in json.dumps(one.do("set", matcher="block"))
+        assert "Traceback" not in serving.stderr
+
+
 def test_a_port_that_is_taken_is_told_with_the_remedy(tmp_path: Path) -> None:
     """Exit 3, one line."""
     with socket.socket() as taken:

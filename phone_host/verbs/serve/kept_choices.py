@@ -2,6 +2,7 @@
 
 import fcntl
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
@@ -72,8 +73,10 @@ def keep(file: Path, choices: Mapping[str, str], before: Mapping[str, str] | Non
     Raises:
         SettingsError: the file is written in a way that cannot be changed, or cannot be written.
     """
-    target = file.resolve() if file.is_symlink() else file.absolute()
     try:
+        with suppress(FileNotFoundError):
+            file.stat()  # links that go round in a circle end here, in words
+        target = file.resolve() if file.is_symlink() else file.absolute()
         with opened_folder(target.parent, make=True) as folder:
             fcntl.flock(folder, fcntl.LOCK_EX)  # until the folder is closed
             text = file.read_text(encoding="utf-8") if is_there(file) else ""
