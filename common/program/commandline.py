@@ -16,7 +16,7 @@ from common.errors import TandemError
 from common.plain_text import printable
 from common.program import interrupts
 from common.program.invocation import as_found
-from common.program.out_of_memory import REMEDY, is_out_of_memory, words_of
+from common.program.out_of_memory import is_out_of_memory, remedy_of, words_of
 from common.program.quantities import decimal_number, whole_number
 from common.program.streams import mend_streams
 from common.program.terminal import fitted
@@ -258,7 +258,7 @@ def _ran(
     except Exception as error:
         if options.debug or not is_out_of_memory(error):
             raise
-        _say(f"{parser.prog}: error: memory ran out{words_of(error)}: {REMEDY}")
+        _say(f"{parser.prog}: error: memory ran out{words_of(error)}: {remedy_of(vars(options))}")
         return _BAD_DATA
 
 

@@ -12,6 +12,7 @@ from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.imagesize.head import size_text as px_text
 from common.orientation import UPRIGHT, Flip, Orientation
+from common.program.out_of_memory import noted_if_out_of_memory
 from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.causes.looks import BoardLook, SeenLook, look_at
 from phone_host.calibration.out_of_step import FileCorners
@@ -105,7 +106,8 @@ def look_for_boards(
     """
 
     def look(path: Path, index: int) -> _Seen:
-        return _look(path, board, most_pixels, mounted[index])
+        with noted_if_out_of_memory(str(path)):
+            return _look(path, board, most_pixels, mounted[index])
 
     seen, failures = _read(files, look, advance)
     rejected = [_alone(path, side.value) for side, alone in _unpaired(files) for path in alone]

@@ -16,6 +16,7 @@ from common import now
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
+from common.program.out_of_memory import noted_if_out_of_memory
 from phone_host.calibration.board_plane import BoardPlane, find_board_plane
 from phone_host.calibration.target import Board
 from phone_host.measure.depth_error import depth_error_m
@@ -114,7 +115,8 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
     with kept_if_interrupted(write_so_far):
         for index, (_, left, right) in enumerate(job.files.pairs):
             try:
-                pairs.append(_measured(job, cores, index, watcher))
+                with noted_if_out_of_memory(f"{left} and {right}"):
+                    pairs.append(_measured(job, cores, index, watcher))
             except DataError as error:
                 if is_only or cores.has_none:
                     raise

@@ -13,6 +13,7 @@ from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
 from common.program.interrupts import is_heard
+from common.program.out_of_memory import noted_if_out_of_memory
 from common.words import counted
 from phone_host.measure.trust import Doubt
 from phone_host.model import Processed
@@ -151,7 +152,8 @@ class _Work:
             SettingsError: the core cannot be made so.
         """
         try:
-            self._pairs.append(self._taken(name, left, right))
+            with noted_if_out_of_memory(f"{left} and {right}"):
+                self._pairs.append(self._taken(name, left, right))
         except DataError as error:
             if self._cores.has_none:  # no pair can be computed without one
                 raise

@@ -17,6 +17,7 @@ from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
+from common.program.out_of_memory import noted_if_out_of_memory
 from phone_host.calibration.running.stills import StillsWatch
 from phone_host.model import Drift
 from phone_host.output.atomic import write_text
@@ -111,7 +112,8 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         work = _Work(job, results, watcher)
         if is_one:
             _, left, right = job.files.pairs[0]
-            done = _set(job, (work.computed("", left, right),))
+            with noted_if_out_of_memory(f"{left} and {right}"):
+                done = _set(job, (work.computed("", left, right),))
             results.publish()
             return done
         pairs: list[PairReport | FailedPair] = []
@@ -215,7 +217,8 @@ class _Work:
     def tried(self, folder: str, left: Path, right: Path) -> PairReport | FailedPair:
         """Compute and write a pair, or say why not."""
         try:
-            return self.computed(folder, left, right)
+            with noted_if_out_of_memory(f"{left} and {right}"):
+                return self.computed(folder, left, right)
         except (DataError, SettingsError) as error:  # or a --crop that lies outside images of this size
             if self._cores.has_none:  # no pair can be computed without one
                 raise

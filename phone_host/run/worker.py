@@ -9,6 +9,7 @@ from common import now
 from common.errors import DataError, SettingsError
 from common.frame import SpoiledImageError
 from common.program.logs import event
+from common.program.out_of_memory import noted_if_out_of_memory
 from phone_host.model import FramePair, Result
 from phone_host.run.ledgerer import Ledgerer, WorkerMarks
 from phone_host.run.pipeline import Pipeline
@@ -88,7 +89,8 @@ class Worker:
 
     def _process(self, pair: FramePair, dequeued_ns: int) -> None:
         try:
-            processed = self._pipeline.process(pair, is_saved=self._is_saved(self._ledgerer.processed))
+            with noted_if_out_of_memory(f"pair {self._ledgerer.processed}"):
+                processed = self._pipeline.process(pair, is_saved=self._is_saved(self._ledgerer.processed))
         except (DataError, SettingsError) as error:  # or a --crop that lies outside images of this size
             self._note_failed(error)
             return

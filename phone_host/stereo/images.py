@@ -28,7 +28,7 @@ from common.imagesize.head import size_text as px_text
 from common.imagesize.read import read_head, whole_image
 from common.orientation import UPRIGHT, Orientation
 from common.program.logs import event
-from common.program.out_of_memory import is_out_of_memory
+from common.program.out_of_memory import is_out_of_memory, noted_if_out_of_memory
 from phone_host.model import Image
 from phone_host.stereo.eight_bit import AnyImage, to_8_bit
 from phone_host.stereo.orient import upright
@@ -302,7 +302,8 @@ def _decoded(image: EncodedFile, reduction: int) -> AnyImage:
     payload = np.frombuffer(whole_image(image.payload, image.head, name), dtype=np.uint8)
     found: list[AnyImage | None] = []
     try:
-        said = overhear(lambda: found.append(cv2.imdecode(payload, flags)))
+        with noted_if_out_of_memory(f"{name} of {px_text(image.head.size_px)} px"):
+            said = overhear(lambda: found.append(cv2.imdecode(payload, flags)))
     except cv2.error as error:
         if is_out_of_memory(error):  # the image is sound
             raise
