@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None: those of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device, link or stdout cannot be had, 4 bad data or a failed check, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, link or stdout cannot be had, 4 bad data or a failed check, 129, 130, 131 and 143 ended by a signal.
     """
     return run_command(parser(), arguments, _run)
 

@@ -2,7 +2,7 @@
 
 Every message is one line that names the culprit (option, key, file, device, peer) and the remedy.
 Exit codes are part of the commands' contract: 0 done, 2 wrong usage or settings, 3 a device or link cannot be had, 4 the data are bad
-or missing, or a check failed, 130 interrupted.
+or missing, or a check failed; 129 hung up, 130 interrupted, 131 quit, 143 terminated.
 """
 
 from typing import ClassVar

@@ -110,7 +110,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name. None: the arguments of the process.
 
     Returns:
-        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout is unavailable, 4 bad data, 130 interrupted.
+        The exit code: 0 done, 2 wrong usage, 3 a device, a link or stdout is unavailable, 4 bad data, 129, 130, 131 and 143 ended by a signal.
     """
     return run_command(parser(), arguments, _run)
 
