@@ -82,10 +82,13 @@ def test_nohup_keeps_a_program_alive(name: str, tmp_path: Path) -> None:
             command, stdout=subprocess.PIPE, stderr=log, stdin=subprocess.DEVNULL, env=environment, cwd=tmp_path
         ) as process,
     ):
-        until(lambda: _has_begun(name, tmp_path, (tmp_path / "program.err").read_text()), f"{name} has begun")
-        process.send_signal(signal.SIGHUP)
-        process.send_signal(signal.SIGTERM)
-        out, _ = process.communicate(timeout=PATIENCE_S)
+        try:
+            until(lambda: _has_begun(name, tmp_path, (tmp_path / "program.err").read_text()), f"{name} has begun")
+            process.send_signal(signal.SIGHUP)
+            process.send_signal(signal.SIGTERM)
+            out, _ = process.communicate(timeout=PATIENCE_S)
+        finally:
+            process.kill()
     assert process.returncode == 0
     assert isinstance(json.loads(out), dict)
 
