@@ -66,7 +66,7 @@ the right ones.
 | 2 | wrong usage or settings; nothing was started |
 | 3 | a device, link or folder cannot be had now; trying again may help |
 | 4 | the data are bad or missing, or a check failed |
-| 130 | ended by Ctrl-C |
+| 130 | ended by Ctrl-C; a print that was cancelled, by whatever but a closed terminal |
 | 129, 131, 143 | a computation was ended by SIGHUP (its terminal was closed, ssh was lost), SIGQUIT or SIGTERM; streams and daemons end in order then, with 0. `nohup` keeps them alive |
 """
 

@@ -78,7 +78,8 @@ def keep(file: Path, choices: Mapping[str, str], before: Mapping[str, str] | Non
             file.stat()  # links that go round in a circle end here, in words
         target = file.resolve() if file.is_symlink() else file.absolute()
         with opened_folder(target.parent, make=True) as folder:
-            fcntl.flock(folder, fcntl.LOCK_EX)  # until the folder is closed
+            with suppress(OSError):  # network shares and FUSE may have no locks: the file is still replaced whole
+                fcntl.flock(folder, fcntl.LOCK_EX)  # until the folder is closed
             text = file.read_text(encoding="utf-8") if is_there(file) else ""
             new = _with_choices(text, choices if before is None else _merged(kept(file)[0], before, choices))
             if new == text:
