@@ -89,9 +89,9 @@ def times_ns(numbers: Sequence[Decimal], unit: Unit | None, name: str, *, are_ti
 def _unit(numbers: Sequence[Decimal], name: str, *, are_times: bool) -> Unit:
     if not numbers:
         return Unit.S
-    dated = [unit for unit in Unit if all(_FIRST_DATE_S <= number * unit.ns / NS < _LAST_DATE_S for number in numbers)]
-    if dated:
-        return dated[0]
+    dated = dated_unit(numbers)
+    if dated is not None:
+        return dated
     if not are_times:
         raise DataError(
             f"the images in {name} have no times",
@@ -99,12 +99,24 @@ def _unit(numbers: Sequence[Decimal], name: str, *, are_times: bool) -> Unit:
         )
     if any(number != number.to_integral_value() for number in numbers):
         return Unit.S
-    between = [after - before for before, after in pairwise(numbers)]
-    usual = statistics.median(between) if between else Decimal(0)
+    usual = usual_step(numbers)
     likely = [unit for unit in Unit if usual > 0 and MIN_HZ <= NS / (float(usual) * unit.ns) <= MAX_HZ]
     if len(likely) != 1:
         raise DataError(f"{name} does not say in which unit its times are", "give it as --stamps-in s|ms|us|ns")
     return likely[0]
+
+
+def dated_unit(numbers: Sequence[Decimal]) -> Unit | None:
+    """Return the unit in which all numbers are dates; None: there is none."""
+    for unit in Unit:
+        if all(_FIRST_DATE_S <= number * unit.ns / NS < _LAST_DATE_S for number in numbers):
+            return unit
+    return None
+
+
+def usual_step(numbers: Sequence[Decimal]) -> Decimal:
+    """Return the lower median of the differences of neighbours; 0 for less than two numbers."""
+    return statistics.median_low([after - before for before, after in pairwise(numbers)] or [Decimal(0)])
 
 
 def at_rate(places: Iterable[int], fps: float, zero_ns: int) -> list[int]:

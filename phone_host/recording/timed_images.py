@@ -1,5 +1,6 @@
 """The images of a data set's two folders, each with its time: of data.csv, a file of times, its name, or a rate that is given."""
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,11 +13,14 @@ from common.camera.replay import find_images
 from common.errors import DataError
 from common.files import read_whole
 from common.words import counted
-from phone_host.recording.given_times import EPOCH_NS, Unit, at_rate, numbers_in, times_ns
+from phone_host.recording.given_times import EPOCH_NS, Unit, at_rate, dated_unit, numbers_in, times_ns, usual_step
 
 _MOST_TIMES_BYTES: Final = 64 << 20
 _SECONDS: Final = re.compile(r"[0-9]{1,12}\.[0-9]{1,9}")
 """A name that is a time in seconds, as TUM's data sets have it."""
+
+_LEAST_STEP_OF_TIMES: Final = 1000
+"""Numbers with a larger step are times: who counts images does not leave out a thousand each time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +69,25 @@ def timed_images(folders: tuple[Path, Path], options: TimeOptions) -> tuple[list
 def _at_rate(folders: tuple[Path, Path], fps: float) -> tuple[list[TimedImage], list[TimedImage]]:
     """Return images that came at a rate, by the numbers in their names: one that is missing leaves its time free."""
     paths = [find_images(str(folder)) for folder in folders]
-    numbers = [numbers_of([path.stem for path in each]) for each in paths]
-    first = min((number for each in numbers for number in each), default=0)
-    last = max((number for each in numbers for number in each), default=0)
-    if not all(numbers) or last - first >= MOST_SPAN:
-        first, numbers = 0, [tuple(range(len(each))) for each in paths]
+    places = _places([_numbers_in_names(each) for each in paths]) or [list(range(len(each))) for each in paths]
     sides = []
-    for each, of in zip(paths, numbers, strict=True):
-        stamps = at_rate([number - first for number in of], fps, EPOCH_NS)
+    for each, of in zip(paths, places, strict=True):
+        stamps = at_rate(of, fps, EPOCH_NS)
         sides.append(_sorted([TimedImage(path, at) for path, at in zip(each, stamps, strict=True)]))
     return sides[0], sides[1]
+
+
+def _places(sides: Sequence[Sequence[Decimal]]) -> list[list[int]]:
+    """Return which image of both films each one is, from 0; empty if the numbers in their names do not tell."""
+    if not all(sides):
+        return []
+    first = min(number for each in sides for number in each)
+    step = min(usual_step(sorted(each)) for each in sides)
+    if step < _LEAST_STEP_OF_TIMES and not all(dated_unit(each) for each in sides):
+        step = Decimal(1)  # counted, not timed: a number that is missing is an image that is missing
+    places = [[math.floor((number - first) / step + Decimal("0.5")) for number in each] for each in sides]
+    is_told = all(len(set(each)) == len(each) and max(each) < MOST_SPAN for each in places)
+    return places if is_told else []
 
 
 def _timed(folder: Path, options: TimeOptions) -> list[TimedImage]:
@@ -112,11 +125,7 @@ def _listed(folder: Path, listed: Path, unit: Unit | None) -> list[TimedImage]:
 
 def _named(paths: Sequence[Path], unit: Unit | None, folder: Path) -> list[int]:
     """Return the times that are the images' names."""
-    stems = [path.stem for path in paths]
-    if all(_SECONDS.fullmatch(stem) for stem in stems):
-        numbers = [Decimal(stem) for stem in stems]
-    else:
-        numbers = [Decimal(number) for number in numbers_of(stems)]
+    numbers = _numbers_in_names(paths)
     if not numbers:
         raise DataError(
             f"the images in {folder} have no times", "give --times FILE, one time a line, or the rate as --fps N"
@@ -125,6 +134,14 @@ def _named(paths: Sequence[Path], unit: Unit | None, folder: Path) -> list[int]:
     stamps = times_ns([numbers[place] for place in order], unit, str(folder), are_times=False)
     by_place = dict(zip(order, stamps, strict=True))
     return [by_place[place] for place in range(len(numbers))]
+
+
+def _numbers_in_names(paths: Sequence[Path]) -> list[Decimal]:
+    """Return the number or the seconds in each image's name; empty if the names are not numbered."""
+    stems = [path.stem for path in paths]
+    if len(stems) > 1 and all(_SECONDS.fullmatch(stem) for stem in stems):
+        return [Decimal(stem) for stem in stems]
+    return [Decimal(number) for number in numbers_of(stems)]
 
 
 def _sorted(images: list[TimedImage]) -> list[TimedImage]:

@@ -255,6 +255,13 @@ def _imported(folder: Path, words: list[str]) -> list[int]:
 
 
 _TIMES = [ZERO_NS + number * PERIOD_NS for number in range(4)]
+_NAMED_BY_TIMES = {
+    "ns": [f"{at}" for at in _TIMES],
+    "us": [f"{at // 1000}" for at in _TIMES],
+    "ms": [f"{at // 10**6}" for at in _TIMES],
+    "s": [f"{at // 10**9}.{at % 10**9:09}" for at in _TIMES],
+    "us since the camera began": [f"{at}" for at in range(5_000_000, 5_400_000, 100_000)],
+}
 NAMES: dict[str, tuple[list[str], list[str], list[int]]] = {
     "ns": ([f"{at}" for at in _TIMES], [], _TIMES),
     "us": ([f"{at // 1000}" for at in _TIMES], [], _TIMES),
@@ -270,12 +277,20 @@ NAMES: dict[str, tuple[list[str], list[str], list[int]]] = {
         ["--fps", "20"],
         [946_684_800 * 10**9 + at * 50_000_000 for at in (0, 1, 3, 4)],
     ),
+    **{
+        f"times in {unit}, one missing, at a rate": (
+            [names[at] for at in (0, 1, 3)],
+            ["--fps", "20"],
+            [946_684_800 * 10**9 + at * 50_000_000 for at in (0, 1, 3)],
+        )
+        for unit, names in _NAMED_BY_TIMES.items()
+    },
 }
 
 
 @pytest.mark.parametrize("kind", NAMES)
 def test_names_are_times_in_the_unit_that_is_plausible(tmp_path: Path, kind: str) -> None:
-    """Dates in any unit are read; of others the unit is given, or the rate, which leaves room for an image that is missing."""
+    """Dates in any unit are read; of others the unit is given, or the rate, which leaves room for an image that is missing, also where the names are times."""
     names, options, expected = NAMES[kind]
     assert _imported(tmp_path, [*_folders(tmp_path, names), *options]) == expected
 
