@@ -26,6 +26,9 @@ _NUMBERED: Final = re.compile(r"[Nn]\s*\d+\s*(?=[A-Za-z])([^*]*)(?:\*\s*\d+)?")
 """A line that has its number already, and perhaps its checksum, as hosts send them."""
 
 _NAME: Final = re.compile(r"([GMT]\d+)(?!\d)")
+_WITH_WORDS: Final = frozenset({"", "M0", "M1", "M16", "M23", "M28", "M32", "M117", "M118", "M486"})
+"""Commands behind which stands a message or a name, in any script; the empty name stands for macros."""
+
 _TIME: Final = re.compile(r";\s*(?:estimated printing time(?: \(normal mode\))?\s*=|TIME:)\s*(.+)", re.IGNORECASE)
 _AREA: Final = re.compile(r";\s*(?:bed_shape|printable_area)\s*=\s*(.+)")
 _HEIGHT: Final = re.compile(r";\s*(?:max_print_height|printable_height)\s*=\s*(\d+(?:\.\d+)?)\s*$")
@@ -99,7 +102,7 @@ def lines_of(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LIN
     Args:
         file: its lines.
         name: of the file, for messages.
-        most_characters: that a line may have.
+        most_characters: that a line may have, as bytes of UTF-8.
 
     Raises:
         DataError: a line is none of G-code, or too long.
@@ -108,13 +111,21 @@ def lines_of(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LIN
         text = _without_comment(raw)
         if not text:
             continue
-        if not text.isascii() or not text.isprintable() or not text[0].isalpha():
+        if not _is_line(text):
             raise DataError(f"{name}: line {number} is no G-code", "give the file that a slicer wrote")
-        if len(text) > most_characters:
+        encoded = text.encode()
+        if len(encoded) > most_characters:
             raise DataError(
-                f"{name}: line {number} has {len(text)} characters", f"give lines of at most {most_characters}"
+                f"{name}: line {number} has {len(encoded)} characters", f"give lines of at most {most_characters}"
             )
         yield Line(number, text)
+
+
+def _is_line(text: str) -> bool:
+    """Return whether a line may be G-code: letters beyond ASCII only where people and macros write words."""
+    if not text.isprintable() or not (text[0].isascii() and text[0].isalpha()):
+        return False
+    return text.isascii() or name_of(text) in _WITH_WORDS
 
 
 def _without_comment(raw: str) -> str:

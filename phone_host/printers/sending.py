@@ -62,7 +62,7 @@ class LineDoor:
         off = heaters_off(job.facts.tools, has_chamber=job.facts.has_chamber)
         options = SenderOptions(off, _INACTIVITY_S if job.facts.heats else 0, self._max_busy_ns)
         try:
-            file = job.gcode.open(encoding="utf-8", errors="replace")
+            file = job.gcode.open(encoding="utf-8-sig", errors="replace")
         except OSError as error:
             raise _unreadable(error) from None
         with file:

@@ -313,7 +313,7 @@ def facts_of(gcode: Path, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
     try:
         if kind_of(gcode) in {Kind.PIPE, Kind.DEVICE, Kind.SOCKET}:  # it would be waited for, and is read twice
             raise DataError(f"{gcode} is not a plain file", "give the file that a slicer wrote")
-        with gcode.open(encoding="utf-8", errors="replace") as file:
+        with gcode.open(encoding="utf-8-sig", errors="replace") as file:
             return examine(file, str(gcode), most_characters)
     except OSError as error:
         raise DataError(f"{gcode} cannot be read ({error.strerror})", "give the file that a slicer wrote") from None
@@ -349,7 +349,7 @@ def require_inside(gcode: Path, facts: GcodeFacts, given: Bed | None) -> None:
         )
     if _holds(bed, facts.low_mm, facts.high_mm):
         return
-    with gcode.open(encoding="utf-8", errors="replace") as file:
+    with gcode.open(encoding="utf-8-sig", errors="replace") as file:
         found = first_outside(file, str(gcode), facts, bed)
     if found is not None:
         line, (x, y, z) = found

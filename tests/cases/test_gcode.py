@@ -138,6 +138,37 @@ def test_a_model_beyond_its_bed_is_refused(text: str, bed: str | None, line: str
     assert "@centre" in caught.value.remedy
 
 
+_PLAIN = "M83\nG28\n" + _square(100, 100)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("\ufeff; würfel\r\n" + _PLAIN, id="a byte order mark before a comment"),
+        pytest.param("\ufeff" + _PLAIN, id="a byte order mark before a command"),
+        pytest.param(_PLAIN + "M117 Fertig: schöner Würfel\n", id="a message on the display"),
+        pytest.param(_PLAIN + "M486 S0\nM486 AKörper, Würfel.stl\n", id="the name of an object"),
+        pytest.param(_PLAIN + "EXCLUDE_OBJECT_START NAME=方块\n", id="a macro of Klipper"),
+    ],
+)
+def test_names_and_messages_may_have_any_letters(text: str, tmp_path: Path) -> None:
+    """Objects have the names that people give them, and editors put a mark before the text: both are G-code."""
+    gcode = tmp_path / "part.gcode"
+    gcode.write_text(text, encoding="utf-8")
+    assert facts_of(gcode).extruding == 4
+
+
+@pytest.mark.parametrize(
+    "line", ["G1 X1\N{ARABIC-INDIC DIGIT TWO} E1", "M104 S2\N{ARABIC-INDIC DIGIT ZERO}", "ü", "M117 a\x00b"]
+)
+def test_commands_have_no_other_letters(line: str, tmp_path: Path) -> None:
+    """Numbers are those that every firmware reads; what a broken file holds is not sent."""
+    gcode = tmp_path / "part.gcode"
+    gcode.write_text(_PLAIN + line + "\n", encoding="utf-8")
+    with pytest.raises(DataError, match="line 8 is no G-code"):
+        facts_of(gcode)
+
+
 def test_beds_are_read_as_they_are_named() -> None:
     """A rectangle begins in its corner, a round bed has its origin in the middle, and both may say otherwise."""
     assert parse_bed("220, 210,250mm") == Bed((220, 210, 250))
