@@ -21,6 +21,7 @@ from typing import Final
 from common.errors import DataError
 from common.files import read_whole
 from phone_host.model import StereoGeometry
+from phone_host.output.meshes.text import without_mark
 
 _MOST_BYTES: Final = 64 << 10
 """Limit for a file. The longest kind (KITTI's raw data) has about 4 KB."""
@@ -47,7 +48,6 @@ _DOFFS_PX: Final = 1.0
 """By how much doffs may differ from the two principal points: smaller copies of a scene have them rounded."""
 
 _MIDDLEBURY_KEYS: Final = frozenset({"cam0", "cam1", "doffs", "baseline", "ndisp"})
-_ENCODING: Final = "utf-8-sig"  # Windows' Notepad writes a byte order mark first
 
 _REMEDY: Final = "give calib.txt as Middlebury, ETH3D or KITTI publish it, or --focal and --baseline"
 
@@ -79,7 +79,7 @@ class CalibTxt:
 def is_calib_txt(path: Path) -> bool:
     """Return whether a file holds lines like a calib.txt's. False also for a file that cannot be read."""
     try:
-        text = read_whole(path, _MOST_BYTES).decode(_ENCODING)
+        text = without_mark(read_whole(path, _MOST_BYTES)).decode()
     except (OSError, UnicodeDecodeError, DataError):
         return False
     if text.lstrip().startswith("%YAML"):
@@ -101,7 +101,7 @@ def read_calib_txt(path: Path, prefer: KittiCameras = KittiCameras.GREY) -> Cali
         DataError: the file cannot be read, or a key is missing or not valid; names file and key.
     """
     try:
-        text = read_whole(path, _MOST_BYTES).decode(_ENCODING)
+        text = without_mark(read_whole(path, _MOST_BYTES)).decode()
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", _REMEDY) from error
     except UnicodeDecodeError as error:

@@ -12,6 +12,10 @@ from phone_host.output.rig_files.imported import import_rig
 
 _D5 = ("0.01", "-0.02", "0.0005", "-0.0003", "0.004")
 _ZERO9 = ("0.0",) * 9
+_MIDDLEBURY = (
+    "cam0=[500 0 320.5; 0 500 239.5; 0 0 1]\ncam1=[500 0 330.5; 0 500 239.5; 0 0 1]\n"
+    "doffs=10\nbaseline=60\nwidth=640\nheight=480\n"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,3 +191,56 @@ def test_images_txt_with_other_images_is_refused(lines: tuple[str, ...], reason:
     """No image is skipped in silence: never a rig of images 1 and 3."""
     with pytest.raises(DataError, match=reason):
         _colmap(tmp_path, lines)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le"])
+def test_calibrations_that_windows_redirected_are_read(encoding: str, tmp_path: Path) -> None:
+    """PowerShell's `>` writes UTF-16 with a mark; a calib.txt is read in it, too. Without a mark UTF-16 is refused."""
+    for name, shift in (("left", "0.0"), ("right", "-30.0")):
+        (tmp_path / f"{name}.yaml").write_text(_Echo().text(shift), encoding=encoding)
+    (tmp_path / "calib.txt").write_text(_MIDDLEBURY, encoding=encoding)
+    for given in (tmp_path, tmp_path / "calib.txt"):
+        if encoding == "utf-16-le":
+            with pytest.raises(DataError):
+                import_rig((given,))
+        else:
+            np.testing.assert_allclose(import_rig((given,)).rig.t_right_left_m, [-0.06, 0, 0], atol=1e-12)
+
+
+def test_a_day_of_kittis_raw_data_is_read_by_its_folder(tmp_path: Path) -> None:
+    """Beside the cameras' file lie those of the laser and of the inertial unit."""
+    eye, shifts = "1 0 0 0 1 0 0 0 1", (0, -30)
+    (tmp_path / "calib_cam_to_cam.txt").write_text(
+        "calib_time: 09-Jan-2012 13:57:47\ncorner_dist: 9.95e-02\n"
+        + "".join(
+            f"S_rect_0{at}: 6.2e+02 1.9e+02\nR_rect_0{at}: {eye}\nP_rect_0{at}: 500 0 300 {shift} 0 500 90 0 0 0 1 0\n"
+            for at, shift in enumerate(shifts)
+        )
+    )
+    for name in ("calib_imu_to_velo.txt", "calib_velo_to_cam.txt"):
+        (tmp_path / name).write_text(f"R: {eye}\nT: 0 0 0\n")
+    assert import_rig((tmp_path,)).rig.left.width_px == 620
+
+
+@pytest.mark.parametrize("given", ["", "cameras.bin", "images.bin"])
+def test_a_binary_model_of_colmap_is_named(given: str, tmp_path: Path) -> None:
+    """One line says what it is and how to write it as text."""
+    for name in ("cameras.bin", "images.bin"):
+        (tmp_path / name).write_bytes(b"\x02" + bytes(79))
+    with pytest.raises(DataError, match="is a binary model of COLMAP") as caught:
+        import_rig((tmp_path / given,))
+    assert "model_converter" in caught.value.remedy
+
+
+@pytest.mark.parametrize("d", ["[[0.01, -0.02, 0, 0, 0.004]]", "[[0.01], [-0.02], [0], [0], [0.004]]"])
+def test_matrices_as_numpy_lists_them_are_read(d: str, tmp_path: Path) -> None:
+    """OpenCV's Python returns coefficients as one row or one column; `tolist` keeps that."""
+    camera = "[[500, 0, 320.5], [0, 500, 239.5], [0, 0, 1]]"
+    path = tmp_path / "calib.json"
+    path.write_text(
+        f'{{"M1": {camera}, "D1": {d}, "M2": {camera}, "D2": {d},'
+        ' "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "T": [[-0.06], [0], [0]]}'
+    )
+    rig = import_rig((path,), sizes_px=((640, 480), (640, 480))).rig
+    np.testing.assert_array_equal(rig.left.distortion[:5], [0.01, -0.02, 0, 0, 0.004])
+    np.testing.assert_allclose(rig.t_right_left_m, [-0.06, 0, 0], atol=1e-12)

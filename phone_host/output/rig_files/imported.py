@@ -15,6 +15,7 @@ from common.files import read_whole
 from common.places import Kind, kind_of
 from phone_host.model import Rectification, Rig
 from phone_host.output.calib_txt import is_calib_txt, read_calib_txt
+from phone_host.output.meshes.text import without_mark
 from phone_host.output.rig_files.colmap import CAMERAS, IMAGES, colmap_texts, is_cameras, is_images, read_colmap
 from phone_host.output.rig_files.euroc import euroc_texts, is_euroc, read_euroc
 from phone_host.output.rig_files.kalibr import is_kalibr, kalibr_texts, read_kalibr
@@ -81,8 +82,12 @@ _IN_FOLDERS: Final = (
     ("stereo.xml",),
     ("rig.yaml",),
     ("calib.txt",),
+    ("calib_cam_to_cam.txt",),
 )
 """What a folder that stands for a calibration holds, by the names that the programs give."""
+
+_BINARY_CAMERAS: Final = "cameras.bin"
+_BINARY_MODEL: Final = frozenset({_BINARY_CAMERAS, "images.bin"})
 
 
 def files_of(given: tuple[Path, ...]) -> tuple[Path, ...]:
@@ -98,6 +103,7 @@ def files_of(given: tuple[Path, ...]) -> tuple[Path, ...]:
     if len(given) > 2:
         raise SettingsError(f"--import has {len(given)} files", "give one or two: left before right")
     try:
+        _require_no_binary(given)
         if len(given) != 1 or kind_of(given[0]) is not Kind.FOLDER:
             return given
         for names in _IN_FOLDERS:
@@ -107,6 +113,19 @@ def files_of(given: tuple[Path, ...]) -> tuple[Path, ...]:
     except OSError as error:  # a circle of links, a name that is too long, a folder that may not be searched
         raise DataError(f"{given[0]} cannot be read ({error.strerror})", _REMEDY) from error
     raise DataError(f"{given[0]} holds no calibration with a usual name", _REMEDY)
+
+
+def _require_no_binary(given: tuple[Path, ...]) -> None:
+    """Refuse COLMAP's binary model, by its names, unless its text lies in the same folder."""
+    for path in given:
+        folder = path if kind_of(path) is Kind.FOLDER else path.parent
+        binary = folder / _BINARY_CAMERAS if path == folder else path
+        is_binary = binary.name in _BINARY_MODEL and kind_of(binary) is Kind.FILE
+        if is_binary and (path != folder or kind_of(folder / CAMERAS) is not Kind.FILE):
+            raise DataError(
+                f"{binary} is a binary model of COLMAP",
+                "write it as text: colmap model_converter --input_path IN --output_path OUT --output_type TXT",
+            )
 
 
 def read_own_rig(path: Path) -> Rig:
@@ -210,7 +229,7 @@ def _rectified(path: Path, sizes_px: tuple[tuple[int, int], tuple[int, int]] | N
 
 def _text(path: Path) -> str:
     try:
-        return read_whole(path, _MOST_BYTES).decode("utf-8-sig")
+        return without_mark(read_whole(path, _MOST_BYTES)).decode()
     except OSError as error:
         raise DataError(f"{path} cannot be read ({error.strerror})", _REMEDY) from error
     except UnicodeDecodeError as error:

@@ -71,8 +71,11 @@ def read_opencv(node: Node) -> StatedRig:
     left, right = (_camera(node, n, side) for n, side in _SIDES)
     turn = node.first_of(*_ROTATION)
     translation = node.first_of(*_TRANSLATION)
-    is_column = isinstance(translation.tree, dict) and translation.child("rows").whole() == 3
-    shift = translation.matrix(*((3, 1) if is_column else (1, 3))).reshape(3)
+    if isinstance(tree := translation.tree, dict):
+        rows = translation.child("rows").whole()
+    else:
+        rows = len(tree) if isinstance(tree, list) and tree and isinstance(tree[0], list) else 1
+    shift = translation.matrix(*((3, 1) if rows == 3 else (1, 3))).reshape(3)
     return StatedRig(left, right, _rotation(turn), shift, f"{translation.file}: {translation.key}")
 
 

@@ -127,12 +127,19 @@ class Node:
         return np.array(values, np.float64).reshape(rows, columns)
 
     def values(self) -> tuple[float, ...]:
-        """Read a list of any length, or a matrix of one row or column.
+        """Read a list of any length, or a matrix of one row or column, also as numpy's `tolist` writes it.
 
         Raises:
             DataError: it is neither, or a number is not finite.
         """
-        return self.child("data").numbers() if isinstance(self.tree, dict) else self.numbers()
+        if isinstance(self.tree, dict):
+            return self.child("data").numbers()
+        rows = self.tree if isinstance(self.tree, list) else []
+        if rows and all(isinstance(row, list) for row in rows):
+            if len(rows) == 1:
+                return Node(self.file, self.key, rows[0]).numbers()
+            return tuple(number for row in rows for number in Node(self.file, self.key, row).numbers(1))
+        return self.numbers()
 
     def whole(self) -> int:
         """Read an image's width or height, or any other whole number above 0.
