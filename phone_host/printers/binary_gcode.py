@@ -1,4 +1,6 @@
-"""Binary G-code (Prusa's .bgcode): known by its first bytes, and converted by the program `bgcode` where one is installed.
+"""G-code that is no text. Binary one (Prusa's .bgcode) is converted by the program `bgcode` where one is installed, archives are named.
+
+What a file is, its first bytes say.
 
 That program (libbgcode) is AGPL, so it is run, never imported. `bgcode NAME.bgcode` writes NAME.gcode beside it.
 Source: https://github.com/prusa3d/libbgcode, doc/specifications.md: a file begins with "GCDE".
@@ -16,28 +18,46 @@ from common.errors import DataError
 from common.places import Kind, kind_of
 
 _MAGIC: Final = b"GCDE"
+_ARCHIVES: Final = {
+    b"\x1f\x8b": "compressed (gzip)",
+    b"PK\x03\x04": "a ZIP archive",
+    b"\xff\xfe": "UTF-16",
+    b"\xfe\xff": "UTF-16",
+}
+"""How the files begin that Cura (.gcode.gz, .ufp), Bambu Studio and OrcaSlicer (.gcode.3mf), and Windows' editors write."""
+
 _PROGRAM: Final = "bgcode"
 _PATIENCE_S: Final = 600
 _REMEDY: Final = 'switch "Supports binary G-code" off in the slicer (printer settings, general) and slice again, or install the program bgcode'
 
+_PLAIN_REMEDY: Final = "unpack it, or save it as UTF-8, and give the .gcode file; Bambu Studio and OrcaSlicer have it in Metadata/plate_1.gcode"
+
 
 def is_binary(gcode: Path) -> bool:
     """Return whether a file is binary G-code, whatever its name is; False also for one that cannot be read."""
+    return _first_bytes(gcode) == _MAGIC
+
+
+def _first_bytes(path: Path) -> bytes:
     try:
-        if kind_of(gcode) is not Kind.FILE:
-            return False
-        with gcode.open("rb") as file:
-            return file.read(len(_MAGIC)) == _MAGIC
+        if kind_of(path) is not Kind.FILE:
+            return b""
+        with path.open("rb") as file:
+            return file.read(len(_MAGIC))
     except OSError:
-        return False
+        return b""
 
 
 def require_readable(gcode: Path) -> None:
-    """Refuse binary G-code where there is no program that converts it.
+    """Refuse archives, and binary G-code where there is no program that converts it.
 
     Raises:
-        DataError: it is.
+        DataError: it is one.
     """
+    first = _first_bytes(gcode)
+    for begin, what in _ARCHIVES.items():
+        if first.startswith(begin):
+            raise DataError(f"{gcode} is {what}, no plain G-code", _PLAIN_REMEDY)
     if is_binary(gcode):
         _converter(gcode)
 

@@ -23,7 +23,8 @@ from phone_host.printers.gcode import MOST_FOR_LINES, MOST_FOR_SERVERS
 from phone_host.printers.printer_uri import LineUri, PrinterUri
 from phone_host.printers.slicing import SlicingWanted, facts_of, find_slicer, require_inside, sliced
 
-_SUFFIXES: Final = frozenset({".gcode", ".gco", ".g", ".bgcode", ".bgc"})
+_SUFFIXES: Final = frozenset({".gcode", ".gco", ".g", ".bgcode", ".bgc", ".ufp"})
+_ARCHIVES: Final = (".gcode.gz", ".gcode.zip", ".gcode.3mf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,8 @@ class Wanted:
 
 
 def is_gcode(what: Path) -> bool:
-    """Return whether a name is one of G-code."""
-    return what.suffix.lower() in _SUFFIXES
+    """Return whether a name is one of G-code, also in an archive."""
+    return what.suffix.lower() in _SUFFIXES or what.name.lower().endswith(_ARCHIVES)
 
 
 def require_input(what: Path) -> None:
@@ -53,7 +54,7 @@ def require_input(what: Path) -> None:
         what: G-code, a scan's folder or a mesh file.
 
     Raises:
-        DataError: there is no such file, or no model in the folder; or it is binary G-code, and there is no program that converts it.
+        DataError: there is no such file, or no model in the folder; or it is an archive, or binary G-code without a program that converts it.
     """
     if not is_gcode(what):
         mesh_file(what)

@@ -1,5 +1,6 @@
 """G-code as slicers and their profiles write it: prime lines beyond the bed, origins in its middle, round beds, binary files."""
 
+import gzip
 import math
 import os
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from common.errors import DataError, SettingsError
 from phone_host.printers.bed import Bed, parse_bed
 from phone_host.printers.binary_gcode import text_gcode
+from phone_host.printers.preparing import require_input
 from phone_host.printers.slicing import facts_of, require_inside
 
 _MODEL = "G1 X{x} Y{y} Z0.2 F6000\nG1 X{x1} Y{y} E0.7\nG1 X{x1} Y{y1} E0.7\nG1 X{x} Y{y1} E0.7\nG1 X{x} Y{y} E0.7\n"
@@ -192,6 +194,24 @@ def test_binary_gcode_is_known_by_its_first_bytes(name: str, tmp_path: Path, mon
     with pytest.raises(DataError, match="is binary G-code") as caught, text_gcode(tmp_path / name):
         pass
     assert 'switch "Supports binary G-code" off' in caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "what"),
+    [
+        ("cup.gcode.gz", gzip.compress(_PLAIN.encode()), "compressed"),
+        ("cup.gcode", gzip.compress(_PLAIN.encode()), "compressed"),
+        ("cup.gcode.3mf", b"PK\x03\x04" + bytes(40), "a ZIP archive"),
+        ("CUP.UFP", b"PK\x03\x04" + bytes(40), "a ZIP archive"),
+        ("cup.gcode", _PLAIN.encode("utf-16"), "UTF-16"),
+    ],
+)
+def test_gcode_in_an_archive_is_named(name: str, content: bytes, what: str, tmp_path: Path) -> None:
+    """What Cura and Bambu Studio compress is no broken G-code and no mesh: one line says what it is."""
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DataError, match=f"is {what}") as caught:
+        require_input(tmp_path / name)
+    assert "unpack it" in caught.value.remedy
 
 
 def _converter(folder: Path, script: str) -> None:
