@@ -67,7 +67,8 @@ def find_images(pattern: str) -> list[Path]:
             raise SettingsError("replay: names no folder", "give a folder of images, an image or a quoted glob")
         kind = kind_of(folder)
         if kind is Kind.FOLDER:
-            found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES]
+            shown = (path for path in folder.iterdir() if not path.name.startswith("."))  # ._1.png: macOS, on any stick
+            found = [path for path in shown if path.suffix.lower() in SUFFIXES]
         elif kind is Kind.MISSING and any(letter in pattern for letter in "*?["):
             anchor = Path(folder.anchor or ".")
             found = [

@@ -49,7 +49,8 @@ class Bed:
     def words(self) -> str:
         """What it reaches, in words."""
         (width, depth, height), (x, y) = self.size_mm, self.origin_mm
-        shape = f"is round, {width:g} mm wide around X {self.centre_mm[0]:g}, Y {self.centre_mm[1]:g}"
+        middle_x, middle_y = (round(value, 3) + 0.0 for value in self.centre_mm)
+        shape = f"is round, {width:g} mm wide around X {middle_x:g}, Y {middle_y:g}"
         area = shape if self.is_round else f"reaches from X {x:g} to {x + width:g}, Y {y:g} to {y + depth:g}"
         return f"{area}, Z 0 to {height:g}"
 

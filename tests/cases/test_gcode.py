@@ -183,6 +183,11 @@ def test_beds_are_read_as_they_are_named() -> None:
             parse_bed(text)
 
 
+def test_the_middle_of_a_round_bed_is_told_in_whole_micrometres() -> None:
+    """Corners that a slicer rounds lie around a middle that is zero but for the digits that no reader wants."""
+    assert "around X 0, Y 0," in Bed((200, 200, 300), (-100 - 1e-14, -100 - 1e-14), is_round=True).words
+
+
 _BINARY = b"GCDE\x01\x00\x00\x00\x01\x00" + bytes(range(40))
 
 

@@ -295,6 +295,14 @@ def test_names_are_times_in_the_unit_that_is_plausible(tmp_path: Path, kind: str
     assert _imported(tmp_path, [*_folders(tmp_path, names), *options]) == expected
 
 
+def test_hidden_files_are_no_pictures(tmp_path: Path) -> None:
+    """MacOS writes `._0003.png` beside each picture on a stick: it is left out, as it is where pictures are paired."""
+    folders = _folders(tmp_path, ["0003", "0004"])
+    for name in ("._0003.png", ".DS_Store"):
+        (Path(folders[0]) / name).write_bytes(b"Mac OS X")
+    assert len(_imported(tmp_path, [*folders, "--fps", "20"])) == 2
+
+
 TABLES: dict[str, tuple[list[str], list[str], list[int]]] = {
     "csv in us, with a head": (["timestamp,filename", *(f"{at // 1000}" for at in _TIMES)], [], _TIMES),
     "csv in ms": ([f"{at // 10**6}" for at in _TIMES], [], _TIMES),
