@@ -222,6 +222,15 @@ def test_a_day_of_kittis_raw_data_is_read_by_its_folder(tmp_path: Path) -> None:
     assert import_rig((tmp_path,)).rig.left.width_px == 620
 
 
+def test_camera_calibrations_ost_txt_is_named(tmp_path: Path) -> None:
+    """It is as its program wrote it; the files beside it hold the same."""
+    path = tmp_path / "ost.txt"
+    path.write_text("# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n\nheight\n480\n")
+    with pytest.raises(DataError, match=r"is ost.txt of camera_calibration") as caught:
+        import_rig((path,))
+    assert "left.yaml and right.yaml" in caught.value.remedy
+
+
 @pytest.mark.parametrize("given", ["", "cameras.bin", "images.bin"])
 def test_a_binary_model_of_colmap_is_named(given: str, tmp_path: Path) -> None:
     """One line says what it is and how to write it as text."""

@@ -265,6 +265,11 @@ def _stated(paths: tuple[Path, ...], texts: list[str]) -> tuple[RigKind, StatedR
 def _node(text: str, name: str) -> Node:
     if len(text) > _MOST_YAML_BYTES:
         raise DataError(f"{name} is longer than any calibration", _REMEDY)
+    if text.lstrip().startswith("# oST version"):
+        raise DataError(
+            f"{name} is ost.txt of camera_calibration, which is not read",
+            "give left.yaml and right.yaml, which lie in the same archive",
+        )
     read = read_xml if text.lstrip().startswith("<") else read_yaml
     return Node(name, "", read(text, name))
 
