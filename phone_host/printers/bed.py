@@ -11,7 +11,7 @@ from typing import Final
 from common.errors import SettingsError
 
 _LENGTH: Final = r"(\d+(?:\.\d+)?)"
-_COORDINATE: Final = r"(-?\d+(?:\.\d+)?)"
+_COORDINATE: Final = r"(-?\d+(?:\.\d+)?(?:e-?\d+)?)"
 _NAME: Final = re.compile(
     rf"(?:{_LENGTH},{_LENGTH},{_LENGTH}|round:{_LENGTH},{_LENGTH})(?:@(?:(centre|center)|{_COORDINATE},{_COORDINATE}))?"
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.printers.bed import Bed, parse_bed
+from phone_host.printers.bed import Bed, parse_bed, stated_bed
 from phone_host.printers.binary_gcode import text_gcode
 from phone_host.printers.preparing import require_input
 from phone_host.printers.slicing import facts_of, require_inside
@@ -171,6 +171,16 @@ def test_commands_have_no_other_letters(line: str, tmp_path: Path) -> None:
         facts_of(gcode)
 
 
+def test_a_disc_on_a_round_bed_is_taken(tmp_path: Path) -> None:
+    """The box around a disc of 190 mm has corners beyond a round bed of 200 mm; the disc has none."""
+    around = [(95 * math.cos(at * math.tau / 36), 95 * math.sin(at * math.tau / 36)) for at in range(37)]
+    gcode = tmp_path / "disc.gcode"
+    gcode.write_text("; a disc\nM83\nG28\nG1 Z0.2\n" + "".join(f"G1 X{x:.3f} Y{y:.3f} E1\n" for x, y in around))
+    require_inside(gcode, facts_of(gcode), parse_bed("round:200,300"))
+    with pytest.raises(DataError, match="leaves the bed"):
+        require_inside(gcode, facts_of(gcode), parse_bed("round:180,300"))
+
+
 def test_beds_are_read_as_they_are_named() -> None:
     """A rectangle begins in its corner, a round bed has its origin in the middle, and both may say otherwise."""
     assert parse_bed("220, 210,250mm") == Bed((220, 210, 250))
@@ -186,6 +196,28 @@ def test_beds_are_read_as_they_are_named() -> None:
 def test_the_middle_of_a_round_bed_is_told_in_whole_micrometres() -> None:
     """Corners that a slicer rounds lie around a middle that is zero but for the digits that no reader wants."""
     assert "around X 0, Y 0," in Bed((200, 200, 300), (-100 - 1e-14, -100 - 1e-14), is_round=True).words
+
+
+def test_a_bed_that_is_stated_is_read_or_not_believed() -> None:
+    """Fewer than three corners, corners in a line and heights that no printer has state no bed."""
+    assert stated_bed("0x0,250x0,250x210,0x210", 210) == Bed((250, 210, 210))
+    assert stated_bed(" -5x-3 , 245x-3, 245x207,-5x207", 210) == Bed((250, 210, 210), (-5, -3))
+    disc = stated_bed(_round_area(90), 300)
+    assert disc is not None
+    assert disc.is_round
+    assert disc.size_mm == pytest.approx((180, 180, 300), abs=1e-3)
+    for area, height_mm in (
+        ("", 10),
+        ("0x0,5x5", 10),
+        ("0x0,5x0,9x0", 10),
+        ("a,b,c,d", 10),
+        ("0x0,9x0,9x9", 0),
+        ("0x0,9x0,9x9", 1e6),
+    ):
+        assert stated_bed(area, height_mm) is None
+    assert not Bed((200, 200, 300)).holds(10, 10, 301)
+    assert not Bed((200, 200, 300)).holds(10, 10, -1)
+    assert "reaches from X -5 to 245" in Bed((250, 210, 210), (-5, -3)).words
 
 
 _BINARY = b"GCDE\x01\x00\x00\x00\x01\x00" + bytes(range(40))
