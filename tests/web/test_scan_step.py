@@ -187,6 +187,7 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
     page.wait_for_function("() => document.getElementById('scan-model').dataset.drawn")
     page.click("#scan-draw")
     page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Keep everything'")
+    until(lambda: bool(program.commands), "the box reaches the scan")
     assert program.commands[-1].do is Do.CROP
     assert program.commands[-1].values == {"box": page.input_value("#scan-box")}
     begun, before = page.input_value("#scan-box"), _box(page)
@@ -222,7 +223,7 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
     page.click("#scan-draw")
     page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Draw the box'")
     assert page.input_value("#scan-box") == ""
-    assert program.commands[-1].values == {"box": ""}
+    until(lambda: program.commands[-1].values == {"box": ""}, "the scan keeps everything again")
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
     assert complaints == []
 
