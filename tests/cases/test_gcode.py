@@ -236,12 +236,13 @@ def test_binary_gcode_is_known_by_its_first_bytes(name: str, tmp_path: Path, mon
 @pytest.mark.parametrize(
     ("name", "content", "what"),
     [
-        ("cup.gcode.gz", gzip.compress(_PLAIN.encode()), "compressed"),
-        ("cup.gcode", gzip.compress(_PLAIN.encode()), "compressed"),
+        ("cup.gcode.gz", gzip.compress(_PLAIN.encode(), mtime=0), "compressed"),
+        ("cup.gcode", gzip.compress(_PLAIN.encode(), mtime=0), "compressed"),
         ("cup.gcode.3mf", b"PK\x03\x04" + bytes(40), "a ZIP archive"),
         ("CUP.UFP", b"PK\x03\x04" + bytes(40), "a ZIP archive"),
         ("cup.gcode", _PLAIN.encode("utf-16"), "UTF-16"),
     ],
+    ids=["gzip", "gzip under another name", "3mf", "ufp", "UTF-16"],
 )
 def test_gcode_in_an_archive_is_named(name: str, content: bytes, what: str, tmp_path: Path) -> None:
     """What Cura and Bambu Studio compress is no broken G-code and no mesh: one line says what it is."""
