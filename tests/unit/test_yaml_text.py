@@ -1,5 +1,7 @@
 """The part of YAML in which calibrations are written: values as the format defines them, one line of error for anything else."""
 
+import subprocess
+import sys
 from contextlib import suppress
 
 import pytest
@@ -100,6 +102,27 @@ def _flow(tree: Tree) -> str:
 def test_what_is_written_in_brackets_is_read_back(tree: dict[str, Tree]) -> None:
     """Nested lists and maps on one line each give the same values."""
     assert read_yaml("\n".join(f"{key}: {_flow(value)}" for key, value in tree.items()), "f") == tree
+
+
+_WITHOUT = """
+import sys
+sys.modules["yaml"] = None  # as where it is not installed
+import phone_host.doctor.vision_checks, phone_host.verbs.doctor.command, phone_host.verbs.run.command
+from phone_host.output.rig_files.yaml_text import read_yaml
+try:
+    read_yaml("a: 1", "f")
+except Exception as error:
+    print(type(error).__name__, error)
+"""
+
+
+def test_a_host_without_pyyaml_runs_and_names_it_where_it_is_needed() -> None:
+    """`run` and `doctor` load without it; a calibration of another program says in one line what to install."""
+    done = subprocess.run([sys.executable, "-c", _WITHOUT], capture_output=True, text=True, check=False, timeout=120)
+    assert done.stdout.strip() == (
+        "UnavailableError YAML of other programs needs PyYAML: pip install PyYAML, or apt install python3-yaml"
+    )
+    assert done.stderr == ""
 
 
 def test_xml_of_filestorage_gives_the_same_values() -> None:

@@ -6,23 +6,21 @@ PyYAML gives events; the tree is built from them here, because its own loaders a
 - nesting deeper than `_MAX_LEVELS` is refused before anything deeper is read.
 Scalars stay the words of the file, so no number is reinterpreted (YAML 1.1 reads 1:30 as 90 and 010 as 8); `tree.Node`
 checks those that are asked for. Tags such as !!opencv-matrix are skipped.
+PyYAML is imported when a text is read: `run` and `doctor` load this module, and a host that imports no calibration does without it.
 """
 
+import importlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Final
 
-import yaml
-
-from common.errors import DataError
+from common.errors import DataError, UnavailableError
 from phone_host.output.rig_files.tree import Tree
 
 _MAX_LEVELS: Final = 32
 _REMEDY: Final = "give it as the program wrote it"
-_LOADER: Final = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
-"""libyaml's parser where PyYAML was built with it (its wheels are; Termux's build is not): twenty times faster, same events."""
-
 _OPENCV_HEADER: Final = re.compile(r"%YAML:1\.0[^\n]*\n?")
 _BLOCK_KEY: Final = re.compile(r"""^([ -]*[A-Za-z_][\w./-]*):(?=[\[{"'])""", re.MULTILINE)
 _FLOW_KEY: Final = re.compile(r"([{,]\s*[A-Za-z_][\w./-]*):(?=[^\s,}])")
@@ -45,6 +43,7 @@ def read_yaml(text: str, file: str) -> Tree:
 
     Raises:
         DataError: it is no YAML, or holds what a calibration has no use for; names the line.
+        UnavailableError: PyYAML is not installed.
     """
     documents = list(_documents(_as_yaml(text.removeprefix("\ufeff")), file))
     if not documents:
@@ -54,6 +53,15 @@ def read_yaml(text: str, file: str) -> Tree:
         if _without_header(other.tree) != _without_header(first):
             raise _problem(file, other.line, "begins a second document, which differs from the first")
     return first
+
+
+def _pyyaml() -> ModuleType:
+    try:
+        return importlib.import_module("yaml")
+    except ImportError:
+        raise UnavailableError(
+            "YAML of other programs needs PyYAML", "pip install PyYAML, or apt install python3-yaml"
+        ) from None
 
 
 def _without_header(tree: Tree) -> Tree:
@@ -89,9 +97,11 @@ class _Open:
 
 def _documents(text: str, file: str) -> Iterator[_Document]:
     """Yield the documents of a text that hold anything."""
-    document, levels = _Document(1), list[_Open]()
+    yaml, document, levels = _pyyaml(), _Document(1), list[_Open]()
+    # libyaml's parser where PyYAML was built with it (its wheels are; Termux's build is not): twenty times faster, same events.
+    loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
     try:
-        for event in yaml.parse(text, Loader=_LOADER):
+        for event in yaml.parse(text, Loader=loader):
             line = event.start_mark.line + 1
             match event:
                 case yaml.DocumentStartEvent():
