@@ -14,6 +14,7 @@ from typing import Final
 
 from common.camera.base import CameraHealth, Grab, Mode, Offers
 from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
+from common.camera.restart_timing import RestartTiming
 from common.camera.v4l2_controls import to_axis, to_locks
 from common.camera.v4l2_device import find_camera
 from common.camera.v4l2_formats import Wanted
@@ -82,8 +83,7 @@ class V4l2Camera:
         self._known_problem = ""
         self._rate = RateWatch()
         self._is_told_lost = False
-        self._latency_ns: int | None = None
-        self._exposed_ns = 0
+        self._timing = RestartTiming()
         try:
             self._life.due(now_ns)
             stream = self._stream = self._open()
@@ -186,15 +186,13 @@ class V4l2Camera:
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Switch the stream off, and on again such that its exposures come `later_ns` later within their period.
 
-        A camera whose sensor runs only while it streams takes its first exposure a fixed time after the start. That time is taken from the stream
-        that ends here. A sensor that runs all the time is unaffected.
+        A sensor that runs all the time is unaffected.
         """
-        if self._stream is None or self._latency_ns is None:
+        if self._stream is None:
             return
         period_ns = self._tally.rate.period_ns or self._stream.period_ns
-        start_ns = self._exposed_ns + later_ns - self._latency_ns
-        start_ns = now_ns + _REST_NS + (start_ns - now_ns - _REST_NS) % period_ns
-        if self._life.steer(start_ns) is not Step.STOP:
+        start_ns = self._timing.start_for(later_ns, now_ns + _REST_NS, period_ns)
+        if start_ns is None or self._life.steer(start_ns) is not Step.STOP:
             return
         try:
             self._stream.stop()
@@ -221,6 +219,7 @@ class V4l2Camera:
         if wanted == self._settings.wanted:
             return
         self._settings = replace(self._settings, wanted=wanted)
+        self._timing = RestartTiming()  # another mode starts with another latency
         if self._life.renew(now_ns) is Step.CLOSE:
             self._let_go()
             self._carry_out(self._life.due(now_ns), now_ns)
@@ -289,8 +288,9 @@ class V4l2Camera:
     def _switch_on(self, stream: Stream, now_ns: int) -> None:
         """Start a stream and make it the current one."""
         self._stream = stream
-        self._latency_ns = self._settle_ns = None
+        self._settle_ns = None
         stream.start()
+        self._timing.started(stream.started_ns)
         self._exposure_due_ns = now_ns + _AUTO_EXPOSURE_NS
 
     def _take(self, stream: Stream, now_ns: int) -> list[Grab]:
@@ -303,11 +303,7 @@ class V4l2Camera:
             not grabs and stream.controls.has_events()
         ):  # woken for something else: fetching events with each frame costs an ioctl
             stream.controls.read_exposure()
-        for grab in grabs:
-            if isinstance(grab, Frame):
-                self._exposed_ns = grab.exposed.ns
-                if self._latency_ns is None:
-                    self._latency_ns = self._exposed_ns - stream.started_ns
+        self._timing.exposed(grab.exposed.ns for grab in grabs if isinstance(grab, Frame))
         if grabs:
             self._life.heard(now_ns, stream.period_ns)
             self._note_back()

@@ -14,7 +14,7 @@ from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
-from statistics import median
+from statistics import fmean, median
 from typing import Final
 
 import numpy as np
@@ -42,7 +42,9 @@ _NEAR_NS: Final = 4 * _MS
 _NEAR_PART: Final = 8
 """The phase is good enough up to 4 ms or an eighth of the period, whichever is less, plus the scatter of the stamps.
 
-Beyond that, the controller corrects again. Restarts of webcams scatter by 1 to 3 ms."""
+Beyond that, the controller corrects again. Restarts of webcams scatter by 1 to 3 ms. If two or more corrections have missed by more
+than this on average, what is no worse than that average is good enough, up to an eighth of the period: another restart would cost
+frames and most likely bring no better phase."""
 
 _SETTLE_NS: Final = {Steering.GRID: 200 * _MS, Steering.RESTART: 1_000 * _MS}
 """Frames exposed after this time belong to the steered stream. A webcam's first frames may have odd stamps."""
@@ -236,6 +238,7 @@ class PhaseController:
         self._deadline_ns = 2**63
         self._aligned_ns: int | None = None
         self._tries = self._corrections = 0
+        self._misses_ns: deque[float] = deque(maxlen=_TRIES)
         self._before_ns = self._after_ns = math.nan
 
     @property
@@ -265,9 +268,11 @@ class PhaseController:
             if now_ns > self._deadline_ns:
                 self._give_up("no frames came after a correction")
             return None
-        self._deadline_ns = 2**63
         skew_ns = self._after_ns = phase.time_skew_ns
-        if abs(skew_ns) <= min(_NEAR_NS, phase.period_ns / _NEAR_PART) + phase.scatter_ns:
+        if self._deadline_ns < 2**63:  # the outcome of a correction
+            self._misses_ns.append(abs(skew_ns))
+            self._deadline_ns = 2**63
+        if abs(skew_ns) <= self._near_ns(phase.period_ns) + phase.scatter_ns:
             if self._state is not Aligning.ALIGNED:
                 self._state, self._aligned_ns = Aligning.ALIGNED, now_ns
             if self._aligned_ns is not None and now_ns - self._aligned_ns >= _PATIENCE_NS:
@@ -278,6 +283,11 @@ class PhaseController:
             self._give_up(f"{_TRIES} corrections left {abs(skew_ns) / _MS:.1f} ms")
             return None
         return self._correct(now_ns, skew_ns, phase.period_ns)
+
+    def _near_ns(self, period_ns: int) -> float:
+        """Return up to which time skew the phase is good enough, ns."""
+        reached_ns = fmean(self._misses_ns) if len(self._misses_ns) > 1 else 0.0
+        return min(max(_NEAR_NS, reached_ns), period_ns / _NEAR_PART)
 
     def _correct(self, now_ns: int, skew_ns: float, period_ns: int) -> Correction:
         if not self._corrections:

@@ -165,6 +165,17 @@ def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift
     assert "--interpolate" in alignment.words
 
 
+def test_what_restarts_cannot_reach_more_finely_is_good_enough() -> None:
+    """At 10 fps, restarts that miss by 9 and then 7 ms are as good as they get: the second is kept, but 13 ms, an eighth of the period, never is."""
+    for outcomes_ms, state, corrections in ([9.0, -7.0], Aligning.ALIGNED, 2), ([13.0, 13.0], Aligning.STEERING, 3):
+        controller = PhaseController(Steering.RESTART, Steering.NONE, has_phase=True)
+        for turn, skew_ms in enumerate([40.0, *outcomes_ms]):
+            now_ns = (turn + 1) * 5_000 * MS
+            controller.update(now_ns, Phase(time_skew_ns=skew_ms * MS, period_ns=100 * MS, drift=0.0, first_ns=now_ns))
+        assert controller.alignment.state is state
+        assert controller.alignment.corrections == corrections
+
+
 def test_a_camera_that_falls_silent_is_given_up() -> None:
     """If no frame comes for ten seconds after a correction, the controller says so and stops steering."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
