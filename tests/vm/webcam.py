@@ -154,6 +154,8 @@ class _Device:
         self._newest = -1  # image number, counted over all laps of the film
         self._rest = b""
         self._ignored: set[int] = set()  # sequence numbers of requests that were never answered
+        self._submitted = 0  # sequence number of the newest request
+        self._revoked: set[int] = set()  # sequence numbers of requests that were unlinked before they came
         self._taken: deque[tuple[int, int] | None] = (
             deque()
         )  # (image, due_ns) of each transfer that the driver has not yet resubmitted
@@ -178,13 +180,21 @@ class _Device:
             found = [item for item in self._waiting if item[0] == unlinked]
             for item in found:
                 self._waiting.remove(item)
-            known = bool(found) or unlinked in self._ignored
+            # The kernel's sender looks for requests first and for unlinks second: one of each that come in between overtake each other.
+            is_early = unlinked > self._submitted
+            if is_early:
+                self._revoked.add(unlinked)
+            known = bool(found) or unlinked in self._ignored or is_early
             self._ignored.discard(unlinked)
             self._socket.sendall(struct.pack(">5Ii24x", _RET_UNLINK, sequence, 0, 0, 0, _UNLINKED if known else 0))
             return
         assert command == _SUBMIT, command
         (length,) = struct.unpack_from(">i", header, 24)
         out = self._read(length) if not is_in and length else b""
+        self._submitted = sequence
+        if sequence in self._revoked:
+            self._revoked.discard(sequence)
+            return
         if endpoint:
             self._waiting.append((sequence, length))
             self._note_taken()
