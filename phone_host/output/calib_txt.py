@@ -18,10 +18,10 @@ from enum import Enum
 from pathlib import Path
 from typing import Final
 
+from common.byte_order_mark import without_mark
 from common.errors import DataError
 from common.files import read_whole
 from phone_host.model import StereoGeometry
-from phone_host.output.meshes.text import without_mark
 
 _MOST_BYTES: Final = 64 << 10
 """Limit for a file. The longest kind (KITTI's raw data) has about 4 KB."""

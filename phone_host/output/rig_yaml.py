@@ -16,6 +16,7 @@ from pathlib import Path
 
 import cv2
 
+from common.byte_order_mark import UTF_8_MARK
 from common.versions import RIG_FORMAT
 from phone_host.model import Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
@@ -172,6 +173,6 @@ def is_rig(path: Path) -> bool:
     """Return whether a file begins like FileStorage YAML, or like a rig.yaml that lost its first line. False also for a file that cannot be read."""
     try:
         with path.open("rb") as file:
-            return file.read(16).removeprefix(b"\xef\xbb\xbf").startswith((b"%YAML", b"format_version:"))
+            return file.read(16).removeprefix(UTF_8_MARK).startswith((b"%YAML", b"format_version:"))
     except OSError:
         return False

@@ -13,7 +13,7 @@ _KINDS: Final = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4
 _SHAPES: Final = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 
-class _File:
+class GlbFile:
     """A GLB that grows: accessors are added, then meshes and nodes are named."""
 
     def __init__(self) -> None:
@@ -76,8 +76,8 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
     scaled = [{"mesh": 0, "scale": [0.001] * 3}]
     cases: dict[str, tuple[bytes, dict[str, Any]]] = {}
 
-    def plain(places: NDArray[Any] = points, kind: str = "f4", index: str = "u2", **more: Any) -> tuple[_File, dict[str, Any]]:  # fmt: skip
-        file = _File()
+    def plain(places: NDArray[Any] = points, kind: str = "f4", index: str = "u2", **more: Any) -> tuple[GlbFile, dict[str, Any]]:  # fmt: skip
+        file = GlbFile()
         return file, {
             "attributes": {"POSITION": file.add(places, kind, **more)},
             "indices": file.add(numbers.ravel(), index),
@@ -89,18 +89,18 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
     file, primitive = plain(points[numbers.ravel()])
     del primitive["indices"]
     cases["without-indices"] = file.bytes([primitive], [{"mesh": 0}]), answer | {"points": 8}
-    file = _File()
+    file = GlbFile()
     tops = {number: numbers[2 * number : 2 * number + 2] for number in range(6)}
     strips = [[int(first[0]), int(first[1]), int(second[2]), int(first[2])] for first, second in tops.values()]
     at = file.add(points, "f4")
     parts = [{"attributes": {"POSITION": at}, "indices": file.add(np.array(each), "u2"), "mode": 5} for each in strips]
     cases["strips"] = file.bytes(parts, [{"mesh": k} for k in range(6)], range(6)), answer
-    file = _File()
+    file = GlbFile()
     at = file.add(points, "f4")
     fans = [[int(first[0]), int(first[1]), int(first[2]), int(second[2])] for first, second in tops.values()]
     parts = [{"attributes": {"POSITION": at}, "indices": file.add(np.array(each), "u2"), "mode": 6} for each in fans]
     cases["fans"] = file.bytes(parts, [{"mesh": k} for k in range(6)], range(6)), answer
-    file = _File()
+    file = GlbFile()
     mixed = np.zeros((8, 8), "<f4")
     mixed[:, 2:5] = points
     view = file.view(mixed.tobytes(), byteStride=32)
@@ -140,7 +140,7 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
         file.bytes([primitive], [{"mesh": 0, "scale": [0.04] * 3}], extensionsRequired=["KHR_mesh_quantization"]),
         answer | {"rel": 1e-4},
     )
-    file = _File()
+    file = GlbFile()
     flat = points * [1, 0, 1]
     lifted = np.flatnonzero(points[:, 1])
     sparse = {

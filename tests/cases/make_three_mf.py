@@ -34,6 +34,12 @@ def _model(resources: str, items: str, unit: str = ' unit="millimeter"', head: s
     )
 
 
+def package(resources: str, items: str = "", method: int = zipfile.ZIP_DEFLATED) -> bytes:
+    """Return a 3MF file with these resources and build items, mm."""
+    name = "3D/3dmodel.model"
+    return _zipped({"_rels/.rels": _RELATIONS.format(name), name: _model(resources, items)}, method)
+
+
 def three_mf_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: dict[str, Any]) -> list[tuple[str, bytes, dict[str, Any]]]:  # fmt: skip
     """Return what other programs write as 3MF.
 

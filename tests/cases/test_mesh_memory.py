@@ -1,4 +1,7 @@
-"""Reading a mesh takes at most 12 times the size of a binary file and 40 times that of a text, whatever the file claims."""
+"""Reading a mesh takes at most 12 times the size of a binary file and 40 times that of a text, whatever the file claims.
+
+A 3MF counts by the text inside: one of a usual mesh keeps to 12 times, one that is nothing but objects or open elements to 40.
+"""
 
 import struct
 import subprocess
@@ -13,10 +16,11 @@ import pytest
 from common.errors import DataError
 from phone_host.output.meshes.formats import mesh_bytes, read_mesh
 from phone_host.output.meshes.solid import NO_COLOURS, Solid
+from tests.cases.make_three_mf import package
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 SIDE: Final = 210
-TEXTS: Final = (".obj", "-text.ply", "-text.stl")
+TEXTS: Final = (".obj", "-text.ply", "-text.stl", "many-objects.3mf", "nested.3mf")
 SLACK: Final = 4 << 20
 """What the interpreter and parts of fixed size take beside the file, bytes."""
 
@@ -56,6 +60,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     text = b'{"asset":{},"extras":[' + b"[]," * 1_000_000 + b"0]}"
     lists = struct.pack("<II", len(text), 0x4E4F534A) + text
     made["lists.glb"] = struct.pack("<III", 0x46546C67, 2, 12 + len(lists)) + lists
+    made["many-objects.3mf"] = package("".join(f'<object id="{number}"/>' for number in range(99_000)))
+    made["nested.3mf"] = package("<a>" * 1_000_000)
     facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
     made["same-text.stl"] = f"solid a\n{facet * 15_000}endsolid\n".encode()
     for name, content in made.items():

@@ -170,6 +170,8 @@ def test_a_glb_that_contradicts_itself_is_refused(change: Callable[[dict[str, An
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nelement face 1\nproperty list uchar int near\nend_header\n1 2 3\n1 0\n", "no triangle"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\nend_header\n-1\n", "cut short"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex -1\nend_header\n", "no PLY"),
+        ("a.obj", b"v 1 2 \\\n3\nf 1 \\\n 2 \\\n x\n", "line 3 is not read"),
+        ("a.obj", b"v 1 2 \\\n3\nv 1 2 \\\r\n3\nv 1 2 x\n", "line 5 is not read"),
         ("a.ply", b"ply\nelement vertex 1\nend_header\n", "no PLY"),
         ("a.ply", b"ply\nformat ascii 1.0\nproperty int x\nend_header\n", "no PLY"),
     ],

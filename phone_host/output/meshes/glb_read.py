@@ -18,7 +18,7 @@ from common.errors import DataError
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.assembly import Part, assemble, require_count
 from phone_host.output.meshes.glb import GENERATOR
-from phone_host.output.meshes.solid import NO_COLOURS, Solid, drop_unused, require_corners
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, require_corners, used_points
 
 _MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _KINDS: Final = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -36,6 +36,7 @@ _WRONG: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError, Ov
 """What reading a tree of JSON raises where something else stands than must."""
 
 Tree = dict[str, Any]
+Used = NDArray[np.integer[Any]] | slice
 
 
 def read_glb(content: bytes, name: str, unit_m: float) -> tuple[Solid, Axes | None]:
@@ -71,11 +72,23 @@ def _axes(asset: Tree) -> Axes | None:
     return next((axes for axes in Axes if axes.text == extras.get("axes")), None)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class _File:
+    """A file that was taken apart.
+
+    Attributes:
+        name: of the file, for errors.
+        tree: its JSON.
+        buffers: its bytes.
+        held_bytes: of all buffers.
+        sparse_rows: that were read so far.
+    """
+
     name: str
     tree: Tree
     buffers: list[memoryview]
+    held_bytes: int
+    sparse_rows: int = 0
 
     def view(self, number: int) -> tuple[memoryview, int]:
         """Return the bytes of a view, and how far apart its rows are; 0: close together."""
@@ -85,24 +98,34 @@ class _File:
             raise IndexError("beyond the end")
         return buffer[begin : begin + length], view.get("byteStride", 0)
 
-    def numbers(self, number: int) -> NDArray[Any]:
-        """Return (N, columns) numbers of an accessor; integers that stand for shares are float32."""
+    def shape(self, number: int) -> tuple[int, int]:
+        """Return how many rows and columns an accessor has, as it says itself."""
         accessor = self.tree["accessors"][number]
-        count, kind, columns = (
-            accessor["count"],
-            np.dtype(_KINDS[accessor["componentType"]]),
-            _COLUMNS[accessor["type"]],
-        )
+        count = accessor["count"]
+        if type(count) is not int or count < 0:
+            raise ValueError("a count that is none")
+        return count, _COLUMNS[accessor["type"]]
+
+    def numbers(self, number: int, used: Used = slice(None)) -> NDArray[Any]:
+        """Return (N, columns) numbers of an accessor; integers that stand for shares are float32.
+
+        Args:
+            number: of the accessor.
+            used: the rows that are wanted, in rising order; the others take no time.
+        """
+        accessor, (count, columns) = self.tree["accessors"][number], self.shape(number)
+        kind = np.dtype(_KINDS[accessor["componentType"]])
         if "bufferView" in accessor:
-            values = self._rows(accessor["bufferView"], accessor.get("byteOffset", 0), (count, columns), kind)
+            rows = self._rows(accessor["bufferView"], accessor.get("byteOffset", 0), (count, columns), kind)
         elif "sparse" in accessor:
-            if count > sum(map(len, self.buffers)):
+            if count > self.held_bytes:
                 raise IndexError("more than any mesh leaves at zero")
-            values = np.zeros((count, columns), kind)
+            rows = np.broadcast_to(np.zeros((), kind), (count, columns))
         else:
             raise IndexError("numbers that are nowhere")
+        values = rows[used]
         if "sparse" in accessor:
-            values = self._apply_sparse(values, accessor["sparse"])
+            values = self._apply_sparse(values, accessor["sparse"], count, used)
         if accessor.get("normalized") and kind.kind in "iu":
             values = np.maximum(values.astype(np.float32) / np.iinfo(kind).max, -1)
         return values
@@ -115,14 +138,24 @@ class _File:
             raise IndexError("beyond the end")
         return np.ndarray(shape, kind, content, begin, (step, kind.itemsize))
 
-    def _apply_sparse(self, values: NDArray[Any], sparse: Tree) -> NDArray[Any]:
+    def _apply_sparse(self, values: NDArray[Any], sparse: Tree, whole: int, used: Used) -> NDArray[Any]:
+        """Return the used rows of an accessor of `whole` rows, some of which stand elsewhere."""
         count, where, what = sparse["count"], sparse["indices"], sparse["values"]
+        self.sparse_rows += count
+        require_count(self.name, self.sparse_rows)  # each primitive reads them anew
         kind = np.dtype(_KINDS[where["componentType"]])
-        rows = self._rows(where["bufferView"], where.get("byteOffset", 0), (count, 1), kind)
-        shape = (count, values.shape[1])
-        changed = values.copy()
-        changed[rows[:, 0]] = self._rows(what["bufferView"], what.get("byteOffset", 0), shape, values.dtype)
-        return changed
+        changed = self._rows(where["bufferView"], where.get("byteOffset", 0), (count, 1), kind)[:, 0]
+        rows = self._rows(what["bufferView"], what.get("byteOffset", 0), (count, values.shape[1]), values.dtype)
+        if count and not 0 <= changed.min() <= changed.max() < whole:
+            raise IndexError("beyond the end")
+        if isinstance(used, slice):
+            values = values.copy()
+            values[changed] = rows
+        elif len(used):
+            places = np.minimum(np.searchsorted(used, changed), len(used) - 1)
+            is_used = used[places] == changed
+            values[places[is_used]] = rows[is_used]
+        return values
 
 
 def _file(content: bytes, name: str) -> _File:
@@ -146,7 +179,8 @@ def _file(content: bytes, name: str) -> _File:
     except RecursionError:
         raise ValueError("too deep") from None
     _require_plain(name, tree.get("extensionsRequired", ()))
-    return _File(name, tree, list(_buffers(name, tree, found.get(_BINARY, memoryview(b"")))))
+    buffers = list(_buffers(name, tree, found.get(_BINARY, memoryview(b""))))
+    return _File(name, tree, buffers, sum(map(len, buffers)))
 
 
 def _buffers(name: str, tree: Tree, binary: memoryview) -> Iterator[memoryview]:
@@ -220,16 +254,25 @@ def _mesh(file: _File, mesh: Tree) -> Iterator[Part]:
         if mode not in (_TRIANGLES, _STRIP, _FAN):
             continue
         attributes = primitive["attributes"]
-        points = file.numbers(attributes["POSITION"])
-        if points.shape[1] != 3:
+        count, columns = file.shape(attributes["POSITION"])
+        if columns != 3:
             raise ValueError("places of another shape")
-        corners = file.numbers(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(points), dtype=np.int32)  # fmt: skip
-        colours = _colours(file.numbers(attributes["COLOR_0"])) if "COLOR_0" in attributes else NO_COLOURS
-        if len(colours) not in (0, len(points)):
-            raise ValueError("colours of other points")
-        triangles = _triangles(corners, mode)
-        require_corners(file.name, triangles, len(points))
-        yield Part(*drop_unused(points, triangles, colours), np.eye(4))
+        triangles = _triangles(_corners(file, primitive), mode)
+        require_corners(file.name, triangles, count)
+        used, numbered = used_points(triangles, count)
+        points, colours = file.numbers(attributes["POSITION"], used), NO_COLOURS
+        if "COLOR_0" in attributes:
+            if file.shape(attributes["COLOR_0"])[0] != count:
+                raise ValueError("colours of other points")
+            colours = _colours(file.numbers(attributes["COLOR_0"], used))
+        yield Part(points, numbered, colours, np.eye(4))
+
+
+def _corners(file: _File, primitive: Tree) -> NDArray[Any]:
+    """Return numbers of points; without indices they are all, in their order."""
+    if "indices" in primitive:
+        return file.numbers(primitive["indices"])[:, 0]
+    return np.arange(len(file.numbers(primitive["attributes"]["POSITION"])), dtype=np.int32)
 
 
 def _triangles(corners: NDArray[Any], mode: int) -> NDArray[Any]:

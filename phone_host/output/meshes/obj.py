@@ -4,6 +4,7 @@ Source: "Object Files (.obj)", Wavefront Advanced Visualizer Manual, appendix B1
 """
 
 import io
+import re
 from array import array
 from collections.abc import Iterator
 from typing import Final
@@ -11,12 +12,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.byte_order_mark import without_mark
 from common.errors import DataError
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, polygon_triangles, sound_solid
-from phone_host.output.meshes.text import require_short, text_lines, without_mark
+from phone_host.output.meshes.text import require_short, text_lines
 
 _NUMBERS: Final = (3, 4, 6, 7)
 """Of a point: three, perhaps a weight that polygons do not heed, or a colour, perhaps with its opacity."""
+
+
+_FIGURE: Final = re.compile(rb"\s*[vf][\s\\]", re.IGNORECASE)
+"""The first line of a point or a face."""
 
 
 def obj_bytes(solid: Solid, comment: str) -> bytes:
@@ -49,9 +55,9 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
     Raises:
         DataError: it is no OBJ file, or holds no sound triangle.
     """
-    require_short(content, name)
+    require_short(len(content), name)
     points, shades, counts, corners = array("d"), array("d"), array("q"), array("q")
-    for number, line in enumerate(_statements(without_mark(content)), start=1):
+    for number, line in _statements(without_mark(content)):
         words = line.partition(b"#")[0].split()
         word = words[0].lower() if words else b""
         try:
@@ -71,17 +77,23 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
     return sound_solid(name, places * unit_m, faces, _colours(shades, len(places)))
 
 
-def _statements(content: bytes) -> Iterator[bytes]:
-    """Yield lines. A backslash ends one that goes on, but only of a point or face: in a comment or a name it is part of a path."""
-    begin = b""
-    for line in text_lines(content):
-        whole = begin + line
-        if whole.rstrip().endswith(b"\\") and whole.split(maxsplit=1)[0].lower() in {b"v", b"f"}:
-            begin = whole.rstrip()[:-1] + b" "
-            continue
-        yield whole
-        begin = b""
-    yield begin
+def _statements(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield statements, each with the number of the line where it begins.
+
+    A backslash continues a point or a face. In a name or a comment it is part of a path.
+    """
+    first, parts = 0, list[bytes]()
+    for number, line in enumerate(text_lines(content), start=1):
+        begin = line.rstrip()
+        if begin.endswith(b"\\") and b"#" not in line and (parts or _FIGURE.match(begin)):
+            first = first if parts else number
+            parts.append(begin[:-1])
+        elif parts:
+            yield first, b" ".join([*parts, line])
+            parts = []
+        else:
+            yield number, line
+    yield first, b" ".join(parts)
 
 
 def _corners(words: list[bytes], count: int) -> list[int]:

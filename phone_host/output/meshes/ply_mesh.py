@@ -8,10 +8,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.byte_order_mark import without_mark
 from common.errors import DataError
 from phone_host.output.meshes.ply_records import Column, Numbers, ShortError, Table, is_text, read_records
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, polygon_triangles, sound_solid
-from phone_host.output.meshes.text import require_short, without_mark
+from phone_host.output.meshes.text import require_short
 
 _CORNER_LISTS: Final = ("vertex_indices", "vertex_index")
 _SHADES: Final = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
@@ -73,7 +74,7 @@ def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
         DataError: it is no PLY file, or is cut short, or holds no sound triangle.
     """
     if is_text(content):
-        require_short(content, name)
+        require_short(len(content), name)
     try:
         tables = read_records(without_mark(content))
     except LookupError:

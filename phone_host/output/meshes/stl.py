@@ -9,10 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.byte_order_mark import without_mark
 from common.errors import DataError
 from common.words import counted
 from phone_host.output.meshes.solid import Solid, require_triangles, sound_solid, welded
-from phone_host.output.meshes.text import require_short, text_lines, without_mark
+from phone_host.output.meshes.text import require_short, text_lines
 
 _TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER: Final = 80
@@ -86,7 +87,7 @@ def _binary(content: bytes, name: str) -> NDArray[np.float32]:
 
 def _text(content: bytes, name: str) -> NDArray[np.float64]:
     """Return (3 T, 3). The last line may be missing, half a triangle not."""
-    require_short(content, name)
+    require_short(len(content), name)
     corners, opened, closed = array("d"), 0, 0
     try:
         for line in text_lines(without_mark(content)):

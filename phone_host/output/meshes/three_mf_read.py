@@ -21,6 +21,7 @@ from common.errors import DataError
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.assembly import Part, assemble, require_count
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, require_corners
+from phone_host.output.meshes.text import require_short
 from phone_host.output.meshes.three_mf import axes_element
 
 _UNITS_M: Final = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
@@ -33,6 +34,9 @@ _FREE_BYTES: Final = 1 << 20
 _CHUNK: Final = 1 << 16
 _HEAD: Final = 1024
 _MAX_DEPTH: Final = 16
+_MAX_OPEN: Final = 1000
+"""Elements within elements; a mesh's have seven."""
+
 _MAX_VISITS: Final = 10_000
 _MAX_ENTRIES: Final = 100_000
 """Objects, components, items and groups of colours: each takes far more memory than text."""
@@ -97,9 +101,11 @@ def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Soli
 
 
 def _require_bounded(archive: zipfile.ZipFile, name: str, held: int) -> None:
+    """Check how long the texts inside are before one of them is read."""
     inflated = sum(each.file_size for each in archive.infolist() if each.filename.lower().endswith((".model", ".rels")))
     if inflated > _FREE_BYTES + _MAX_INFLATED * held:
         raise DataError(f"{name} would grow to {inflated // held} times its size", "no mesh does: export it anew")
+    require_short(inflated, name)
 
 
 def _root(archive: zipfile.ZipFile) -> str:
@@ -124,11 +130,13 @@ class _Reader:
         self._package, self._part, self._name, self._is_root = package, part, name, is_root
         self._object, self._group = _Object(), list[int]()
         self._paint: tuple[str | None, str | None] = (None, None)
+        self._open = 0
 
     def read(self, archive: zipfile.ZipFile) -> None:
         """Read the file."""
         parser = expat.ParserCreate()
         parser.StartElementHandler = self._start_element
+        parser.EndElementHandler = self._end_element
         parser.StartDoctypeDeclHandler = self._refuse
         parser.buffer_text = True
         with archive.open(self._part) as file:
@@ -139,12 +147,22 @@ class _Reader:
     def _refuse(self, *_: object) -> None:
         raise DataError(f"{self._name} has a document type, which no 3MF file has", "export it anew")
 
-    def _start_element(self, tag: str, attributes: dict[str, str]) -> None:
-        element = tag.rpartition(":")[2]
+    def _end_element(self, _: str) -> None:
+        self._open -= 1
+
+    def _count(self, element: str) -> None:
+        """Bound what takes more memory than its text."""
+        self._open += 1
+        if self._open > _MAX_OPEN:
+            raise ValueError("elements within elements")
         if element in _ENTRIES:
             self._package.entries += 1
             if self._package.entries > _MAX_ENTRIES:
                 raise DataError(f"{self._name} has more than {_MAX_ENTRIES} objects and groups", "export fewer")
+
+    def _start_element(self, tag: str, attributes: dict[str, str]) -> None:
+        element = tag.rpartition(":")[2]
+        self._count(element)
         match element:
             case "vertex":
                 self._object.points.extend((float(attributes["x"]), float(attributes["y"]), float(attributes["z"])))
@@ -199,7 +217,9 @@ def _colour(text: str) -> tuple[int, ...]:
 
 def _build_parts(package: _Package, name: str) -> Iterator[Part]:
     """Yield the meshes as often as the build places them; of a build without items, all."""
-    items = package.items or [(key, np.eye(4)) for key in package.objects]
+    unmoved = np.eye(4)
+    items = package.items or [(key, unmoved) for key in package.objects]
+    palette = np.array([*package.colours, (255, 255, 255)], np.uint8)  # the last is for corners without one
     waiting, parts, visits, triangles = [(*item, 0) for item in items], dict[Key, Part](), 0, 0
     while waiting:
         key, transform, depth = waiting.pop()
@@ -211,19 +231,18 @@ def _build_parts(package: _Package, name: str) -> Iterator[Part]:
         thing = package.objects[key]
         waiting += [(inner, transform @ way, depth + 1) for inner, way in thing.components]
         if thing.triangles:
-            part = parts.get(key) or _part(package, thing, name)
+            part = parts.get(key) or _part(palette, thing, name)
             parts[key] = part
             triangles += len(part.triangles)
             require_count(name, triangles)
             yield Part(part.points, part.triangles, part.colours, transform)
 
 
-def _part(package: _Package, thing: _Object, name: str) -> Part:
+def _part(palette: NDArray[np.uint8], thing: _Object, name: str) -> Part:
     points = np.frombuffer(thing.points, np.float64).reshape(-1, 3) if thing.points else np.zeros((0, 3))
     triangles = np.frombuffer(thing.triangles, np.int32).reshape(-1, 3)
     require_corners(name, triangles, len(points))
     paints: NDArray[Any] = np.frombuffer(thing.paints, np.int32)
     if not (paints >= 0).any():
         return Part(points, triangles, NO_COLOURS, np.eye(4))
-    palette = np.array([*package.colours, (255, 255, 255)], np.uint8)  # the last is for those without
     return Part(points, triangles, colours_of_points(triangles.ravel(), palette[paints], len(points)), np.eye(4))

@@ -10,12 +10,12 @@ from typing import Final
 
 import numpy as np
 
+from common.byte_order_mark import without_mark
 from common.errors import DataError, SettingsError
 from common.files import read_whole
 from common.places import Kind, kind_of
 from phone_host.model import Rectification, Rig
 from phone_host.output.calib_txt import is_calib_txt, read_calib_txt
-from phone_host.output.meshes.text import without_mark
 from phone_host.output.rig_files.colmap import CAMERAS, IMAGES, colmap_texts, is_cameras, is_images, read_colmap
 from phone_host.output.rig_files.euroc import euroc_texts, is_euroc, read_euroc
 from phone_host.output.rig_files.kalibr import is_kalibr, kalibr_texts, read_kalibr
