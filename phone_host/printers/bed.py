@@ -21,6 +21,10 @@ _MIN_CORNERS, _MAX_CORNERS = 3, 1000
 _ROUND_CORNERS: Final = 16
 """A slicer writes a round bed as a polygon of 36 or more corners, others have 4 to 8."""
 
+_MAX_MM: Final = 10_000.0
+_DELTA: Final = 1
+"""Simplify3D's number of the kind of machine whose bed is round, with the origin in its middle."""
+
 _SLACK_MM: Final = 0.01
 _ROUND_SLACK: Final = 0.01
 """Share of the radius by which a slicer's polygon may lie inside its circle."""
@@ -84,7 +88,7 @@ def parse_bed(text: str) -> Bed:
     is_round = found[4] is not None
     size = (found[4], found[4], found[5]) if is_round else (found[1], found[2], found[3])
     width, depth, height = map(float, size)
-    if not 0 < min(width, depth, height) <= max(width, depth, height) <= 10_000:
+    if not _is_believable(width, depth, height):
         raise SettingsError(f"--bed is {text!r}", "give lengths above 0 and up to 10000 mm")
     if found[7] is not None:
         origin = float(found[7]), float(found[8])
@@ -112,7 +116,7 @@ def stated_bed(area: str, height_mm: float) -> Bed | None:
         return None
     low, high = (tuple(f(each[axis] for each in corners) for axis in range(2)) for f in (min, max))
     width, depth = high[0] - low[0], high[1] - low[1]
-    if not (0 < width <= 10_000 and 0 < depth <= 10_000 and 0 < height_mm <= 10_000):
+    if not _is_believable(width, depth, height_mm):
         return None
     middle = tuple(sum(each[axis] for each in corners) / len(corners) for axis in range(2))
     radius = max(math.dist(each, middle) for each in corners)
@@ -121,3 +125,32 @@ def stated_bed(area: str, height_mm: float) -> Bed | None:
     ):
         return Bed((2 * radius, 2 * radius, height_mm), (middle[0] - radius, middle[1] - radius), is_round=True)
     return Bed((width, depth, height_mm), (low[0], low[1]))
+
+
+def bed_of_settings(settings: dict[str, float]) -> Bed | None:
+    """Read the bed that a slicer states as single numbers in its G-code.
+
+    Args:
+        settings: by name: of KISSlicer and IceSL `bed_size_x_mm`, y and z, `bed_offset_x_mm` and y (from the corner to the origin) and `round_bed`; of
+            Simplify3D `strokeXoverride`, Y and Z, `originOffsetXoverride` and Y, and `machineTypeOverride`.
+
+    Returns:
+        The bed; None: there is none among them, or one that no printer has.
+    """
+
+    def value(name: str, other: str, default: float) -> float:
+        return settings.get(name, settings.get(other, default))
+
+    width, depth = (value(f"bed_size_{axis}_mm", f"stroke{axis.upper()}override", 0) for axis in "xy")
+    height = value("bed_size_z_mm", "strokeZoverride", USUAL_BED.size_mm[2])
+    x, y = (value(f"bed_offset_{axis}_mm", f"originOffset{axis.upper()}override", 0) for axis in "xy")
+    if not (_is_believable(width, depth, height) and 0 <= x <= width and 0 <= y <= depth):
+        return None
+    is_round = settings.get("round_bed") == 1 or settings.get("machineTypeOverride") == _DELTA
+    if is_round and not (x or y):
+        x, y = width / 2, depth / 2
+    return Bed((width, depth, height), (-x, -y), is_round and width == depth)
+
+
+def _is_believable(*lengths_mm: float) -> bool:
+    return all(0 < length <= _MAX_MM for length in lengths_mm)

@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from common.byte_order_mark import without_mark
 from common.errors import SettingsError, UnavailableError
 from phone_host.output.atomic import write_bytes
 from phone_host.printers.door import Job, Wishes
+from phone_host.printers.host_commands import passed_note
 from phone_host.printers.progress import Ended, Phase, Progress
 
 _HOT = "its G-code leaves heaters on: the printer stays hot at the end"
@@ -34,9 +36,10 @@ class FileDoor:
         self.require_ready()
         tell(Progress(phase=Phase.SENDING))
         try:
-            write_bytes(self._path, job.gcode.read_bytes())
+            write_bytes(self._path, without_mark(job.gcode.read_bytes()))
         except OSError as error:
             raise UnavailableError(
                 f"{self._path} cannot be written ({error.strerror})", "make room on the disk, or give another name"
             ) from None
-        return Ended(phase=Phase.DONE, share=1.0, notes=(_HOT,) if job.facts.leaves_hot else ())
+        notes = (_HOT,) * job.facts.leaves_hot + passed_note(job.facts.host_commands, "whoever prints the file")
+        return Ended(phase=Phase.DONE, share=1.0, notes=notes)

@@ -7,13 +7,14 @@ Source: the RepRap wiki, "G-code" (https://reprap.org/wiki/G-code); Marlin's G-c
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
 from common.errors import DataError
-from phone_host.printers.bed import Bed, stated_bed
+from phone_host.printers.bed import USUAL_BED, Bed, bed_of_settings, stated_bed
 from phone_host.printers.cooling import MAX_TOOL
+from phone_host.printers.host_commands import host_command
 from phone_host.printers.nozzle_path import Place, PrintPath, words_of
 
 MOST_FOR_LINES: Final = 90
@@ -25,7 +26,8 @@ MOST_FOR_SERVERS: Final = 4096
 _NUMBERED: Final = re.compile(r"[Nn]\s*\d+\s*(?=[A-Za-z])([^*]*)(?:\*\s*\d+)?")
 """A line that has its number already, and perhaps its checksum, as hosts send them."""
 
-_NAME: Final = re.compile(r"([GMT]\d+)(?!\d)")
+_NAME: Final = re.compile(r"([GMT])0*(\d+)(?!\d)")
+"""Zeros before a number mean nothing: G01 is G1."""
 _WITH_WORDS: Final = frozenset({"", "M0", "M1", "M16", "M23", "M28", "M32", "M117", "M118", "M486"})
 """Commands behind which stands a message or a name, in any script; the empty name stands for macros."""
 
@@ -33,6 +35,11 @@ _TIME: Final = re.compile(r";\s*(?:estimated printing time(?: \(normal mode\))?\
 _AREA: Final = re.compile(r";\s*(?:bed_shape|printable_area)\s*=\s*(.+)")
 _HEIGHT: Final = re.compile(r";\s*(?:max_print_height|printable_height)\s*=\s*(\d+(?:\.\d+)?)\s*$")
 """What PrusaSlicer and OrcaSlicer write at the end of a file."""
+
+_BED_SETTING: Final = re.compile(
+    r";\s*(bed_size_[xyz]_mm|bed_offset_[xy]_mm|round_bed|stroke[XYZ]override|originOffset[XY]override|machineTypeOverride)\s*[=:,]\s*(-?\d+(?:\.\d+)?)\s*$"
+)
+"""What KISSlicer, IceSL and Simplify3D write among their settings."""
 
 _TIME_PART: Final = re.compile(r"(\d+)\s*([dhms]?)")
 _UNIT_S: Final = {"d": 86400, "h": 3600, "m": 60, "s": 1, "": 1}
@@ -78,6 +85,8 @@ class GcodeFacts:
         leaves_hot: whether a heater is still on at its end.
         tools: numbers of the tools whose nozzles are heated.
         has_chamber: whether a chamber is heated.
+        has_model: whether anything that extrudes is the model, and not all the printer's own code.
+        host_commands: names of the commands in it that are for the host, such as pause; each once.
     """
 
     lines: int
@@ -94,15 +103,23 @@ class GcodeFacts:
     leaves_hot: bool
     tools: tuple[int, ...] = ()
     has_chamber: bool = False
+    has_model: bool = True
+    host_commands: tuple[str, ...] = ()
 
 
-def lines_of(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINES) -> Iterator[Line]:
+def lines_of(
+    file: Iterable[str],
+    name: str,
+    most_characters: int = MOST_FOR_LINES,
+    obey: Callable[[str], None] = lambda _: None,
+) -> Iterator[Line]:
     """Give the lines that go to the printer.
 
     Args:
         file: its lines.
         name: of the file, for messages.
         most_characters: that a line may have, as bytes of UTF-8.
+        obey: is told the name of each command for the host, before the line behind it is given.
 
     Raises:
         DataError: a line is none of G-code, or too long.
@@ -110,6 +127,9 @@ def lines_of(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LIN
     for number, raw in enumerate(file, start=1):
         text = _without_comment(raw)
         if not text:
+            continue
+        if command := host_command(text):
+            obey(command)
             continue
         if not _is_line(text):
             raise DataError(f"{name}: line {number} is no G-code", "give the file that a slicer wrote")
@@ -140,7 +160,7 @@ def _without_comment(raw: str) -> str:
 def name_of(text: str) -> str:
     """Return a line's command, such as G1 or M104; empty: it has none."""
     found = _NAME.match(text.upper().replace(" ", ""))
-    return found[1] if found else ""
+    return found[1] + found[2] if found else ""
 
 
 def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
@@ -155,6 +175,7 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
         DataError: a line is none of G-code, or nothing is sent.
     """
     path, heaters, comments, count = PrintPath(), _Heaters(), _Comments(), 0
+    commands = dict[str, None]()
 
     def watched() -> Iterator[str]:
         for raw in file:
@@ -163,7 +184,7 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
                 path.take_comment(raw)
             yield raw
 
-    for line in lines_of(watched(), name, most_characters):
+    for line in lines_of(watched(), name, most_characters, commands.setdefault):
         count += 1
         heaters.take(line.text)
         path.take(name_of(line.text), line.text)
@@ -171,7 +192,8 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
             raise DataError(f"{name}: line {line.number} moves to no place", "give the file that a slicer wrote")
     if not count:
         raise DataError(f"{name} has no line that a printer would do", "give the file that a slicer wrote")
-    whole = path.model if path.model.moves else path.printer  # nothing but start code is what is printed
+    has_model = path.model.moves > 0
+    whole = path.model if has_model else path.printer  # nothing but start code is what is printed
     return GcodeFacts(
         lines=count,
         extruding=path.model.moves + path.printer.moves,
@@ -179,7 +201,7 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
         high_mm=_ends(whole.high),
         prime_low_mm=_ends(path.printer.low),
         prime_high_mm=_ends(path.printer.high),
-        start_moves=path.start_moves if path.model.moves else 0,
+        start_moves=path.start_moves if has_model else 0,
         is_marked=path.is_marked,
         bed=comments.bed,
         seconds=comments.seconds,
@@ -187,11 +209,13 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
         leaves_hot=heaters.are_on,
         tools=heaters.tools,
         has_chamber=heaters.has_chamber,
+        has_model=has_model,
+        host_commands=tuple(commands),
     )
 
 
 def first_outside(file: Iterable[str], name: str, facts: GcodeFacts, bed: Bed) -> tuple[Line, Place] | None:
-    """Find the first line that extrudes the model beyond a bed.
+    """Find the first line that extrudes the model beyond a bed; without any model all that extrudes counts.
 
     Args:
         file: lines of G-code.
@@ -214,7 +238,7 @@ def first_outside(file: Iterable[str], name: str, facts: GcodeFacts, bed: Bed) -
         printers = path.printer.moves
         places = path.take(name_of(line.text), line.text)
         moves += bool(places)
-        is_model = moves > facts.start_moves and path.printer.moves == printers
+        is_model = not facts.has_model or (moves > facts.start_moves and path.printer.moves == printers)
         outside = next((place for place in places if not bed.holds(*place)), None)
         if is_model and outside is not None:
             return line, outside
@@ -226,12 +250,13 @@ class _Comments:
 
     def __init__(self) -> None:
         self.seconds = math.nan
-        self._area, self._height_mm = "", math.nan
+        self._area, self._height_mm = "", USUAL_BED.size_mm[2]
+        self._settings = dict[str, float]()
 
     @property
     def bed(self) -> Bed | None:
-        """The bed, if area and height are both stated."""
-        return stated_bed(self._area, self._height_mm) if self._area and math.isfinite(self._height_mm) else None
+        """The bed, if its area is stated; a height that is not stated is the usual one."""
+        return stated_bed(self._area, self._height_mm) if self._area else bed_of_settings(self._settings)
 
     def take(self, raw: str) -> None:
         """Take a line that begins with a semicolon."""
@@ -241,6 +266,8 @@ class _Comments:
             self._area = found[1]
         elif found := _HEIGHT.match(raw):
             self._height_mm = float(found[1])
+        elif found := _BED_SETTING.match(raw):
+            self._settings[found[1]] = float(found[2])
 
 
 def _ends(values: list[float]) -> tuple[float, float, float]:

@@ -49,7 +49,7 @@ class ReplyKind(Enum):
 
 
 class HostAction(Enum):
-    """What the printer's display or its sensors want of the host."""
+    """What the printer's display, its sensors or the G-code itself want of the host."""
 
     NONE = "none"
     CANCEL = "cancel"

@@ -19,7 +19,13 @@ AXES: Final = "XYZ"
 _TURNS: Final = {"G2": -1, "G3": 1}
 """Of arcs: with the clock, and against it."""
 
-_LAYER: Final = re.compile(r";\s*(?:LAYER_CHANGE|CHANGE_LAYER|LAYER:\s*-?\d+|layer \d+)\b", re.IGNORECASE)
+_SPLINE: Final = "G5"
+
+_LAYER: Final = re.compile(
+    r";+\s*(?:-+\s*|<)?(?:LAYER_CHANGE|CHANGE_LAYER|BEGIN_LAYER_\w+|LAYER:\s*-?\d+|layer \d+)\b", re.IGNORECASE
+)
+"""Of PrusaSlicer, OrcaSlicer, KISSlicer, Cura and ideaMaker, Simplify3D, Kiri:Moto and IceSL."""
+
 _TYPE: Final = re.compile(r";\s*(?:TYPE|FEATURE):\s*(.+)", re.IGNORECASE)
 _CUSTOM: Final = "custom"
 _MAX_PRIME_MOVES: Final = 20
@@ -150,8 +156,8 @@ class NozzlePath:
         """Take a line; return what it reaches while it extrudes, as `PrintPath.take`."""
         words = words_of(text)
         match name:
-            case "G0" | "G1" | "G2" | "G3":
-                return self._move(words, _TURNS.get(name, 0))
+            case "G0" | "G1" | "G2" | "G3" | "G5":
+                return self._move(words, name)
             case "G28":
                 self._home([axis for axis, letter in enumerate(AXES) if letter in text.upper()[3:]])
             case "G90":
@@ -184,8 +190,8 @@ class NozzlePath:
                 self._at[axis] = words[letter] * self._unit
         self._e = words.get("E", self._e)
 
-    def _move(self, words: dict[str, float], turn: int) -> tuple[Place, ...]:
-        """Follow a line, or an arc: against the clock (1), or with it (-1)."""
+    def _move(self, words: dict[str, float], name: str) -> tuple[Place, ...]:
+        """Follow a line, an arc or a spline."""
         before = list(self._at)
         for axis, letter in enumerate(AXES):
             if letter in words:
@@ -196,7 +202,15 @@ class NozzlePath:
         self._e = self._e + amount if self._e_is_relative else amount
         if fed <= 0 or not {"X", "Y", "I", "J"} & words.keys():
             return ()
-        return _place(before), _place(self._at), *(self._tips(before, words, turn) if turn else ())
+        if turn := _TURNS.get(name):
+            return _place(before), _place(self._at), *self._tips(before, words, turn)
+        return _place(before), _place(self._at), *(self._controls(before, words) if name == _SPLINE else ())
+
+    def _controls(self, before: list[float], words: dict[str, float]) -> Iterator[Place]:
+        """Yield the two points between which and its ends a cubic spline stays."""
+        i, j, p, q = (words.get(letter, 0.0) * self._unit for letter in "IJPQ")
+        yield before[0] + i, before[1] + j, before[2]
+        yield self._at[0] + p, self._at[1] + q, self._at[2]
 
     def _tips(self, before: list[float], words: dict[str, float], turn: int) -> Iterator[Place]:
         """Yield where an arc in the plane of the bed reaches farthest along its axes, beside its ends."""

@@ -12,7 +12,15 @@ from typing import Final
 from phone_host.printers.digest import digest_header
 from phone_host.printers.printer_uri import ServerUri
 from phone_host.printers.progress import Heat
-from phone_host.printers.server import Condition, ServerState, note_refusal, pieces, require_good, require_key
+from phone_host.printers.server import (
+    Condition,
+    ServerState,
+    note_refusal,
+    pieces,
+    require_good,
+    require_key,
+    size_bytes,
+)
 from phone_host.printers.server_answer import Answer, or_zero
 from phone_host.printers.server_talk import ServerTalk
 
@@ -78,7 +86,7 @@ class PrusaLink:
         target = f"/api/v1/files{self._store()}/{name}"
         headers = {"Content-Type": "text/x.gcode", "Print-After-Upload": "?1", "Overwrite": "?1"}
         headers |= self._headers("PUT", target, self._challenge)
-        size = gcode.stat().st_size
+        size = size_bytes(gcode)
         answer = self._talk.hand_over("PUT", target, headers, pieces(gcode, sent), size)
         require_key(answer, self._key, self._example, _WHERE)
         require_good(answer, "the file")

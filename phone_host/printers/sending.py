@@ -7,7 +7,7 @@ the printer itself has confirmed the end, the lines that switch its heaters off 
 import math
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
-from typing import Final
+from typing import Final, assert_never
 
 from common import now
 from common.errors import DataError, TandemError
@@ -15,6 +15,7 @@ from phone_host.printers.cooling import heaters_off, last_lines
 from phone_host.printers.door import Job, Wishes
 from phone_host.printers.gcode import GcodeFacts, lines_of
 from phone_host.printers.gcode import Line as GcodeLine
+from phone_host.printers.host_commands import action_of, ignored_note
 from phone_host.printers.line import Line, PrinterGoneError, open_line, require_allowed
 from phone_host.printers.marlin import MarlinSender
 from phone_host.printers.marlin_reply import HostAction
@@ -69,20 +70,22 @@ class LineDoor:
             line = open_line(self._uri)
             try:
                 cooling = off if job.facts.leaves_hot else ()
-                lines = chain(_whole(file, job), (GcodeLine(0, text) for text in cooling))
+                commands = _FileCommands(wishes)
+                lines = chain(_whole(file, job, commands), (GcodeLine(0, text) for text in cooling))
                 sender = MarlinSender(lines, now.monotonic_ns(), options)
-                send(line, sender, wishes, _telling(sender, job.facts, tell))
+                send(line, sender, wishes, _telling(sender, job.facts, commands, tell))
             finally:
                 line.close()
-        return _ended(sender, job.facts)
+        return _ended(sender, job.facts, commands)
 
 
-def _ended(sender: MarlinSender, facts: GcodeFacts) -> Ended:
+def _ended(sender: MarlinSender, facts: GcodeFacts, commands: "_FileCommands") -> Ended:
     done = min(sender.done, facts.lines)
     is_left = not sender.phase.is_over
     notes = (_UNPROVED,) if is_left else ()
     if sender.phase is Phase.DONE and facts.leaves_hot:
         notes = ("its G-code leaves heaters on: they were switched off",)
+    notes = (*notes, *commands.notes, *ignored_note(facts.host_commands))
     left = f"; {done} of {facts.lines} lines were done"
     return Ended(
         phase=Phase.CANCELLED if is_left else sender.phase,
@@ -94,18 +97,66 @@ def _ended(sender: MarlinSender, facts: GcodeFacts) -> Ended:
     )
 
 
-def _whole(file: Iterable[str], job: Job) -> Iterator[GcodeLine]:
+class _FileCommands:
+    """Obeys what the G-code itself wants of its host: the lines that begin with `@`.
+
+    Attributes:
+        message: why it pauses; empty: it does not.
+        notes: on what was obeyed.
+
+    Args:
+        wishes: of the user, who can go on after a pause.
+    """
+
+    def __init__(self, wishes: Wishes) -> None:
+        self._wishes = wishes
+        self._is_new = False
+        self.message, self.notes = "", tuple[str, ...]()
+
+    def obey(self, name: str) -> None:
+        """Take a command of the file; others than those that are known do nothing."""
+        match action_of(name):
+            case HostAction.CANCEL:
+                self._wishes.cancel()
+                self.notes = (f"its G-code ended it (@{name})",)
+            case HostAction.PAUSE:
+                self.message = f"its G-code pauses (@{name})"
+                self._wishes.pause()
+            case HostAction.RESUME:
+                self._wishes.go_on()
+            case HostAction.SHOW | HostAction.NONE:
+                return
+            case _ as unknown:
+                assert_never(unknown)
+        self._is_new = True
+
+    def hold_back(self) -> Iterator[GcodeLine]:
+        """Yield a harmless line behind a command, so that it works before the next line of the print goes out."""
+        if self._is_new:
+            self._is_new = False
+            yield GcodeLine(0, "M105")
+
+    def words(self, phase: Phase) -> str:
+        """Return what is shown of a pause, as long as it lasts."""
+        if phase is Phase.PRINTING and not self._wishes.is_paused:
+            self.message = ""
+        return self.message
+
+
+def _whole(file: Iterable[str], job: Job, commands: _FileCommands) -> Iterator[GcodeLine]:
     """Yield the lines of a file.
 
     Raises:
         DataError: a line is none of G-code, or the file is another than the one that was examined: nobody knows whether it ends cold.
     """
     count = 0
-    for line in lines_of(file, str(job.gcode)):
+    for line in lines_of(file, str(job.gcode), obey=commands.obey):
+        yield from commands.hold_back()
         count += 1
         if count > job.facts.lines:
             break
         yield line
+    yield from commands.hold_back()
     if count != job.facts.lines:
         raise DataError(f"{job.gcode} was changed while it was printed", "print it again, from a copy")
 
@@ -114,7 +165,9 @@ def _unreadable(error: OSError) -> DataError:
     return DataError(f"the G-code cannot be read any more ({error.strerror})", "copy it to this machine's own disk")
 
 
-def _telling(sender: MarlinSender, facts: GcodeFacts, tell: Callable[[Progress], None]) -> Callable[[], None]:
+def _telling(
+    sender: MarlinSender, facts: GcodeFacts, commands: _FileCommands, tell: Callable[[Progress], None]
+) -> Callable[[], None]:
     began_ns: list[int] = []
 
     def told() -> None:
@@ -130,7 +183,7 @@ def _telling(sender: MarlinSender, facts: GcodeFacts, tell: Callable[[Progress],
                 seconds_left=left_s,
                 heat=sender.heat,
                 resent=sender.resent,
-                message=sender.message,
+                message=sender.message or commands.words(sender.phase),
             )
         )
 

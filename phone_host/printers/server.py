@@ -7,6 +7,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Final, Protocol
 
+from common.byte_order_mark import UTF_8_MARK
 from common.errors import DataError, SettingsError, UnavailableError
 from phone_host.printers.progress import Heat
 from phone_host.printers.server_answer import Answer
@@ -100,6 +101,27 @@ class PrintServer(Protocol):
         """Stop everything at once; return what has to be done before the next print. Empty: the server cannot do that."""
 
 
+def size_bytes(gcode: Path) -> int:
+    """Return how long a file is as it is sent: without a byte order mark, which a printer would take for a command.
+
+    Raises:
+        DataError: it cannot be read.
+    """
+    try:
+        return gcode.stat().st_size - _mark_bytes(gcode)
+    except OSError as error:
+        raise _unreadable(gcode, error) from None
+
+
+def _mark_bytes(gcode: Path) -> int:
+    with gcode.open("rb") as file:
+        return len(UTF_8_MARK) if file.read(len(UTF_8_MARK)) == UTF_8_MARK else 0
+
+
+def _unreadable(gcode: Path, error: OSError) -> DataError:
+    return DataError(f"{gcode} cannot be read ({error.strerror})", "give the file that a slicer wrote")
+
+
 def pieces(gcode: Path, sent: Callable[[float], None]) -> Iterator[bytes]:
     """Yield a file in pieces, telling the share that was sent before each: so what `sent` raises ends the transfer before it is whole.
 
@@ -107,15 +129,15 @@ def pieces(gcode: Path, sent: Callable[[float], None]) -> Iterator[bytes]:
         DataError: it cannot be read.
     """
     try:
-        size = max(gcode.stat().st_size, 1)
+        size, done = max(size_bytes(gcode), 1), 0
         with gcode.open("rb") as file:
-            done = 0
+            file.seek(_mark_bytes(gcode))
             while piece := file.read(_PIECE):
                 sent(min(done / size, 1.0))
                 yield piece
                 done += len(piece)
     except OSError as error:
-        raise DataError(f"{gcode} cannot be read ({error.strerror})", "give the file that a slicer wrote") from None
+        raise _unreadable(gcode, error) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +159,7 @@ class Form:
 
     def size(self, gcode: Path) -> int:
         """Return its length with the file in it, bytes."""
-        return len(self.head) + gcode.stat().st_size + len(self.tail)
+        return len(self.head) + size_bytes(gcode) + len(self.tail)
 
     def body(self, gcode: Path, sent: Callable[[float], None]) -> Iterator[bytes]:
         """Yield it with the file in it."""

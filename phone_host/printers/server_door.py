@@ -8,11 +8,13 @@ import re
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Final
 
 from common import now
 from common.errors import TandemError, UnavailableError
 from phone_host.printers.door import Job, Wishes
+from phone_host.printers.host_commands import passed_note
 from phone_host.printers.line import PrinterGoneError
 from phone_host.printers.progress import Ended, Heat, Phase, Progress
 from phone_host.printers.server import Condition, PrintServer, ServerState
@@ -70,7 +72,8 @@ class ServerDoor:
             raise ServerLostError(
                 f"{error.problem} while it gets the file: nobody knows whether it prints", "look at its own page"
             ) from None
-        return _Watch(self._server, job, wishes, tell).until_over()
+        ended = _Watch(self._server, job, wishes, tell).until_over()
+        return replace(ended, notes=(*ended.notes, *passed_note(job.facts.host_commands, self._server.title)))
 
     def _require_idle(self, state: ServerState) -> None:
         title = self._server.title

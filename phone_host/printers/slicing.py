@@ -81,7 +81,7 @@ _TELL_S: Final = 0.2
 _NEAR_MM: Final = 20.0
 """So far beyond the bed may start code go that no mark tells from the model: printers reach 2 to 10 mm beyond."""
 
-_OTHER_BED: Final = "move or scale the model in the slicer; if this printer has another bed, or its origin elsewhere, give --bed, such as 200,200,300@centre"
+_OTHER_BED: Final = "move or scale the model in the slicer; if this printer has another bed, or its origin elsewhere, give --bed, such as 200,200,300@centre; if that line is the printer's own code, put ;TYPE:Custom before it"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,14 @@
+M83
+G28
+G1 X-80 Y0 Z0.3 F5000
+G1 X-70 Y-40 E4
+G1 X-10 Y-10 Z0.2 F6000
+G1 X10.0 Y-10 E0.7
+G1 X10.0 Y10.0 E0.7
+G1 X-10 Y10.0 E0.7
+G1 X-10 Y-10 E0.7
+M104 S0
+M140 S0
+M84
+; printable_area = -90x-90,90x-90,90x90,-90x90
+; printable_height = 180
