@@ -3,7 +3,7 @@
 import base64
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -203,4 +203,35 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
     file, primitive = plain()
     nodes = [*({"children": [k + 1, k + 1]} for k in range(40)), {"mesh": 0}]
     cases["nodes-that-double"] = file.bytes([primitive], nodes), {"refused": "circle"}
+    cases |= _odd_cases(plain, answer)
     return [(f"{name}.glb", content, answer) for name, (content, answer) in cases.items()]
+
+
+def _odd_cases(
+    plain: Callable[[], tuple[GlbFile, dict[str, Any]]], answer: dict[str, Any]
+) -> dict[str, tuple[bytes, dict[str, Any]]]:
+    """Return what few programs write, or what the specification allows and nobody expects."""
+    cases: dict[str, tuple[bytes, dict[str, Any]]] = {}
+    file, primitive = plain()
+    cases["primitive-without-places"] = file.bytes([primitive, {"attributes": {}}], [{"mesh": 0}, {"mesh": 1}], (0, 1)), answer  # fmt: skip
+    file, primitive = plain()
+    buffers = [{"byteLength": len(file.buffer)}, {"byteLength": 9, "uri": "picture.bin"}]
+    cases["another-file-that-no-mesh-needs"] = file.bytes([primitive], [{"mesh": 0}], buffers=buffers), answer
+    file, primitive = plain()
+    file.views[0]["buffer"] = 1
+    buffers = [{"byteLength": len(file.buffer)}, {"byteLength": 96}]
+    cases["second-buffer-without-an-address"] = file.bytes([primitive], [{"mesh": 0}], buffers=buffers), {"refused": "another file"}  # fmt: skip
+    file, primitive = plain()
+    node = {"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {}}}}
+    cases["instances-that-are-not-required"] = file.bytes([primitive], [node], extensionsUsed=["EXT_mesh_gpu_instancing"]), {"refused": "EXT_mesh_gpu_instancing"}  # fmt: skip
+    file, primitive = plain()
+    primitive["attributes"]["COLOR_0"] = file.add(np.tile([147, 1, 1], (8, 1)), "u1")
+    cases["colours-that-say-not-that-they-are-shares"] = file.bytes([primitive], [{"mesh": 0}]), answer | {"colour": [200, 13, 13]}  # fmt: skip
+    file, primitive = plain()
+    whole = file.bytes([primitive], [{"mesh": 0}], extras="\N{DEGREE SIGN}")
+    length = struct.unpack_from("<I", whole, 12)[0]
+    text = b"\xef\xbb\xbf" + whole[20 : 20 + length].rstrip() + b"\0"
+    text += bytes(-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + whole[20 + length :]
+    cases["filled-with-zeros-behind-a-mark"] = struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks, answer
+    return cases

@@ -2,7 +2,7 @@
 
 import io
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from numpy.typing import NDArray
@@ -18,7 +18,10 @@ _RELATIONS: Final = (
 )
 
 
-def _zipped(parts: dict[str, str], method: int = zipfile.ZIP_DEFLATED) -> bytes:
+_PRUSA, _BAMBU = "Metadata/Slic3r_PE_model.config", "Metadata/model_settings.config"
+
+
+def _zipped(parts: Mapping[str, str | bytes], method: int = zipfile.ZIP_DEFLATED) -> bytes:
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w", method) as archive:
         for name, text in parts.items():
@@ -71,6 +74,15 @@ def three_mf_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], bo
         thing(k, f'<components><component objectid="{k - 1}"/><component objectid="{k - 1}"/></components>')
         for k in range(2, 42)
     )
+    twice_in_one = mesh().replace("</vertices>", "".join(f'<vertex x="{3 * x:g}" y="{y:g}" z="{z:g}"/>' for x, y, z in corners) + "</vertices>")  # fmt: skip
+    others = "".join(f'<triangle v1="{a + 8}" v2="{b + 8}" v3="{c + 8}"/>' for a, b, c in triangles)
+    twice_in_one = twice_in_one.replace("</triangles>", others + "</triangles>")
+    in_parts = thing(2, '<components><component objectid="1"/><component objectid="5"/></components>')
+
+    def project(config: str, resources: str, roles: str) -> bytes:
+        item = '<item objectid="2"/>' if 'id="2"' in resources else '<item objectid="1"/>'
+        return _zipped({"3D/3dmodel.model": _model(resources, item), config: f"<config>{roles}</config>"})
+
     model = _model(thing(1, mesh()), item)
     cases: dict[str, tuple[bytes, dict[str, Any]]] = {
         "plain": (whole(model), box),
@@ -95,5 +107,17 @@ def three_mf_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], bo
         "entities": (whole(_model(thing(1, mesh()), item, head='<?xml version="1.0"?><!DOCTYPE model [<!ENTITY a "b">]>')), {"refused": "document type"}),
         "cut-short": (whole(model)[:-200], {"refused": "no 3MF"}),
         "bomb": (whole(_model(thing(1, mesh()), item) + " " * (1 << 25)), {"refused": "times its size"}),
+        "empty-object": (whole(_model(thing(1, mesh()) + thing(2, "<mesh><vertices/><triangles/></mesh>"), item + '<item objectid="2"/>')), box),
+        "of-type-surface": (whole(_model(thing(1, mesh()).replace('type="model"', 'type="surface"'), item)), box),
+        "item-that-is-not-printed": (whole(_model(thing(1, mesh()), f'{item}<item objectid="1" {move} printable="0"/>')), box),
+        "path-in-another-case": (
+            _zipped({"_rels/.rels": _RELATIONS.format("3D/3DModel.model"), "3D/3dmodel.model": _model(apart.replace("Objects/box", "objects/Box"), item), "3D/Objects/box.model": _model(thing(7, mesh()), "")}),
+            box,
+        ),
+        "modifier-of-prusaslicer": (project(_PRUSA, thing(1, twice_in_one), '<object id="1"><volume firstid="0" lastid="11"><metadata type="volume" key="volume_type" value="ModelPart"/></volume><volume firstid="12" lastid="23"><metadata type="volume" key="modifier" value="1"/><metadata type="volume" key="volume_type" value="ParameterModifier"/></volume></object>'), box),
+        "support-blocker-of-bambu-studio": (project(_BAMBU, thing(1, mesh()) + thing(5, mesh(3)) + in_parts, '<object id="2"><part id="1" subtype="normal_part"/><part id="5" subtype="support_blocker"/></object>'), box),
+        "negative-part": (project(_BAMBU, thing(1, mesh()) + thing(5, mesh(3)) + in_parts, '<object id="2"><part id="1" subtype="normal_part"/><part id="5" subtype="negative_part"/></object>'), {"refused": "cut away"}),
+        "beams": (whole(_model(thing(1, mesh().replace("</mesh>", '<b:beamlattice xmlns:b="b" radius="1"><b:beams><b:beam v1="0" v2="1"/></b:beams></b:beamlattice></mesh>')), item)), {"refused": "beamlattice"}),
+        "in-utf-16": (_zipped({"3D/3dmodel.model": model.replace('"1.0"', '"1.0" encoding="UTF-16"').encode("utf-16")}), box),
     }  # fmt: skip
     return [(f"{name}.3mf", content, answer) for name, (content, answer) in cases.items()]

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.byte_order_mark import without_mark
 from common.errors import DataError
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.assembly import Part, assemble, require_count
@@ -79,14 +80,14 @@ class _File:
     Attributes:
         name: of the file, for errors.
         tree: its JSON.
-        buffers: its bytes.
+        buffers: its bytes; None: they are in another file.
         held_bytes: of all buffers.
         sparse_rows: that were read so far.
     """
 
     name: str
     tree: Tree
-    buffers: list[memoryview]
+    buffers: list[memoryview | None]
     held_bytes: int
     sparse_rows: int = 0
 
@@ -94,6 +95,8 @@ class _File:
         """Return the bytes of a view, and how far apart its rows are; 0: close together."""
         view = self.tree["bufferViews"][number]
         begin, length, buffer = view.get("byteOffset", 0), view["byteLength"], self.buffers[view["buffer"]]
+        if buffer is None:
+            raise DataError(f"{self.name} has its numbers in another file", "export it as one file")
         if min(begin, length) < 0 or begin + length > len(buffer):
             raise IndexError("beyond the end")
         return buffer[begin : begin + length], view.get("byteStride", 0)
@@ -172,27 +175,25 @@ def _file(content: bytes, name: str) -> _File:
         found.setdefault(kind, whole[at + 8 : at + 8 + length])
         at += 8 + length
     try:
-        text = bytes(found[_JSON])
+        text = without_mark(bytes(found[_JSON])).rstrip(b"\0")  # with which some fill the chunk
         if text.count(b"[") + text.count(b"{") > _FREE_LISTS + len(content) // _BYTES_PER_LIST:
             raise ValueError("too many lists")
         tree = json.loads(text)
     except RecursionError:
         raise ValueError("too deep") from None
     _require_plain(name, tree.get("extensionsRequired", ()))
-    buffers = list(_buffers(name, tree, found.get(_BINARY, memoryview(b""))))
-    return _File(name, tree, buffers, sum(map(len, buffers)))
+    buffers = list(_buffers(tree, found.get(_BINARY, memoryview(b""))))
+    return _File(name, tree, buffers, sum(len(buffer) for buffer in buffers if buffer is not None))
 
 
-def _buffers(name: str, tree: Tree, binary: memoryview) -> Iterator[memoryview]:
-    """Yield the buffers: the binary chunk, or bytes within the JSON, as Open3D writes them."""
-    for buffer in tree.get("buffers", ()):
-        uri = buffer.get("uri")
-        if uri is None:
-            yield binary
-        elif uri.startswith("data:"):
+def _buffers(tree: Tree, binary: memoryview) -> Iterator[memoryview | None]:
+    """Yield the buffers: the binary chunk, which only the first one can be, or bytes within the JSON, as Open3D writes them; None: another file."""
+    for number, buffer in enumerate(tree.get("buffers", ())):
+        uri = buffer.get("uri", "")
+        if uri.startswith("data:"):
             yield memoryview(base64.b64decode(uri.partition(",")[2]))
         else:
-            raise DataError(f"{name} has its numbers in another file", "export it as one file")
+            yield None if uri or number else binary
 
 
 def _require_plain(name: str, extensions: Iterable[str]) -> None:
@@ -223,6 +224,7 @@ def _parts(file: _File) -> Iterator[Part]:
         if depth > _MAX_DEPTH or visits > len(nodes):  # a node has one parent
             raise DataError(f"{file.name} has nodes in a circle", "export it anew")
         node = nodes[number]
+        _require_plain(file.name, node.get("extensions", ()))
         transform = transform @ _matrix(node)
         waiting += [(child, transform, depth + 1) for child in node.get("children", ())]
         if "mesh" in node:
@@ -254,6 +256,8 @@ def _mesh(file: _File, mesh: Tree) -> Iterator[Part]:
         if mode not in (_TRIANGLES, _STRIP, _FAN):
             continue
         attributes = primitive["attributes"]
+        if "POSITION" not in attributes:  # the specification allows that, and nothing is to be seen of it
+            continue
         count, columns = file.shape(attributes["POSITION"])
         if columns != 3:
             raise ValueError("places of another shape")
@@ -286,7 +290,8 @@ def _triangles(corners: NDArray[Any], mode: int) -> NDArray[Any]:
 
 
 def _colours(shades: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return (N, 3): sRGB, as in pictures; those of a file are linear."""
-    linear = np.clip(np.nan_to_num(shades[:, :3].astype(np.float64)), 0, 1)
+    """Return (N, 3): sRGB, as in pictures; those of a file are linear. Integers are shares, also where the file forgets to say so."""
+    white = np.iinfo(shades.dtype).max if shades.dtype.kind in "iu" else 1
+    linear = np.clip(np.nan_to_num(shades[:, :3].astype(np.float64)) / white, 0, 1)
     shares = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return np.asarray(np.rint(255 * shares), np.uint8)

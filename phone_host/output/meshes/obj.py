@@ -21,8 +21,8 @@ _NUMBERS: Final = (3, 4, 6, 7)
 """Of a point: three, perhaps a weight that polygons do not heed, or a colour, perhaps with its opacity."""
 
 
-_FIGURE: Final = re.compile(rb"\s*[vf][\s\\]", re.IGNORECASE)
-"""The first line of a point or a face."""
+_FIGURE: Final = re.compile(rb"\s*(?:v|fo?)[\s\\]", re.IGNORECASE)
+"""The first line of a point or a face, of which `fo` is the name in old files."""
 
 
 def obj_bytes(solid: Solid, comment: str) -> bytes:
@@ -67,7 +67,7 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
                     raise DataError(f"{name} is no OBJ file: a point has not three numbers", "export it anew")
                 points.extend(values[:3])
                 shades.extend(values[3:6] if len(values) > 4 else ())
-            elif word == b"f":
+            elif word in {b"f", b"fo"}:
                 counts.append(len(words) - 1)
                 corners.extend(_corners(words, len(points) // 3))
         except (ValueError, OverflowError):

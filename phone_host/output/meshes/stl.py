@@ -3,6 +3,7 @@
 Source: "The StL Format", 3D Systems, 1989: 80 bytes of header, a count, then 50 bytes a triangle.
 """
 
+import re
 from array import array
 from typing import Final
 
@@ -20,6 +21,11 @@ _HEADER: Final = 80
 _COUNTS_NOT_SET: Final = (0, 0xFFFFFFFF)
 """What writers leave there that do not go back to the header."""
 
+_NAMED: Final = re.compile(rb"\s*(?:end\s*)?solid\b")
+_FACETS: Final = re.compile(rb"\bfacet\s+normal\s+[-+.\dni].*?(?=\bend\s*solid\b|$)", re.DOTALL)
+"""From a facet, which begins with its normal (a number, nan or inf), to the end of its solid."""
+
+_SOLID_END: Final = re.compile(rb"\bend\s*solid\b")
 _TEXT_HEAD: Final = 512
 """A binary file has a zero byte here: it is in the count, or in the first triangles' attributes."""
 
@@ -91,17 +97,18 @@ def _text(content: bytes, name: str) -> NDArray[np.float64]:
     corners, opened, closed = array("d"), 0, 0
     try:
         for line in text_lines(without_mark(content)):
-            words = iter(line.lower().split())
-            for number, word in enumerate(words):
+            words = iter(_behind_names(line.lower()).split())
+            before = b""
+            for word in words:
                 if word == b"vertex":
                     corners.extend([float(next(words)), float(next(words)), float(next(words))])
-                elif number == 0 and word in {b"solid", b"endsolid"}:
-                    break  # a name follows, of any words
+                elif word == b"endfacet" or (before, word) == (b"end", b"facet"):
+                    closed += 1
                 else:
                     opened += word == b"facet"
-                    closed += word == b"endfacet"
+                before = word
     except (ValueError, StopIteration):
-        if b"endsolid" not in content[-_TEXT_HEAD:].lower():
+        if not _SOLID_END.search(content[-_TEXT_HEAD:].lower()):
             raise _cut_error(name) from None
         raise DataError(f"{name} has a vertex that is no number", "export it anew") from None
     if opened != closed:
@@ -109,6 +116,13 @@ def _text(content: bytes, name: str) -> NDArray[np.float64]:
     if len(corners) % 9:
         raise DataError(f"{name} has a triangle without three corners", "export it anew")
     return np.frombuffer(corners, np.float64).reshape(-1, 3)
+
+
+def _behind_names(line: bytes) -> bytes:
+    """Return a line without the name of a solid, which may have any words; facets may follow on the same line."""
+    if not _NAMED.match(line):
+        return line
+    return b" ".join(facets[0] for facets in _FACETS.finditer(line))
 
 
 def _cut_error(name: str) -> DataError:

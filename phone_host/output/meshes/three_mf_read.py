@@ -23,9 +23,14 @@ from phone_host.output.meshes.assembly import Part, assemble, require_count
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, require_corners
 from phone_host.output.meshes.text import require_short
 from phone_host.output.meshes.three_mf import axes_element
+from phone_host.output.meshes.three_mf_roles import Roles, read_roles
 
 _UNITS_M: Final = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 _TARGET: Final = re.compile(r'Target\s*=\s*"/?([^"]+\.model)"', re.IGNORECASE)
+_TEXTS: Final = (".model", ".rels", ".config")
+_UNREAD: Final = ("beamlattice", "booleanshape", "displacementmesh", "levelset")
+"""Elements of extensions whose shape is not that of triangles."""
+
 _RELATIONS: Final = "_rels/.rels"
 _MAX_INFLATED: Final = 100
 """Times the file's size that its parts may have: a mesh's text has 5 to 20."""
@@ -68,6 +73,7 @@ class _Package:
     colours: list[tuple[int, ...]] = field(default_factory=list)
     unit_m: float = 1e-3
     entries: int = 0
+    roles: Roles = field(default_factory=Roles)
 
 
 def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Solid, Axes | None]:
@@ -87,7 +93,7 @@ def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Soli
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             _require_bounded(archive, name, len(content))
-            package, root = _Package(), _root(archive)
+            package, root = _Package(roles=read_roles(archive, name)), _root(archive)
             with archive.open(root) as file:
                 head = file.read(_HEAD).decode("utf-8", "replace")
             names = sorted((each for each in archive.namelist() if each.lower().endswith(".model")), key=root.__ne__)
@@ -102,7 +108,7 @@ def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Soli
 
 def _require_bounded(archive: zipfile.ZipFile, name: str, held: int) -> None:
     """Check how long the texts inside are before one of them is read."""
-    inflated = sum(each.file_size for each in archive.infolist() if each.filename.lower().endswith((".model", ".rels")))
+    inflated = sum(each.file_size for each in archive.infolist() if each.filename.lower().endswith(_TEXTS))
     if inflated > _FREE_BYTES + _MAX_INFLATED * held:
         raise DataError(f"{name} would grow to {inflated // held} times its size", "no mesh does: export it anew")
     require_short(inflated, name)
@@ -127,7 +133,8 @@ class _Reader:
     """
 
     def __init__(self, package: _Package, part: str, name: str, *, is_root: bool) -> None:
-        self._package, self._part, self._name, self._is_root = package, part, name, is_root
+        self._package, self._file, self._name, self._is_root = package, part, name, is_root
+        self._part = part.lower()
         self._object, self._group = _Object(), list[int]()
         self._paint: tuple[str | None, str | None] = (None, None)
         self._open = 0
@@ -139,7 +146,7 @@ class _Reader:
         parser.EndElementHandler = self._end_element
         parser.StartDoctypeDeclHandler = self._refuse
         parser.buffer_text = True
-        with archive.open(self._part) as file:
+        with archive.open(self._file) as file:
             while chunk := file.read(_CHUNK):
                 parser.Parse(chunk)
             parser.Parse(b"", True)  # noqa: FBT003 - expat's own argument
@@ -155,6 +162,10 @@ class _Reader:
         self._open += 1
         if self._open > _MAX_OPEN:
             raise ValueError("elements within elements")
+        if element in _UNREAD:
+            raise DataError(
+                f"{self._name} has a {element}, which is not read", "let the program that made it export triangles"
+            )
         if element in _ENTRIES:
             self._package.entries += 1
             if self._package.entries > _MAX_ENTRIES:
@@ -175,7 +186,7 @@ class _Reader:
                 self._package.objects[self._part, attributes["id"]] = self._object
             case "component":
                 self._object.components.append((self._key(attributes), _matrix(attributes)))
-            case "item" if self._is_root:
+            case "item" if self._is_root and attributes.get("printable") != "0":
                 self._package.items.append((self._key(attributes), _matrix(attributes)))
             case "model" if self._is_root:
                 self._package.unit_m = _UNITS_M[attributes.get("unit", "millimeter")]
@@ -188,7 +199,7 @@ class _Reader:
     def _key(self, attributes: dict[str, str]) -> Key:
         """Return which object a component or an item places."""
         path = next((value for key, value in attributes.items() if key.rpartition(":")[2] == "path"), self._part)
-        return path.lstrip("/"), attributes["objectid"]
+        return path.lstrip("/").lower(), attributes["objectid"]
 
     def _paints(self, attributes: dict[str, str]) -> tuple[int, int, int]:
         """Return the numbers of the colours of a triangle's corners."""
@@ -229,20 +240,30 @@ def _build_parts(package: _Package, name: str) -> Iterator[Part]:
         if key not in package.objects:
             raise DataError(f"{name} places an object that it does not hold", "export it anew")
         thing = package.objects[key]
-        waiting += [(inner, transform @ way, depth + 1) for inner, way in thing.components]
+        waiting += [
+            (inner, transform @ way, depth + 1)
+            for inner, way in thing.components
+            if (key[1], inner[1]) not in package.roles.parts
+        ]
         if thing.triangles:
-            part = parts.get(key) or _part(palette, thing, name)
+            part = parts.get(key) or _part(palette, thing, package.roles.ranges.get(key[1], []), name)
             parts[key] = part
             triangles += len(part.triangles)
             require_count(name, triangles)
             yield Part(part.points, part.triangles, part.colours, transform)
 
 
-def _part(palette: NDArray[np.uint8], thing: _Object, name: str) -> Part:
+def _part(palette: NDArray[np.uint8], thing: _Object, others: list[tuple[int, int]], name: str) -> Part:
+    """Return a mesh, without those ranges of its triangles that are not the model."""
     points = np.frombuffer(thing.points, np.float64).reshape(-1, 3) if thing.points else np.zeros((0, 3))
     triangles = np.frombuffer(thing.triangles, np.int32).reshape(-1, 3)
-    require_corners(name, triangles, len(points))
     paints: NDArray[Any] = np.frombuffer(thing.paints, np.int32)
+    if others:
+        is_model = np.ones(len(triangles), np.bool_)
+        for first, last in others:
+            is_model[max(first, 0) : max(last + 1, 0)] = False
+        triangles, paints = triangles[is_model], paints.reshape(-1, 3)[is_model[: len(paints) // 3]].ravel()
+    require_corners(name, triangles, len(points))
     if not (paints >= 0).any():
         return Part(points, triangles, NO_COLOURS, np.eye(4))
     return Part(points, triangles, colours_of_points(triangles.ravel(), palette[paints], len(points)), np.eye(4))
