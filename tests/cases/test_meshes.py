@@ -191,6 +191,7 @@ def test_a_3mf_that_contradicts_itself_is_refused() -> None:
         (text.replace("<build>", "<build>" + '<item objectid="1"/>' * 110_000), "more than 100000"),
         (text.replace('unit="millimeter"', 'unit="mile"'), "no 3MF"),
         (text.replace("</mesh>", ""), "no 3MF"),
+        (text.replace('version="1.0"', 'version="1.0" encoding="F-16"'), "no 3MF"),
     ):
         held = io.BytesIO()
         with zipfile.ZipFile(held, "w") as archive:

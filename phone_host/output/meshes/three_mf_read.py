@@ -99,7 +99,7 @@ def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Soli
             names = sorted((each for each in archive.namelist() if each.lower().endswith(".model")), key=root.__ne__)
             for each in names:
                 _Reader(package, each, name, is_root=each == root).read(archive)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError, expat.ExpatError, ValueError, KeyError, IndexError, OverflowError) as error:  # fmt: skip
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError, expat.ExpatError, ValueError, LookupError, OverflowError) as error:  # fmt: skip
         raise DataError(f"{name} is no 3MF file, or cut short", "copy the file again, or export it anew") from error
     parts = list(_build_parts(package, name))
     axes = next((axes for axes in Axes if axes_element(axes) in head), None)
