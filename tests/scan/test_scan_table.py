@@ -63,6 +63,39 @@ def test_what_is_no_table_with_a_thing_is_told() -> None:
     assert find_table(blank) is Weakness.NO_TABLE
 
 
+def test_the_table_of_a_wide_view_is_that_of_a_small_one() -> None:
+    """A view of 1280 px is made small first: the table and the ball are where they are in one of 320."""
+    small, seen = find_table(Slope().view()), Slope().view()
+    wide = replace(
+        seen,
+        depth_m=np.repeat(np.repeat(seen.depth_m, 4, axis=0), 4, axis=1),
+        geometry=replace(seen.geometry, focal_px=1200, cx_px=4 * 159.5 + 1.5, cy_px=4 * 119.5 + 1.5),
+    )
+    found = find_table(wide)
+    assert isinstance(small, Table)
+    assert isinstance(found, Table)
+    assert found.plane.distance_m == pytest.approx(small.plane.distance_m, abs=0.001)
+    assert found.world_camera.t_m == pytest.approx(small.world_camera.t_m, abs=0.003)
+
+
+def test_depths_without_a_plane_are_no_table() -> None:
+    """Single pixels that are far from each other, and depths that only chance has put there."""
+    draw = np.random.default_rng(1)
+    scattered = Slope().view()
+    alone = np.full_like(scattered.depth_m, np.nan)
+    alone[::40, ::35] = scattered.depth_m[::40, ::35]
+    chance = draw.uniform(0.3, 3.0, alone.shape).astype(np.float32)
+    for depth in (alone, chance):
+        assert find_table(replace(scattered, depth_m=depth)) is Weakness.NO_TABLE
+
+
+def test_what_reaches_across_the_whole_picture_is_no_thing_on_a_table() -> None:
+    """A beam on the table, from the left rim to the right one: nobody can walk around it."""
+    beam = Slope(ball_m=0).view()
+    beam.depth_m[90:130] = beam.depth_m[130]
+    assert find_table(beam) is Weakness.BARE_TABLE
+
+
 def test_the_box_holds_what_is_connected_to_the_thing_in_the_middle() -> None:
     """All of the thing from the table up, and nothing of a block that stands 5 cm beside it; an empty room has none."""
     settings = VolumeSettings(voxel_m=0.003, far_m=1.0, truncation_voxels=6.0)
