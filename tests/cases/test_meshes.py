@@ -202,6 +202,30 @@ def test_a_3mf_that_contradicts_itself_is_refused() -> None:
         read_mesh(b"PK\x03\x04 and no more", "a.3mf")
 
 
+@pytest.mark.parametrize(
+    ("config", "triangles"),
+    [
+        ('<config><object id="1"><volume firstid="6" lastid="99"><metadata key="modifier" value="1"/></volume></object></config>', 6),
+        ('<config><object id="1"><volume firstid="6" lastid="9"><metadata key="modifier" value="0"/></volume></object></config>', 12),
+        ('<config><object id="7"><volume firstid="0" lastid="11"><metadata key="modifier" value="1"/></volume></object></config>', 12),
+        ('<config><object id="1"><volume firstid="-9" lastid="-1"><metadata key="modifier" value="1"/></volume></object></config>', 12),
+        ("<!DOCTYPE config><config/>", None),
+        ('<config><object id="1"><volume/></object></config>', None),
+        ("no XML", None),
+    ],
+)  # fmt: skip
+def test_what_a_slicer_says_of_a_mesh_is_checked(config: str, triangles: int | None) -> None:
+    """Ranges beyond the mesh and objects that are not there change nothing; what cannot be read is refused, for a modifier may be in it."""
+    held = io.BytesIO((FOLDER / "plain.3mf").read_bytes())
+    with zipfile.ZipFile(held, "a") as archive:
+        archive.writestr("Metadata/Slic3r_PE_model.config", config)
+    if triangles is not None:
+        assert len(read_mesh(held.getvalue(), "a.3mf").solid.triangles) == triangles
+        return
+    with pytest.raises(DataError, match="no 3MF"):
+        read_mesh(held.getvalue(), "a.3mf")
+
+
 def test_a_concave_face_of_thousands_of_corners_is_refused() -> None:
     """Cutting it would take for ever."""
     star = "".join(f"v {x % 2} {x} 0\n" for x in range(2000)) + "v 9 0 0\n"
