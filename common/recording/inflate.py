@@ -2,7 +2,7 @@
 
 from typing import Any, Final
 
-from common.recording.salvage import MOST_CHUNK_BYTES
+from common.recording.mcap_records import MOST_CHUNK_BYTES, InflateError
 
 ZSTD: Final = b"\x28\xb5\x2f\xfd"
 """First bytes of what is compressed with zstd (RFC 8878, section 3.1.1)."""
@@ -19,10 +19,10 @@ def inflate(compression: str, data: memoryview, size: int) -> memoryview:
         size: how many bytes it claims to become.
 
     Raises:
-        ValueError: it cannot be undone, becomes more than it claims, or claims more than any chunk has.
+        InflateError: it cannot be undone, becomes more than it claims, or claims more than any chunk has.
     """
     if size > MOST_CHUNK_BYTES:
-        raise ValueError(f"a chunk claims to become {size / 1e6:.0f} MB: more than is believed")
+        raise InflateError(f"a chunk claims to become {size / 1e6:.0f} MB: more than is believed")
     try:
         match compression:
             case "zstd":
@@ -32,16 +32,16 @@ def inflate(compression: str, data: memoryview, size: int) -> memoryview:
 
                 plain = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
             case _:
-                raise ValueError(f"a chunk is compressed with {compression[:40]}, which nobody here knows")
+                raise InflateError(f"a chunk is compressed with {compression[:40]}, which nobody here knows")
     except ImportError as error:
         package = "zstandard" if compression == "zstd" else compression
-        raise ValueError(f"a chunk is compressed with {compression}: pip install {package}") from error
-    except ValueError:
+        raise InflateError(f"a chunk is compressed with {compression}: pip install {package}") from error
+    except InflateError:
         raise
     except Exception as error:
-        raise ValueError(f"a chunk cannot be decompressed ({error})") from error
+        raise InflateError(f"a chunk cannot be decompressed ({error})", size) from error
     if len(plain) != size:
-        raise ValueError("a chunk cannot be decompressed (it has another length than it claims)")
+        raise InflateError("a chunk cannot be decompressed (it has another length than it claims)", len(plain))
     return memoryview(plain)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.frame import Buffer
-from common.recording.salvage import CHANNELS, MAGIC
+from common.recording.mcap_records import CHANNELS, MAGIC
 
 CHUNK_BYTES: Final = 256 * 1024
 """A crash loses one chunk at most; larger ones cost more per frame, smaller ones more overhead."""

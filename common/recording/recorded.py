@@ -31,9 +31,10 @@ from common.recording.layout import (
     camera_of,
     side_of,
 )
+from common.recording.mcap_records import Attachment, Channel, Damage, Inflate, Message, Metadata, StoredMessage
 from common.recording.ros1 import ROS1, NoRos1Error, read_ros1_image
 from common.recording.ros_messages import CAMERA_INFO, COMPRESSED_IMAGE, IMAGE, RecordedImage, StoredBytes, read_image
-from common.recording.salvage import Attachment, Channel, Damage, Inflate, Message, Metadata, Salvage, StoredMessage
+from common.recording.salvage import Salvage
 from common.recording.stamps import stamp_fault
 from common.strict_json import strict_json, whole_number
 from common.words import counted

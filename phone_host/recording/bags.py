@@ -15,12 +15,13 @@ from typing import Any, BinaryIO, Final
 from common.errors import DataError, UnavailableError
 from common.name_order import name_order
 from common.recording.inflate import ZSTD, inflate, unzstd, zstd_reader
+from common.recording.mcap_records import MAGIC, MOST_CHUNK_BYTES, Channel, Message
 from common.recording.mcap_writer import Topic
 from common.recording.opened import stored_data
 from common.recording.recorded import image_kind
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros1 import EXTRA, ROS1
-from common.recording.salvage import MAGIC, MOST_CHUNK_BYTES, Channel, Message, Salvage
+from common.recording.salvage import Salvage
 
 _ROS1_BAG: Final = b"#ROSBAG V2.0\n"
 _SQLITE: Final = b"SQLite format 3\0"

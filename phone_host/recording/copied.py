@@ -7,12 +7,13 @@ from typing import Final
 from common.errors import DataError
 from common.recording.inflate import inflate
 from common.recording.layout import topics
+from common.recording.mcap_records import CHANNELS, Attachment, Channel, Damage, Message, Metadata
 from common.recording.mcap_writer import MOST_TOPICS, Topic
 from common.recording.opened import stored_data
 from common.recording.recorded import image_kind
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import SCHEMAS
-from common.recording.salvage import CHANNELS, Attachment, Channel, Damage, Message, Metadata, Salvage
+from common.recording.salvage import Salvage
 
 _JSON: Final = "json"
 

@@ -10,11 +10,12 @@ from common.errors import DataError, SettingsError
 from common.recording.capture_runs import CaptureRuns
 from common.recording.inflate import inflate
 from common.recording.layout import ABOUT, CAPTURE, CLOCK, camera_name, image_topic
+from common.recording.mcap_records import CHANNELS, Message
 from common.recording.opened import open_recorded, stored_data
 from common.recording.recorded import Recorded, Shown
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import RecordedImage, image_parts, image_type
-from common.recording.salvage import CHANNELS, Message, Salvage
+from common.recording.salvage import Salvage
 from phone_host.model import Side
 from phone_host.recording.clock_messages import ToldClock, clock_text, told_clocks
 from phone_host.recording.relation import Relation, Stream, relate

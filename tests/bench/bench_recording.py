@@ -26,8 +26,9 @@ from rich.console import Console
 from common.frame import PixelFormat
 from common.protocol.message import CameraDescription, Pacing
 from common.recording.inflate import inflate
+from common.recording.mcap_records import Message
 from common.recording.recording_file import RecordingFile
-from common.recording.salvage import Message, Salvage
+from common.recording.salvage import Salvage
 from phone_host.model import Side
 from phone_host.recording.recorder import Recorder
 from tests.bench import recording_memory, recording_power

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.recording.inflate import inflate
-from common.recording.salvage import Message, Salvage
+from common.recording.mcap_records import Message
+from common.recording.salvage import Salvage
 from tests.bench.figures import Verdict
 from tests.bench.payloads import write_jpegs
 from tests.support.programs import board

@@ -13,9 +13,10 @@ from common.ledger import StageTimes
 from common.protocol.message import CameraDescription, Pacing
 from common.recording.inflate import inflate
 from common.recording.layout import CLOUD, DEPTH
+from common.recording.mcap_records import Message
 from common.recording.opened import open_recorded, stored_data
 from common.recording.ros_messages import IMAGE, POINT_BYTES, POINT_CLOUD
-from common.recording.salvage import Message, Salvage
+from common.recording.salvage import Salvage
 from phone_host.model import FramePair, Processed, RectifiedPair, Result, Side
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.computed import cloud_data

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from common.frame import PixelFormat, raw_bytes
 from common.recording.cdr import BrokenMessageError
 from common.recording.inflate import inflate
+from common.recording.mcap_records import Attachment, Damage, Message, Metadata, Record
 from common.recording.recorded import read_recorded
 from common.recording.ros_messages import (
     COMPRESSED_IMAGE,
@@ -24,7 +25,7 @@ from common.recording.ros_messages import (
     read_camera_info,
     read_image,
 )
-from common.recording.salvage import Attachment, Damage, Message, Metadata, Record, Salvage, is_mcap
+from common.recording.salvage import Salvage, is_mcap
 from tests.support.recorded import recording
 
 PAIRS = 24

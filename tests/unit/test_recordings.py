@@ -13,11 +13,11 @@ from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes, ledger_of
 from common.protocol.message import Pacing
 from common.recording.layout import camera_of, camera_values
+from common.recording.mcap_records import Message
 from common.recording.mcap_writer import McapWriter, Topic
 from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
 from common.recording.ros_messages import RecordedImage, image_message
-from common.recording.salvage import Message
 from phone_host.recording.copied import copy_recording
 from phone_host.recording.folders import export_folders, import_folders
 from phone_host.recording.opened import open_playback

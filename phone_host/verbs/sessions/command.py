@@ -14,9 +14,9 @@ from common.places import make_folder
 from common.plain_text import printable
 from common.program.terminal import fitted
 from common.recording.layout import CAPTURE
+from common.recording.mcap_records import Message
 from common.recording.opened import is_recording, open_recorded
 from common.recording.recording_file import require_new
-from common.recording.salvage import Message
 from common.recording.stamps import MAX_HZ, MIN_HZ
 from common.versions import REPORT_FORMAT
 from common.words import counted, listed
