@@ -1,5 +1,6 @@
 """Undoes the compression of other programs' files, with packages that ours do not need. Never takes more memory than the result may have."""
 
+from collections.abc import Iterator
 from typing import Any, Final
 
 from common.recording.mcap_records import MOST_CHUNK_BYTES, InflateError
@@ -8,6 +9,8 @@ ZSTD: Final = b"\x28\xb5\x2f\xfd"
 """First bytes of what is compressed with zstd (RFC 8878, section 3.1.1)."""
 
 _PIECE_BYTES: Final = 1 << 20
+_FRAME_HEAD_BYTES: Final = 18
+"""Longest head of a frame (RFC 8878, section 3.1.1.1)."""
 
 
 def inflate(compression: str, data: memoryview, size: int) -> memoryview:
@@ -54,18 +57,39 @@ def unzstd(data: bytes) -> bytes:
     """
     parts: list[bytes] = []
     size = 0
-    reader = zstd_reader(data)
-    try:
-        while part := reader.read(_PIECE_BYTES):
-            parts.append(part)
-            size += len(part)
-            if size > MOST_CHUNK_BYTES:
-                raise ValueError("a message becomes larger than is believed")
-    except ValueError:
-        raise
-    except Exception as error:
-        raise ValueError(f"a message cannot be decompressed ({error})") from error
+    for part in unzstd_pieces(data):
+        parts.append(part)
+        size += len(part)
+        if size > MOST_CHUNK_BYTES:
+            raise ValueError("becomes larger than is believed")
     return b"".join(parts)
+
+
+def unzstd_pieces(source: Any) -> Iterator[bytes]:  # noqa: ANN401 - bytes or a file; the package has no types
+    """Undo the compression of a source piece by piece.
+
+    Args:
+        source: bytes, or a file that is open for reading.
+
+    Raises:
+        ImportError: the package zstandard is not installed.
+        OSError: the file cannot be read.
+        ValueError: it cannot be undone, or ends too early; what could be undone comes before.
+    """
+    import zstandard  # noqa: PLC0415 - not ours to require
+
+    head = source[:_FRAME_HEAD_BYTES] if isinstance(source, bytes) else source.peek(_FRAME_HEAD_BYTES)
+    size = 0
+    try:
+        claimed = zstandard.frame_content_size(head)  # -1: the frame does not say
+        reader = zstd_reader(source)
+        while piece := reader.read(_PIECE_BYTES):
+            size += len(piece)
+            yield piece
+    except zstandard.ZstdError as error:
+        raise ValueError(f"cannot be decompressed: {error}") from error
+    if size < claimed:
+        raise ValueError("ends before its compression does")
 
 
 def zstd_reader(source: Any) -> Any:  # noqa: ANN401 - bytes or a file; the package has no types

@@ -1,27 +1,32 @@
 """Bags of ROS 1 and folders of rosbag2 as MCAP files, so that everything that takes a recording takes them.
 
 What is a bag is known by its first bytes, and so is compression, of a whole file as of each message: nothing depends on metadata.yaml. Messages
-with images are copied as they are; of others only that they are there. ROS 1 and sqlite3 are read with the library rosbags, an extra.
+that a recording may hold are copied as they are; of others only that they are there. ROS 1 and sqlite3 are read with the library rosbags, an extra.
+What is missing or spoiled in a part is left out and reported.
 """
 
 import bz2
 import struct
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO, Final
 
 from common.errors import DataError, UnavailableError
 from common.name_order import name_order
-from common.recording.inflate import ZSTD, inflate, unzstd, zstd_reader
-from common.recording.mcap_records import MAGIC, MOST_CHUNK_BYTES, Channel, Message
+from common.recording.inflate import ZSTD, inflate, unzstd, unzstd_pieces
+from common.recording.mcap_records import MAGIC, MOST_CHUNK_BYTES, Channel, Damage, Message, Record
 from common.recording.mcap_writer import Topic
 from common.recording.opened import stored_data
 from common.recording.recorded import image_kind
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros1 import EXTRA, ROS1
+from common.recording.ros_messages import SCHEMAS
 from common.recording.salvage import Salvage
+from common.words import counted
 
 _ROS1_BAG: Final = b"#ROSBAG V2.0\n"
 _SQLITE: Final = b"SQLite format 3\0"
@@ -44,8 +49,21 @@ def is_bag(path: Path) -> bool:
     return path.is_file() and _head(path).startswith((_ROS1_BAG, _SQLITE, ZSTD))
 
 
+@dataclass(frozen=True, slots=True)
+class RecordingSource:
+    """What is read as a recording.
+
+    Attributes:
+        path: an MCAP file, or a folder of images.
+        damages: where something was missing in the bag of which the file is a copy.
+    """
+
+    path: Path
+    damages: tuple[Damage, ...] = ()
+
+
 @contextmanager
-def as_recording(path: Path) -> Iterator[Path]:
+def as_recording(path: Path) -> Iterator[RecordingSource]:
     """Give a bag as an MCAP file while the block runs; any other path as it is.
 
     Args:
@@ -56,7 +74,7 @@ def as_recording(path: Path) -> Iterator[Path]:
         UnavailableError: there is no room for the copy.
     """
     if not is_bag(path):
-        yield path
+        yield RecordingSource(path)
         return
     try:
         folder = TemporaryDirectory(prefix="tandemscan-bag-")
@@ -65,41 +83,63 @@ def as_recording(path: Path) -> Iterator[Path]:
     with folder as name:
         copy = Path(name) / "bag.mcap"
         try:
-            _copy(path, copy, Path(name))
+            damages = _copy(path, copy, Path(name) / "parts")
         except ImportError as error:
             package = (error.name or "rosbags").partition(".")[0]
             raise DataError(f"{path} needs the package {package}", f"install it: {EXTRA}") from None
         try:
-            yield copy
+            yield RecordingSource(copy, tuple(damages))
         except DataError as error:
             error.problem = error.problem.replace(str(copy), str(path))  # the copy's name means nothing to a user
             raise
 
 
-def _copy(path: Path, copy: Path, folder: Path) -> None:
-    """Write the messages of all parts of a bag into one file."""
-    parts = [_plain(part, folder) for part in (_parts(path) if path.is_dir() else [path])]
+def _copy(path: Path, copy: Path, folder: Path) -> list[Damage]:
+    """Write the messages of all parts of a bag into one file, and return what is missing in them.
+
+    Args:
+        path: the bag.
+        copy: the new file.
+        folder: for parts whose compression is undone; it must not exist.
+    """
+    damages: list[Damage] = []
+    folder.mkdir()
+    parts = [_plain(part, folder, damages) for part in (_parts(path) if path.is_dir() else [path])]
     channels: dict[Channel, Topic] = {}
     for part in parts:
         for channel in _channels(part, path):
             channels[channel] = Topic(channel.topic, channel.encoding, channel.kind, f"{channel.encoding}msg")
     if len(channels) > _MOST_TOPICS:
         raise DataError(f"{path} has {len(channels)} topics: more than is believed", "give a bag with fewer")
+    lost: Counter[str] = Counter()
     with written(copy, tuple(channels.values())) as file:
         for part in parts:
-            for number, message in enumerate(_messages(part, path)):
-                _add(file, message, number)
+            for number, record in enumerate(_records(part, path)):
+                match record:
+                    case Damage():
+                        damages.append(replace(record, words=f"{record.words} ({part.name})"))
+                    case Message():
+                        lost += _add(file, record, number)
+                    case _:
+                        pass
+    damages += [Damage(0, 0, f"{counted(count, 'message')} {words}") for words, count in lost.items()]
+    return damages
 
 
-def _add(file: RecordingFile, message: Message, number: int) -> None:
+def _add(file: RecordingFile, message: Message, number: int) -> Counter[str]:
+    """Copy a message, and return why it cannot be copied."""
     channel, data = message.channel, bytes(message.data)
     if channel is None:
-        return
-    if not image_kind(channel):
+        return Counter(["of an unknown topic"])
+    if channel.kind not in SCHEMAS and not image_kind(channel):
         data = b""
     elif data.startswith(ZSTD):
-        data = unzstd(data)
+        try:
+            data = unzstd(data)
+        except ValueError as error:
+            return Counter([f"of {channel.topic}: {error}"])
     file.add(channel.topic, data, sequence=number & 0xFFFFFFFF, log_ns=message.log_ns, publish_ns=message.publish_ns)
+    return Counter()
 
 
 def _head(path: Path) -> bytes:
@@ -117,12 +157,19 @@ def _parts(folder: Path) -> list[Path]:
     except OSError as error:
         raise DataError(f"{folder} cannot be read ({error.strerror})", "check its permissions") from None
     names = {path.name for path in found}
-    is_bag = (folder / _METADATA).is_file() or any(".db3" in name for name in names)
-    return sorted(found, key=name_order) if is_bag else []
+    if not (folder / _METADATA).is_file() and not any(".db3" in name for name in names):
+        return []
+    # whoever runs unzstd has a part with and without its compression
+    return sorted((path for path in found if path.suffix != ".zstd" or path.stem not in names), key=name_order)
 
 
-def _plain(path: Path, folder: Path) -> Path:
-    """Return a file without compression: itself, or a copy.
+def _plain(path: Path, folder: Path, damages: list[Damage]) -> Path:
+    """Return a file without compression: itself, or a copy of what can be decompressed.
+
+    Args:
+        path: the file.
+        folder: for the copy.
+        damages: takes what cannot be decompressed, where the copy is an MCAP file: of that the rest can be read.
 
     Raises:
         DataError: it cannot be decompressed, or becomes larger than is believed.
@@ -132,19 +179,19 @@ def _plain(path: Path, folder: Path) -> Path:
     out = folder / path.with_suffix("").name
     most, size = max(_ALWAYS_BYTES, _MOST_RATIO * path.stat().st_size), 0
     with path.open("rb") as packed, out.open("wb") as plain:
-        reader = zstd_reader(packed)
         try:
-            while piece := reader.read(_PIECE_BYTES):
+            for piece in unzstd_pieces(packed):
                 size += len(piece)
                 if size > most:
                     raise DataError(f"{path} becomes larger than is believed", "undo its compression: unzstd FILE")
                 plain.write(piece)
         except OSError as error:
             raise UnavailableError(f"{path} cannot be decompressed ({error.strerror})", "make room in TMPDIR") from None
-        except DataError:
-            raise
-        except Exception as error:
-            raise DataError(f"{path} cannot be decompressed ({error})", "copy it again") from error
+        except ValueError as error:
+            damage = Damage(size, 0, f"{path.name} cannot be decompressed behind {counted(size, 'byte')} ({error})")
+            damages.append(damage)
+    if damages and not _head(out).startswith(MAGIC):
+        raise DataError(f"{path}: {damages[-1].words}", "copy it again")
     return out
 
 
@@ -156,10 +203,13 @@ def _channels(part: Path, bag: Path) -> list[Channel]:
         return [_channel(connection, part) for connection in reader.connections]
 
 
-def _messages(part: Path, bag: Path) -> Iterator[Message]:
-    """Return the messages of a file in their order."""
+def _records(part: Path, bag: Path) -> Iterator[Record]:
+    """Return the messages of a file in their order, and where something is missing."""
     if _head(part).startswith(MAGIC):
-        yield from (each for each in Salvage(stored_data(part), inflate).records() if isinstance(each, Message))
+        salvage = Salvage(stored_data(part), inflate)
+        yield from salvage.records()
+        if not salvage.is_complete:
+            yield Damage(0, 0, "it was not ended in order")
         return
     with _opened(part, bag) as reader:
         channels = {connection.id: _channel(connection, part) for connection in reader.connections}
@@ -254,23 +304,25 @@ def _chunk_bytes(file: BinaryIO, size: int, fields: dict[bytes, bytes], most: in
     Raises:
         DataError: the refusal: it becomes more than it may.
     """
-    name = fields.get(b"compression", b"none")
     limit = min(most, MOST_CHUNK_BYTES)
-    if name == b"bz2":
-        decompressor: Any = bz2.BZ2Decompressor()
-    elif name == b"lz4":
-        import lz4.frame  # noqa: PLC0415 - rosbags brings it
+    match fields.get(b"compression", b"none"):
+        case b"bz2":
+            begin: Callable[[], Any] = bz2.BZ2Decompressor
+        case b"lz4":
+            import lz4.frame  # noqa: PLC0415 - rosbags brings it
 
-        decompressor = lz4.frame.LZ4FrameDecompressor()
-    else:
-        return size
-    total, packed = 0, file.read(size)
+            begin = lz4.frame.LZ4FrameDecompressor
+        case _:
+            return size
+    total, packed, decompressor = 0, file.read(size), begin()
     try:
-        while not decompressor.eof and (packed or not decompressor.needs_input):
+        while packed or not decompressor.needs_input:
             total += len(decompressor.decompress(packed, _PIECE_BYTES))
-            packed = b""
             if total > limit:
                 raise refusal
+            packed = b""
+            if decompressor.eof:  # the library goes on with the stream behind it
+                packed, decompressor = decompressor.unused_data or b"", begin()
     except (OSError, RuntimeError, EOFError, ValueError):
         return total  # the library says what is wrong with it
     return total

@@ -5,7 +5,7 @@ have it. Read are these folders, KITTI's (image_0, image_1 or image_2, image_3 w
 folders with a file of times.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -23,6 +23,7 @@ from common.versions import all_versions
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.preview import write_png
 from phone_host.recording.both_sides import encoded
+from phone_host.recording.image_sizes import Size, size_text, usual_size
 from phone_host.recording.import_account import ImportAccount
 from phone_host.recording.timed_images import TimedImage, TimeOptions, timed_images
 from phone_host.stereo.raw_images import decode_frame
@@ -102,21 +103,37 @@ def import_folders(paths: Sequence[Path], options: TimeOptions, out: Path) -> Im
 
     Raises:
         SettingsError: the folders are none of those known.
-        DataError: a folder is missing, or images have no times, or none that can be true.
+        DataError: a folder is missing, images have no times, or none that can be true, or one has another size than the others of its folder.
         UnavailableError: a folder cannot be read, or the file not be made.
     """
     folders, times = _folders(paths, options.times)
     sides = timed_images(folders, replace(options, times=times))
+    sizes_px: dict[str, dict[Path, Size]] = {side: {} for side in _SIDES}
     with written(out) as file:
         file.tell(ABOUT, About(versions=all_versions()).values())
         for side, sequence, timed in _in_order(sides):
             image = load(timed.path)
-            size = (image.width_px, image.height_px)
+            size = sizes_px[side][timed.path] = (image.width_px, image.height_px)
             recorded = RecordedImage(timed.stamp_ns, side, image.pixel_format, size, image.payload)
             topic, at_ns = image_topic(side, image_type(image.pixel_format)), timed.stamp_ns
             file.add(topic, image_message(recorded), sequence=sequence, log_ns=at_ns, publish_ns=at_ns)
+        for side in _SIDES:
+            _require_one_size(sizes_px[side])
     remarks = (f"the images are taken for {options.fps:g} a second",) if options.fps else ()
     return ImportAccount(dict(zip(_SIDES, map(len, sides), strict=True)), remarks)
+
+
+def _require_one_size(sizes_px: Mapping[Path, Size]) -> None:
+    """Refuse the images of one camera if one of them has another size than most."""
+    usual = usual_size(tuple(sizes_px.values()))
+    for path, size in sorted(sizes_px.items()):
+        if usual is not None and size != usual:
+            of_usual = sum(each == usual for each in sizes_px.values())
+            raise DataError(
+                f"{path} is {size_text(size)}, but {of_usual} of the {len(sizes_px)} images beside it"
+                f" are {size_text(usual)}",
+                "remove it from the folder, or give images of one size",
+            )
 
 
 def _in_order(sides: Sequence[list[TimedImage]]) -> Iterator[tuple[str, int, TimedImage]]:

@@ -1,20 +1,23 @@
 """Takes the images of two topics of another program's MCAP file into a recording of ours."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import starmap
 from pathlib import Path
 
 from common.errors import DataError
+from common.frame import SpoiledImageError
 from common.recording.layout import ABOUT, About, image_topic
 from common.recording.opened import open_recorded
-from common.recording.recorded import Recorded, Shown, retimed
+from common.recording.recorded import Recorded, Shown, retimed, size_px
 from common.recording.recording_file import written
 from common.recording.ros_messages import image_message, image_type
 from common.versions import all_versions
-from common.words import listed
+from common.words import counted, listed
 from phone_host.recording.both_sides import topics_of
 from phone_host.recording.given_times import EPOCH_NS, at_rate
+from phone_host.recording.image_sizes import Size, size_text, usual_size
 from phone_host.recording.import_account import ImportAccount
 
 _SIDES = ("left", "right")
@@ -54,7 +57,8 @@ def import_topics(source: Path, options: ImportOptions, out: Path) -> ImportAcco
         )
     for topic in chosen:
         found.camera(topic)  # refuses a stream all of whose images are spoiled
-    streams = [_timed(found.images[topic], options.fps) for topic in chosen]
+    remarks = [f"the images are taken for {options.fps:g} a second"] if options.fps else found.remarks
+    streams = [_timed(_of_one_size(found.images[topic], topic, remarks), options.fps) for topic in chosen]
     every = [(shown, side) for side, stream in zip(_SIDES, streams, strict=True) for shown in stream]
     with written(out) as file:
         file.tell(ABOUT, About(versions=all_versions()).values())
@@ -64,9 +68,34 @@ def import_topics(source: Path, options: ImportOptions, out: Path) -> ImportAcco
             topic = image_topic(side, image_type(image.pixel_format))
             times = {"log_ns": shown.log_ns, "publish_ns": shown.publish_ns}
             file.add(topic, image_message(moved), sequence=shown.sequence, **times)
-    remarks = [f"the images are taken for {options.fps:g} a second"] if options.fps else found.remarks
     counts = dict(zip(_SIDES, map(len, streams), strict=True))
-    return ImportAccount(counts, tuple(remarks), _unused(found, chosen))
+    return ImportAccount(counts, tuple(remarks), _unused(found, chosen), tuple(found.damages))
+
+
+def _of_one_size(stream: Sequence[Shown], topic: str, remarks: list[str]) -> list[Shown]:
+    """Return the images that have the size which most of a topic's images have.
+
+    Args:
+        stream: the images.
+        topic: whose they are.
+        remarks: takes how many are left out, for each other size.
+    """
+    sizes_px = [_size(shown) for shown in stream]
+    usual = usual_size(sizes_px)
+    others = Counter(size for size in sizes_px if size is not None and size != usual)
+    for size, count in others.items():
+        assert usual is not None
+        words = f"{counted(count, 'image')} of {topic} left out: {size_text(size)} instead of {size_text(usual)}"
+        remarks.append(words)
+    return [shown for shown, size in zip(stream, sizes_px, strict=True) if size not in others]
+
+
+def _size(shown: Shown) -> Size | None:
+    """Return an image's width and height, px; None: it is spoiled, which whoever decodes it reports."""
+    try:
+        return size_px(shown.image)
+    except SpoiledImageError:
+        return None
 
 
 def _timed(shown: Sequence[Shown], fps: float | None) -> list[Shown]:

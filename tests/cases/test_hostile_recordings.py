@@ -23,23 +23,16 @@ from phone_host.recording.clock_messages import told_clocks
 from phone_host.recording.opened import open_playback
 from tests.support import foreign_recordings as other
 from tests.support.foreign_recordings import COMPRESSED, PERIOD_NS, ZERO_NS, Sent, picture
+from tests.support.measured_command import run_measured
 
 _MOST_MORE_BYTES = 250 << 20
 """What reading any small file may take beyond reading a sound one: a chunk that is believed, and its copies."""
 
-_MEASURED = (
-    "import sys; from phone_host.cli import main; code = main(sys.argv[1:]); "
-    "print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0]); sys.exit(code)"
-)
-"""Of this program alone: what getrusage tells also holds the memory of the one that started it."""
-
 
 def _run(*words: str) -> tuple[int, list[str], int]:
     """Exit code, lines of errors, and the greatest memory, bytes, of `phone-host` with these words."""
-    ended = subprocess.run(
-        [sys.executable, "-c", _MEASURED, *words], capture_output=True, text=True, timeout=60, check=False
-    )
-    return ended.returncode, ended.stderr.splitlines(), 1024 * int(ended.stdout.split()[-1])
+    code, _, errors, peak = run_measured(*words)
+    return code, errors, peak
 
 
 def _sound(folder: Path) -> Path:

@@ -2,7 +2,7 @@
 
 import argparse
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
@@ -14,8 +14,9 @@ from common.places import make_folder
 from common.plain_text import printable
 from common.program.terminal import fitted
 from common.recording.layout import CAPTURE
-from common.recording.mcap_records import Message
+from common.recording.mcap_records import Damage, Message
 from common.recording.opened import is_recording, open_recorded
+from common.recording.recorded import Recorded
 from common.recording.recording_file import require_new
 from common.recording.stamps import MAX_HZ, MIN_HZ
 from common.versions import REPORT_FORMAT
@@ -53,7 +54,8 @@ def run(options: argparse.Namespace) -> int:
     if options.task == "join":
         values, text = _join(options)
     else:
-        with busy_bar(f"sessions {options.task}"), as_recording(options.paths[0]) as options.source:
+        with busy_bar(f"sessions {options.task}"), as_recording(options.paths[0]) as source:
+            options.source, options.damages = source.path, source.damages
             values, text = tasks[options.task](options)
     if options.json:
         print(json_text({"format_version": REPORT_FORMAT, "command": "sessions", "task": options.task, **values}))
@@ -89,7 +91,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _info(options: argparse.Namespace) -> Told:
     path: Path = options.paths[0]
-    recorded = open_recorded(options.source)
+    recorded = _recorded(options)
     info = session_info(recorded)
     page = None
     if options.out is not None:
@@ -101,6 +103,12 @@ def _info(options: argparse.Namespace) -> Told:
             raise unwritable(options.out, error) from error
     lines = _lines(path, info) + ([f"plots: {page}"] if page else [])
     return {**asdict(info), "page": None if page is None else str(page)}, "\n".join(lines)
+
+
+def _recorded(options: argparse.Namespace) -> Recorded:
+    recorded = open_recorded(options.source)
+    recorded.damages += options.damages
+    return recorded
 
 
 def _lines(path: Path, info: SessionInfo) -> list[str]:
@@ -126,7 +134,7 @@ def _lines(path: Path, info: SessionInfo) -> list[str]:
     lines.append(printable(f"  also: {also or 'nothing'}"))
     lines += _reasons(info.unused)
     lines += [printable(f"  {words}") for words in info.remarks]
-    lines += [f"  missing: {words}" for words in info.damages]
+    lines += [printable(f"  missing: {words}") for words in info.damages]
     if not info.is_complete or info.damages:
         lines.append(
             f"  it was not ended in order; phone-host sessions repair {path} --out whole.mcap writes a whole file"
@@ -165,7 +173,8 @@ def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
     Raises:
         DataError: nothing was.
     """
-    told = [f"missing: {one.text}" for one in account.damages]
+    damages = [*options.damages, *account.damages]
+    told = _missing(damages)
     told += [
         f"left out: {count} of {topic}, a message that is not known here" for topic, count in account.left_out.items()
     ]
@@ -177,7 +186,7 @@ def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
     values = {
         "file": str(options.out),
         "messages": account.messages,
-        "damages": [asdict(one) for one in account.damages],
+        "damages": [asdict(one) for one in damages],
         "left_out": account.left_out,
     }
     return values, "\n  ".join([written, *told])
@@ -216,11 +225,12 @@ def _join_lines(out: Path, account: JoinAccount) -> list[str]:
 
 
 def _export(options: argparse.Namespace) -> Told:
-    recorded = open_recorded(options.source)
+    recorded = _recorded(options)
     counts = export_folders(recorded, options.out)
     text = f"{counts['left']} left and {counted(counts['right'], 'right image')} written to {options.out}"
-    told = [*(f"missing: {one.text}" for one in recorded.damages), *recorded.remarks]
-    return {"folder": str(options.out), "images": counts}, "\n  ".join([text, *told])
+    told = [*_missing(recorded.damages), *recorded.remarks]
+    values = {"folder": str(options.out), "images": counts, "damages": [asdict(one) for one in recorded.damages]}
+    return values, "\n  ".join([text, *told])
 
 
 def _import(options: argparse.Namespace) -> Told:
@@ -236,9 +246,22 @@ def _import(options: argparse.Namespace) -> Told:
         account = import_folders(options.paths, TimeOptions(options.times, options.fps, unit), options.out)
     counts = account.images
     text = f"{counts['left']} left and {counted(counts['right'], 'right image')} written to {options.out}"
-    lines = [text, *(f"  {words}" for words in account.remarks), *_reasons(account.unused)]
-    values = {"file": str(options.out), "images": counts, "remarks": account.remarks, "unused": account.unused}
+    damages = [*options.damages, *account.damages]
+    told = [*_missing(damages), *account.remarks]
+    lines = [text, *(printable(f"  {words}") for words in told), *_reasons(account.unused)]
+    values = {
+        "file": str(options.out),
+        "images": counts,
+        "remarks": account.remarks,
+        "damages": [asdict(one) for one in damages],
+        "unused": account.unused,
+    }
     return values, "\n".join(lines)
+
+
+def _missing(damages: Sequence[Damage]) -> list[str]:
+    """Return a line for each place where something is missing."""
+    return [printable(f"missing: {one.text}") for one in damages]
 
 
 def _reasons(unused: Mapping[str, str]) -> list[str]:

@@ -1,0 +1,78 @@
+"""Small bags of ROS 1 and folders of rosbag2, written by the library rosbags: in each storage and compression."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.foreign_recordings import HEIGHT, PERIOD_NS, WIDTH, ZERO_NS, picture
+
+pytest.importorskip("rosbags", reason="the extra recordings is not installed")
+
+from rosbags import rosbag1, rosbag2
+from rosbags.typesys import Stores, get_typestore
+
+_TOPICS = ("/stereo/left/image_raw", "/stereo/right/image_raw")
+_IMAGE, _STRING = "sensor_msgs/msg/Image", "std_msgs/msg/String"
+PAIRS = 3
+
+
+def _image(store: Any, side: int, number: int, **more: int) -> Any:
+    at_ns = ZERO_NS + number * PERIOD_NS
+    stamp = store.types["builtin_interfaces/msg/Time"](sec=at_ns // 10**9, nanosec=at_ns % 10**9)
+    return store.types[_IMAGE](
+        header=store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="cam", **more),
+        height=HEIGHT,
+        width=WIDTH,
+        encoding="bgr8",
+        is_bigendian=0,
+        step=3 * WIDTH,
+        data=picture(side, number).ravel(),
+    )
+
+
+def _ros2(path: Path, storage: rosbag2.StoragePlugin, mode: rosbag2.CompressionMode | None) -> None:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    writer = rosbag2.Writer(path, version=9, storage_plugin=storage)
+    if mode is not None:
+        writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        cameras = [writer.add_connection(topic, _IMAGE, typestore=store) for topic in _TOPICS]
+        words = writer.add_connection("/words", _STRING, typestore=store)
+        for number in range(PAIRS):
+            at_ns = ZERO_NS + number * PERIOD_NS
+            for side, camera in enumerate(cameras):
+                writer.write(camera, at_ns, store.serialize_cdr(_image(store, side, number), _IMAGE))
+            writer.write(words, at_ns, store.serialize_cdr(store.types[_STRING](data="x"), _STRING))
+
+
+def _ros1(path: Path, form: rosbag1.Writer.CompressionFormat | None) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    writer = rosbag1.Writer(path)
+    if form is not None:
+        writer.set_compression(form)
+    with writer:
+        cameras = [writer.add_connection(topic, _IMAGE, typestore=store) for topic in _TOPICS]
+        words = writer.add_connection("/words", _STRING, typestore=store)
+        for number in range(PAIRS):
+            at_ns = ZERO_NS + number * PERIOD_NS
+            for side, camera in enumerate(cameras):
+                message = _image(store, side, number, seq=number)
+                writer.write(camera, at_ns, bytes(store.serialize_ros1(message, _IMAGE)))
+            writer.write(words, at_ns, bytes(store.serialize_ros1(store.types[_STRING](data="x"), _STRING)))
+
+
+_SQLITE, _MCAP = rosbag2.StoragePlugin.SQLITE3, rosbag2.StoragePlugin.MCAP
+_MESSAGE, _FILE = rosbag2.CompressionMode.MESSAGE, rosbag2.CompressionMode.FILE
+BAGS: dict[str, Callable[[Path], None]] = {
+    "rosbag2, sqlite3": lambda path: _ros2(path, _SQLITE, None),
+    "rosbag2, sqlite3, messages zstd": lambda path: _ros2(path, _SQLITE, _MESSAGE),
+    "rosbag2, sqlite3, file zstd": lambda path: _ros2(path, _SQLITE, _FILE),
+    "rosbag2, mcap": lambda path: _ros2(path, _MCAP, None),
+    "rosbag2, mcap, messages zstd": lambda path: _ros2(path, _MCAP, _MESSAGE),
+    "rosbag2, mcap, file zstd": lambda path: _ros2(path, _MCAP, _FILE),
+    "rosbag1": lambda path: _ros1(path, None),
+    "rosbag1, lz4": lambda path: _ros1(path, rosbag1.Writer.CompressionFormat.LZ4),
+    "rosbag1, bz2": lambda path: _ros1(path, rosbag1.Writer.CompressionFormat.BZ2),
+}
