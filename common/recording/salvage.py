@@ -150,11 +150,13 @@ class Salvage:
 
     def _chunk(self, head: ChunkHead) -> Iterator[Record]:
         """Return the messages of a chunk."""
+        place: Chunk | StoredData
         if head.compression:
             chunk = Chunk(self._latest, self._inflate, head.compression, head.packed, head.size)
             records, place = self._inflated(chunk, head), chunk
         else:
-            records, place = _in_memory(head.packed), head.packed
+            records = _in_memory(head.packed)
+            place = head.packed
         at = 0
         try:
             if head.checksum and crc32(records) != head.checksum:
