@@ -61,7 +61,7 @@ def unzstd(data: bytes) -> bytes:
         parts.append(part)
         size += len(part)
         if size > MOST_CHUNK_BYTES:
-            raise ValueError("becomes larger than is believed")
+            raise ValueError("it becomes larger than is believed")
     return b"".join(parts)
 
 
@@ -87,9 +87,9 @@ def unzstd_pieces(source: Any) -> Iterator[bytes]:  # noqa: ANN401 - bytes or a 
             size += len(piece)
             yield piece
     except zstandard.ZstdError as error:
-        raise ValueError(f"cannot be decompressed: {error}") from error
+        raise ValueError(str(error)) from error
     if size < claimed:
-        raise ValueError("ends before its compression does")
+        raise ValueError("it ends before its compression does")
 
 
 def zstd_reader(source: Any) -> Any:  # noqa: ANN401 - bytes or a file; the package has no types

@@ -137,7 +137,7 @@ def _add(file: RecordingFile, message: Message, number: int) -> Counter[str]:
         try:
             data = unzstd(data)
         except ValueError as error:
-            return Counter([f"of {channel.topic}: {error}"])
+            return Counter([f"of {channel.topic} cannot be decompressed ({error})"])
     file.add(channel.topic, data, sequence=number & 0xFFFFFFFF, log_ns=message.log_ns, publish_ns=message.publish_ns)
     return Counter()
 
@@ -188,10 +188,10 @@ def _plain(path: Path, folder: Path, damages: list[Damage]) -> Path:
         except OSError as error:
             raise UnavailableError(f"{path} cannot be decompressed ({error.strerror})", "make room in TMPDIR") from None
         except ValueError as error:
-            damage = Damage(size, 0, f"{path.name} cannot be decompressed behind {counted(size, 'byte')} ({error})")
-            damages.append(damage)
-    if damages and not _head(out).startswith(MAGIC):
-        raise DataError(f"{path}: {damages[-1].words}", "copy it again")
+            plain.flush()
+            if not _head(out).startswith(MAGIC):
+                raise DataError(f"{path} cannot be decompressed ({error})", "copy it again") from error
+            damages.append(Damage(0, 0, f"{error}, behind {counted(size, 'byte')} ({path.name})"))
     return out
 
 

@@ -128,9 +128,9 @@ def _require_one_size(sizes_px: Mapping[Path, Size]) -> None:
     usual = usual_size(tuple(sizes_px.values()))
     for path, size in sorted(sizes_px.items()):
         if usual is not None and size != usual:
-            of_usual = sum(each == usual for each in sizes_px.values())
+            count = sum(each == usual for each in sizes_px.values())
             raise DataError(
-                f"{path} is {size_text(size)}, but {of_usual} of the {len(sizes_px)} images beside it"
+                f"{path} is {size_text(size)}, but {count} of the {len(sizes_px)} images beside it"
                 f" are {size_text(usual)}",
                 "remove it from the folder, or give images of one size",
             )
