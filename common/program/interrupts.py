@@ -138,16 +138,19 @@ def answering() -> Iterator[None]:
 
 
 def leave(number: int = signal.SIGINT) -> NoReturn:
-    """End this process now with one line and the exit code of a signal. What it had begun to write is removed.
+    """End this process now with one line and the exit code of a signal, or of what could not be left safely. What it had begun to write is removed.
 
     Args:
         number: one of `ENDINGS`.
     """
     from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
 
-    remove_unfinished()
-    _say_so(number)
-    os._exit(ENDINGS[number].exit_code)
+    if threading.current_thread() is threading.main_thread():
+        for each in ENDINGS:  # a key that is held would call this again within itself, until Python gives up
+            signal.signal(each, signal.SIG_IGN)
+    removed = remove_unfinished()
+    _say_so(number, removed.words)
+    os._exit(removed.exit_code or ENDINGS[number].exit_code)
 
 
 def is_heard() -> bool:
@@ -157,11 +160,12 @@ def is_heard() -> bool:
     return True  # closed: writing to it fails at once
 
 
-def _say_so(number: int) -> None:
+def _say_so(number: int, words: str = "") -> None:
     """Write the one line, in a terminal in place of a progress bar."""
     if is_heard():
+        line = ": ".join(filter(None, (ENDINGS[number].word, words)))
         with suppress(OSError):  # closed: the exit code must suffice
-            os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + f"{ENDINGS[number].word}\n".encode())
+            os.write(_STDERR, _CLEAR_LINE * os.isatty(_STDERR) + f"{line}\n".encode())
 
 
 def forget_terminal() -> None:

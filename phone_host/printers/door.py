@@ -31,6 +31,7 @@ class Wishes:
     def __init__(self) -> None:
         self._cancelled, self._paused = threading.Event(), threading.Event()
         self._is_left = False
+        self._left: Callable[[], None] = lambda: None
 
     def cancel(self) -> None:
         """End it, and switch the heaters off."""
@@ -39,6 +40,11 @@ class Wishes:
     def leave(self) -> None:
         """End it, ask for the heaters to be switched off, and do not wait for the answer. It takes no lock: a signal's handler may call it."""
         self._is_left = True
+        self._left()
+
+    def when_left(self, call: Callable[[], None]) -> None:
+        """Have something called by `leave`, in its thread: it breaks off what the print waits for. It must take no lock."""
+        self._left = call
 
     def pause(self) -> None:
         """Pause it."""
@@ -76,7 +82,13 @@ class Wishes:
 
 
 class PrinterDoor(Protocol):
-    """A printer, however it is reached."""
+    """A printer, however it is reached.
+
+    Attributes:
+        leaving_s: the longest time from `Wishes.leave` until `send` returns, with the last lines or requests written, s.
+    """
+
+    leaving_s: float
 
     def require_ready(self) -> None:
         """See whether it would take a print now, as far as that is known without starting anything.

@@ -20,6 +20,8 @@ class FileDoor:
         path: of the file; there must be none yet.
     """
 
+    leaving_s = 0.0
+
     def __init__(self, path: Path) -> None:
         self._path = path
 

@@ -63,6 +63,7 @@ class JournalEntry:
         with suppress(OSError):
             # Not by `replacing`: where the process leaves at once, that waits for its end, and a print has to be cooled first.
             with part.open("w", encoding="utf-8") as file:
+                fcntl.flock(file, fcntl.LOCK_EX)  # it is being written: see `_remove_parts`
                 file.write(json.dumps(asdict(entry)) + "\n")
                 file.flush()
                 os.fsync(file.fileno())
@@ -105,6 +106,7 @@ class Journal:
         for _ in range(_TRIES):  # another start may look at the lock just now
             try:
                 make_folder(self._folder)
+                self._remove_parts()
                 lock = self._locked(printer)
             except OSError:  # a folder that cannot be written keeps nobody from printing
                 return JournalEntry(path, -1)
@@ -123,6 +125,13 @@ class Journal:
                     left.append(entry)
                     path.unlink(missing_ok=True)
         return left
+
+    def _remove_parts(self) -> None:
+        """Remove what programs had begun to write when they were killed. A file that is locked is being written."""
+        for path in self._folder.glob("*.part"):
+            with suppress(OSError), path.open("rb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                path.unlink()
 
     def _goes_on(self, entry: Entry) -> bool:
         lock = self._locked(entry.printer)

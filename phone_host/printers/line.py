@@ -13,9 +13,11 @@ from common.android import is_android
 from common.errors import MissingDeviceError, TakenError, UnavailableError
 from phone_host.printers.printer_uri import LineKind, LineUri
 
-_CONNECT_S: Final = 5.0
+WRITE_S: Final = 5.0
+"""Of a connection that is made, and of bytes that do not move."""
+
 _AT_ONCE: Final = 4096
-_GOODBYE_S: Final = 0.5
+GOODBYE_S: Final = 0.5
 """Until a peer has closed its end of a connection, too."""
 
 _RFCOMM: Final = 3
@@ -92,7 +94,7 @@ class _SerialLine:
     def __init__(self, uri: LineUri) -> None:
         self._name = uri.text
         try:
-            self._port = serial.Serial(uri.place, uri.baud, timeout=0, write_timeout=_CONNECT_S, exclusive=True)
+            self._port = serial.Serial(uri.place, uri.baud, timeout=0, write_timeout=WRITE_S, exclusive=True)
         except serial.SerialException as error:
             raise _unavailable(uri, error.errno) from None
         except (OSError, ValueError) as error:
@@ -168,7 +170,7 @@ class _SocketLine:
         with suppress(OSError, ValueError):
             self._socket.setblocking(False)  # noqa: FBT003
             self._socket.shutdown(socket.SHUT_WR)
-            end_s = time.monotonic() + _GOODBYE_S
+            end_s = time.monotonic() + GOODBYE_S
             while (left_s := end_s - time.monotonic()) > 0 and select.select([self._socket], [], [], left_s)[0]:
                 if not self._socket.recv(_AT_ONCE):
                     break
@@ -194,14 +196,14 @@ def _offered(descriptor: int, data: bytes, wait_s: float) -> bool:
 
 def _connected(uri: LineUri) -> socket.socket:
     if uri.kind is LineKind.SOCKET:
-        connected = socket.create_connection((uri.place, uri.port), _CONNECT_S)
+        connected = socket.create_connection((uri.place, uri.port), WRITE_S)
         connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return connected
     family = getattr(socket, "AF_BLUETOOTH", None)
     if family is None:
         raise OSError(97, "this Python knows no Bluetooth")
     made = socket.socket(family, socket.SOCK_STREAM, _RFCOMM)
-    made.settimeout(_CONNECT_S)
+    made.settimeout(WRITE_S)
     try:
         made.connect((uri.place, uri.port))
     except OSError:

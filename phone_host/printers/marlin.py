@@ -17,20 +17,20 @@ from typing import Final, assert_never
 from phone_host.printers import marlin_problems as problems
 from phone_host.printers.cooling import wake
 from phone_host.printers.gcode import Line, name_of
+from phone_host.printers.marlin_cooling import CoolingCheck
 from phone_host.printers.marlin_reply import HostAction, Reply, ReplyKind, read_reply
 from phone_host.printers.marlin_rules import (
     ALIVE_NS,
     SECOND_NS,
     USUAL_NS,
     Attempts,
+    Guard,
     PlannedLine,
     SenderOptions,
     SentLine,
     framed,
     is_done_now,
     is_long,
-    is_unknown,
-    may_outlast_guard,
     patience_ns,
 )
 from phone_host.printers.progress import Heat, Phase
@@ -49,8 +49,6 @@ _SAVED: Final = 200
 _ASK_NS: Final = 300 * SECOND_NS
 """Between questions for temperatures while it waits: they keep M85 from its end, and find out whether the printer is still there."""
 
-_UNGUARD: Final = "M85 S0"
-
 
 class MarlinSender:
     """Sends the lines of a print.
@@ -64,7 +62,7 @@ class MarlinSender:
         problem: why it failed, in words; empty: it did not.
         remedy: what to do about it.
         off: lines that switch off what the print heats.
-        is_cold: whether the printer has confirmed them.
+        cooling: whether the printer has done them.
 
     Args:
         lines: of the print.
@@ -74,7 +72,7 @@ class MarlinSender:
 
     def __init__(self, lines: Iterator[Line], now_ns: int, options: SenderOptions | None = None) -> None:
         self._lines, self._options = lines, options or SenderOptions()
-        self.off, self.is_cold = self._options.off, False
+        self.off, self.cooling = self._options.off, CoolingCheck(self._options.off)
         self._opened_ns = now_ns
         self._queue: list[PlannedLine] = []
         self._saved: dict[int, PlannedLine] = {}
@@ -88,8 +86,7 @@ class MarlinSender:
         self._last_heard_ns = now_ns
         self._urgent = b""
         self._ended_there = ""
-        self._guard = f"M85 S{self._options.inactivity_s}" if self._options.inactivity_s else ""
-        self._is_guarded = False
+        self._guard = Guard(self._options.inactivity_s)
         self.phase = Phase.OPENING
         self.done = self.resent = 0
         self.heat = Heat()
@@ -116,9 +113,8 @@ class MarlinSender:
             return b""
         self._is_first = self._is_first or self.phase is Phase.OPENING
         self._number = 0 if self._is_first else self._number
-        begin, guard = ("M110 N0",) * self._is_first, (_UNGUARD,) * self._is_guarded
         self.phase = Phase.CANCELLING
-        self._queue = [PlannedLine(text) for text in (*begin, *self.off, "M107", "M84", *guard)]
+        self._queue = [PlannedLine(text) for text in (*("M110 N0",) * self._is_first, *self.cooling.begin(), "M84")]
         # A printer that waits for a temperature hears later: a second copy would make it drop what stands behind the first.
         self._is_deaf = self._under_way is not None and is_long(self._under_way.line.text)
         # Whatever is requested, nothing of the print goes out any more.
@@ -128,11 +124,11 @@ class MarlinSender:
         return wake()
 
     def finish_cancelling(self) -> None:
-        """End it: what cools was confirmed, and the rest is not waited for."""
-        if self._ended_there:
-            self._fail(problems.ended_there(self._ended_there))
+        """End it: what cools was confirmed, or the printer says that it heats all the same; the rest is not waited for."""
+        if self._ended_there and not self.cooling.hot:
+            self._fail(problems.ended_there(self._ended_there, is_cold=not self.cooling.is_unreported))
         else:
-            self.phase = Phase.CANCELLED
+            self._end(Phase.CANCELLED)
 
     def heard(self, text: str, now_ns: int) -> HostAction:
         """Take a line of the printer; return what its display wants, which is already done here.
@@ -198,9 +194,8 @@ class MarlinSender:
 
     def _begin(self) -> None:
         self.phase = Phase.PRINTING
-        self._is_guarded = bool(self._guard)
         self._is_first = True
-        self._queue = [PlannedLine(text) for text in ("M110 N0", self._guard) if text]
+        self._queue = [PlannedLine(text) for text in ("M110 N0", *self._guard.begin())]
 
     def _started(self, now_ns: int) -> None:
         if self.phase is Phase.OPENING:
@@ -250,9 +245,7 @@ class MarlinSender:
 
     def _note_unguarded(self, reply: Reply) -> None:
         """Remember that the printer does not know M85."""
-        is_guard = self._under_way is not None and self._under_way.line.text == self._guard
-        if is_guard and is_unknown(reply):
-            self._guard, self._is_guarded = "", False
+        if self._under_way is not None and self._guard.note_unknown(self._under_way.line.text, reply):
             self.message = "this printer has no M85: if this machine fails, its heaters stay on"
 
     def _resend(self, number: int, now_ns: int) -> None:
@@ -268,6 +261,7 @@ class MarlinSender:
             self.done += sum(self._saved[old].is_print for old in self._again if old < number)
             self._again = [old for old in self._again if old >= number]
             self._arrived(now_ns, is_answered=False)
+            self.cooling.note_arrival(number - 1)
             self._swallow_ok, self._awaited_ok_ns = True, now_ns + _AFTER_RESEND_NS
         elif number == under_way.number and self._ghosts and refused_order:
             self._ghosts, self._swallow_ok = self._ghosts - 1, True
@@ -288,6 +282,7 @@ class MarlinSender:
 
     def _go_back(self, under_way: SentLine, number: int, now_ns: int) -> None:
         is_new = not under_way.is_requested
+        self.cooling.note_request(number)
         if number < under_way.number:
             self._again = [*range(number + 1, under_way.number + 1), *self._again]
             self.done -= sum(self._saved[back].is_print for back in range(number, under_way.number))
@@ -315,8 +310,8 @@ class MarlinSender:
         self._awaited_ok_ns = now_ns
         self._is_first = False
         self.done += under_way.line.is_print
-        if self.phase is Phase.CANCELLING and under_way.line.text in self.off:
-            self.is_cold = not self._again and not any(line.text in self.off for line in self._queue)
+        self.cooling.note_arrival(under_way.number)
+        self._queue[:0] = [PlannedLine(text) for text in self.cooling.lines_after(under_way.line.text)]
         if not self._attempts.note_arrival(under_way.number, is_answered=is_answered):
             return
         self._is_doubted = False
@@ -366,22 +361,23 @@ class MarlinSender:
             return PlannedLine("M105") if now_ns - self._last_sent_ns >= _ASK_NS else None
         if self._queue:
             return self._queue.pop(0)
+        if self.phase is not Phase.CANCELLING:
+            if (line := next(self._lines, None)) is not None:
+                self._queue = [PlannedLine(text, is_print=text == line.text) for text in self._guard.around(line.text)]
+                return self._queue.pop(0)
+            if self._options.heats and (asks := self.cooling.ask()):
+                return PlannedLine(asks)
+        if not self.cooling.hot and (ends := self._guard.end()):  # a printer that heats all the same keeps its guard
+            return PlannedLine(ends)
         if self.phase is Phase.CANCELLING:
             self.finish_cancelling()
-        elif (line := next(self._lines, None)) is not None:
-            if not (self._is_guarded and may_outlast_guard(line.text)):
-                return PlannedLine(line.text, is_print=True)
-            self._queue = [PlannedLine(line.text, is_print=True), PlannedLine(self._guard)]
-            return PlannedLine(_UNGUARD)
-        elif self._is_guarded:
-            self._is_guarded = False
-            return PlannedLine(_UNGUARD)
         else:
-            self.phase = Phase.DONE
+            self._end(Phase.DONE)
         return None
 
     def _sent_new(self, line: PlannedLine, now_ns: int) -> bytes:
         sent = SentLine(self._number, line)
+        self.cooling.note_sent(sent.number, line.text)
         self._number += 1
         self._began_ns = now_ns
         return self._on_its_way(sent, now_ns)
@@ -395,9 +391,17 @@ class MarlinSender:
         return framed(sent.number, sent.line.text)
 
     def _note_heat(self, reply: Reply) -> None:
+        self.cooling.note_heat(reply.heat)
         read = {letter: (now, goal) for letter, now, goal in reversed(reply.heat)}  # the tool in use comes first
         if read:
             self.heat = Heat(read.get("T", self.heat.nozzle), read.get("B", self.heat.bed))
+
+    def _end(self, phase: Phase) -> None:
+        """End the print as it was meant to, unless the printer says that a heater is on."""
+        if self.cooling.hot:
+            self._fail(problems.still_heating(self.cooling.hot))
+        else:
+            self.phase = phase
 
     def _fail(self, problem: problems.Problem) -> None:
         self.phase, self.problem, self.remedy = Phase.FAILED, problem.words, problem.remedy

@@ -28,9 +28,31 @@ SILENT: Final = Problem(
 _CABLE: Final = "see whether its cable is sound and its baud rate right, and whether its heaters are off"
 
 
-def ended_there(words: str) -> Problem:
-    """Return what somebody has done at the printer, which is cold."""
-    return Problem(words, "heaters, fan and motors are off; start it again")
+UNREPORTED: Final = (
+    "the printer has answered the lines that switch heaters off, and does not report their goals: see that it cools"
+)
+
+
+def ended_there(words: str, *, is_cold: bool) -> Problem:
+    """Return what somebody has done at the printer.
+
+    Args:
+        words: for it.
+        is_cold: whether the printer reports that its heaters are off.
+    """
+    return Problem(words, f"{'heaters, fan and motors are off' if is_cold else UNREPORTED}; start it again")
+
+
+def still_heating(heaters: str) -> Problem:
+    """Return that the printer heats though it was told twice to switch its heaters off.
+
+    Args:
+        heaters: that are on, with their goals.
+    """
+    return Problem(
+        f"the printer has answered the lines that switch its heaters off, and heats all the same ({heaters})",
+        "go and look; switch it off at its plug",
+    )
 
 
 def printer_says(words: str) -> Problem:

@@ -24,6 +24,7 @@ _HEATING: Final = frozenset({"M109", "M116", "M190", "M191", "M303"})
 _LONG: Final = _HEATING | {"G4", "G28", "G29", "G30", "G33", "G34", "G76", "M0", "M1", "M226", "M400", "M600"}
 """What may take minutes without a word."""
 
+_UNGUARD: Final = "M85 S0"
 _FOR_PEOPLE: Final = frozenset({"M0", "M1", "M226", "M600", "M601"})
 _DWELL: Final = re.compile(r"G0*4\s*([SP])\s*(\d+)", re.IGNORECASE)
 _LONG_DWELL_S: Final = 300
@@ -93,11 +94,13 @@ class SenderOptions:
         off: lines that switch off what the print heats.
         inactivity_s: the printer stops and switches its heaters off when no command came for so long, s; 0: that is left alone.
         max_busy_ns: the longest time that one line may take, ns.
+        heats: whether the print heats: then the printer is asked at its end whether a heater is on.
     """
 
     off: tuple[str, ...] = heaters_off()
     inactivity_s: int = 0
     max_busy_ns: int = 3600 * SECOND_NS
+    heats: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,3 +184,39 @@ class Attempts:
     def are_too_many(self) -> bool:
         """Whether there were so many that the printer will not take the line."""
         return self.requests > _MAX_REQUESTS or self.timeouts > _MAX_TIMEOUTS
+
+
+@dataclass(slots=True)
+class Guard:
+    """The printer's own guard against a host that has died: M85.
+
+    Attributes:
+        inactivity_s: the printer kills itself when no command came for so long, s; 0: that is left alone.
+        is_on: whether it was switched on.
+    """
+
+    inactivity_s: int
+    is_on: bool = False
+
+    def begin(self) -> tuple[str, ...]:
+        """Return what switches it on."""
+        self.is_on = self.inactivity_s > 0
+        return (f"M85 S{self.inactivity_s}",) if self.is_on else ()
+
+    def end(self) -> str:
+        """Return what switches it off; empty: it is not on."""
+        was_on, self.is_on = self.is_on, False
+        return _UNGUARD if was_on else ""
+
+    def around(self, text: str) -> tuple[str, ...]:
+        """Return a line of the print; where it may outlast the guard, between those that switch it off and on."""
+        if not (self.is_on and may_outlast_guard(text)):
+            return (text,)
+        return _UNGUARD, text, *self.begin()
+
+    def note_unknown(self, text: str, reply: Reply) -> bool:
+        """Return whether a reply to a line says that the printer has no such guard; it is not used again then."""
+        is_missing = self.inactivity_s > 0 and text == f"M85 S{self.inactivity_s}" and is_unknown(reply)
+        if is_missing:
+            self.inactivity_s, self.is_on = 0, False
+        return is_missing

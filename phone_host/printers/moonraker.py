@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
@@ -19,12 +20,9 @@ from phone_host.printers.server import (
     require_key,
 )
 from phone_host.printers.server_answer import Answer, Value, or_zero
-from phone_host.printers.server_talk import ServerLostError, ServerTalk
+from phone_host.printers.server_talk import ORDER_S, ServerLostError, ServerTalk
 
 _WHERE: Final = "Fluidd and Mainsail show it under Settings, Authorization"
-_COMMAND_S: Final = 2.0
-"""Klipper answers a command when it was done, which may be after it has heated; it is done all the same."""
-
 _OF_STATE: Final = {
     "standby": Condition.READY,
     "printing": Condition.PRINTING,
@@ -89,17 +87,23 @@ class Moonraker:
 
     def cancel(self) -> None:
         """See PrintServer. The macro behind it is the user's own; many leave heaters on, so `cool` follows."""
-        self._do("/printer/print/cancel", "cancel")
+        with suppress(ServerLostError):
+            self._ordered("/printer/print/cancel")
 
     def cool(self) -> bool:
         """See PrintServer."""
-        self._do(f"/printer/gcode/script?script={quote('TURN_OFF_HEATERS')}", "cooling")
+        answer = self._ordered(f"/printer/gcode/script?script={quote('TURN_OFF_HEATERS')}")
+        require_good(answer, "to switch its heaters off")
         return True
 
     def halt(self) -> str:
         """See PrintServer."""
         self._do("/printer/emergency_stop", "stopping")
         return "give FIRMWARE_RESTART on its page"
+
+    def hurry(self) -> None:
+        """See PrintServer."""
+        self._talk.hurry()
 
     def _headers(self) -> dict[str, str]:
         return {"X-Api-Key": self._key} if self._key else {}
@@ -116,13 +120,15 @@ class Moonraker:
         return answer.json()["result"]
 
     def _do(self, target: str, what: str) -> None:
+        """Give an order. Klipper answers when it was done, which may be after it has heated; it is done all the same."""
+        with suppress(ServerLostError):  # it is done later, or the next question tells that the server is gone
+            note_refusal(self._ordered(target), what)
+
+    def _ordered(self, target: str) -> Answer:
         headers = {**self._headers(), "Content-Type": "application/json"}
-        try:
-            answer: Answer = self._talk.ask("POST", target, headers, json.dumps({}).encode(), _COMMAND_S)
-        except ServerLostError:
-            return  # it is done later, or the next question tells that the server is gone
+        answer = self._talk.ask("POST", target, headers, json.dumps({}).encode(), ORDER_S)
         require_key(answer, self._key, self._example, _WHERE)
-        note_refusal(answer, what)
+        return answer
 
 
 def _state(status: Value, heaters: tuple[str, ...]) -> ServerState:

@@ -19,7 +19,7 @@ from phone_host.printers.server import (
     require_key,
 )
 from phone_host.printers.server_answer import Answer, Value, or_zero
-from phone_host.printers.server_talk import ServerTalk
+from phone_host.printers.server_talk import ORDER_S, ServerTalk
 
 _WHERE: Final = "OctoPrint shows it under User settings, Application keys"
 _TOOL: Final = re.compile(r"tool(\d{1,2})")
@@ -83,19 +83,23 @@ class OctoPrint:
 
     def cancel(self) -> None:
         """See PrintServer."""
-        note_refusal(self._command("/api/job", {"command": "cancel"}), "cancel")
+        self._command("/api/job", {"command": "cancel"})
 
     def cool(self) -> bool:
         """See PrintServer."""
         tools = [int(found[1]) for name in self._heaters if (found := _TOOL.fullmatch(name))]
         cold = [*heaters_off(tools, has_chamber="chamber" in self._heaters), "M107", "M84"]
-        note_refusal(self._command("/api/printer/command", {"commands": cold}), "cooling")
+        require_good(self._command("/api/printer/command", {"commands": cold}), "to switch its heaters off")
         return True
 
     def halt(self) -> str:
         """See PrintServer. M112 is heard at once by firmware with an emergency parser, by the others when they hear again."""
         note_refusal(self._command("/api/printer/command", {"commands": ["M112"]}), "stopping")
         return "restart the printer, and connect it again in OctoPrint"
+
+    def hurry(self) -> None:
+        """See PrintServer."""
+        self._talk.hurry()
 
     def _headers(self) -> dict[str, str]:
         return {"X-Api-Key": self._key} if self._key else {}
@@ -107,7 +111,7 @@ class OctoPrint:
 
     def _command(self, target: str, command: dict[str, object]) -> Answer:
         headers = {**self._headers(), "Content-Type": "application/json"}
-        answer = self._talk.ask("POST", target, headers, json.dumps(command).encode())
+        answer = self._talk.ask("POST", target, headers, json.dumps(command).encode(), ORDER_S)
         require_key(answer, self._key, self._example, _WHERE)
         return answer
 

@@ -1,8 +1,10 @@
 """Runs a print and keeps on disk how far it is; in the caller's thread, or in one of its own."""
 
 import os
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,8 +16,7 @@ from phone_host.printers.journal import Entry, Journal, JournalEntry
 from phone_host.printers.progress import Ended, Phase, Progress
 
 _NOTE_NS: Final = 5_000_000_000
-_ABANDON_S: Final = 5.0
-"""For the last lines to a printer; a line that does not move is given up after this, too."""
+_STEP_S: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,16 +27,16 @@ class Place:
         door: to the printer.
         text: its address, as the user wrote it.
         source: what is printed, as the user named it.
+        journal: keeps how far it is, so that a later start can say what became of a killed print, and locks the printer; None: it is no printer.
     """
 
     door: PrinterDoor
     text: str
     source: str
+    journal: Journal | None = None
 
 
-def printed(
-    place: Place, job: Job, wishes: Wishes, tell: Callable[[Progress], None], journal: Journal | None = None
-) -> Ended:
+def printed(place: Place, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
     """Print something; return when that has ended.
 
     Args:
@@ -43,14 +44,13 @@ def printed(
         job: what.
         wishes: of the user; any thread may change them.
         tell: called several times a second, in this thread.
-        journal: keeps how far it is, so that a later start can say what became of a killed print; None: nobody does.
 
     Raises:
         TandemError: it cannot be printed, or the printer is gone; or another print goes to it.
     """
-    if journal is None:
+    if place.journal is None:
         return place.door.send(job, wishes, tell)
-    entry = journal.begin(place.text)
+    entry = place.journal.begin(place.text)
     try:
         return place.door.send(job, wishes, _noting(place, job, tell, entry))
     finally:
@@ -80,7 +80,7 @@ class RunningPrint:
     Args:
         place: where.
         job: what; its file stays until the print has ended.
-        journal: see `printed`.
+        wishes: of the user; None: those of the methods alone.
         tell: called several times a second, in the print's thread; None: nobody listens.
         over: called once, in the print's thread, with how it ended or with the error that ended it; None: nobody listens.
     """
@@ -89,13 +89,13 @@ class RunningPrint:
         self,
         place: Place,
         job: Job,
-        journal: Journal | None = None,
+        wishes: Wishes | None = None,
         tell: Callable[[Progress], None] | None = None,
         over: Callable[[Ended | TandemError], None] | None = None,
     ) -> None:
-        self._place, self._job, self._journal = place, job, journal
+        self._place, self._job = place, job
         self._tell, self._told_over = tell, over
-        self._wishes, self._is_over = Wishes(), threading.Event()
+        self._wishes, self._is_over = wishes or Wishes(), threading.Event()
         self._progress = Progress(phase=Phase.OPENING)
         self._outcome: Ended | TandemError | None = None
         self._thread = threading.Thread(target=self._run, name="print", daemon=False)
@@ -135,30 +135,84 @@ class RunningPrint:
         self._thread.join(wait_s)
         return not self._thread.is_alive()
 
+    def ended(self) -> Ended:
+        """Return how it ended; it has.
+
+        Raises:
+            TandemError: what ended it.
+        """
+        assert self._outcome is not None
+        if isinstance(self._outcome, TandemError):
+            raise self._outcome
+        return self._outcome
+
     def _run(self) -> None:
-        try:
-            with unfinished(self._abandon):
-                outcome: Ended | TandemError = self._printed()
-        except TandemError as error:
-            outcome = error
-        except Exception as error:  # noqa: BLE001 - a thread's root: whoever started it is told
-            outcome = UnavailableError(f"the print broke off ({type(error).__name__}: {error})", "go and look")
-        self._outcome = outcome
-        if self._told_over is not None:
-            self._told_over(outcome)
-
-    def _printed(self) -> Ended:
-        try:
-            return printed(self._place, self._job, self._wishes, self._heard, self._journal)
-        finally:
+        with unfinished(self._abandon):
+            self._outcome = self._printed()
             self._is_over.set()
+        if self._told_over is not None:
+            self._told_over(self._outcome)
 
-    def _abandon(self) -> None:
-        """Let the printer get the lines that cool it: the process ends next, whatever goes on."""
+    def _printed(self) -> Ended | TandemError:
+        try:
+            return printed(self._place, self._job, self._wishes, self._heard)
+        except TandemError as error:
+            return error
+        except Exception as error:  # noqa: BLE001 - a thread's root: whoever started it is told
+            return UnavailableError(f"the print broke off ({type(error).__name__}: {error})", "go and look")
+
+    def _abandon(self) -> str:
+        """Let the printer get the lines that cool it: the process ends next, whatever goes on.
+
+        Returns:
+            What is to be said of its heaters; empty: they are off.
+
+        Raises:
+            TandemError: they must be taken to be on.
+        """
         self._wishes.leave()
-        self._is_over.wait(_ABANDON_S)
+        if not self._is_over.wait(self._place.door.leaving_s):
+            raise UnavailableError(
+                f"{self._place.text} has not taken what switches its heaters off", "go and look: they may be on"
+            )
+        ended = self.ended()
+        if ended.phase is Phase.FAILED:
+            raise UnavailableError(ended.problem, ended.remedy)
+        return "; ".join(ended.notes)
 
     def _heard(self, progress: Progress) -> None:
         self._progress = progress
         if self._tell is not None:
             self._tell(progress)
+
+
+@contextmanager
+def begun(running: RunningPrint) -> Iterator[None]:
+    """Start a print, and leave the block when it has ended. What is raised in the block cancels the print first.
+
+    Args:
+        running: it.
+    """
+    running.start()
+    try:
+        yield
+    finally:
+        while not running.join(_STEP_S):
+            if sys.exception() is not None:
+                running.cancel()
+
+
+def watched(running: RunningPrint, tell: Callable[[Progress], None]) -> Ended:
+    """Start a print; return when it has ended.
+
+    Args:
+        running: it.
+        tell: called several times a second, in this thread; what it raises cancels the print.
+
+    Raises:
+        TandemError: see `printed`.
+    """
+    with begun(running):
+        while not running.join(_STEP_S):
+            tell(running.progress)
+    return running.ended()

@@ -22,7 +22,7 @@ from phone_host.printers.server import (
     size_bytes,
 )
 from phone_host.printers.server_answer import Answer, or_zero
-from phone_host.printers.server_talk import ServerTalk
+from phone_host.printers.server_talk import ANSWER_S, ORDER_S, ServerTalk
 
 _WHERE: Final = "the printer shows it under Settings, Network, PrusaLink"
 _OF_STATE: Final = {
@@ -104,7 +104,7 @@ class PrusaLink:
         if not self._job:
             self.state()
         if self._job:
-            note_refusal(self._ask("DELETE", f"/api/v1/job/{self._job}"), "cancel")
+            self._ask("DELETE", f"/api/v1/job/{self._job}", ORDER_S)
 
     def cool(self) -> bool:
         """See PrintServer."""
@@ -113,6 +113,10 @@ class PrusaLink:
     def halt(self) -> str:
         """See PrintServer."""
         return ""
+
+    def hurry(self) -> None:
+        """See PrintServer."""
+        self._talk.hurry()
 
     def _store(self) -> str:
         """Return where files go: the first store that is there and takes them."""
@@ -132,11 +136,13 @@ class PrusaLink:
         said = digest_header(challenge, self._user, self._password, (method, target), secrets.token_hex(8))
         return {"Authorization": said} if said else {}
 
-    def _ask(self, method: str, target: str) -> Answer:
+    def _ask(self, method: str, target: str, patience_s: float = ANSWER_S) -> Answer:
         """Ask; where a user's password is given and asked for, ask again with its proof."""
-        answer = self._talk.ask(method, target, self._headers(method, target, self._challenge))
+        answer = self._talk.ask(method, target, self._headers(method, target, self._challenge), patience_s=patience_s)
         if answer.status == _UNAUTHORIZED and self._user and answer.challenge:
             self._challenge = answer.challenge
-            answer = self._talk.ask(method, target, self._headers(method, target, self._challenge))
+            answer = self._talk.ask(
+                method, target, self._headers(method, target, self._challenge), patience_s=patience_s
+            )
         require_key(answer, self._key, self._example, _WHERE)
         return answer

@@ -16,8 +16,9 @@ from phone_host.printers.door import Job, Wishes
 from phone_host.printers.gcode import GcodeFacts, lines_of
 from phone_host.printers.gcode import Line as GcodeLine
 from phone_host.printers.host_commands import action_of, ignored_note
-from phone_host.printers.line import Line, PrinterGoneError, open_line, require_allowed
+from phone_host.printers.line import GOODBYE_S, WRITE_S, Line, PrinterGoneError, open_line, require_allowed
 from phone_host.printers.marlin import MarlinSender
+from phone_host.printers.marlin_problems import UNREPORTED
 from phone_host.printers.marlin_reply import HostAction
 from phone_host.printers.marlin_rules import SECOND_NS, SenderOptions
 from phone_host.printers.printer_uri import LineUri
@@ -33,6 +34,9 @@ _CANCEL_NS: Final = 5 * SECOND_NS
 
 _LAST_S: Final = 1.0
 """For the lines that cool, where even the machine's own buffer is full."""
+
+LEAVING_S: Final = WRITE_S + _LAST_S + GOODBYE_S + 1.0
+"""From a user who leaves until the lines that cool are written: a line that does not move first, then these, and a second of a busy machine."""
 
 _INACTIVITY_S: Final = 900
 """A printer that gets no command for so long kills itself (M85): longer than any wait of ours (10 min) and than the pause between two
@@ -51,6 +55,8 @@ class LineDoor:
         max_busy_s: the longest time that it may take for one line, s.
     """
 
+    leaving_s = LEAVING_S
+
     def __init__(self, uri: LineUri, max_busy_s: float = 3600.0) -> None:
         self._uri, self._max_busy_ns = uri, round(max_busy_s * SECOND_NS)
 
@@ -61,7 +67,7 @@ class LineDoor:
     def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
         """See PrinterDoor."""
         off = heaters_off(job.facts.tools, has_chamber=job.facts.has_chamber)
-        options = SenderOptions(off, _INACTIVITY_S if job.facts.heats else 0, self._max_busy_ns)
+        options = SenderOptions(off, _INACTIVITY_S if job.facts.heats else 0, self._max_busy_ns, heats=job.facts.heats)
         try:
             file = job.gcode.open(encoding="utf-8-sig", errors="replace")
         except OSError as error:
@@ -82,9 +88,9 @@ class LineDoor:
 def _ended(sender: MarlinSender, facts: GcodeFacts, commands: "_FileCommands") -> Ended:
     done = min(sender.done, facts.lines)
     is_left = not sender.phase.is_over
-    notes = (_UNPROVED,) if is_left else ()
+    notes = (_UNPROVED,) if is_left else (UNREPORTED,) if sender.cooling.is_unreported else ()
     if sender.phase is Phase.DONE and facts.leaves_hot:
-        notes = ("its G-code leaves heaters on: they were switched off",)
+        notes = ("its G-code leaves heaters on: they were switched off", *notes)
     notes = (*notes, *commands.notes, *ignored_note(facts.host_commands))
     left = f"; {done} of {facts.lines} lines were done"
     return Ended(
@@ -203,14 +209,21 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], No
         How it ended; CANCELLING: the user did not wait for the printer's answer.
 
     Raises:
-        PrinterGoneError: the printer is gone, or does not answer.
+        PrinterGoneError: the printer is gone, or does not answer, or the machine has not taken the lines that cool.
         DataError: a line of the file is none of G-code, or cannot be read any more; the heaters are off.
     """
+    is_written = True
     try:
         _exchange(line, sender, wishes, tell)
     finally:
-        if sender.phase not in {Phase.DONE, Phase.CANCELLED} and not sender.is_cold:
-            line.offer(last_lines(sender.off), _LAST_S)
+        if sender.phase not in {Phase.DONE, Phase.CANCELLED} and not sender.cooling.is_confirmed:
+            is_written = line.offer(last_lines(sender.off), _LAST_S)
+    if not is_written:
+        problem = f"{sender.problem}, and " if sender.problem else ""
+        raise PrinterGoneError(
+            f"{problem}the lines that switch the printer's heaters off could not be written",
+            "go and look; switch it off if its display does not say that they are cold",
+        )
     tell()
     return sender.phase
 
@@ -250,12 +263,14 @@ def _exchange(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[
         for each in lines:
             _obey(sender.heard(each.decode("ascii", "replace"), now.monotonic_ns()), wishes)
         rest = rest[-_MOST_LINE:]
+    if failure is not None and sender.phase is Phase.FAILED:  # it may be hot, too
+        raise DataError(f"{failure.problem}; {sender.problem}", f"{failure.remedy}; {sender.remedy}")
     if failure is not None:
         raise failure
 
 
 def _require_cold(sender: MarlinSender) -> None:
-    if not sender.is_cold:
+    if not sender.cooling.is_confirmed:
         raise PrinterGoneError(
             "the printer does not answer any more: the lines that switch its heaters off were written, and nobody knows whether it has read them",
             "go and look; switch it off if its display does not say that they are cold",

@@ -92,10 +92,17 @@ class PrintServer(Protocol):
         """Go on with it. A refusal is logged."""
 
     def cancel(self) -> None:
-        """End the print. A refusal is logged: it may be over already."""
+        """End the print. A refusal changes nothing: it may be over already, and the state tells."""
 
     def cool(self) -> bool:
-        """Switch the heaters off; return whether the server can do that at all."""
+        """Switch the heaters off; return whether the server can do that at all.
+
+        Raises:
+            UnavailableError: the server refuses it.
+        """
+
+    def hurry(self) -> None:
+        """Break off what is asked just now, and wait little from now on: the process ends next. A signal's handler may call it."""
 
     def halt(self) -> str:
         """Stop everything at once; return what has to be done before the next print. Empty: the server cannot do that."""

@@ -7,7 +7,6 @@ import math
 import re
 import threading
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
@@ -18,7 +17,7 @@ from phone_host.printers.host_commands import passed_note
 from phone_host.printers.line import PrinterGoneError
 from phone_host.printers.progress import Ended, Heat, Phase, Progress
 from phone_host.printers.server import Condition, PrintServer, ServerState
-from phone_host.printers.server_talk import ServerLostError
+from phone_host.printers.server_talk import LEAVING_S, ServerLostError
 
 _SECOND_NS: Final = 1_000_000_000
 _ASK_S: Final = 1.0
@@ -33,6 +32,7 @@ _OBEY_NS: Final = 10 * _SECOND_NS
 
 _HALTED_NS: Final = 5 * _SECOND_NS
 _AGAIN_NS: Final = 2 * _SECOND_NS
+_UNPROVED: Final = "the server has taken the orders to end the print and to switch the heaters off, and nobody has waited until they were done: see that the printer cools"
 _MOST_NAME: Final = 60
 _PHASE_OF: Final = {Condition.PAUSED: Phase.PAUSED, Condition.PRINTING: Phase.PRINTING, Condition.BUSY: Phase.PRINTING}
 
@@ -48,6 +48,8 @@ class ServerDoor:
         server: it.
     """
 
+    leaving_s = LEAVING_S
+
     def __init__(self, server: PrintServer) -> None:
         self._server = server
 
@@ -57,7 +59,13 @@ class ServerDoor:
 
     def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
         """See PrinterDoor."""
-        self.require_ready()
+        wishes.when_left(self._server.hurry)
+        try:
+            self.require_ready()
+        except ServerLostError:
+            if wishes.is_left:
+                return Ended(phase=Phase.CANCELLED, share=0.0)
+            raise
 
         def sent(share: float) -> None:
             tell(Progress(phase=Phase.SENDING, share=share))
@@ -69,6 +77,8 @@ class ServerDoor:
         except _StoppedError:
             return Ended(phase=Phase.CANCELLED, share=0.0)
         except ServerLostError as error:
+            if wishes.is_left:
+                return _Watch(self._server, job, wishes, tell).until_over()
             raise ServerLostError(
                 f"{error.problem} while it gets the file: nobody knows whether it prints", "look at its own page"
             ) from None
@@ -186,19 +196,17 @@ class _Watch:
         Raises:
             PrinterGoneError: nobody knows whether they are.
         """
-        share, notes = self._last.share, tuple[str, ...]()
-        began_ns, asked_ns = now.monotonic_ns(), 0
-        while (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS:
+        share, began_ns, asked_ns = self._last.share, now.monotonic_ns(), 0
+        while (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS and not self._wishes.is_left:
             if now_ns - asked_ns > _AGAIN_NS:
                 self._end_and_cool(is_first=not asked_ns)
                 asked_ns = now_ns
             if self._is_cold():
-                return Ended(phase=Phase.CANCELLED, share=share, notes=notes)
-            if self._wishes.is_left:
-                self._end_and_cool(is_first=False)
-                break
+                return Ended(phase=Phase.CANCELLED, share=share)
             self._tell(Phase.CANCELLING)
             _pause(_SOON_S)
+        if self._wishes.is_left and self._end_and_cool(is_first=True):
+            return Ended(phase=Phase.CANCELLED, share=share, notes=() if self._is_cold() else (_UNPROVED,))
         while (
             (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS + _HALTED_NS
             and not self._wishes.is_left
@@ -213,14 +221,16 @@ class _Watch:
             "go and look; switch the printer off if its display does not say that they are cold",
         )
 
-    def _end_and_cool(self, *, is_first: bool) -> None:
-        """Ask for the end, again only where the print still goes on, and for cold heaters."""
+    def _end_and_cool(self, *, is_first: bool) -> bool:
+        """Ask for the end, again only where the print still goes on, and for cold heaters; return whether the server has taken all."""
+        is_taken = True
         ends = (self._server.cancel,) if is_first or self._last.condition.is_active else ()
         for ask in (*ends, self._server.cool):
-            with suppress(
-                TandemError
-            ):  # one that is refused, with the key or without words, does not keep the other one away
+            try:
                 ask()
+            except TandemError:  # one that is refused, or gets no answer, does not keep the other one away
+                is_taken = False
+        return is_taken
 
     def _halted(self) -> str:
         try:

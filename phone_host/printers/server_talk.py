@@ -4,6 +4,7 @@ import http.client
 import socket
 import ssl
 import threading
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Final
@@ -13,8 +14,18 @@ from phone_host.printers.printer_uri import ServerUri
 from phone_host.printers.server_answer import Answer
 
 _CONNECT_S: Final = 5.0
-_ANSWER_S: Final = 10.0
+ANSWER_S: Final = 10.0
 """Of the whole answer; a server on a Raspberry Pi answers within one."""
+
+ORDER_S: Final = 3.0
+"""Of an order to end a print or to cool: it is given again soon, and one that gets no answer must not keep the next one back."""
+
+_HURRIED_S: Final = 1.5
+_LAST_ASKS: Final = 4
+"""The end of the print, cold heaters, and a state of two answers."""
+
+LEAVING_S: Final = _CONNECT_S + _LAST_ASKS * _HURRIED_S + 1.0
+"""From `hurry` until the last orders have gone: a connection that is being made, then one request after the other; and a second of a busy machine."""
 
 _STORED_S: Final = 120.0
 """Until a server has written a file that it has got, to a card or a stick."""
@@ -50,11 +61,20 @@ class ServerTalk:
 
     def __init__(self, uri: ServerUri) -> None:
         self._uri = uri
+        self._is_hurried = False
+        self._under_way: socket.socket | None = None
         host = f"[{uri.host}]" if ":" in uri.host else uri.host
         self.server = f"{uri.kind.title} at {host}:{uri.port}"
 
+    def hurry(self) -> None:
+        """Break the request off that is under way, and wait little for those that follow: the process ends next. It takes no lock."""
+        self._is_hurried = True
+        if (under_way := self._under_way) is not None:
+            with suppress(OSError):
+                under_way.shutdown(socket.SHUT_RDWR)
+
     def ask(
-        self, method: str, target: str, headers: Mapping[str, str], body: bytes = b"", patience_s: float = _ANSWER_S
+        self, method: str, target: str, headers: Mapping[str, str], body: bytes = b"", patience_s: float = ANSWER_S
     ) -> Answer:
         """Ask for something small.
 
@@ -63,13 +83,14 @@ class ServerTalk:
             target: path and query.
             headers: beside the usual ones.
             body: to send.
-            patience_s: for the whole of it, s.
+            patience_s: for the whole of it, the connection included, s.
 
         Raises:
             ServerLostError: there is no answer.
             UnavailableError: the answer is elsewhere, or beyond all measure.
         """
-        with self._client() as client, _limit(client, patience_s):
+        end_s = time.monotonic() + patience_s
+        with self._client(patience_s) as client, _limit(client, self._hurried(end_s - time.monotonic())):
             client.request(method, target, body or None, {**_USUAL, **headers})
             return self._answer(client)
 
@@ -91,26 +112,31 @@ class ServerTalk:
         """
         with self._client() as client:
             client.request(method, target, body, {**_USUAL, **headers, "Content-Length": str(size_bytes)})
-            with _limit(client, _STORED_S):
+            with _limit(client, self._hurried(_STORED_S)):
                 client.sock.settimeout(_STORED_S)
                 return self._answer(client)
 
+    def _hurried(self, patience_s: float) -> float:
+        return min(patience_s, _HURRIED_S) if self._is_hurried else patience_s
+
     @contextmanager
-    def _client(self) -> Iterator[http.client.HTTPConnection]:
-        uri = self._uri
+    def _client(self, patience_s: float = _CONNECT_S) -> Iterator[http.client.HTTPConnection]:
+        uri, connect_s = self._uri, self._hurried(min(patience_s, _CONNECT_S))
         if uri.is_secure:
             context = ssl.create_default_context()
             client: http.client.HTTPConnection = http.client.HTTPSConnection(
-                uri.host, uri.port, timeout=_CONNECT_S, context=context
+                uri.host, uri.port, timeout=connect_s, context=context
             )
         else:
-            client = http.client.HTTPConnection(uri.host, uri.port, timeout=_CONNECT_S)
+            client = http.client.HTTPConnection(uri.host, uri.port, timeout=connect_s)
         try:
             client.connect()
+            self._under_way = client.sock
             yield client
         except (OSError, http.client.HTTPException, ValueError) as error:
             raise self._failed(error) from None
         finally:
+            self._under_way = None
             client.close()
 
     def _answer(self, client: http.client.HTTPConnection) -> Answer:

@@ -8,6 +8,7 @@ from typing import Final
 
 from common.errors import SettingsError, TandemError
 from phone_host.output.atomic import write_bytes
+from phone_host.output.data_folder import data_folder
 from phone_host.output.meshes.decimated import NoLibraryError, decimated
 from phone_host.output.meshes.formats import FORMATS, mesh_bytes
 from phone_host.output.meshes.printable import Printer, Problem, problems
@@ -20,7 +21,7 @@ from phone_host.printers.doors import configured_door, door_to
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, job_of, require_input
 from phone_host.printers.printer_uri import FileUri, read_uri
-from phone_host.printers.printing import Place, RunningPrint, printed
+from phone_host.printers.printing import Place, RunningPrint, watched
 from phone_host.printers.progress import Ended, Progress
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.settings import printer_keys
@@ -154,18 +155,18 @@ def print_model(
         profile: settings of the slicer; None: PLA, layers of 0.2 mm.
         config: settings file with the keys of servers; None: the usual one.
         wishes: another thread pauses and cancels by it; None: nobody does.
-        tell: called several times a second with how far it is, in this thread; None: nobody listens.
+        tell: called several times a second with how far it is, in this thread; what it raises cancels the print. None: nobody listens.
 
     Returns:
         How it ended: `phase` is DONE, CANCELLED or FAILED, the last with `problem` and `remedy`.
 
     Raises:
-        TandemError: it cannot be printed, or the printer is gone.
+        TandemError: it cannot be printed, or the printer is gone, or another print of this machine goes to it.
     """
     slicing = SlicingWanted(bed or (Bed(bed_mm) if bed_mm else None), None if profile is None else Path(profile))
     file = None if config is None else Path(config)
     with closing(prepare_print(Path(what), printer, Wanted(slicing, unit, up), config=file)) as prepared:
-        return printed(prepared.place, prepared.job, wishes or Wishes(), tell or (lambda _: None))
+        return watched(RunningPrint(prepared.place, prepared.job, wishes), tell or (lambda _: None))
 
 
 class PreparedPrint:
@@ -186,19 +187,15 @@ class PreparedPrint:
         self._kept = kept
 
     def start(
-        self,
-        tell: Callable[[Progress], None] | None = None,
-        over: Callable[[Ended | TandemError], None] | None = None,
-        journal: Journal | None = None,
+        self, tell: Callable[[Progress], None] | None = None, over: Callable[[Ended | TandemError], None] | None = None
     ) -> RunningPrint:
         """Begin to print, in a thread of its own; the user has confirmed it.
 
         Args:
             tell: called several times a second, in that thread, with how far it is.
             over: called once, in that thread, when it has ended; close this then.
-            journal: keeps how far it is, so that a later start can say what became of a killed print.
         """
-        running = RunningPrint(self.place, self.job, journal, tell, over)
+        running = RunningPrint(self.place, self.job, tell=tell, over=over)
         running.start()
         return running
 
@@ -233,4 +230,5 @@ def prepare_print(
     door.require_ready()
     with ExitStack() as kept:
         job = kept.enter_context(job_of(what, wanted, uri, tell))
-        return PreparedPrint(Place(door, printer, str(what.absolute())), job, kept.pop_all())
+        journal = None if isinstance(uri, FileUri) else Journal(data_folder() / "printing")
+        return PreparedPrint(Place(door, printer, str(what.absolute()), journal), job, kept.pop_all())

@@ -143,8 +143,8 @@ class Workshop:
                     f"that is not what would be printed: {state.asks}", "look at file and printer again"
                 )
             assert wanted.door is not None
-            place = Place(wanted.door, wanted.text, str(job.gcode))
-            self._running = RunningPrint(place, job, wanted.journal, self._heard, self._over)
+            place = Place(wanted.door, wanted.text, str(job.gcode), wanted.journal)
+            self._running = RunningPrint(place, job, tell=self._heard, over=self._over)
             self._show(PrintStage.PRINTING, f"{job.name}: waiting for the printer")
             self._running.start()
         return "it begins"

@@ -13,6 +13,7 @@ import pytest
 from tests.print.test_print_verb import done, environment
 from tests.support.lying_printer import Answer, LyingPrinter, lying_printer
 from tests.support.marlin_printer import Faults, cube, printer
+from tests.support.print_doors import until_or_over
 from tests.support.programs import until
 
 SLOW = pytest.mark.slow
@@ -186,6 +187,27 @@ def test_two_prints_of_one_machine(tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("printing/*.json"))
 
 
+def test_the_api_locks_its_printer_and_keeps_a_journal(tmp_path: Path) -> None:
+    """A command to the same printer is refused meanwhile; after a kill the next start says so; what `tell` raises cools."""
+    path = _gcode(tmp_path, 3000)
+    call = f"from phone_host.api import print_model; print_model({path!r}, sys.argv[1], tell=tell)"
+    kill, fail = "def tell(_): pass", "def tell(progress):\n if progress.share > 0: raise KeyError('mine')"
+    for body in (kill, fail):
+        with printer(Faults(delay_s=0.01), on_socket=True) as there:
+            script = [sys.executable, "-P", "-c", f"import sys\n{body}\n{call}", there.uri]
+            with subprocess.Popen(script, env=environment(tmp_path), stderr=subprocess.PIPE, text=True) as process:
+                if body is kill:
+                    until_or_over(process, lambda: bool(list(tmp_path.rglob("printing/*.json"))), "it has an entry")
+                    refused = done(tmp_path, path, "--printer", there.uri, "--yes")
+                    assert (refused.returncode, "another print goes to" in refused.stderr) == (3, True), refused.stderr
+                    process.kill()
+                _, errors = process.communicate(timeout=60)
+            assert ("KeyError: 'mine'" in errors) == (body is fail), errors
+            assert there.is_cold == (body is fail)
+        told = done(tmp_path, path, "--printer", there.uri, "--yes")
+        assert ("was not finished" in told.stderr) == (body is kill), told.stderr
+
+
 def test_a_file_that_is_cut_while_it_is_printed_leaves_nothing_hot(tmp_path: Path) -> None:
     """Its lines that cool are gone: the heaters are switched off all the same, and the file is named."""
     path = tmp_path / "cube.gcode"
@@ -198,3 +220,28 @@ def test_a_file_that_is_cut_while_it_is_printed_leaves_nothing_hot(tmp_path: Pat
         assert process.returncode == 4
         assert f"{path} was changed while it was printed" in errors
         assert there.is_cold
+
+
+@pytest.mark.parametrize("ends", [True, False], ids=["at its end", "cancelled"])
+def test_a_printer_that_answers_and_stays_hot_is_told(ends: bool, tmp_path: Path) -> None:  # noqa: FBT001 - a parameter of the test
+    """It says ok to every line that cools, twice, and heats: exit 3 in one line with both goals."""
+    gcode = tmp_path / "cube.gcode"
+    gcode.write_text("\n".join(cube(40 if ends else 3000)) + "\n")
+    with printer(Faults(delay_s=0.005, stays_hot=True), on_socket=True) as there:
+        with _begun(tmp_path, there.uri, str(gcode)) as process:
+            if not ends:
+                until(lambda: len(there.done) > 20, "it prints")
+                process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=60)
+        assert there.refused_to_cool >= 4
+    assert process.returncode == 3
+    assert "heats all the same (nozzle 200 C, bed 60 C)" in errors
+    assert len(errors.splitlines()) == 1
+
+
+def test_a_printer_that_reports_no_goals_is_noted(tmp_path: Path) -> None:
+    """It has answered what cools; that nobody can know more is said in one sentence."""
+    with printer(Faults(reports=False), on_socket=True) as there:
+        ended = done(tmp_path, _gcode(tmp_path), "--printer", there.uri, "--yes")
+    assert ended.returncode == 0, ended.stderr
+    assert "does not report their goals" in ended.stdout

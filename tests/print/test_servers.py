@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
@@ -283,7 +284,7 @@ def test_every_tool_of_a_server_s_printer_is_switched_off(job: Job) -> None:
 
 
 def test_a_user_who_leaves_asks_once_more(job: Job) -> None:
-    """The server does not obey at once: the last request is the one that cools, and nobody says that it is cold."""
+    """The server does not obey at once: the last order is the one that cools, and nobody says that it is cold."""
     wishes = Wishes()
 
     def watch(progress: Progress) -> None:
@@ -293,7 +294,35 @@ def test_a_user_who_leaves_asks_once_more(job: Job) -> None:
             wishes.cancel()
 
     with print_server(ServerKind.MOONRAKER, ServerFaults(rate=0.01, cools=False)) as there:
-        with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
-            printed(there, job, wishes=wishes, tell=watch)
+        ended = printed(there, job, wishes=wishes, tell=watch)
+        assert ended.phase is Phase.CANCELLED
+        assert "nobody has waited" in ended.notes[0]
         assert there.asked[-1] == "POST /printer/gcode/script"
         assert "POST /printer/emergency_stop" not in there.asked
+
+
+@KINDS
+def test_orders_that_get_no_answer_do_not_keep_each_other_back(kind: ServerKind, job: Job) -> None:
+    """The user leaves while the server says nothing any more: the end and cold heaters are ordered all the same, and nobody calls it cold."""
+    wishes = Wishes()
+
+    def watch(progress: Progress) -> None:
+        if progress.phase is Phase.PRINTING and not there.faults.holds:
+            there.faults.holds = frozenset({"GET", "POST", "DELETE"})
+            Timer(0.3, wishes.leave).start()  # while a question waits for its answer
+
+    with print_server(kind, ServerFaults(rate=0.001)) as there:
+        with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
+            printed(there, job, wishes=wishes, tell=watch)
+        assert there.condition == "cancelled"
+        assert (there.goal, there.bed) == (0.0, 0.0)
+
+
+def test_an_order_to_cool_that_is_refused_is_no_cold_printer(tmp_path: Path) -> None:
+    """A server that answers 404 to the order after a print that leaves its heaters on has not switched them off."""
+    hot = tmp_path / "hot.gcode"
+    hot.write_text("\n".join(cube(100)[:-3]) + "\n")
+    with print_server(ServerKind.OCTOPRINT, ServerFaults(refuses_to_cool=True)) as there:
+        ended = printed(there, Job(hot, hot.name, facts_of(hot)))
+    assert ended.phase is Phase.DONE
+    assert "could not be switched off" in ended.notes[0]

@@ -11,8 +11,10 @@ from typing import Final
 import pytest
 from _pytest.mark import ParameterSet
 
+from phone_host.printers.printer_uri import ServerKind
 from tests.print.test_print_verb import environment
-from tests.support.print_doors import Door, Scene, State, gcode_of, scene, until_or_over
+from tests.support.print_doors import Door, Scene, State, gcode_of, scene, server_scene, until_or_over
+from tests.support.print_server import ServerFaults, print_server
 from tests.support.programs import until
 
 INT, TERM, HUP, QUIT = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
@@ -101,3 +103,26 @@ def test_a_print_under_nohup_goes_on(tmp_path: Path) -> None:
         _, errors = process.communicate(timeout=60)
         until(there.is_cold, "both heaters are off")
     assert process.returncode == 130, errors
+
+
+@pytest.mark.parametrize("holds", [{"GET"}, {"GET", "POST"}], ids=["questions", "orders, too"])
+def test_a_second_ctrl_c_orders_the_end_and_cold_heaters_though_no_answer_comes(
+    holds: set[str], tmp_path: Path
+) -> None:
+    """Both orders are given before it leaves; without an answer to them, one line says that heaters may be on, with exit 3."""
+    with print_server(ServerKind.OCTOPRINT, ServerFaults(rate=0.001)) as server:
+        there = server_scene(server, State.PRINTING, tmp_path)
+        with _started(tmp_path, State.PRINTING, there) as process:
+            until_or_over(process, there.is_there, "it prints")
+            server.faults.holds = frozenset(holds)
+            asked = server.answers
+            until_or_over(process, lambda: server.answers > asked, "a question waits for its answer")
+            until(
+                lambda: process.poll() is not None or process.send_signal(INT), "it leaves, however often it is told to"
+            )
+            _, errors = process.communicate(timeout=60)
+        assert there.is_cold()
+        assert server.condition == "cancelled"
+    assert process.returncode == (3 if "POST" in holds else 130), errors
+    assert ("go and look" in errors) == ("POST" in holds)
+    assert len(errors.splitlines()) == 1, errors

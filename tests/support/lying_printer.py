@@ -23,10 +23,11 @@ class LyingPrinter:
     Args:
         answer: what it says to each line.
         chatter: said again and again, whatever comes.
+        is_slow: whether it says one byte after the other, as a slow USB port does.
     """
 
-    def __init__(self, answer: Answer, chatter: bytes = b"") -> None:
-        self._answer, self._chatter = answer, chatter
+    def __init__(self, answer: Answer, chatter: bytes = b"", *, is_slow: bool = False) -> None:
+        self._answer, self._chatter, self._is_slow = answer, chatter, is_slow
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.uri = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self.lines: list[str] = []
@@ -70,13 +71,22 @@ class LyingPrinter:
             for line in lines:
                 self.lines.append(line.decode("ascii", "replace"))
                 with suppress(OSError):
-                    connection.sendall(self._answer(self.lines[-1], len(self.lines)))
+                    self._say(connection, self._answer(self.lines[-1], len(self.lines)))
+
+    def _say(self, connection: socket.socket, said: bytes) -> None:
+        if not self._is_slow:
+            connection.sendall(said)
+            return
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for byte in said:
+            connection.sendall(bytes([byte]))
+            self._is_over.wait(0.001)
 
 
 @contextmanager
-def lying_printer(answer: Answer, chatter: bytes = b"") -> Iterator[LyingPrinter]:
+def lying_printer(answer: Answer, chatter: bytes = b"", *, is_slow: bool = False) -> Iterator[LyingPrinter]:
     """A printer that is on while the block runs."""
-    made = LyingPrinter(answer, chatter)
+    made = LyingPrinter(answer, chatter, is_slow=is_slow)
     try:
         yield made
     finally:

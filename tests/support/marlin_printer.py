@@ -45,6 +45,8 @@ class Faults:
         lost_answers: numbers of lines whose answer never arrives, once each.
         chatter: said again and again, whatever is done: reports of M155, `wait` of Repetier.
         chatter_s: between two of these.
+        reports: whether it answers M105 with its temperatures.
+        stays_hot: whether it answers what switches a heater off, and heats all the same.
         greets: whether it says `start` once its port has been opened, as a board that restarts then; it always does on a socket.
     """
 
@@ -64,6 +66,8 @@ class Faults:
     chatter: str = ""
     chatter_s: float = 0.2
     greets: bool = False
+    reports: bool = True
+    stays_hot: bool = False
 
 
 class MarlinPrinter:
@@ -78,6 +82,7 @@ class MarlinPrinter:
         bed: likewise.
         inactivity_s: after which it kills itself without a command (M85), s; 0: never.
         guards: every value that M85 has set.
+        refused_to_cool: lines that switch a heater off which it has answered and not done.
         cooled_s: when the last heater was switched off, time.monotonic().
         resends: how often it asked for a line again.
         lost: answers of it that never arrived.
@@ -105,7 +110,9 @@ class MarlinPrinter:
         self.tools: dict[int, float] = {}
         self.inactivity_s, self.guards = 0, list[int]()
         self.cooled_s = 0.0
+        self.refused_to_cool = 0
         self.resends = self.lost = 0
+        self._said_with_ok = ""
         self._last = 0
         self._waiting = b""
         self._is_over = threading.Event()
@@ -228,6 +235,9 @@ class MarlinPrinter:
         if name == "M85":
             self._guard(text)
             return
+        if name == "M105":
+            self._report()
+            return
         self.done.append(text)
         while name in self._faults.busy and not self._is_over.is_set():
             self._say("echo:busy: paused for user")
@@ -236,6 +246,9 @@ class MarlinPrinter:
         if (seconds := self._faults.silent.get(name)) is not None:
             self._is_over.wait(seconds)
         target, tool = re.search(r"S(\d+)", text), re.search(r"T(\d+)", text)
+        if self._faults.stays_hot and name in {"M104", "M140"} and text.endswith("S0"):
+            self.refused_to_cool += 1
+            return
         if name in {"M104", "M109"} and target and tool:
             self.tools[int(tool[1])] = float(target[1])
         elif name in {"M104", "M109"} and target:
@@ -246,6 +259,13 @@ class MarlinPrinter:
             self.cooled_s = time.monotonic()
         if name in {"M109", "M190"}:
             self._heat()
+
+    def _report(self) -> None:
+        goals = {**{f"T{tool}": goal for tool, goal in self.tools.items()}, "B": self.bed}
+        if self._faults.reports:
+            self._said_with_ok = f" T:21.0 /{self.nozzle:.1f} " + " ".join(
+                f"{key}:21.0 /{goal:.1f}" for key, goal in goals.items()
+            )
 
     def _guard(self, text: str) -> None:
         if not self._faults.has_m85:
@@ -273,9 +293,10 @@ class MarlinPrinter:
         if self._faults.delay_s:
             self._is_over.wait(self._faults.delay_s)
         if self._random.random() >= self._faults.lost:
-            self._say("ok")
+            self._say("ok" + self._said_with_ok)
         else:
             self.lost += 1
+        self._said_with_ok = ""
 
     def _say(self, text: str) -> None:
         try:

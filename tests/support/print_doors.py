@@ -84,7 +84,7 @@ def scene(door: Door, state: State, folder: Path) -> Iterator[Scene]:
     kind = ServerKind(door.value)
     faults_there = ServerFaults(rate=0.001, cools=state is not State.CANCELLING)
     with print_server(kind, faults_there) as server:
-        yield _server_scene(server, state, folder)
+        yield server_scene(server, state, folder)
 
 
 def _line_scene(there: MarlinPrinter, state: State) -> Scene:
@@ -100,7 +100,8 @@ def _line_scene(there: MarlinPrinter, state: State) -> Scene:
     )
 
 
-def _server_scene(there: PrintServerStandIn, state: State, folder: Path) -> Scene:
+def server_scene(there: PrintServerStandIn, state: State, folder: Path) -> Scene:
+    """A scene of a server that is there."""
     config = folder / "host.toml"
     config.write_text(f'[printers]\n"{there.uri}" = "{KEY}"\n')
     conditions = {State.WAITING: "finishing", State.PAUSED: "paused"}

@@ -36,9 +36,11 @@ class ServerFaults:
         refuses: status with which a file is refused; 0: it is not.
         starts: whether a file that was handed over is begun.
         cools: whether the heaters can be switched off.
+        refuses_to_cool: whether the order to switch heaters off gets 404.
         raw: sent in place of every answer; empty: the answer.
         forbids: end of the paths that the key does not open; empty: it opens all.
         silent_after: answers after which it hangs up on everybody.
+        holds: methods whose requests are taken and done, and get no answer while they stand here.
         second_nozzle: where the heater of a second tool shall go, degrees C; negative: it has none.
     """
 
@@ -51,9 +53,11 @@ class ServerFaults:
     refuses: int = 0
     starts: bool = True
     cools: bool = True
+    refuses_to_cool: bool = False
     raw: bytes = b""
     forbids: str = ""
     silent_after: int = 1 << 30
+    holds: frozenset[str] = frozenset()
     second_nozzle: float = -1.0
 
 
@@ -82,7 +86,7 @@ class PrintServerStandIn:
         self.share = 0.0
         self.answers = 0
         self._at_s = time.monotonic()
-        self.lock = threading.Lock()
+        self.lock, self.is_over = threading.Lock(), threading.Event()
         stand_in = self
 
         class Handler(_Handler):
@@ -97,6 +101,7 @@ class PrintServerStandIn:
 
     def stop(self) -> None:
         """Switch it off."""
+        self.is_over.set()
         self._http.shutdown()
         self._http.server_close()
         self._thread.join(10)
@@ -166,6 +171,8 @@ class _Handler(BaseHTTPRequestHandler):
             if self.command != "GET":
                 there.asked.append(f"{self.command} {path}")
             status, said = self._refusal(path) or _ANSWERS[there.kind](there, self, path, body)
+        while self.command in there.faults.holds and not there.is_over.wait(0.02):
+            pass
         self._say(status, said)
 
     def _refusal(self, path: str) -> tuple[int, Any] | None:
@@ -244,7 +251,7 @@ def _octoprint(there: PrintServerStandIn, handler: _Handler, path: str, body: by
             return 201, {"done": True, "effectivePrint": there.faults.starts}
         case "POST", "/api/job":
             return _ordered(there, json.loads(body).get("action") or json.loads(body)["command"])
-        case "POST", "/api/printer/command":
+        case "POST", "/api/printer/command" if not there.faults.refuses_to_cool:
             commands = json.loads(body)["commands"]
             there.cool(nozzle="M104 S0" in commands, bed="M140 S0" in commands)
             if "M104 T1 S0" in commands:

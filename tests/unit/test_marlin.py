@@ -1,5 +1,6 @@
 """Marlin's protocol, and the files and addresses that lead to it: pure, so the test is the printer."""
 
+import fcntl
 import math
 import os
 from contextlib import closing
@@ -388,6 +389,16 @@ def test_the_journal_tells_of_prints_whose_programs_are_gone(tmp_path: Path) -> 
     for text in ("{}", "[", "[" * 9000, '{"file": 1, "printer": "", "done": 0, "lines": 0, "pid": 1}'):
         (folder / "0.json").write_text(text)
         assert journal.take_left() == []
+
+
+def test_what_a_killed_program_had_begun_to_write_is_removed(tmp_path: Path) -> None:
+    """By the next print; not what another print writes just now."""
+    journal = Journal(tmp_path)
+    (tmp_path / "0123456789abcdef.part").write_text('{"file": "cup')
+    with (tmp_path / "fedcba9876543210.part").open("w") as written:
+        fcntl.flock(written, fcntl.LOCK_EX)
+        journal.begin("serial:x").close()
+        assert [path.name for path in tmp_path.glob("*.part")] == ["fedcba9876543210.part"]
 
 
 def test_two_prints_never_go_to_one_printer(tmp_path: Path) -> None:

@@ -170,8 +170,8 @@ def test_a_print_that_is_ended_at_the_display_ends(said: str) -> None:
     bench.run(lambda text: ["ok", said] if text.startswith("N10 ") else ["ok"], 60)
     assert bench.sender.phase is Phase.FAILED
     assert "ended at the printer" in bench.sender.problem
-    assert bench.sender.is_cold
-    assert bench.texts[-6:] == ["G1 X10", "M108", "M104 S0", "M140 S0", "M107", "M84"]
+    assert bench.sender.cooling.is_confirmed
+    assert bench.texts[-9:] == ["G1 X10", "M108", "M104 S0", "M140 S0", "M107", "M105", "M105", "M105", "M84"]
 
 
 @pytest.mark.parametrize(
@@ -354,7 +354,7 @@ def test_what_cools_counts_and_not_what_follows() -> None:
         lambda text: [] if "M84" in text else ["ok", *(["//action:cancel"] if text.startswith("N10 ") else [])], 3
     )
     assert bench.texts[-1] == "M84"
-    assert bench.sender.is_cold
+    assert bench.sender.cooling.is_confirmed
     bench.sender.finish_cancelling()
     assert bench.sender.phase is Phase.FAILED
     assert "ended at the printer" in bench.sender.problem

@@ -9,9 +9,9 @@ from common.program.terminal import fitted
 from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.doctor.host_doctor import Question, examine
+from phone_host.output.data_folder import data_folder
 from phone_host.output.json_text import json_text
 from phone_host.settings import check, key_folder, resolve_settings
-from phone_host.verbs.serve.places import data_folder
 
 
 def run(options: argparse.Namespace) -> int:

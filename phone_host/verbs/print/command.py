@@ -7,7 +7,7 @@ import termios
 from contextlib import ExitStack, closing, suppress
 from typing import Final
 
-from common.errors import DataError, SettingsError, TandemError, UnavailableError
+from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import HUNG_UP
 from common.program.signals import StopSignals
@@ -18,7 +18,7 @@ from phone_host.printers.door import Job, Wishes
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, is_gcode
 from phone_host.printers.printer_uri import FileUri, PrinterUri, ServerUri, read_uri
-from phone_host.printers.printing import RunningPrint, printed
+from phone_host.printers.printing import RunningPrint, begun, printed
 from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import Slicer, SlicingWanted
 from phone_host.run.model_job import PreparedPrint, prepare_print
@@ -26,7 +26,6 @@ from phone_host.run.progress_bar import share_bar, step_bar
 from phone_host.verbs.print.finding import find
 from phone_host.verbs.print.keypad import keypad
 from phone_host.verbs.printer_bed import bed_of
-from phone_host.verbs.serve.places import data_folder
 
 _STEP_S: Final = 0.1
 
@@ -49,15 +48,15 @@ def run(options: argparse.Namespace) -> int:
             )
         if isinstance(uri, FileUri):
             return _told(printed(prepared.place, prepared.job, Wishes(), lambda _: None), options, uri, prepared.job)
-        journal = Journal(data_folder() / "printing")
-        _tell_left(journal)
+        if prepared.place.journal is not None:
+            _tell_left(prepared.place.journal)
         _ask(options, prepared.job)
         signals = StopSignals()
-        code = _told(_sent(prepared, journal, signals), options, uri, prepared.job)
+        code = _told(_sent(prepared, signals), options, uri, prepared.job)
         return HUNG_UP if signals.hung_up and code == INTERRUPTED else code
 
 
-def _sent(prepared: PreparedPrint, journal: Journal, signals: StopSignals) -> Ended:
+def _sent(prepared: PreparedPrint, signals: StopSignals) -> Ended:
     """Send the print in a thread of its own; show how far it is, and take keys and signals.
 
     A terminal that is held or gone stops what is shown, never what is sent: a print must end cold.
@@ -68,20 +67,10 @@ def _sent(prepared: PreparedPrint, journal: Journal, signals: StopSignals) -> En
         if signals.stop:
             running.cancel()
 
-    running = RunningPrint(prepared.place, prepared.job, journal, heed_signals)
-    running.start()
-    try:
-        with suppress(OSError, termios.error):
-            _show(running, name)
-    finally:
-        while not running.join(_STEP_S):
-            if sys.exception() is not None:
-                running.cancel()
-    outcome = running.outcome
-    if isinstance(outcome, TandemError):
-        raise outcome
-    assert outcome is not None
-    return outcome
+    running = RunningPrint(prepared.place, prepared.job, tell=heed_signals)
+    with begun(running), suppress(OSError, termios.error):
+        _show(running, name)
+    return running.ended()
 
 
 def _show(running: RunningPrint, name: str) -> None:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from phone_host.output.data_folder import data_folder
 from phone_host.printers.bed import parse_bed
 from phone_host.printers.doors import configured_door
 from phone_host.printers.journal import Journal
@@ -10,7 +11,6 @@ from phone_host.printers.printer_uri import read_uri
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.serve.program import Choices, PrintWanted
 from phone_host.settings import printer_keys
-from phone_host.verbs.serve.places import data_folder
 
 
 def asked_print(values: Choices, file: Path | None) -> PrintWanted:

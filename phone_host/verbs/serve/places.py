@@ -1,14 +1,8 @@
 """Where the page puts what nobody gave a place."""
 
-import os
 from pathlib import Path
 
-
-def data_folder() -> Path:
-    """Return where results lie that nobody gave a place (XDG base directory specification)."""
-    home = os.environ.get("XDG_DATA_HOME", "")
-    base = Path(home) if home.startswith("/") else Path(os.environ.get("HOME", "/")) / ".local" / "share"
-    return base / "tandemscan"
+from phone_host.output.data_folder import data_folder
 
 
 def snapshot_folder(out: Path | None) -> Path:

@@ -26,6 +26,7 @@ from phone_host.live.calibration_view import Shows
 from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import is_calib_txt
+from phone_host.output.data_folder import data_folder
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.run.pair_budget import usable_matchers
 from phone_host.run.sinks import Sink
@@ -49,7 +50,7 @@ from phone_host.verbs.serve.choices import (
 from phone_host.verbs.serve.kept_choices import is_there, keep, kept
 from phone_host.verbs.serve.page_print import asked_print
 from phone_host.verbs.serve.page_scan import PageScan, asked_box, page_scan
-from phone_host.verbs.serve.places import data_folder, recording_folder, scan_folder, snapshot_folder
+from phone_host.verbs.serve.places import recording_folder, scan_folder, snapshot_folder
 from phone_host.verbs.stereo_options import refuse_rejected
 
 _TRIAL_S: Final = 2.5
