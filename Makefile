@@ -8,6 +8,8 @@ BIN := .venv/bin
 READY := .venv/.ready
 RUN := .venv/.ready-run
 PARTS := unit cases scan contract native system hostile print web
+# Every signal in every state, and printers that lie: `make test` runs a part of them, `make attack` all.
+SIGNALS := tests/print/test_signals.py tests/print/test_lying_printers.py tests/print/test_strange_firmware.py tests/system/test_signals_of_verbs.py
 # What the native library is made of; .ci/venv knows the same.
 NATIVE := setup.py phone_host/stereo/native/build_library.py $(wildcard phone_host/stereo/native/src/*)
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
@@ -87,8 +89,9 @@ bench: .venv/.ready-bench ## run every benchmark in tests/bench; each prints its
 soak: $(READY) ## run a booted board for ten minutes and both programs for thirty (MINUTES=N for each part); exit 4 if a limit is missed
 	@$(BIN)/python -m tests.bench.soak $(if $(MINUTES),--minutes $(MINUTES))
 
-attack: $(READY) ## run every attack on the running programs, ten minutes in all (MINUTES=N, ONLY=word); exit 4 if a limit is missed
-	@$(BIN)/python -m tests.system.hostile $(if $(MINUTES),--minutes $(MINUTES)) $(if $(ONLY),--only "$(ONLY)")
+attack: $(READY) ## run every attack on the running programs, ten minutes in all (MINUTES=N, ONLY=word), then every signal in every state of a print by every door, and printers that lie (five minutes; not with ONLY); exit 4 if a limit is missed
+	@missed=0; $(BIN)/python -m tests.system.hostile $(if $(MINUTES),--minutes $(MINUTES)) $(if $(ONLY),--only "$(ONLY)") || missed=$$?; \
+	$(if $(ONLY),:) $(BIN)/python -m pytest -q -n 4 -m "slow or not slow" $(SIGNALS) || missed=4; exit $$missed
 
 figures: .venv/.ready-bench ## run short benchmarks of everything and write docs/figures.md (an hour; ONLY=name, AGAIN=1); exit 4 if one is missed
 	@$(BIN)/python -m tests.docs.figures $(if $(ONLY),--only "$(ONLY)") $(if $(AGAIN),--again)

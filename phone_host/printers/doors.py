@@ -12,7 +12,7 @@ from phone_host.printers.octoprint import OctoPrint
 from phone_host.printers.printer_uri import FileUri, LineUri, PrinterUri, ServerKind, ServerUri, read_uri
 from phone_host.printers.prusalink import PrusaLink
 from phone_host.printers.sending import LineDoor
-from phone_host.printers.server_door import ServerDoor
+from phone_host.printers.server_door import ServerDoor, ServerPatience
 
 _MOST_KEY: Final = 200
 _BUSY_KEY: Final = "max_busy_minutes"
@@ -20,13 +20,16 @@ _BUSY_MIN: Final = 60.0
 _MAX_BUSY_MIN: Final = 100_000
 
 
-def door_to(uri: PrinterUri, key: str = "", max_busy_s: float = 3600.0) -> PrinterDoor:
+def door_to(
+    uri: PrinterUri, key: str = "", max_busy_s: float = 3600.0, patience: ServerPatience | None = None
+) -> PrinterDoor:
     """Return the door to a printer. Nothing is opened yet.
 
     Args:
         uri: where it is.
         key: of its server; empty: none.
         max_busy_s: the longest time that a printer on a line may take for one line of the print, s.
+        patience: how long a server is waited for; None: as long as usual.
     """
     match uri:
         case LineUri():
@@ -36,11 +39,11 @@ def door_to(uri: PrinterUri, key: str = "", max_busy_s: float = 3600.0) -> Print
         case ServerUri():
             match uri.kind:
                 case ServerKind.OCTOPRINT:
-                    return ServerDoor(OctoPrint(uri, key))
+                    return ServerDoor(OctoPrint(uri, key), patience)
                 case ServerKind.MOONRAKER:
-                    return ServerDoor(Moonraker(uri, key))
+                    return ServerDoor(Moonraker(uri, key), patience)
                 case ServerKind.PRUSALINK:
-                    return ServerDoor(PrusaLink(uri, key))
+                    return ServerDoor(PrusaLink(uri, key), patience)
                 case _:
                     assert_never(uri.kind)
         case _:

@@ -7,7 +7,7 @@ import math
 import re
 import threading
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from common import now
@@ -20,21 +20,31 @@ from phone_host.printers.server import Condition, PrintServer, ServerState
 from phone_host.printers.server_talk import LEAVING_S, ServerLostError
 
 _SECOND_NS: Final = 1_000_000_000
-_ASK_S: Final = 1.0
 _TELL_S: Final = 0.25
 _SOON_S: Final = 0.2
 """Between questions while it cancels."""
 
 _LOST_NS: Final = 60 * _SECOND_NS
 _BEGIN_NS: Final = 20 * _SECOND_NS
-_OBEY_NS: Final = 10 * _SECOND_NS
-"""Klipper cancels only when it has heated, which may take minutes: after this, what can be halted is halted."""
-
-_HALTED_NS: Final = 5 * _SECOND_NS
 _AGAIN_NS: Final = 2 * _SECOND_NS
 _UNPROVED: Final = "the server has taken the orders to end the print and to switch the heaters off, and nobody has waited until they were done: see that the printer cools"
 _MOST_NAME: Final = 60
 _PHASE_OF: Final = {Condition.PAUSED: Phase.PAUSED, Condition.PRINTING: Phase.PRINTING, Condition.BUSY: Phase.PRINTING}
+
+
+@dataclass(frozen=True, slots=True)
+class ServerPatience:
+    """How long a server is waited for.
+
+    Attributes:
+        ask_s: between questions while it prints, s.
+        obey_s: until it has cancelled, s. Klipper cancels only when it has heated, which may take minutes: after this, what can be halted is halted.
+        halted_s: until what was halted is cold, s.
+    """
+
+    ask_s: float = 1.0
+    obey_s: float = 10.0
+    halted_s: float = 5.0
 
 
 class _StoppedError(Exception):
@@ -46,12 +56,13 @@ class ServerDoor:
 
     Args:
         server: it.
+        patience: how long it is waited for.
     """
 
     leaving_s = LEAVING_S
 
-    def __init__(self, server: PrintServer) -> None:
-        self._server = server
+    def __init__(self, server: PrintServer, patience: ServerPatience | None = None) -> None:
+        self._server, self._patience = server, patience or ServerPatience()
 
     def require_ready(self) -> None:
         """See PrinterDoor."""
@@ -78,11 +89,11 @@ class ServerDoor:
             return Ended(phase=Phase.CANCELLED, share=0.0)
         except ServerLostError as error:
             if wishes.is_left:
-                return _Watch(self._server, job, wishes, tell).until_over()
+                return _Watch(self._server, job, wishes, tell, self._patience).until_over()
             raise ServerLostError(
                 f"{error.problem} while it gets the file: nobody knows whether it prints", "look at its own page"
             ) from None
-        ended = _Watch(self._server, job, wishes, tell).until_over()
+        ended = _Watch(self._server, job, wishes, tell, self._patience).until_over()
         return replace(ended, notes=(*ended.notes, *passed_note(job.facts.host_commands, self._server.title)))
 
     def _require_idle(self, state: ServerState) -> None:
@@ -117,8 +128,15 @@ def _pause(wait_s: float) -> None:
 class _Watch:
     """Watches one print."""
 
-    def __init__(self, server: PrintServer, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> None:
-        self._server, self._job, self._wishes, self._tell_user = server, job, wishes, tell
+    def __init__(
+        self,
+        server: PrintServer,
+        job: Job,
+        wishes: Wishes,
+        tell: Callable[[Progress], None],
+        patience: ServerPatience,
+    ) -> None:
+        self._server, self._job, self._wishes, self._tell_user, self._patience = server, job, wishes, tell, patience
         self._began_ns = self._heard_ns = now.monotonic_ns()
         self._was_active = self._is_paused = False
         self._last = ServerState(condition=Condition.READY, share=0.0, seconds_left=math.nan, heat=Heat(), is_hot=False)
@@ -132,7 +150,7 @@ class _Watch:
             if (ended := self._over()) is not None:
                 return ended
             self._tell(_PHASE_OF.get(self._last.condition, Phase.OPENING))
-            self._wait(_ASK_S if self._was_active else _SOON_S)
+            self._wait(self._patience.ask_s if self._was_active else _SOON_S)
 
     def _ask(self) -> None:
         """Ask how it is, and pass a pause on.
@@ -197,7 +215,8 @@ class _Watch:
             PrinterGoneError: nobody knows whether they are.
         """
         share, began_ns, asked_ns = self._last.share, now.monotonic_ns(), 0
-        while (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS and not self._wishes.is_left:
+        obey_ns = round(self._patience.obey_s * _SECOND_NS)
+        while (now_ns := now.monotonic_ns()) - began_ns < obey_ns and not self._wishes.is_left:
             if now_ns - asked_ns > _AGAIN_NS:
                 self._end_and_cool(is_first=not asked_ns)
                 asked_ns = now_ns
@@ -208,12 +227,12 @@ class _Watch:
         if self._wishes.is_left and self._end_and_cool(is_first=True):
             return Ended(phase=Phase.CANCELLED, share=share, notes=() if self._is_cold() else (_UNPROVED,))
         while (
-            (now_ns := now.monotonic_ns()) - began_ns < _OBEY_NS + _HALTED_NS
+            now.monotonic_ns() - began_ns < obey_ns + round(self._patience.halted_s * _SECOND_NS)
             and not self._wishes.is_left
             and (remedy := self._halted())
         ):
             if self._is_cold():
-                said = f"the printer did not obey within {_OBEY_NS // _SECOND_NS} s and was stopped at once: {remedy}"
+                said = f"the printer did not obey within {self._patience.obey_s:g} s and was stopped at once: {remedy}"
                 return Ended(phase=Phase.CANCELLED, share=share, notes=(said,))
             _pause(_SOON_S)
         raise PrinterGoneError(

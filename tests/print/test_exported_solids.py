@@ -24,6 +24,8 @@ from phone_host.output.meshes.solid import Solid
 from phone_host.scene.objects import OBJECTS
 from phone_host.scene.solid import Solid as Parts
 
+pytestmark = pytest.mark.xdist_group("exported solids")  # they share the models that were scanned
+
 ROOT: Final = Path(__file__).resolve().parents[2]
 JUDGE: Final = ROOT / "build/printers/meshes/bin/python"
 SPOT: Final = Path(os.environ.get("SCAN_DATA", "")) / "meshes/spot/spot_triangulated.obj"

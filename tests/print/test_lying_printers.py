@@ -10,6 +10,12 @@ from typing import Final
 
 import pytest
 
+from common.errors import TandemError
+from phone_host.printers.door import Job, Wishes
+from phone_host.printers.doors import door_to
+from phone_host.printers.printer_uri import read_uri
+from phone_host.printers.progress import Ended, Phase
+from phone_host.printers.slicing import facts_of
 from tests.print.test_print_verb import done, environment
 from tests.support.lying_printer import Answer, LyingPrinter, lying_printer
 from tests.support.marlin_printer import Faults, cube, printer
@@ -62,15 +68,27 @@ def _gcode(folder: Path, lines: int = 400) -> str:
     return str(path)
 
 
+def _sent(folder: Path, uri: str) -> Ended | TandemError:
+    """Print in this process, which costs no start of another one; return how it ended."""
+    gcode = Path(_gcode(folder))
+    try:
+        return door_to(read_uri(uri)).send(Job(gcode, gcode.name, facts_of(gcode)), Wishes(), lambda _: None)
+    except TandemError as error:
+        return error
+
+
 @pytest.mark.parametrize(("answer", "chatter", "words"), LIES)
 def test_a_printer_that_lies_is_given_up_and_cooled(answer: Answer, chatter: bytes, words: str, tmp_path: Path) -> None:
-    """Exit 3 in one line that says what it did; nozzle and bed were told to be cold behind everything that heats."""
+    """It fails in one line that says what the printer did; nozzle and bed were told to be cold behind everything that heats."""
     with lying_printer(answer, chatter) as there:
-        ended = done(tmp_path, _gcode(tmp_path), "--printer", there.uri, "--yes")
+        ended = _sent(tmp_path, there.uri)
         until(lambda: there.is_told_to_cool, "it was told to cool")
-    assert ended.returncode == 3, ended.stderr
-    assert words in ended.stderr
-    assert len(ended.stderr.splitlines()) == 1
+    if isinstance(ended, TandemError):
+        assert ended.exit_code == 3
+    else:
+        assert (ended.phase, bool(ended.remedy)) == (Phase.FAILED, True)
+    assert words in ended.problem
+    assert "\n" not in ended.problem
     assert len(there.lines) < 100
 
 
@@ -78,9 +96,10 @@ def test_a_printer_that_lies_is_given_up_and_cooled(answer: Answer, chatter: byt
 def test_what_can_be_borne_is_borne(answer: Answer, tmp_path: Path) -> None:
     """More answers than questions, and an echo of every line: the print goes on to its end, and leaves nothing hot."""
     with lying_printer(answer) as there:
-        ended = done(tmp_path, _gcode(tmp_path), "--printer", there.uri, "--yes")
+        ended = _sent(tmp_path, there.uri)
         assert there.is_told_to_cool
-    assert ended.returncode == 0, ended.stderr
+    assert isinstance(ended, Ended)
+    assert ended.phase is Phase.DONE
 
 
 def _begun(folder: Path, uri: str, gcode: str = "") -> "subprocess.Popen[str]":
@@ -157,8 +176,9 @@ def test_the_printer_s_own_guard_is_on_while_it_prints(tmp_path: Path) -> None:
 def test_an_answer_that_is_lost_among_temperatures_is_noticed(tmp_path: Path) -> None:
     """M155 reports all the while: the print goes on, and no line is done twice."""
     with printer(Faults(lost_answers={8}, chatter="T:200.1 /200.0 B:60.0 /60.0", greets=True)) as there:
-        ended = done(tmp_path, _gcode(tmp_path), "--printer", there.uri, "--yes")
-    assert ended.returncode == 0, ended.stderr
+        ended = _sent(tmp_path, there.uri)
+    assert isinstance(ended, Ended)
+    assert ended.phase is Phase.DONE
     assert there.lost == 1
     assert there.done == [*cube(400)[:-3], "M104 S0", "M140 S0"]
 
@@ -242,6 +262,6 @@ def test_a_printer_that_answers_and_stays_hot_is_told(ends: bool, tmp_path: Path
 def test_a_printer_that_reports_no_goals_is_noted(tmp_path: Path) -> None:
     """It has answered what cools; that nobody can know more is said in one sentence."""
     with printer(Faults(reports=False), on_socket=True) as there:
-        ended = done(tmp_path, _gcode(tmp_path), "--printer", there.uri, "--yes")
-    assert ended.returncode == 0, ended.stderr
-    assert "does not report their goals" in ended.stdout
+        ended = _sent(tmp_path, there.uri)
+    assert isinstance(ended, Ended)
+    assert "does not report their goals" in ended.notes[-1]

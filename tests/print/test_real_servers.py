@@ -19,6 +19,8 @@ from tests.support import real_print_servers as real
 from tests.support.marlin_printer import Faults, cube, printer
 from tests.support.programs import until
 
+pytestmark = pytest.mark.xdist_group("real servers")  # they share one OctoPrint
+
 needs_octoprint = pytest.mark.skipif(not real.OCTOPRINT.exists(), reason=f"OctoPrint is {real.HOW}")
 needs_moonraker = pytest.mark.skipif(not real.MOONRAKER.exists(), reason=f"Moonraker is {real.HOW}")
 needs_printrun = pytest.mark.skipif(not real.PRINTRUN.exists(), reason=f"Printrun is {real.HOW}")

@@ -13,10 +13,17 @@ from phone_host.printers.line import PrinterGoneError
 from phone_host.printers.printer_uri import ServerKind, read_uri
 from phone_host.printers.printing import Place, RunningPrint
 from phone_host.printers.progress import Ended, Phase, Progress
+from phone_host.printers.server_door import ServerPatience
 from phone_host.printers.slicing import facts_of
 from tests.support.marlin_printer import cube
 from tests.support.print_server import KEY, PASSWORD, PrintServerStandIn, ServerFaults, print_server
 from tests.support.programs import until
+
+BRISK = ServerPatience(ask_s=0.1)
+"""What is asked ten times a second shows the same in a tenth of the time."""
+
+CURT = ServerPatience(ask_s=0.1, obey_s=1.0, halted_s=1.0)
+"""Of servers that do not obey, however long they are waited for."""
 
 KINDS = pytest.mark.parametrize("kind", list(ServerKind), ids=lambda kind: kind.value)
 
@@ -35,9 +42,11 @@ def printed(
     key: str = KEY,
     wishes: Wishes | None = None,
     tell: Callable[[Progress], None] = lambda _: None,
+    *,
+    patience: ServerPatience = BRISK,
 ) -> Ended:
     """Print by the server."""
-    return door_to(read_uri(there.uri), key).send(job, wishes or Wishes(), tell)
+    return door_to(read_uri(there.uri), key, patience=patience).send(job, wishes or Wishes(), tell)
 
 
 @KINDS
@@ -198,12 +207,12 @@ def test_a_key_that_may_not_cool_is_no_reason_to_call_it_cold(job: Job) -> None:
     faults = ServerFaults(rate=0.01, forbids="/printer/command")
     with print_server(ServerKind.OCTOPRINT, faults) as there:
         with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
-            printed(there, job, wishes=wishes, tell=watch)
+            printed(there, job, wishes=wishes, tell=watch, patience=CURT)
         assert there.condition == "cancelled"
 
 
 def test_klipper_that_does_not_cool_is_stopped_at_once(job: Job) -> None:
-    """Ten seconds after cancelling; what has to be done before the next print is told."""
+    """Some time after cancelling; what has to be done before the next print is told."""
     wishes = Wishes()
 
     def watch(progress: Progress) -> None:
@@ -211,7 +220,7 @@ def test_klipper_that_does_not_cool_is_stopped_at_once(job: Job) -> None:
             wishes.cancel()
 
     with print_server(ServerKind.MOONRAKER, ServerFaults(rate=0.01, cools=False)) as there:
-        ended = printed(there, job, wishes=wishes, tell=watch)
+        ended = printed(there, job, wishes=wishes, tell=watch, patience=CURT)
     assert ended.phase is Phase.CANCELLED
     assert there.goal == 0.0
     assert "FIRMWARE_RESTART" in ended.notes[0]
@@ -231,7 +240,7 @@ def test_prusalink_that_does_not_cool_is_told(job: Job) -> None:
                 wishes.cancel()
 
         with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
-            printed(there, job, wishes=wishes, tell=watch)
+            printed(there, job, wishes=wishes, tell=watch, patience=CURT)
 
 
 def test_a_file_that_leaves_heaters_on_is_cooled_or_told(tmp_path: Path) -> None:

@@ -19,6 +19,8 @@ from tests.support.lying_printer import lying_printer
 from tests.support.marlin_printer import cube
 from tests.support.strange_firmware import FIRMWARES
 
+pytestmark = pytest.mark.xdist_group("strange firmware")  # one process begins all prints, side by side
+
 _WARNS: Final = re.compile(r"heaters|go and look|see that it cools|see what its display says|switch it off")
 _ENDS: Final = ("by itself", "cancelled")
 _ENDS_DONE: Final = {"flood of ok", "flood of ok, does nothing", "unknown commands", "start twice", "split lines"}

@@ -36,6 +36,7 @@ class Faults:
         baud: bits per second of the wire; 0: no limit.
         answers_ok_after_resend: whether `ok` follows `Resend`.
         silent: commands that take so many seconds without a word.
+        holds: commands that it does when the test releases it.
         dies_after: lines after which the plug is pulled.
         says: to be said once before a line of this number is answered.
         heating_s: that M109 and M190 wait, with a temperature every tenth of a second; M108 ends the wait of firmware that hears it at once.
@@ -56,6 +57,7 @@ class Faults:
     baud: int = 0
     answers_ok_after_resend: bool = True
     silent: dict[str, float] = field(default_factory=dict)
+    holds: frozenset[str] = frozenset()
     dies_after: int = 1 << 60
     says: dict[int, str] = field(default_factory=dict)
     heating_s: float = 0.0
@@ -84,6 +86,7 @@ class MarlinPrinter:
         guards: every value that M85 has set.
         refused_to_cool: lines that switch a heater off which it has answered and not done.
         cooled_s: when the last heater was switched off, time.monotonic().
+        is_released: set by a test that lets it do what it holds.
         resends: how often it asked for a line again.
         lost: answers of it that never arrived.
 
@@ -115,7 +118,7 @@ class MarlinPrinter:
         self._said_with_ok = ""
         self._last = 0
         self._waiting = b""
-        self._is_over = threading.Event()
+        self._is_over, self.is_released = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def start(self) -> None:
@@ -239,12 +242,7 @@ class MarlinPrinter:
             self._report()
             return
         self.done.append(text)
-        while name in self._faults.busy and not self._is_over.is_set():
-            self._say("echo:busy: paused for user")
-            if b"M108" in self._read(0.2) and self._faults.hears_at_once:
-                break
-        if (seconds := self._faults.silent.get(name)) is not None:
-            self._is_over.wait(seconds)
+        self._take_time(name)
         target, tool = re.search(r"S(\d+)", text), re.search(r"T(\d+)", text)
         if self._faults.stays_hot and name in {"M104", "M140"} and text.endswith("S0"):
             self.refused_to_cool += 1
@@ -259,6 +257,16 @@ class MarlinPrinter:
             self.cooled_s = time.monotonic()
         if name in {"M109", "M190"}:
             self._heat()
+
+    def _take_time(self, name: str) -> None:
+        while name in self._faults.busy and not self._is_over.is_set():
+            self._say("echo:busy: paused for user")
+            if b"M108" in self._read(0.2) and self._faults.hears_at_once:
+                break
+        while name in self._faults.holds and not (self.is_released.wait(0.02) or self._is_over.is_set()):
+            pass
+        if (seconds := self._faults.silent.get(name)) is not None:
+            self._is_over.wait(seconds)
 
     def _report(self) -> None:
         goals = {**{f"T{tool}": goal for tool, goal in self.tools.items()}, "B": self.bed}

@@ -76,7 +76,7 @@ def scene(door: Door, state: State, folder: Path) -> Iterator[Scene]:
             heating_s=60.0,
             busy=frozenset({"M0"}),
             says={20: "//action:pause"} if state is State.PAUSED else {},
-            silent={"M84": 1.0, "M107": 0.5} if state is State.CANCELLING else {},
+            holds=frozenset({"M107"} if state is State.CANCELLING else ()),
         )
         with printer(faults, on_socket=door is Door.SOCKET) as there:
             yield _line_scene(there, state)
@@ -96,7 +96,7 @@ def _line_scene(there: MarlinPrinter, state: State) -> Scene:
         is_cold=lambda: there.is_cold,
         is_cancelling=lambda: "M108" in there.done,
         count=lambda: len(there.done),
-        obey=lambda: None,
+        obey=there.is_released.set,
     )
 
 
