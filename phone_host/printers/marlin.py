@@ -22,7 +22,6 @@ from phone_host.printers.marlin_reply import HostAction, Reply, ReplyKind, read_
 from phone_host.printers.marlin_rules import (
     ALIVE_NS,
     SECOND_NS,
-    USUAL_NS,
     Attempts,
     Guard,
     PlannedLine,
@@ -332,7 +331,7 @@ class MarlinSender:
             self._ghosts += 1
             self._attempts.timeouts += 1
         under_way.tries += 1
-        if under_way.tries >= _MAX_TRIES and now_ns - self._last_heard_ns > USUAL_NS:
+        if under_way.tries >= _MAX_TRIES and now_ns - self._last_heard_ns > self._options.usual_ns:
             self._fail(problems.SILENT)
             return b""
         if self._is_given_up(under_way):
@@ -386,7 +385,7 @@ class MarlinSender:
         self._under_way = sent
         self._saved[sent.number] = sent.line
         self._saved.pop(sent.number - _SAVED, None)
-        sent.due_ns = now_ns + patience_ns(sent.line.text)
+        sent.due_ns = now_ns + patience_ns(sent.line.text, self._options.usual_ns)
         self._last_sent_ns = now_ns
         return framed(sent.number, sent.line.text)
 

@@ -57,9 +57,14 @@ def is_long(text: str) -> bool:
     return name_of(text) in _LONG
 
 
-def patience_ns(text: str) -> int:
-    """Return how long the answer to a line is waited for, ns."""
-    return LONG_NS if is_long(text) else USUAL_NS
+def patience_ns(text: str, usual_ns: int) -> int:
+    """Return how long the answer to a line is waited for, ns.
+
+    Args:
+        text: of the line.
+        usual_ns: for a line that takes no time, ns.
+    """
+    return LONG_NS if is_long(text) else usual_ns
 
 
 def is_done_now(text: str, reply: Reply) -> bool:
@@ -94,12 +99,14 @@ class SenderOptions:
         off: lines that switch off what the print heats.
         inactivity_s: the printer stops and switches its heaters off when no command came for so long, s; 0: that is left alone.
         max_busy_ns: the longest time that one line may take, ns.
+        usual_ns: how long the answer to a line that takes no time is waited for, ns.
         heats: whether the print heats: then the printer is asked at its end whether a heater is on.
     """
 
     off: tuple[str, ...] = heaters_off()
     inactivity_s: int = 0
     max_busy_ns: int = 3600 * SECOND_NS
+    usual_ns: int = USUAL_NS
     heats: bool = False
 
 

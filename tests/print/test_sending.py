@@ -1,8 +1,11 @@
 """A print over a serial line: every line once, in order, whatever happens to it on the way."""
 
 import errno
+import os
 import time
+import tty
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 import pytest
 
@@ -11,6 +14,7 @@ from phone_host.printers.door import Wishes
 from phone_host.printers.gcode import lines_of
 from phone_host.printers.line import PrinterGoneError, open_line
 from phone_host.printers.marlin import MarlinSender
+from phone_host.printers.marlin_rules import SenderOptions
 from phone_host.printers.printer_uri import LineUri, read_uri
 from phone_host.printers.progress import Phase
 from phone_host.printers.sending import send
@@ -35,7 +39,8 @@ def printed(
 ) -> MarlinSender:
     """Print over the line; return what has sent it."""
     line = open_line(line_uri(f"serial:{on.path}?baud=115200"))
-    sender = MarlinSender(lines_of(lines, "cube.gcode"), time.monotonic_ns() - 3 * S)  # it has said start
+    options = SenderOptions(usual_ns=S // 2)  # a printer that is simulated answers at once, or never
+    sender = MarlinSender(lines_of(lines, "cube.gcode"), time.monotonic_ns() - 3 * S, options)  # it has said start
     try:
         send(line, sender, wishes or Wishes(), lambda: tell(sender))
     finally:
@@ -49,7 +54,7 @@ def printed(
         Faults(),
         Faults(corrupted=0.02),
         Faults(corrupted=0.02, answers_ok_after_resend=False),
-        Faults(silent={"G28": 5.0}),
+        Faults(silent={"G28": 2.0}),
     ],
     ids=["clean", "corrupted", "no ok after resend", "silent homing"],
 )
@@ -200,3 +205,25 @@ def test_a_printer_that_is_not_there_is_named(uri: str, words: str) -> None:
     """With a remedy."""
     with pytest.raises(UnavailableError, match=words):
         open_line(line_uri(uri))
+
+
+def test_lines_that_cool_and_cannot_be_written_are_told() -> None:
+    """The port takes no byte any more, and the user leaves: nobody says that the printer is cold."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    line = open_line(line_uri(f"serial:{os.ttyname(slave)}?baud=115200"))
+    os.set_blocking(slave, False)
+    for _ in range(5):  # the kernel moves what it has got from one buffer into the next
+        with suppress(BlockingIOError):
+            while True:
+                os.write(slave, b"x")
+        time.sleep(0.05)
+    wishes = Wishes()
+    wishes.leave()
+    try:
+        with pytest.raises(PrinterGoneError, match="could not be written"):
+            send(line, MarlinSender(lines_of(cube(40), "cube.gcode"), time.monotonic_ns()), wishes, lambda: None)
+    finally:
+        os.close(master)
+        line.close()
+        os.close(slave)

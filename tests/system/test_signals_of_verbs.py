@@ -1,5 +1,6 @@
 """The same signals end the verbs that need two cameras, or compute: what they have come to stays. Beside test_signals.py, which has the others."""
 
+import functools
 import json
 import os
 import re
@@ -19,7 +20,6 @@ from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.board_films import FPS, board_films
 from tests.support.planes import noise
-from tests.support.print_doors import until_or_over
 from tests.support.programs import Program, board, children_of, command_of, lines, program, until
 from tests.support.rigs import small_rig
 from tests.support.terminal import in_terminal
@@ -105,6 +105,10 @@ def _films(folder: Path) -> Iterator[None]:
         yield
 
 
+def _is_there_or_over(begins: Callable[[Path, Program], bool], folder: Path, running: Program) -> bool:
+    return running.process.poll() is not None or begins(folder, running)
+
+
 @pytest.mark.parametrize(("name", "number"), _cases())
 def test_a_stream_ends_in_order_with_what_it_has_come_to(name: str, number: signal.Signals, tmp_path: Path) -> None:
     """Its results are whole, its account is printed, and the exit code is 0."""
@@ -115,7 +119,7 @@ def test_a_stream_ends_in_order_with_what_it_has_come_to(name: str, number: sign
         program(verb.module, arguments, tmp_path, "verb") as running,
     ):
         for begins in verb.begins:
-            until_or_over(running.process, lambda begins=begins: begins(tmp_path, running), f"{name} has begun")
+            until(functools.partial(_is_there_or_over, begins, tmp_path, running), f"{name} has begun")
         assert running.stop(number) == 0, running.stderr
         assert isinstance(running.json(), dict)
         assert "Traceback" not in running.stderr
