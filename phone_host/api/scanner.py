@@ -111,7 +111,9 @@ class Scanner:
         except BaseException as error:  # noqa: BLE001 - a thread's root: the iterator raises it
             self._failure = error
         try:
-            self.is_complete = self._host.write_report(build(self.snapshot()))
+            snapshot = self.snapshot()
+            is_whole = self._failure is None and snapshot.processed > 0
+            self.is_complete = self._host.write_report(build(snapshot), replaces_earlier=is_whole)
         except Exception as error:  # noqa: BLE001 - as above
             self._failure = self._failure or error
         finally:

@@ -110,7 +110,7 @@ class DemoRun:
         core = StereoCore(MatchSettings(disparities=near), self._rectifier)
         camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
         link = open_link(parse_link(self.address, listens_by_default=False))
-        settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0, resolved=resolved)
+        settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0, resolved=resolved, command="demo")
         self.host = Host(settings, camera, [link], core, [FunctionSink("check", self._keep, waits=True)])
 
     @property

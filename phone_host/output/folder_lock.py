@@ -8,6 +8,10 @@ Where the file system has no flock (some network and FUSE file systems) the work
 nothing at all otherwise; a line in the log says so. Two commands of one process are kept apart all the same.
 
 The table of locks belongs to the process, not to an object: flock asks for nothing else.
+
+Signals may raise an error between any two steps. So a lock acquires nothing before `acquire`, each descriptor is noted before it is locked, and whoever
+acquires releases in any case: with a context manager, or `release` in a `finally` that begins before `acquire`. A hidden file is only removed by
+whoever has it locked, and only if it still has its name: else it would be another program's.
 """
 
 import errno
@@ -48,9 +52,10 @@ class Length(Enum):
 
 @dataclass(slots=True)
 class _Held:
-    """A lock of this process."""
+    """A lock of this process: the descriptor of the hidden file, -1 for none, and whether it is locked."""
 
-    descriptor: int
+    descriptor: int = -1
+    is_locked: bool = False
     lengths: set[Length] = field(default_factory=set)
 
 
@@ -67,32 +72,41 @@ class FolderLock:
         file: name of a file in it, if only that is to be locked; the folder must exist then. Empty: the whole folder.
         length: how long it is meant to last.
         option: with which the user gives another place.
-
-    Raises:
-        UnavailableError: another program writes there, or a foreign file has the lock's name.
-        OSError: as the operating system reports it.
     """
 
     def __init__(self, path: Path, file: str = "", *, length: Length = Length.COMMAND, option: str = "--out") -> None:
         self._name = f".{file}.lock" if file else LOCK
         self._path, self._length, self._option = path / file if file else path, length, option
-        self._made = [] if file else _missing(path)
+        self._place, self._is_whole = path, not file
+        self._made: list[Path] = []
         self._ending = ExitStack()
-        if not file:
-            make_folder(path)
-        self._folder = os.open(path, _FOLDER)
-        status = os.fstat(self._folder)
-        self._key: _Key = status.st_dev, status.st_ino, self._name
+        self._folder = -1
+        self._key: _Key = 0, 0, ""
         self._held: _Held | None = None
+
+    def acquire(self) -> None:
+        """Keep others from writing there from now on. Call `release` also if this fails.
+
+        Raises:
+            UnavailableError: another program writes there, or a foreign file has the lock's name.
+            OSError: as the operating system reports it.
+        """
+        if self._is_whole:
+            self._made = _missing(self._place)
+            make_folder(self._place)
+        self._folder = os.open(self._place, _FOLDER)
+        status = os.fstat(self._folder)
+        self._key = status.st_dev, status.st_ino, self._name
+        with _TURN:
+            self._take()
+        self._ending.enter_context(unfinished(self._unlink))
+
+    def __enter__(self) -> Self:
         try:
-            with _TURN:
-                self._take()
-            self._ending.enter_context(unfinished(self._unlink))
+            self.acquire()
         except BaseException:
             self.release()
             raise
-
-    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -105,55 +119,66 @@ class FolderLock:
 
         Ctrl-C and SIGTERM may raise an error between any two steps; what matters most comes first: that this process may lock it again.
         """
-        if self._folder < 0:
-            return
         try:
             if self._held is not None:
-                self._held.lengths.discard(self._length)
                 self._let_go(self._held)
             self._ending.close()
         finally:
-            os.close(self._folder)
-            self._folder = -1
+            folder, self._folder = self._folder, -1
+            if folder >= 0:
+                os.close(folder)
             self._remove_made()
 
     def _let_go(self, held: _Held) -> None:
         with _TURN:
-            if not held.lengths and _HELD.get(self._key) is held:
-                del _HELD[self._key]
+            held.lengths.discard(self._length)
+            if not held.lengths:
+                if _HELD.get(self._key) is held:
+                    del _HELD[self._key]
                 self._unlink()  # while it is locked: whoever locks it next looks whether it still has its name
-                if held.descriptor >= 0:
-                    os.close(held.descriptor)
+                self._close(held)
+            self._held = None
 
     def _take(self) -> None:
         held = _HELD.get(self._key)
-        if held is None:
-            held = _HELD[self._key] = _Held(self._locked())
-        elif self._length in held.lengths or self._length is Length.COMMAND:
-            raise self._refusal(str(os.getpid()))
-        self._held = held
+        if held is not None:
+            if self._length in held.lengths or self._length is Length.COMMAND:
+                raise self._refusal(str(os.getpid()))
+            self._held = held
+        else:
+            self._held = held = _Held()
+            self._lock(held)
+            _HELD[self._key] = held
         held.lengths.add(self._length)
 
-    def _locked(self) -> int:
-        """Lock the hidden file; return its descriptor, or -1 where the file system has no locks."""
+    def _lock(self, held: _Held) -> None:
+        """Lock the hidden file; where the file system has no locks, go on without."""
         while True:
-            descriptor = self._opened()
+            held.descriptor = self._opened()
             try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(held.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                with os.fdopen(descriptor, "rb") as file:
-                    raise self._refusal(file.read(_MOST_DIGITS).decode("ascii", "replace").strip()) from None
+                number = os.pread(held.descriptor, _MOST_DIGITS, 0).decode("ascii", "replace").strip()
+                raise self._refusal(number) from None
             except OSError as error:
-                os.close(descriptor)
-                self._unlink()
+                self._close(held)
+                with suppress(OSError):
+                    os.unlink(self._name, dir_fd=self._folder)
                 _LOG.warning(event("not_locked", folder=self._path, cause=error.strerror))
-                return -1
-            if self._is_named(descriptor):
+                return
+            if self._is_named(held.descriptor):
+                held.is_locked = True
                 with suppress(OSError):  # a full disk: the lock counts, the number is only told
-                    os.ftruncate(descriptor, 0)
-                    os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
-                return descriptor
-            os.close(descriptor)  # its program has just ended
+                    os.ftruncate(held.descriptor, 0)
+                    os.pwrite(held.descriptor, f"{os.getpid()}\n".encode(), 0)
+                return
+            self._close(held)  # its program has just ended
+
+    @staticmethod
+    def _close(held: _Held) -> None:
+        descriptor, held.descriptor = held.descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)
 
     def _opened(self) -> int:
         try:
@@ -178,8 +203,11 @@ class FolderLock:
         return named.st_ino == os.fstat(descriptor).st_ino
 
     def _unlink(self) -> None:
+        """Remove the hidden file if this process has it locked under its name."""
+        held = self._held
         with suppress(OSError):
-            os.unlink(self._name, dir_fd=self._folder)
+            if held is not None and held.is_locked and self._is_named(held.descriptor):
+                os.unlink(self._name, dir_fd=self._folder)
 
     def _remove_made(self) -> None:
         with suppress(OSError):  # it holds results
@@ -208,20 +236,19 @@ def _missing(path: Path) -> list[Path]:
     return missing
 
 
-_COMMANDS: Final[list[dict[Path, FolderLock]]] = []
+_COMMANDS: Final[list[tuple[ExitStack, set[Path]]]] = []
 
 
 @contextmanager
 def command_locks() -> Iterator[None]:
     """Release what `lock_for_command` locks when the block, which is one command, ends."""
-    locks: dict[Path, FolderLock] = {}
-    _COMMANDS.append(locks)
-    try:
-        yield
-    finally:
-        _COMMANDS.remove(locks)
-        for lock in reversed(locks.values()):
-            lock.release()
+    with ExitStack() as locks:
+        command = locks, set[Path]()
+        _COMMANDS.append(command)
+        try:
+            yield
+        finally:
+            _COMMANDS.remove(command)
 
 
 def lock_for_command(folder: Path, file: str = "", option: str = "--out") -> None:
@@ -237,5 +264,9 @@ def lock_for_command(folder: Path, file: str = "", option: str = "--out") -> Non
         OSError: as the operating system reports it.
     """
     place = resolved(folder / file)
-    if _COMMANDS and place not in _COMMANDS[-1]:
-        _COMMANDS[-1][place] = FolderLock(folder, file, option=option)
+    if _COMMANDS and place not in _COMMANDS[-1][1]:
+        locks, places = _COMMANDS[-1]
+        lock = FolderLock(folder, file, option=option)
+        locks.callback(lock.release)
+        lock.acquire()
+        places.add(place)

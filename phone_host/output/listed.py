@@ -6,8 +6,11 @@ has such a name, the run ends before it changes anything. Links are never ours. 
 part of report.json, because that one is written at the end, which a killed run does not reach.
 
 What an earlier run has left stays until what replaces it is whole on the disk (decision 0088): new results are written
-into a hidden folder in this one (`stage`), synced, and moved up at the end (`publish`). The hidden folder gets a second
-name once it is whole; if a run is killed while it moves its results up, the next one finishes that.
+into a hidden folder in this one (`stage`), and moved up at the end (`publish`, `move_up.py`). A set that is not whole replaces nothing: it is left in a
+folder of its own beside the earlier results (`keep_staged`). What a killed program has staged stays until the next one stages.
+
+Signals may raise an error between any two steps. So nothing is acquired before `open`, and `close` releases whatever was acquired by then: call it in
+any case, or use the folder as a context manager.
 """
 
 import errno
@@ -17,25 +20,31 @@ import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Final
+from types import TracebackType
+from typing import Final, Self
 
 from common.errors import DataError, UnavailableError
 from common.files import read_file, replacing_in, sync_folder
 from common.plain_text import writable
-from common.temporary import final_name
 from common.unfinished import unfinished
 from phone_host.output.folder_lock import FolderLock, Length
-from phone_host.output.open_folders import FOLDER, entries_of, remove_tree, sync_file, way_to
+from phone_host.output.move_up import STAGED, WHOLE, begin_move, finish_move, keep_under
+from phone_host.output.open_folders import (
+    FOLDER,
+    INNER,
+    entries_of,
+    plain_name,
+    remove_result,
+    remove_tree,
+    sync_file,
+    way_to,
+)
+from phone_host.output.partial_set import REPLACED, leave_partial, remove_set
+from phone_host.output.report_owner import names_of_other_report
 
 LIST: Final = ".tandemscan"
-STAGED: Final = ".tandemscan.new"
-"""Name of the folder for results that are not whole yet."""
-
-_WHOLE: Final = ".tandemscan.whole"
-_OWN: Final = (STAGED, _WHOLE)
-_LAST: Final = "report.json"
-"""What is moved up last: it tells what the other results are."""
-
+_OWN: Final = (STAGED, WHOLE, REPLACED)
+_NOTHING: Final = "(?!)"
 _HEAD: Final = "# What tandemscan has written here. A later run replaces this, and nothing else.\n"
 _MOST_BYTES: Final = 64 << 20
 """Enough for five million pairs."""
@@ -44,49 +53,66 @@ RunAll = Callable[[Callable[[str], None], Iterable[str]], Iterable[None]]
 
 
 class ListedFolder:
-    """A folder of results. New results go into the folder itself, or after `stage` into a hidden one until `publish`.
+    """A folder of results. New results go into the folder itself, or after `stage` into a hidden one until `publish`. A context manager.
 
     Attributes:
         earlier: names of the results that an earlier run has left, and that `publish` or `remove_earlier` removes.
+        renamed: another verb's report and page, each with the name that it gets when this verb's takes its place.
 
     Args:
         path: created if missing.
         names: pattern of the names that are removed if they are ours, and written anew.
         kept: pattern of the names that stay if they are ours, because they are replaced one by one.
-        inner: pattern of the files that may lie in folders among `names`.
-
-    Raises:
-        UnavailableError: such a name belongs to a foreign file, or to a link; or another program writes there.
-        OSError: as the operating system reports it.
+        command: the verb whose report is among `names`: that of another verb is not replaced but stays under another name. Empty: it has none.
     """
 
-    def __init__(self, path: Path, names: str, *, kept: str = "(?!)", inner: str = "(?!)") -> None:
-        self._path, self._inner = path, re.compile(inner)
+    def __init__(self, path: Path, names: str, *, kept: str = _NOTHING, command: str = "") -> None:
+        self._path, self._pattern, self._kept, self._command = path, re.compile(names), re.compile(kept), command
         self._lock = FolderLock(path, length=Length.RESULTS)
         self.descriptor = self._list = self._into = -1
         self._ending = ExitStack()
+        self.renamed: dict[str, str] = {}
+        self.earlier: list[str] = []
+
+    def open(self) -> None:
+        """Lock and open the folder, and finish what killed programs have left to do in it.
+
+        Raises:
+            UnavailableError: such a name belongs to a foreign file, or to a link; or another program writes there.
+            OSError: as the operating system reports it.
+        """
+        self._lock.acquire()
+        self._into = self.descriptor = os.open(self._path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        listed = self._listed()
+        self._check_own(listed)
+        if WHOLE in entries_of(self.descriptor):  # a program was killed while it moved its results up
+            finish_move(self.descriptor, listed)
+        self.renamed = names_of_other_report(way_to(self.descriptor, self._path), self._command)
+        ours = self._ours(self._pattern, listed)
+        self._ours(self._kept, listed)
+        self._ours(_any_of((*self.renamed, *self.renamed.values())), listed)
+        for name in ours:
+            self._check_inside(name)
+        self._clear(listed)
+        self.earlier = [name for name in ours if name == plain_name(name) and name not in self.renamed]
+        there = set(entries_of(self.descriptor))
+        listed = {name for name in listed if name in there or not self._pattern.fullmatch(name)}
+        self._names = {*listed, *_OWN, *self.renamed.values(), *filter(None, [self._partial])}
+        self._size_bytes = self._write()
+        self._list = os.open(LIST, os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=self.descriptor)
+
+    def __enter__(self) -> Self:
         try:
-            self.descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-            self._into = self.descriptor
-            listed = self._listed()
-            self._check_own(listed)
-            ours = self._ours(re.compile(names), listed)
-            self._ours(re.compile(kept), listed)
-            for name in ours:
-                self._check_inside(name)
-            if _WHOLE in entries_of(self.descriptor):  # a run was killed while it moved its results up
-                self._move_up(ours)
-                ours = self._ours(re.compile(names), listed)
-            self._clear(listed)
-            self.earlier = [name for name in ours if name == plain_name(name)]
-            there = set(entries_of(self.descriptor))
-            listed = {name for name in listed if name in there or not re.fullmatch(names, name)}
-            self._names = {*listed, *_OWN}
-            self._size_bytes = self._write()
-            self._list = os.open(LIST, os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, dir_fd=self.descriptor)
+            self.open()
         except BaseException:
             self.close()
             raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
     @property
     def is_staged(self) -> bool:
@@ -99,33 +125,48 @@ class ListedFolder:
         return way_to(self._into, self._path / STAGED) if self.is_staged else self._path
 
     def stage(self) -> None:
-        """Let new results go into the hidden folder from now on.
+        """Let new results go into the hidden folder from now on. What a killed program has left there goes.
 
         Raises:
             OSError: as the operating system reports it.
         """
+        for name in (STAGED, REPLACED):
+            remove_tree(name, self.descriptor)
         os.mkdir(STAGED, dir_fd=self.descriptor)
         self._into = os.open(STAGED, FOLDER, dir_fd=self.descriptor)
         self._ending.enter_context(unfinished(self.discard))
 
     def publish(self) -> None:
-        """Let the new results, which are whole, take the place of the earlier ones.
+        """Let the new results, which are whole, take the place of the earlier ones, and of partial ones of this verb.
 
         Raises:
             OSError: as the operating system reports it; if the new ones are on the disk by then, the next run moves them up.
         """
         if self.is_staged:
-            for name in entries_of(self._into):
-                sync_file(name, self._into)
-            os.fsync(self._into)
-            self._ending.close()
-            os.rename(STAGED, _WHOLE, src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
-            sync_folder(self.descriptor)
-            os.close(self._into)
-            self._into = self.descriptor
-            self._move_up(self.earlier)
+            begin_move(self.descriptor, self._into, {*self.earlier, *self.renamed}, self.renamed)
+            self._end_staging()
+            finish_move(self.descriptor, self._names)
+            self.earlier = []
         else:
             self.remove_earlier()
+            self._rename_others()
+            self.discard()  # what a killed program has staged
+        if self._partial:
+            remove_set(self._partial, self.descriptor, self._pattern)
+
+    def keep_staged(self) -> Path:
+        """Leave the new results, which are not whole, beside the earlier ones, in a folder that says so; return where.
+
+        It takes the place of one of this verb that was left before. Without a verb they stay in the hidden folder until the next run.
+
+        Raises:
+            OSError: as the operating system reports it; they are in the hidden folder then.
+        """
+        if not self.is_staged:
+            return self._path
+        self._end_staging()
+        is_named = bool(self._partial) and leave_partial(self.descriptor, self._partial, self._pattern)
+        return self._path / (self._partial if is_named else STAGED)
 
     def publish_alone(self, name: str) -> bool:
         """Move one new result up, where nothing is replaced, and leave the others; return whether it was there.
@@ -147,7 +188,7 @@ class ListedFolder:
             OSError: as the operating system reports it.
         """
         while self.earlier:
-            self._remove(self.earlier[-1])
+            remove_result(self.earlier[-1], self.descriptor)
             self.earlier.pop()
 
     def discard(self) -> None:
@@ -158,13 +199,6 @@ class ListedFolder:
     def spare_staged(self) -> None:
         """Leave the new results in the hidden folder if the process has to end at once: what is in it is of use."""
         self._ending.close()
-
-    def keep_staged(self) -> None:
-        """Leave the new results in the hidden folder: the next run removes them."""
-        self._ending.close()
-        if self.is_staged:
-            os.close(self._into)
-            self._into = self.descriptor
 
     def add(self, *names: str) -> None:
         """List names before they are written.
@@ -199,7 +233,7 @@ class ListedFolder:
                 takes several at once in little more time than one.
 
         Yields:
-            Where to write its files, which must match `inner`. The path leads to the open folder, so replacing its name
+            Where to write its files, which are those of a pair (`PAIR_NAMES`). The path leads to the open folder, so replacing its name
             has no effect.
 
         Raises:
@@ -211,7 +245,7 @@ class ListedFolder:
         os.mkdir(part, dir_fd=into)
         folder = os.open(part, FOLDER, dir_fd=into)
         try:
-            with unfinished(lambda: self._remove(part, into)):
+            with unfinished(lambda: remove_result(part, into)):
                 yield way_to(folder, self.place / part)
                 for _ in run_all(lambda entry: sync_file(entry, folder), entries_of(folder)):
                     pass
@@ -219,17 +253,19 @@ class ListedFolder:
             os.rename(part, name, src_dir_fd=into, dst_dir_fd=into)
             sync_folder(into)
         except BaseException:
-            self._remove(part, into)
+            remove_result(part, into)
             raise
         finally:
             os.close(folder)
 
     def write_text(self, name: str, text: str) -> None:
-        """Write a listed file, whole or not at all; it survives a power cut.
+        """Write a listed file, whole or not at all; it survives a power cut. Another verb's report of that name stays under its other name.
 
         Raises:
             OSError: as the operating system reports it.
         """
+        if not self.is_staged and name in self.renamed:
+            keep_under(name, self.renamed.pop(name), self.descriptor)
         with replacing_in(self._into, name) as file:
             file.write(writable(text).encode())
 
@@ -243,19 +279,37 @@ class ListedFolder:
         sync_folder(self._into)
 
     def close(self) -> None:
-        """Close the folder. New results that were not published are removed, and what is not whole with them."""
+        """Close the folder. New results that were not published are removed, and what is not whole with them. May be called again."""
         try:
             if self.is_staged:
-                os.close(self._into)
-                self._into = self.descriptor
                 self.discard()
-            self._ending.close()
-            for descriptor in (self._list, self.descriptor):
+            self._end_staging()
+        finally:  # whatever a signal raises in between
+            ours, self._list, self.descriptor, self._into = (self._list, self.descriptor), -1, -1, -1
+            for descriptor in ours:
                 if descriptor >= 0:
                     os.close(descriptor)
-        finally:  # whatever a signal raises in between
-            self._list = self.descriptor = self._into = -1
             self._lock.release()
+
+    @property
+    def _partial(self) -> str:
+        """Name of the folder for results of this verb that are not whole; empty: it has none."""
+        return f"partial-{self._command}" if self._command else ""
+
+    def _end_staging(self) -> None:
+        """Let what is written from now on go into the folder itself; what was staged stays where it is."""
+        self._ending.close()
+        into, self._into = self._into, self.descriptor
+        if into != self.descriptor:
+            os.close(into)
+
+    def _rename_others(self) -> None:
+        """Give another verb's report and page their other names."""
+        while self.renamed:
+            name, other = self.renamed.popitem()
+            keep_under(name, other, self.descriptor)
+            with suppress(FileNotFoundError):
+                os.unlink(name, dir_fd=self.descriptor)
 
     def _listed(self) -> set[str]:
         path = self._path / LIST
@@ -307,59 +361,23 @@ class ListedFolder:
         try:
             for entry in entries_of(folder):
                 mode = os.lstat(entry, dir_fd=folder).st_mode
-                if not (self._inner.fullmatch(plain_name(entry)) and stat.S_ISREG(mode)):
+                if not (INNER.fullmatch(plain_name(entry)) and stat.S_ISREG(mode)):
                     raise self._in_the_way(f"{self._path / name / entry} was not written by an earlier run")
         finally:
             os.close(folder)
 
     def _clear(self, listed: set[str]) -> None:
-        """Remove what killed runs have begun."""
-        remove_tree(STAGED, self.descriptor)
+        """Remove what killed runs have half written. What is whole in their hidden folder stays until the next `stage`."""
         for name in entries_of(self.descriptor):
             if plain_name(name) == name or plain_name(name) not in listed:
                 continue
             mode = os.lstat(name, dir_fd=self.descriptor).st_mode
             if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
-                with suppress(OSError):  # a folder of another verb's, whose files are not known here
-                    self._remove(name)
-
-    def _move_up(self, earlier: Iterable[str]) -> None:
-        """Move whole results up, over the earlier ones; then remove those that nothing replaces."""
-        whole = os.open(_WHOLE, FOLDER, dir_fd=self.descriptor)
-        try:
-            moved = sorted(entries_of(whole), key=lambda name: (name == _LAST, name))
-            for name in moved:
-                with suppress(FileNotFoundError):
-                    if stat.S_ISDIR(os.lstat(name, dir_fd=self.descriptor).st_mode):
-                        self._remove(name)
-                os.replace(name, name, src_dir_fd=whole, dst_dir_fd=self.descriptor)
-        finally:
-            os.close(whole)
-        for name in set(earlier).difference(moved):
-            self._remove(name)
-        os.rmdir(_WHOLE, dir_fd=self.descriptor)
-        sync_folder(self.descriptor)
-        self.earlier = []
-
-    def _remove(self, name: str, parent: int | None = None) -> None:
-        within = self.descriptor if parent is None else parent
-        if not stat.S_ISDIR(os.lstat(name, dir_fd=within).st_mode):
-            os.unlink(name, dir_fd=within)
-            return
-        folder = os.open(name, FOLDER, dir_fd=within)
-        try:
-            for entry in entries_of(folder):
-                if self._inner.fullmatch(plain_name(entry)):
-                    os.unlink(entry, dir_fd=folder)
-        finally:
-            os.close(folder)
-        os.rmdir(name, dir_fd=within)
+                remove_result(name, self.descriptor)
 
     def _in_the_way(self, problem: str) -> UnavailableError:
         return UnavailableError(problem, "move or delete it, or give another folder with --out")
 
 
-def plain_name(name: str) -> str:
-    """Return the name under which something is listed: an unfinished file or folder counts as the finished one."""
-    final = final_name(name)
-    return final if final != name else name.removesuffix(".part")
+def _any_of(names: Iterable[str]) -> re.Pattern[str]:
+    return re.compile("|".join(map(re.escape, names)) or _NOTHING)

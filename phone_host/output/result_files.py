@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -10,7 +10,15 @@ from phone_host.output.listed import ListedFolder
 
 
 @contextmanager
-def replacing_results(path: Path, names: str, files: Iterable[str], *, first: str = "") -> Iterator[Path]:
+def replacing_results(
+    path: Path,
+    names: str,
+    files: Iterable[str],
+    *,
+    first: str = "",
+    command: str = "",
+    partial: Callable[[Path], None] | None = None,
+) -> Iterator[Path]:
     """Write results that take the place of an earlier run's if the block ends without an error; else those stay as they are.
 
     Args:
@@ -18,6 +26,8 @@ def replacing_results(path: Path, names: str, files: Iterable[str], *, first: st
         names: pattern of the names that are removed if they are ours.
         files: names of what is written.
         first: name of a file that is worth keeping alone if the others cannot be written, unless it would replace an earlier one.
+        command: the verb whose report is among them: that of another verb stays under another name. Empty: it has none.
+        partial: what is called with the folder where the results are, if they are not whole and so must not replace any; None: they are whole.
 
     Yields:
         Where to write the files.
@@ -26,20 +36,21 @@ def replacing_results(path: Path, names: str, files: Iterable[str], *, first: st
         UnavailableError: such a name belongs to a foreign file, or to a link; or another program writes there.
         OSError: as the operating system reports it; it names the file as it would be called in the end.
     """
-    folder = ListedFolder(path, names)
-    try:
-        folder.add(*files)
-        folder.stage()
-        yield folder.place
-        folder.publish()
-    except OSError as error:
-        if first and folder.publish_alone(first):
-            error.strerror = f"{error.strerror}; {path / first} is written"
-        if error.filename and (name := Path(os.fsdecode(error.filename)).name):
-            error.filename = str(path / name)
-        raise
-    finally:
-        folder.close()
+    with ListedFolder(path, names, command=command) as folder:
+        try:
+            folder.add(*files)
+            folder.stage()
+            yield folder.place
+            if partial is not None and folder.earlier:
+                partial(folder.keep_staged())
+            else:
+                folder.publish()
+        except OSError as error:
+            if first and folder.publish_alone(first):
+                error.strerror = f"{error.strerror}; {path / first} is written"
+            if error.filename and (name := Path(os.fsdecode(error.filename)).name):
+                error.filename = str(path / name)
+            raise
 
 
 def remove_results(path: Path, names: str) -> None:
@@ -53,11 +64,8 @@ def remove_results(path: Path, names: str) -> None:
         UnavailableError: such a name belongs to a foreign file, or to a link; or another program writes there.
         OSError: as the operating system reports it.
     """
-    folder = ListedFolder(path, names)
-    try:
+    with ListedFolder(path, names) as folder:
         folder.remove_earlier()
-    finally:
-        folder.close()
 
 
 def claim(path: Path, *names: str) -> None:
@@ -71,8 +79,5 @@ def claim(path: Path, *names: str) -> None:
         UnavailableError: such a name belongs to a foreign file, or to a link.
         OSError: as the operating system reports it.
     """
-    folder = ListedFolder(path, "(?!)", kept="|".join(re.escape(name) for name in names))
-    try:
+    with ListedFolder(path, "(?!)", kept="|".join(re.escape(name) for name in names)) as folder:
         folder.add(*names)
-    finally:
-        folder.close()

@@ -49,14 +49,11 @@ class ViewFolders:
         self.left, self.right = left, right
         for folder in (left, right):
             _require_no_others(folder)
-        self._left = ListedFolder(left, _NAMES)
-        try:
-            self._right = ListedFolder(right, _NAMES)
-        except BaseException:
-            self._left.close()
-            raise
+        self._left, self._right = ListedFolder(left, _NAMES), ListedFolder(right, _NAMES)
         self._are_taken_live, self._has_failed, self._count = are_taken_live, False, 0
         try:
+            for listed in (self._left, self._right):
+                listed.open()
             for listed in (self._left, self._right):
                 if not are_taken_live or self._left.earlier or self._right.earlier:
                     listed.stage()
@@ -106,8 +103,10 @@ class ViewFolders:
         self._release()
 
     def _release(self) -> None:
-        self._left.close()
-        self._right.close()
+        try:
+            self._left.close()
+        finally:
+            self._right.close()
 
 
 def _require_no_others(folder: Path) -> None:

@@ -8,7 +8,7 @@ are dropped, each counted as a drop of the sink `pairs`; lines are never dropped
 Files that an earlier run listed as its own in the same folder are replaced (`output/listed.py`). Anything else in the
 way ends the run before it begins. Where there is nothing to replace, files appear under their names at once. Else they
 lie in the hidden folder `.tandemscan.new` until the run has written its report and all the rest: only then do the
-earlier results go (decision 0088). A saved pair survives a power cut as soon as it is there; lines and report do once
+earlier results go (decision 0088). Those of a run that is not whole stay in `partial-run` instead (decision 0120). A saved pair survives a power cut as soon as it is there; lines and report do once
 the run has ended.
 """
 
@@ -17,6 +17,7 @@ import logging
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -24,15 +25,14 @@ from common import now
 from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.program.logs import event
-from common.words import counted
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.model import Result, Unwritten
 from phone_host.output.axes import Axes
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.output.json_text import json_text
-from phone_host.output.listed import STAGED, ListedFolder
+from phone_host.output.listed import ListedFolder
 from phone_host.output.overlay_yaml import OVERLAY_NAME
-from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
+from phone_host.output.pair_files import RUN_FILES, write_pair
 from phone_host.run.sinks import NotWrittenError, SinkQueue
 
 _LOG = logging.getLogger(__name__)
@@ -103,6 +103,11 @@ class _Lines:
         """The number of lines that are lost or still wait."""
         return self.lost + len(self._pending)
 
+    @property
+    def are_begun(self) -> bool:
+        """Whether a line is in the file."""
+        return self._written_bytes > 0
+
     def append(self, ledger: PairLedger) -> None:
         """Add a line."""
         line = ledger.to_json().encode() + b"\n"
@@ -143,6 +148,7 @@ class FileSink:
         waits: whether the worker waits for room for a pair that is due to be saved, so that none is missing.
         settings: settings of the run, each with its value and origin; None: not saved.
         axes: of the points in saved clouds.
+        command: the verb that runs.
 
     Raises:
         UnavailableError: the folder cannot be created or written to, or something that is not ours is in the way.
@@ -156,6 +162,7 @@ class FileSink:
         waits: bool = False,
         settings: Mapping[str, object] | None = None,
         axes: Axes = Axes.CAMERA,
+        command: str = "run",
     ) -> None:
         self._save_every, self._axes = save_every, axes
         self._unsaved_pairs = self._lost_lines = 0
@@ -167,7 +174,8 @@ class FileSink:
             return
         self._folder = folder
         try:
-            self._own = ListedFolder(folder, NAMES, inner=PAIR_NAMES)
+            self._own = ListedFolder(folder, NAMES, command=command)
+            self._own.open()
             if self._own.earlier:
                 self._own.stage()
             self._own.add("report.json")
@@ -228,7 +236,9 @@ class FileSink:
     @property
     def missing(self) -> str:
         """The files of the run's end that could not be written, and why, in words; empty: none."""
-        names = f"{', '.join(self._missing)} ({self._of_report.last})" if self._missing else ""
+        if self.complete:
+            return ""
+        names = f"{', '.join(self._missing)} ({self._of_report.last})" if self._missing else "some of the results"
         return names + self._stays
 
     @property
@@ -263,7 +273,7 @@ class FileSink:
             page: the HTML document to write as index.html beside it; empty: none.
             cameras: content of cameras.json; empty: none.
             overlay: content of overlay.yaml; empty: none.
-            replaces_earlier: whether the run gave anything that an earlier run's results may be replaced by.
+            replaces_earlier: whether the run is whole, so that an earlier run's results may be replaced by it.
         """
         if self._own is None:
             return
@@ -303,14 +313,16 @@ class FileSink:
         return {}
 
     def _keep_earlier(self) -> None:
-        """Leave an earlier run's results where they are, and what this one has saved where the next one finds it."""
+        """Leave an earlier run's results where they are, and what this one has saved beside them."""
         assert self._own is not None
-        saved = f"{counted(self._saved_pairs, 'pair')} of this run in {self._folder / STAGED} until the next one"
-        self._stays = "; the earlier results stay" + (f", and {saved}" if self._saved_pairs else "")
-        if self._saved_pairs:
-            self._own.keep_staged()
-        if self.complete:
-            _LOG.warning(event("earlier_results_stay", folder=self._folder, why="this run has no pair"))
+        why, where = "this run has no pair", {}
+        if self._saved_pairs or (self.complete and self._lines.are_begun):
+            why = "this run ended early" if self.complete else "this run is not whole"
+            with suppress(OSError):
+                where["of_this_run"] = str(self._own.keep_staged())
+        _LOG.warning(event("earlier_results_stay", folder=self._folder, **where, why=why))
+        saved = "".join(f", and what could be written is in {place}" for place in where.values())
+        self._stays = f"; the earlier results stay in {self._folder}{saved}"
 
     def _write_last(self, texts: Mapping[str, str]) -> dict[str, OSError]:
         """Write the files of the run's end. One for which there is no room does not keep the others from being written.

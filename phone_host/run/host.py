@@ -100,8 +100,8 @@ class Host:
             waits=bool(settings.pairs) or demand.is_timeless,
             settings=settings.resolved,
             axes=settings.axes,
+            command=settings.command,
         )
-        is_timeless = demand.is_timeless
         self._keeper = (
             None
             if core is None or core.rig is None
@@ -110,16 +110,16 @@ class Host:
                 settings.board_side,
                 corrects=settings.corrects,
                 start=settings.overlay,
-                is_timeless=is_timeless,
+                is_timeless=demand.is_timeless,
                 interpolates=settings.interpolate,
             )
         )
-        self._trust = TrustSink(core, period_ns=0 if is_timeless else PERIOD_NS, keeper=self._keeper)
+        self._trust = TrustSink(core, period_ns=0 if demand.is_timeless else PERIOD_NS, keeper=self._keeper)
         motion = FunctionSink(_MOTION, self._measure_motion)
         recorded = () if recording is None else (RecordingSink(recording),)
         self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *recorded, *sinks)
         self._queue = PairQueue(
-            _UNHURRIED if self._playback is not None and is_timeless else settings.fifo,
+            _UNHURRIED if self._playback is not None and demand.is_timeless else settings.fifo,
             settings.tolerance_ns,
             self._own.period_ns,
             demand=demand,
@@ -246,7 +246,7 @@ class Host:
         Args:
             report: content of report.json.
             page: content of index.html; empty: none.
-            replaces_earlier: whether the run gave anything that an earlier run's results may be replaced by.
+            replaces_earlier: whether the run is whole, so that an earlier run's results may be replaced by it.
 
         Returns:
             Whether all results of the run were written.

@@ -45,6 +45,7 @@ class HostSettings:
         budget: time budget for each pair; None: there is none. Only with a core that was built from settings.
         corrects: whether a rig that has turned since its calibration is corrected; it is watched in any case.
         overlay: the correction of an earlier run, in use from the start.
+        command: the verb whose results these are.
     """
 
     board_side: Side = Side.LEFT
@@ -65,3 +66,4 @@ class HostSettings:
     budget: BudgetWanted | None = None
     corrects: bool = True
     overlay: Departure = AS_CALIBRATED
+    command: str = "run"

@@ -3,10 +3,12 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
-from common.program.interrupts import answering, terminable
+from common.program.interrupts import answering, is_heard, terminable
 from common.program.out_of_memory import is_out_of_memory
 from common.unfinished import unfinished
+from common.words import counted
 
 
 @contextmanager
@@ -29,6 +31,36 @@ def kept_if_interrupted(write: Callable[[], None]) -> Iterator[None]:
                 with suppress(OSError, MemoryError):
                     last()
             raise
+
+
+def tell_if_heard(tell: Callable[[str], None], line: str) -> None:
+    """Tell a line where somebody listens: a pipe that nobody empties must not keep results from being written."""
+    if is_heard():
+        with suppress(OSError):
+            tell(line)
+
+
+def tell_of_partial(tell: Callable[[str], None], partial: Path, out: Path, done: int, count: int) -> None:
+    """Tell where the results of a part of the pairs are, and that the earlier results stay.
+
+    Args:
+        tell: takes the line.
+        partial: the folder of the results so far.
+        out: that of the earlier ones.
+        done: pairs so far.
+        count: of how many.
+    """
+    tell_if_heard(tell, f"ended after {done} of {counted(count, 'pair')}: {partial_words(partial, out)}")
+
+
+def partial_words(partial: Path, out: Path) -> str:
+    """Say where results are that are not whole, and that the earlier ones stay.
+
+    Args:
+        partial: their folder.
+        out: that of the earlier ones.
+    """
+    return f"the results so far are in {partial}, the earlier results stay in {out}"
 
 
 class _Once:

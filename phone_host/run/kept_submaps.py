@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, SettingsError
-from phone_host.output.atomic import write_bytes
+from phone_host.output.atomic import replacing
 from phone_host.output.listed import ListedFolder
 from phone_host.output.result_files import remove_results
 from phone_host.report.stereo_report import Remark
@@ -117,12 +117,10 @@ class KeptSubmaps:
 
     def _write(self, submap: Submap) -> None:
         name, earlier = f"submap-{self._next:04d}.bin", _paths(self._out)
-        folder = ListedFolder(self._out, "(?!)", kept=_NAMES)
-        try:
+        with ListedFolder(self._out, "(?!)", kept=_NAMES) as folder:
             folder.add(name)
-            write_bytes(self._out / name, submap_bytes(submap))
-        finally:
-            folder.close()
+            with replacing(self._out / name, durable=True) as file:  # earlier ones go when it is on the disk
+                file.write(submap_bytes(submap))
         self._next, self._must_be_whole = self._next + 1, False
         if submap.is_whole:  # the others are in it, or of an earlier scan
             for path in earlier:

@@ -32,7 +32,7 @@ from phone_host.report.quality_report import MeasuredPair, QualityReport
 from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size, alone_remarks
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
-from phone_host.run.kept import kept_if_interrupted
+from phone_host.run.kept import kept_if_interrupted, tell_of_partial
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_remarks import turned_remarks
 from phone_host.run.stereo_trust import judge_pair
@@ -73,6 +73,7 @@ class QualityJob:
         roi: the region that counts, px of the rectified left image; None: the board's outline, or the middle.
         most_pixels: an image that claims more is refused.
         mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
+        tell: takes a line that the user should know.
     """
 
     files: ViewFiles
@@ -85,6 +86,7 @@ class QualityJob:
     roi: Crop | None = None
     most_pixels: int = MOST_PIXELS
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
+    tell: Callable[[str], None] = lambda _: None
 
 
 def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
@@ -110,7 +112,9 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
     def write_so_far() -> None:
         so_far = replace(_report(job, pairs), interrupted_of=len(job.files.pairs))
         if so_far.measured:
-            _write(job.out, so_far)
+            _write(
+                job, so_far, lambda place: tell_of_partial(job.tell, place, job.out, len(pairs), len(job.files.pairs))
+            )
 
     with kept_if_interrupted(write_so_far):
         for index, (_, left, right) in enumerate(job.files.pairs):
@@ -127,7 +131,7 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
         first = report.pairs[0]
         assert isinstance(first, FailedPair)
         raise first.none_of(len(pairs))
-    _write(job.out, report)
+    _write(job, report)
     return report
 
 
@@ -145,9 +149,9 @@ def _report(job: QualityJob, pairs: list[MeasuredPair | FailedPair]) -> QualityR
     )
 
 
-def _write(out: Path, report: QualityReport) -> None:
+def _write(job: QualityJob, report: QualityReport, partial: Callable[[Path], None] | None = None) -> None:
     texts = json_text(quality_json(report), indent=2) + "\n", quality_page(report)
-    with replacing_results(out, NAMES, ALWAYS) as place:
+    with replacing_results(job.out, NAMES, ALWAYS, command="quality", partial=partial) as place:
         for name, text in zip(ALWAYS, texts, strict=True):
             write_text(place / name, text)
 

@@ -1,8 +1,10 @@
 """The results folder of `scan`: the model first, because it is what took the time."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from dataclasses import field as default
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.json_text import json_text
@@ -32,15 +34,19 @@ class FinishedScan:
         model: its surface.
         commands: what to do next, for the page.
         field: its field as bytes, for another pass; empty: it takes none.
+        command: the verb that made it.
+        told: what that verb adds to report.json.
     """
 
     report: ScanReport
     model: ScanModel
     commands: tuple[NextCommand, ...] = ()
     field: bytes = b""
+    command: str = "scan"
+    told: Mapping[str, object] = default(default_factory=dict)
 
 
-def write_scan(out: Path, scan: FinishedScan) -> None:
+def write_scan(out: Path, scan: FinishedScan, partial: Callable[[Path], None] | None = None) -> None:
     """Write model.ply, trajectory.txt, report.json and index.html; when all are whole they take the place of an earlier run's.
 
     Where there is no earlier run, a model that is whole stays even if the others have no room.
@@ -48,6 +54,7 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
     Args:
         out: the folder.
         scan: what is written.
+        partial: see `replacing_results`; None: the scan is whole.
 
     Raises:
         UnavailableError: a file there was not written by this program.
@@ -55,16 +62,24 @@ def write_scan(out: Path, scan: FinishedScan) -> None:
     """
     report, mesh = scan.report, scan.model.mesh
     files = MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else [])
-    with replacing_results(out, NAMES, files, first=MODEL) as place:
+    with replacing_results(out, NAMES, files, first=MODEL, command=scan.command, partial=partial) as place:
         seen = scan.model.seen if scan.model.is_closed else None
         write_surface(place / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
         write_text(place / TRAJECTORY, trajectory_of(report))
-        write_text(place / "report.json", json_text(scan_json(report), indent=2) + "\n")
+        write_text(
+            place / "report.json",
+            json_text(report_values(scan), indent=2) + "\n",
+        )
         if scan.field:
             write_bytes(place / FIELD, scan.field)
         voxel_m = report.settings.voxel_m if report.settings else 1.0
         shown = ShownModel(mesh, scan.model.noise_m, voxel_m, upright=report.axes if report.axes.is_upright else None)
         write_text(place / "index.html", scan_page(report, shown, scan.commands))
+
+
+def report_values(scan: FinishedScan) -> dict[str, Any]:
+    """Return the content of report.json."""
+    return scan_json(scan.report) | {"command": scan.command, **scan.told}
 
 
 def trajectory_of(report: ScanReport) -> str:

@@ -4,7 +4,6 @@ A pair that cannot be computed is named, and the others go on. After Ctrl-C or S
 """
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from common import now
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
-from common.program.interrupts import is_heard
 from common.program.out_of_memory import noted_if_out_of_memory
 from common.words import counted
 from phone_host.measure.trust import Doubt
@@ -23,7 +21,7 @@ from phone_host.report.scan_report import ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark, Size, alone_remarks
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
-from phone_host.run.kept import kept_if_interrupted
+from phone_host.run.kept import kept_if_interrupted, tell_if_heard, tell_of_partial
 from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import report_of, require_something
@@ -99,12 +97,16 @@ def run_scan(job: ScanJob, watcher: Watcher) -> ScanReport:
     def write_so_far() -> None:
         if work.scan.fused:
             goes_on = "" if job.wanted.turntable else f"; --resume {job.out} goes on with it"
-            if is_heard():
-                with suppress(OSError):  # nobody listens any more: the model is written all the same
-                    job.tell(f"stopped after {work.taken} of {counted(count, 'pair')}: writing their model{goes_on}")
+            tell_if_heard(
+                job.tell, f"stopped after {work.taken} of {counted(count, 'pair')}: writing their model{goes_on}"
+            )
             finished = work.finished()  # first, for it makes the field whole where a loop was just moving it
             work.kept.before_end()
-            write_scan(job.out, replace(finished, report=replace(finished.report, interrupted_of=count)))
+            write_scan(
+                job.out,
+                replace(finished, report=replace(finished.report, interrupted_of=count)),
+                lambda place: tell_of_partial(job.tell, place, job.out, work.taken, count),
+            )
 
     with kept_if_interrupted(write_so_far):
         for name, left, right in job.files.pairs:

@@ -37,7 +37,7 @@ from phone_host.report.stereo_report import (
 )
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
-from phone_host.run.kept import kept_if_interrupted
+from phone_host.run.kept import kept_if_interrupted, tell_of_partial
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import drift_remarks, pair_remarks, turned_remarks
 from phone_host.run.stereo_results import StereoResults
@@ -77,6 +77,7 @@ class StereoJob:
         most_pixels: an image that claims more is refused.
         mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
         commands: returns what to do next, for the page of these pairs.
+        tell: takes a line that the user should know.
     """
 
     files: ViewFiles
@@ -88,6 +89,7 @@ class StereoJob:
     most_pixels: int = MOST_PIXELS
     mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
     commands: Callable[[Sequence[PairReport]], tuple[NextCommand, ...]] = lambda _: ()
+    tell: Callable[[str], None] = lambda _: None
 
 
 def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
@@ -122,6 +124,8 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
             so_far = replace(_set(job, tuple(pairs), work.drift), interrupted_of=len(job.files.pairs))
             if so_far.computed:
                 _write_set(job, results, work, so_far)
+                if (partial := results.publish_partial()) is not None:
+                    tell_of_partial(job.tell, partial, job.out, len(pairs), len(job.files.pairs))
 
         with kept_if_interrupted(write_so_far):
             for number, (name, left, right) in enumerate(job.files.pairs):
@@ -132,13 +136,13 @@ def run_stereo(job: StereoJob, watcher: Watcher) -> SetReport:
         if not report.computed:
             raise report.failed[0].none_of(len(pairs))
         _write_set(job, results, work, report)
+        results.publish()
         return report
 
 
 def _write_set(job: StereoJob, results: StereoResults, work: "_Work", report: SetReport) -> None:
     results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
     results.write_text("index.html", set_page(report, work.thumbnails, job.commands(report.computed)))
-    results.publish()
 
 
 def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...], drift: Drift | None = None) -> SetReport:

@@ -14,7 +14,7 @@ from typing import Final, Self
 
 from common.places import nearest
 from phone_host.output.listed import ListedFolder, RunAll
-from phone_host.output.pair_files import PAIR_NAMES, STEREO_NAMES
+from phone_host.output.pair_files import STEREO_NAMES
 
 NAMES: Final = rf"{STEREO_NAMES}|pair-[0-9]{{6,}}"
 """The names that `stereo` writes into its folder: of the only pair, or a folder for each of several."""
@@ -49,7 +49,8 @@ class StereoResults:
             OSError: as the operating system reports it.
         """
         if self._own is None:
-            self._own = ListedFolder(self._path, NAMES, inner=PAIR_NAMES)
+            self._own = ListedFolder(self._path, NAMES, command="stereo")
+            self._own.open()
             if self._is_one or self._own.earlier:
                 self._own.stage()
 
@@ -61,6 +62,21 @@ class StereoResults:
         """
         assert self._own is not None
         self._own.publish()
+
+    def publish_partial(self) -> Path | None:
+        """Let results that are not whole take their places where they replace nothing; else leave them in a folder beside the earlier ones.
+
+        Returns:
+            That folder; None: they replaced nothing.
+
+        Raises:
+            OSError: as the operating system reports it.
+        """
+        assert self._own is not None
+        if self._own.earlier:
+            return self._own.keep_staged()
+        self._own.publish()
+        return None
 
     @contextmanager
     def folder_of(self, name: str, files: Sequence[str], run_all: RunAll) -> Iterator[Path]:

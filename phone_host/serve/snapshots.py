@@ -8,7 +8,7 @@ from common.errors import DataError, UnavailableError
 from phone_host.model import Result
 from phone_host.output.axes import Axes
 from phone_host.output.listed import ListedFolder
-from phone_host.output.pair_files import PAIR_NAMES, RUN_FILES, write_pair
+from phone_host.output.pair_files import RUN_FILES, write_pair
 from phone_host.serve.shelf import Shelf
 from phone_host.web.source import Answer
 
@@ -42,13 +42,10 @@ def keep_newest(shelf: Shelf, folder: Path, axes: Axes) -> Answer:
 
 def _save(result: Result, folder: Path, axes: Axes) -> Path:
     """Save a pair, whole or not at all; return its folder."""
-    listed = ListedFolder(folder, "(?!)", inner=PAIR_NAMES)
-    try:
+    with ListedFolder(folder, "(?!)") as listed, ThreadPoolExecutor(_WRITERS) as writers:
         name = f"pair-{_next(folder):06d}"
-        with ThreadPoolExecutor(_WRITERS) as writers, listed.new_folder(name, writers.map) as inner:
+        with listed.new_folder(name, writers.map) as inner:
             write_pair(inner, result.processed, RUN_FILES, axes, writers.map)
-    finally:
-        listed.close()
     return folder / name
 
 

@@ -3,43 +3,20 @@
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-from common.errors import DataError, SettingsError, UnavailableError
-from common.files import read_whole
+from common.errors import SettingsError, UnavailableError
 from common.places import Kind, kind_of, nearest, resolved
 from common.program.terminal import say
 from phone_host.output.folder_lock import lock_for_command
-from phone_host.output.json_text import json_value
 from phone_host.output.listed import ListedFolder
-from phone_host.output.result_files import claim, remove_results, replacing_results
+from phone_host.output.report_owner import PAGE, report_owner
+from phone_host.output.result_files import claim, replacing_results
 
-REPORT: Final = "report.json"
-PAGE: Final = "index.html"
-_REPLACED: Final = (REPORT, PAGE)
-"""What every command calls alike; the other results of two commands have different names or are computed from the same input."""
-
-_MOST_REPORT_BYTES: Final = 16 << 20
-"""A longer file is no report of ours."""
-
-_COMMAND: Final = "command"
-"""The key under which a report names the verb that wrote it."""
-
-_OWN_KEYS: Final = (
-    ("truth", "demo"),
-    ("ended", "run"),
-    ("matcher", "stereo"),
-    ("left_alone", "stereo"),
-    ("verdict", "calibrate"),
-    ("time_offset_ns", "calibrate-time"),
-)
-"""For reports before that key: one that only this verb's report has, or only with one of those before it."""
-
-_VERBS: Final = frozenset({"quality", "scan", *(verb for _, verb in _OWN_KEYS)})
-"""No other name in a report becomes part of a file's name."""
+_NOTHING: Final = "(?!)"
 
 
 def require_folder(out: Path) -> None:
@@ -69,12 +46,13 @@ def require_alone(folder: Path, file: str = "", option: str = "--out") -> None:
 
 
 @contextmanager
-def written_together(out: Path, *names: str) -> Iterator[Path]:
+def written_together(out: Path, *names: str, command: str = "") -> Iterator[Path]:
     """Write files that take the place of an earlier command's if the block ends without an error; else those stay as they are.
 
     Args:
         out: the folder that the user gave; created if missing.
         names: names of the files.
+        command: the verb whose report is among them; empty: it has none. Another verb's report stays under another name.
 
     Yields:
         Where to write them.
@@ -83,19 +61,21 @@ def written_together(out: Path, *names: str) -> Iterator[Path]:
         UnavailableError: such a file is not from an earlier command, another program writes there, or it cannot be written.
     """
     try:
-        with replacing_results(out, "|".join(map(re.escape, names)), names) as place:
+        with replacing_results(out, "|".join(map(re.escape, names)), names, command=command) as place:
             yield place
     except OSError as error:
         raise unwritable(out, error) from error
 
 
 @contextmanager
-def written_beside(out: Path, *names: str) -> Iterator[Path]:
+def written_beside(out: Path, *names: str, command: str, replaces: Sequence[str] = ()) -> Iterator[Path]:
     """Write a file that the user named, and others beside it, as `written_together` does. The file need not be from an earlier command.
 
     Args:
         out: the file that the user named; its folder is created if missing.
         names: names of what is written beside it.
+        command: the verb whose report is among them.
+        replaces: names of what goes without a new one.
 
     Yields:
         The folder to write them in.
@@ -104,7 +84,8 @@ def written_beside(out: Path, *names: str) -> Iterator[Path]:
         UnavailableError: another program writes there, or it cannot be written.
     """
     try:
-        with replacing_results(out.parent, "|".join(map(re.escape, names)), names) as place:
+        pattern = "|".join(map(re.escape, (*names, *replaces)))
+        with replacing_results(out.parent, pattern, names, command=command) as place:
             yield place
     except OSError as error:
         raise unwritable(out.parent, error) from error
@@ -147,40 +128,29 @@ def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
             )
 
 
-def keep_other_report(folder: Path, command: str) -> None:
-    """Move another command's report and page aside, which this one would replace, and say where they are.
+def announce_other_report(folder: Path, command: str) -> None:
+    """Say under which names another command's report and page stay when this one's take their places. Until then nothing changes.
 
     Args:
         folder: folder for the results.
         command: the verb whose results go there.
 
     Raises:
-        UnavailableError: they are not ours to move, or the folder cannot be written to.
+        UnavailableError: they are not ours to rename, or the folder cannot be written to.
     """
-    owner = _owner_of(folder / REPORT)
+    owner = report_owner(folder)
     if owner in {"", command}:
         return
-    moves = {
-        name: f"{Path(name).stem}-{owner}{Path(name).suffix}"
-        for name in _REPLACED
-        if kind_of(folder / name) is not Kind.MISSING
-    }
     try:
-        listed = ListedFolder(folder, "(?!)", kept="|".join(map(re.escape, (*moves, *moves.values()))))
-        try:
-            listed.add(*moves.values())
-            for name, kept in moves.items():
-                os.replace(name, kept, src_dir_fd=listed.descriptor, dst_dir_fd=listed.descriptor)
-        finally:
-            listed.close()
+        with ListedFolder(folder, _NOTHING, command=command) as listed:
+            names = " and ".join(listed.renamed.values())
     except OSError as error:
         raise unwritable(folder, error) from error
-    names = " and ".join(moves.values())
-    say(f"phone-host: kept what {owner} had written in {folder} as {names}", sys.stderr)
+    say(f"phone-host: what {owner} has written in {folder} stays there as {names}", sys.stderr)
 
 
-def drop_page(folder: Path, command: str) -> None:
-    """Remove the page that a command wrote earlier, where it now writes a report without one.
+def stale_page(folder: Path, command: str) -> tuple[str, ...]:
+    """Return the name of the page that a command wrote earlier, where it now writes a report without one; the user's own is not meant.
 
     Args:
         folder: folder for the results.
@@ -189,27 +159,14 @@ def drop_page(folder: Path, command: str) -> None:
     Raises:
         UnavailableError: the folder cannot be written to.
     """
-    if _owner_of(folder / REPORT) != command or kind_of(folder / PAGE) is Kind.MISSING:
-        return
+    if report_owner(folder) != command or kind_of(folder / PAGE) is Kind.MISSING:
+        return ()
     try:
-        with suppress(UnavailableError):  # the user's own
-            remove_results(folder, re.escape(PAGE))
+        with suppress(UnavailableError), ListedFolder(folder, re.escape(PAGE)):
+            return (PAGE,)
     except OSError as error:
         raise unwritable(folder, error) from error
-
-
-def _owner_of(report: Path) -> str:
-    """Return the verb that wrote a report; empty if there is none, or it does not say."""
-    try:
-        content = json_value(read_whole(report, _MOST_REPORT_BYTES))
-    except (OSError, DataError, ValueError):
-        return ""
-    if not isinstance(content, dict):
-        return ""
-    named = content.get(_COMMAND)
-    if named is not None:
-        return named if isinstance(named, str) and named in _VERBS else ""
-    return next((command for key, command in _OWN_KEYS if key in content), "")
+    return ()
 
 
 def require_file(out: Path, option: str = "--out") -> None:

@@ -6,7 +6,13 @@ from common.errors import SettingsError
 from common.places import resolved
 from phone_host.run.stereo_results import require_writable
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.output_folders import keep_other_report, require_alone, require_folder, spare_inputs, unwritable
+from phone_host.verbs.output_folders import (
+    announce_other_report,
+    require_alone,
+    require_folder,
+    spare_inputs,
+    unwritable,
+)
 
 
 def require_place(out: Path, files: ViewFiles, names: str, command: str) -> None:
@@ -36,4 +42,4 @@ def require_place(out: Path, files: ViewFiles, names: str, command: str) -> None
     for _, left, right in files.pairs:
         spare_inputs(out, names, {"LEFT": left, "RIGHT": right})
     require_alone(out)
-    keep_other_report(out, command)
+    announce_other_report(out, command)

@@ -1,13 +1,9 @@
 """Results folders into which others have put things: links, pipes, folders of their own."""
 
-import errno
-import fcntl
 import os
-import re
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -17,10 +13,10 @@ import pytest
 from common.errors import DataError, SettingsError, TandemError, UnavailableError
 from common.files import read_whole
 from phone_host.output.atomic import replacing, write_bytes, write_text
-from phone_host.output.folder_lock import LOCK, FolderLock
-from phone_host.output.listed import LIST, STAGED, ListedFolder
-from phone_host.output.pair_files import PAIR_NAMES
-from phone_host.output.result_files import claim, remove_results, replacing_results
+from phone_host.output.folder_lock import LOCK
+from phone_host.output.listed import LIST, ListedFolder
+from phone_host.output.move_up import STAGED
+from phone_host.output.result_files import claim, remove_results
 from phone_host.run.file_sink import NAMES, FileSink
 from phone_host.verbs.output_folders import spare_inputs
 from phone_host.verbs.run.prepared import spare
@@ -83,8 +79,8 @@ def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
     assert killed._own is not None
     with pytest.raises(UnavailableError, match=f"is being written by process {os.getpid()}: wait for its end"):
         FileSink(tmp_path, 1)
-    killed._own.keep_staged()
-    killed._own.close()
+    killed._own.spare_staged()
+    killed._own._lock.release()
     assert (tmp_path / STAGED).is_dir()
     FileSink(tmp_path, 1).close({})
     assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
@@ -183,9 +179,8 @@ def test_a_torn_last_line_of_the_list_counts_for_nothing(tmp_path: Path) -> None
 
 def test_what_another_verb_has_listed_stays(tmp_path: Path) -> None:
     """A run leaves files that it does not write itself, and they remain ours."""
-    other = ListedFolder(tmp_path, "disparity.pfm")
-    other.add("disparity.pfm", "report.json")
-    other.close()
+    with ListedFolder(tmp_path, "disparity.pfm") as other:
+        other.add("disparity.pfm", "report.json")
     for name in ("disparity.pfm", "report.json"):
         (tmp_path / name).write_text("of stereo")
     FileSink(tmp_path, 1).close({})
@@ -202,7 +197,8 @@ def test_a_list_with_ways_out_of_the_folder_leads_nowhere(tmp_path: Path) -> Non
     (out / "notes.txt").write_text("precious")
     with (out / LIST).open("a") as list_file:
         list_file.write("../report.json\nnotes.txt\n/etc/passwd\n..\n.\n")
-    ListedFolder(out, NAMES, inner=PAIR_NAMES).close()
+    with ListedFolder(out, NAMES):
+        pass
     assert (tmp_path / "report.json").read_text() == "precious"
     assert (out / "notes.txt").read_text() == "precious"
 
@@ -299,118 +295,6 @@ def test_a_run_does_not_write_among_the_photographs_it_replays(tmp_path: Path, r
             spare(out, str(tmp_path / replay), "")
     spare(tmp_path / "photos" / "scan", str(tmp_path / replay), "")
     spare(tmp_path, str(tmp_path / replay), "")
-
-
-def placed(folder: Path, **texts: str) -> None:
-    """A set of results: files by name, and a pair that holds the same."""
-    with replacing_results(folder, r"a\.txt|b\.txt|pair-\d{6}", [f"{name}.txt" for name in texts]) as place:
-        for name, text in texts.items():
-            write_text(place / f"{name}.txt", text)
-
-
-def test_results_take_their_places_together(tmp_path: Path) -> None:
-    """A set replaces the one before as a whole, and what nothing replaces goes; a set whose writing fails changes nothing and leaves nothing."""
-    placed(tmp_path, a="1", b="1")
-    placed(tmp_path, a="2")
-    kept = tree(tmp_path)
-    assert {name: kept[name] for name in kept if name != LIST} == {"a.txt": b"2"}
-    with pytest.raises(OSError, match="No space") as caught:
-        write_badly(tmp_path)
-    assert caught.value.filename == str(tmp_path / "b.txt")
-    assert {name: text for name, text in tree(tmp_path).items() if name != LIST} == {"a.txt": b"2"}
-
-
-def write_badly(folder: Path) -> None:
-    """The first file is written; for the second there is no room."""
-    with replacing_results(folder, r"a\.txt|b\.txt", ("a.txt", "b.txt")) as place:
-        write_text(place / "a.txt", "3")
-        raise OSError(errno.ENOSPC, "No space left on device", str(place / "b.txt"))
-
-
-@pytest.mark.parametrize("moved", [(), ("a.txt",)])
-def test_a_run_that_was_killed_while_it_moved_its_results_is_finished(moved: tuple[str, ...], tmp_path: Path) -> None:
-    """Results that were whole are moved up by whoever opens the folder next, those that are missing, too; what they replace goes."""
-    placed(tmp_path, a="1", b="1")
-    (tmp_path / ".tandemscan.whole").mkdir()
-    for name in {"a.txt", "c.txt"}.difference(moved):
-        (tmp_path / ".tandemscan.whole" / name).write_text("2")
-    for name in moved:
-        (tmp_path / name).write_text("2")
-    claim(tmp_path, "d.txt")
-    assert not (tmp_path / ".tandemscan.whole").exists()
-    assert [(tmp_path / name).read_text() for name in ("a.txt", "c.txt")] == ["2", "2"]
-
-
-_HOLDER = """
-import sys
-from pathlib import Path
-from phone_host.output.folder_lock import FolderLock
-with FolderLock(Path(sys.argv[1]), *sys.argv[2:]):
-    print("locked", flush=True)
-    sys.stdin.read()
-"""
-
-
-@pytest.mark.parametrize("file", [(), ("cup.mcap",)])
-def test_another_program_is_kept_out_as_long_as_one_writes(tmp_path: Path, file: tuple[str, ...]) -> None:
-    """It is told the number of the process that writes; when that one is killed, nothing is in the way any more and nothing stays."""
-    out = tmp_path / "out"
-    out.mkdir()
-    words = [sys.executable, "-c", _HOLDER, str(out), *file]
-    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
-        assert holder.stdout is not None
-        holder.stdout.readline()
-        with pytest.raises(
-            UnavailableError, match=f"is being written by process {holder.pid}: wait for its end"
-        ) as caught:
-            FolderLock(out, *file)
-        assert caught.value.exit_code == 3
-        holder.kill()
-    assert len(list(out.iterdir())) == 1  # nobody was left to remove it
-    FolderLock(out, *file).release()
-    assert list(out.iterdir()) == []
-
-
-@pytest.mark.parametrize("plant", [plant_link, os.mkfifo, Path.mkdir])
-@pytest.mark.timeout(30)
-def test_a_foreign_lock_is_named(plant: Callable[[Path], None], tmp_path: Path) -> None:
-    """A link, pipe or folder under the lock's name is one line, and stays."""
-    (tmp_path / "precious").write_text("")
-    (tmp_path / "out").mkdir()
-    plant(tmp_path / "out" / LOCK)
-    with pytest.raises(UnavailableError, match=rf"out/{re.escape(LOCK)} is not a file of this program: move or delete"):
-        FolderLock(tmp_path / "out")
-    assert (tmp_path / "precious").read_text() == ""
-    assert (tmp_path / "out" / LOCK).exists()
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can make another user's lock")
-def test_what_a_killed_root_left_locks_nobody_out() -> None:
-    """A lock file of root's that nobody holds is no obstacle for the user whose folder it is, and goes with his own lock; one that is held is told."""
-    with tempfile.TemporaryDirectory() as name:
-        out = Path(name)
-        (out / LOCK).write_text("1\n")
-        out.chmod(0o777)
-        held = os.open(out / LOCK, os.O_RDONLY)
-        fcntl.flock(held, fcntl.LOCK_EX)
-        os.seteuid(65534)
-        try:
-            with pytest.raises(UnavailableError, match="is being written by process 1:"):
-                FolderLock(out)
-            os.close(held)
-            FolderLock(out).release()
-            assert list(out.iterdir()) == []
-        finally:
-            os.seteuid(0)
-
-
-def test_a_lock_leaves_no_folder_behind(tmp_path: Path) -> None:
-    """Folders that it had to make go with it if nothing was written into them; others stay."""
-    FolderLock(tmp_path / "a" / "b").release()
-    assert list(tmp_path.iterdir()) == []
-    with FolderLock(tmp_path / "a" / "b"):
-        (tmp_path / "a" / "file").write_text("")
-    assert [path.name for path in tmp_path.rglob("*")] == ["a", "file"]
 
 
 def test_what_a_killed_writer_left_is_removed_by_the_next_one(tmp_path: Path) -> None:

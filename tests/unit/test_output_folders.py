@@ -12,7 +12,7 @@ from phone_host.model import CameraModel, Rig
 from phone_host.output.result_files import claim
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.output_folders import drop_page, keep_other_report, unwritable
+from phone_host.verbs.output_folders import announce_other_report, stale_page, unwritable
 from tests.support.planes import noise
 
 CALIB = (
@@ -54,7 +54,7 @@ def test_each_verb_recognises_its_own_report(
         assert main(words) == code
         assert names(tmp_path / name) == once
         assert json.loads((tmp_path / name / "report.json").read_text())["command"] == words[0]
-    assert "kept what" not in capsys.readouterr().err
+    assert "stays there as" not in capsys.readouterr().err
 
 
 def test_another_verbs_report_is_kept(tmp_path: Path, sides: list[str]) -> None:
@@ -73,7 +73,7 @@ def test_the_key_command_decides(tmp_path: Path, verb: str) -> None:
     """Whatever else stands in it, a report is that of the verb it names; no other verb takes it for its own."""
     everything = {"command": verb, "truth": {}, "ended": "", "verdict": "", "time_offset_ns": 0, "matcher": "sgbm"}
     (tmp_path / "report.json").write_text(json.dumps(everything))
-    keep_other_report(tmp_path, verb)
+    announce_other_report(tmp_path, verb)
     assert names(tmp_path) == {"report.json"}
 
 
@@ -94,7 +94,7 @@ def test_reports_of_older_versions_are_recognised_by_their_keys(
 ) -> None:
     """They do not name their verb; a stereo report has a verdict, too."""
     (tmp_path / "report.json").write_text(json.dumps(dict.fromkeys(keys, 1)))
-    keep_other_report(tmp_path, verb)
+    announce_other_report(tmp_path, verb)
     assert names(tmp_path) == {"report.json"}
 
 
@@ -105,20 +105,20 @@ def test_a_page_of_before_goes_where_its_report_is_replaced(
     tmp_path: Path, verb: str, *, listed: bool, stays: bool
 ) -> None:
     """Ours goes; the user's own and another verb's stay, and so does an empty folder."""
-    drop_page(tmp_path, "calibrate")
+    assert stale_page(tmp_path, "calibrate") == ()
     assert names(tmp_path) == set()
     (tmp_path / "report.json").write_text(json.dumps({"command": verb}))
     if listed:
         claim(tmp_path, "index.html")
     (tmp_path / "index.html").write_text("a page")
-    drop_page(tmp_path, "calibrate")
-    assert (tmp_path / "index.html").exists() == stays
+    assert (stale_page(tmp_path, "calibrate") == ()) == stays
+    assert (tmp_path / "index.html").read_text() == "a page"  # until a report is written
 
 
 def test_a_strangers_report_names_no_file(tmp_path: Path) -> None:
     """A name that is no verb of ours moves nothing, wherever it would lead."""
     (tmp_path / "report.json").write_text(json.dumps({"command": "../../x"}))
-    keep_other_report(tmp_path, "stereo")
+    announce_other_report(tmp_path, "stereo")
     assert names(tmp_path) == {"report.json"}
 
 

@@ -14,7 +14,7 @@ from common.places import Kind, kind_of, make_folder, nearest, resolved
 from phone_host.cli import main
 from phone_host.doctor.host_doctor import examine_out
 from phone_host.stereo.view_files import pair_files
-from phone_host.verbs.output_folders import keep_other_report, require_file, require_folder, spare_inputs
+from phone_host.verbs.output_folders import announce_other_report, require_file, require_folder, spare_inputs
 from phone_host.verbs.run.prepared import spare
 
 LONG = "a" * 300
@@ -131,7 +131,7 @@ def test_a_strange_replay_is_left_to_the_camera() -> None:
 def test_a_report_of_brackets_belongs_to_nobody(room: Path) -> None:
     """It is no report of another verb that would be kept."""
     (room / "report.json").write_text("[" * 200_000)
-    keep_other_report(room, "stereo")
+    announce_other_report(room, "stereo")
     assert (room / "report.json").stat().st_size == 200_000
 
 

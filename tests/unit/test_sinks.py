@@ -20,7 +20,8 @@ from common.ledger import BoardMarks, HostMarks, StageTimes
 from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Processed, RectifiedPair, Result
 from phone_host.output.axes import Axes
-from phone_host.output.listed import LIST, STAGED
+from phone_host.output.listed import LIST
+from phone_host.output.move_up import STAGED
 from phone_host.output.ply import read_ply
 from phone_host.run.file_sink import FileSink
 from phone_host.run.sinks import FunctionSink, SinkQueue
@@ -259,7 +260,7 @@ def test_a_full_disk_is_told_once_and_counted(tmp_path: Path, caplog: pytest.Log
 
 
 def test_a_run_that_is_not_whole_replaces_no_earlier_one(tmp_path: Path) -> None:
-    """Of two pairs the second has no room: the earlier results stay, the last line says so and names where the first pair lies; the next whole run replaces all."""
+    """Of two pairs the second has no room: the earlier results stay, the last line names them and where the first pair lies; the next whole run replaces all."""
     first = FileSink(tmp_path, 1, waits=True)
     first.offer(result(0))
     first.close({"number": 1})
@@ -278,13 +279,12 @@ def test_a_run_that_is_not_whole_replaces_no_earlier_one(tmp_path: Path) -> None
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, ignored)
     assert not sink.complete
-    assert sink.missing.endswith(
-        f"the earlier results stay, and 1 pair of this run in {tmp_path / STAGED} until the next one"
-    )
+    partial = tmp_path / "partial-run"
+    assert sink.missing.endswith(f"the earlier results stay in {tmp_path}, and what could be written is in {partial}")
     assert {path: path.read_bytes() for path in before if path.name != LIST} == {
         path: content for path, content in before.items() if path.name != LIST
     }
-    assert (tmp_path / STAGED / "pair-000000").is_dir()
+    assert (partial / "pair-000000").is_dir()
     FileSink(tmp_path, 0).close({"number": 3})
     assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]
 

@@ -16,7 +16,8 @@ def test_leaving_in_the_middle_removes_half_written_files_and_folders_only(tmp_p
     (tmp_path / "whole").write_bytes(b"whole")
 
     def leave_in_the_middle() -> None:
-        folder = ListedFolder(tmp_path, r"pair-\d", inner=r"left\.png")
+        folder = ListedFolder(tmp_path, r"pair-\d")
+        folder.open()
         with replacing(tmp_path / "half") as file, folder.new_folder("pair-0") as inside:
             file.write(b"begun")
             file.flush()

@@ -16,6 +16,7 @@ from phone_host.calibration.series_snapshot import Taken
 from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
+from phone_host.output.report_owner import PAGE, REPORT
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files, passed_over
@@ -42,10 +43,8 @@ from phone_host.verbs.calibrate.summary import pairing_notes, passed_over_notes,
 from phone_host.verbs.given_pictures import GivenPictures, given_pictures
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import (
-    PAGE,
-    REPORT,
+    announce_other_report,
     claim_names,
-    keep_other_report,
     require_file,
     spare_names,
     written_beside,
@@ -107,7 +106,7 @@ def calibrate_pictures(
         options = _with_board_side(options, given.board_side)
     files = pair_files(given.left, given.right)
     require_first_sizes(files, asked, options, mounted)
-    keep_other_report(out.parent, "calibrate")
+    announce_other_report(out.parent, "calibrate")
     claim_names(out.parent, out, REPORT, PAGE)
     beside = cameras_beside(files, mounted)
     series, known = series_of(options, asked, lambda named: board_in(files, named, _limit(options)))
@@ -127,7 +126,7 @@ def calibrate_pictures(
     order = [name for name, _, _ in files.pairs]
     taken = Taken(order=order, views=views, pairs=solved.pairs, seen=solved.seen, board=series.board)
     lines = _file_notes(files, given)
-    with written_beside(out, REPORT, PAGE) as place:
+    with written_beside(out, REPORT, PAGE, command="calibrate") as place:
         if isinstance(result, DataError):
             report = replace(report, earlier_rig=replace_rig(place, out, None, None))
             page, more = series_of_failure(taken, result), []

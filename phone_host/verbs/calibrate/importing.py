@@ -15,6 +15,7 @@ from phone_host.calibration.causes.name import BASELINE_OFF
 from phone_host.model import Rig, Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
+from phone_host.output.report_owner import PAGE, REPORT
 from phone_host.output.rig_files.imported import Imported, RigKind, import_rig
 from phone_host.output.rig_yaml import read_rig_views
 from phone_host.stereo.rectify import rectify_rig
@@ -25,14 +26,12 @@ from phone_host.verbs.calibrate.report import ImportReport
 from phone_host.verbs.calibrate.report_json import import_values
 from phone_host.verbs.calibrate.rig_file import REFUSED, earlier_words, replace_rig, require_own
 from phone_host.verbs.output_folders import (
-    PAGE,
-    REPORT,
+    announce_other_report,
     claim_names,
-    drop_page,
-    keep_other_report,
     require_alone,
     require_file,
     spare_names,
+    stale_page,
     written_beside,
 )
 from phone_host.verbs.units import baseline_mm, length_mm
@@ -60,13 +59,14 @@ def import_calibration(options: argparse.Namespace) -> int:
     found = replace(found, rig=_on_side(found.rig, side))
     if not same:
         require_own(options.out)
-        keep_other_report(options.out.parent, "calibrate")
-        drop_page(options.out.parent, "calibrate")
+        announce_other_report(options.out.parent, "calibrate")
         claim_names(options.out.parent, options.out, options.out.name, REPORT)
     report = ImportReport(imported=found, exported=write_exports(options, found.rig, rectification, found.files))
     if not same:
         views = read_rig_views(found.files[0]) if found.kind is RigKind.RIG else None
-        with written_beside(options.out, REPORT) as place:
+        with written_beside(
+            options.out, REPORT, replaces=stale_page(options.out.parent, "calibrate"), command="calibrate"
+        ) as place:
             report = replace(report, earlier_rig=replace_rig(place, options.out, found.rig, rectification, views))
             write_text(place / REPORT, json_text(import_values(report), indent=2) + "\n")
     if options.json:

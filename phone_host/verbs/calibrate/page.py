@@ -14,10 +14,10 @@ from phone_host.calibration.view_turns import view_turns
 from phone_host.model import Rig, Verdict
 from phone_host.model.calibration_series import CalibrationSeries
 from phone_host.output.atomic import write_text
+from phone_host.output.report_owner import PAGE
 from phone_host.report.calibration_page import calibration_page
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.report import Judged
-from phone_host.verbs.output_folders import PAGE
 
 
 def series_of_failure(taken: Taken, failure: DataError) -> CalibrationSeries:

@@ -13,10 +13,10 @@ from phone_host.calibration.board_pairs import Calibration, Rejected
 from phone_host.calibration.board_views import BoardViews, turn_text
 from phone_host.calibration.verdict import SHARE_GOOD
 from phone_host.model import Verdict
+from phone_host.output.report_owner import REPORT
 from phone_host.stereo.view_files import ViewFiles, is_unread_photograph
 from phone_host.verbs.calibrate.report import CalibrationReport, Judged
 from phone_host.verbs.calibrate.rig_file import REFUSED, earlier_words
-from phone_host.verbs.output_folders import REPORT
 
 _SHOWN = 3
 _WHOLE_METRES = 10.0

@@ -41,8 +41,8 @@ from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.verbs.output_folders import (
+    announce_other_report,
     claim_names,
-    keep_other_report,
     require_alone,
     require_file,
     require_folder,
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out is not None:
         require_folder(options.out)
         require_alone(options.out)
-        keep_other_report(options.out, "calibrate-time")
+        announce_other_report(options.out, "calibrate-time")
         claim_names(options.out, options.out, *_FILES)
     signals = StopSignals()
     footage = _footage(options, signals)
@@ -188,7 +188,7 @@ def _report(options: argparse.Namespace, measured: Measured, footage: Footage) -
 
 def _store(options: argparse.Namespace, measured: Measured, report: dict[str, Any]) -> None:
     if options.out is not None:
-        with written_together(options.out, *_FILES) as place:
+        with written_together(options.out, *_FILES, command="calibrate-time") as place:
             write_text(place / "report.json", json_text(report, indent=2) + "\n")
             write_text(place / "time-offset.svg", misfit_svg(measured))
     if options.calibration is None:

@@ -24,7 +24,6 @@ from phone_host.model import Rig
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
-from phone_host.output.pair_files import PAIR_NAMES
 from phone_host.output.rig_yaml import write_rig
 from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
@@ -72,7 +71,8 @@ def run(options: argparse.Namespace) -> int:
                 with live or nullcontext():
                     demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
             except BaseException as error:
-                demo.host.write_report(build(demo.host.snapshot("failed", trouble_of(error)), "demo"))
+                failed = build(demo.host.snapshot("failed", trouble_of(error)), "demo")
+                demo.host.write_report(failed, replaces_earlier=False)
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
         with busy_bar("comparing the depth with the known scene, writing the page", console):
@@ -106,11 +106,8 @@ def _claim(out: Path) -> None:
     """
     lock_for_command(out)
     names = rf"{NAMES}|film|rig\.yaml|cloud\.ply|disparity\.png"
-    folder = ListedFolder(out, "(?!)", kept=names, inner=PAIR_NAMES)
-    try:
+    with ListedFolder(out, "(?!)", kept=names) as folder:
         folder.add("film", "rig.yaml", "cloud.ply", "disparity.png", "index.html")
-    finally:
-        folder.close()
 
 
 class _StoppedError(Exception):

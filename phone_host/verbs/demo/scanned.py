@@ -22,7 +22,7 @@ from phone_host.children.board_process import socket_folder
 from phone_host.demo.scan_demonstration import ScanDemo, render_pictures, with_truth
 from phone_host.demo.scan_truth import ModelErrors
 from phone_host.live.scan_view import ScanPicture
-from phone_host.output.atomic import write_bytes, write_text
+from phone_host.output.atomic import write_bytes
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
 from phone_host.output.meshes.formats import mesh_bytes
@@ -35,10 +35,9 @@ from phone_host.printers.preparing import Wanted, job_of
 from phone_host.printers.printer_uri import FileUri
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.report.page_links import NextCommand
-from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
 from phone_host.run.progress_bar import busy_bar, progress_bar, step_bar
-from phone_host.run.scan_files import FinishedScan, write_scan
+from phone_host.run.scan_files import FinishedScan, report_values, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
 from phone_host.stereo.default_matcher import default_matcher
@@ -82,9 +81,8 @@ def run_scan_demo(options: argparse.Namespace) -> int:
             return 0
         scan, errors = done
         require_something(scan.report)
+        scan = replace(scan, command="demo", told={"truth": _truth_json(errors)})
         write_scan(out, scan)
-        told = scan_json(scan.report) | {"command": "demo", "truth": _truth_json(errors)}
-        write_text(out / "report.json", json_text(told, indent=2) + "\n")
         printed = {} if signals.stop else _printed(out, console)
     except OSError as error:
         raise UnavailableError(
@@ -92,7 +90,7 @@ def run_scan_demo(options: argparse.Namespace) -> int:
             "make room on the disk, or give another folder with --out",
         ) from None
     if options.json:
-        print(json_text(told | {"print": printed}))
+        print(json_text(report_values(scan) | {"print": printed}))
     else:
         say(scan_lines(scan.report, str(out)))
     say(_closing(out, printed), sys.stderr)

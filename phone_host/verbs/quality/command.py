@@ -1,6 +1,7 @@
 """phone-host quality: measure how good a rig's depth is, on pairs of images of a flat wall or board."""
 
 import argparse
+import sys
 from typing import Final
 
 from common.errors import SettingsError
@@ -48,6 +49,7 @@ def run(options: argparse.Namespace) -> int:
         roi=roi,
         most_pixels=limit,
         mounted=orientations(options),
+        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
     )
     count = len(files.pairs)
     try:

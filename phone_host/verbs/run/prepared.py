@@ -44,7 +44,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_note
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
-from phone_host.verbs.output_folders import keep_other_report, require_alone, spare_inputs
+from phone_host.verbs.output_folders import announce_other_report, require_alone, spare_inputs
 from phone_host.verbs.run.budget import budget_wanted
 from phone_host.verbs.run.own_rig import with_own_rig
 from phone_host.verbs.stereo_options import build_core, depth_wanted, output_options, overlay_of
@@ -95,7 +95,7 @@ class Opened:
             for link in self.links:
                 opened.enter_context(closing(link))
             if self.options.out is not None:
-                keep_other_report(self.options.out, "run")
+                announce_other_report(self.options.out, "run")
             settings = _host_settings(self, words)
             recording = self._recording(settings)
             computed = computed_wanted(self.options)
@@ -103,7 +103,9 @@ class Opened:
                 sinks = (*sinks, ComputedSink(recording, computed, self.board_side))
             host = Host(settings, self.camera, self.links, self.core, sinks, recording=recording)
             opened.pop_all()
-        return PreparedRun(host, self.named, self.keys, self.board_side, self.options.out)
+        pairs = self.options.pairs or 0
+        is_replay = isinstance(self.camera, Playback)
+        return PreparedRun(host, self.named, self.keys, self.board_side, self.options.out, pairs, is_replay)
 
     def _recording(self, settings: HostSettings) -> RecordingSwitch | None:
         """Return what records, begun if that was asked for; None: a recording is played."""
@@ -148,6 +150,8 @@ class PreparedRun:
         keys: folder that remembers the board.
         board_side: which view the board's camera gives.
         out: folder for results; None: none.
+        pairs: after how many the run is whole; 0: it has no such number.
+        is_replay: whether it plays a recording, which has an end.
     """
 
     host: Host
@@ -155,6 +159,8 @@ class PreparedRun:
     keys: Path
     board_side: Side
     out: Path | None
+    pairs: int
+    is_replay: bool
 
     def ended(self, ended: EndReason) -> Ended:
         """Write the report of a run that has ended, and remember its board.
@@ -165,7 +171,17 @@ class PreparedRun:
         is_plain = len(self.named) == 1 and "?" not in self.named[0] and self.named[0].startswith("tcp://")
         if self.host.has_met_board and is_plain:
             remember(self.keys, self.named[0])
-        return self._written(self.host.snapshot(ended.value))
+        snapshot = self.host.snapshot(ended.value)
+        return self._written(snapshot, is_whole=snapshot.processed > 0 and not self.is_cut_short(snapshot, ended))
+
+    def is_cut_short(self, snapshot: RunSnapshot, ended: EndReason) -> bool:
+        """Tell whether a run ended before all its pairs came: those that were asked for, or those of the recording.
+
+        Args:
+            snapshot: its last one.
+            ended: why it ended.
+        """
+        return snapshot.processed < self.pairs or (self.is_replay and ended is EndReason.STOPPED)
 
     def failed(self, failure: Trouble) -> Ended:
         """Write the report of a run that an error ended.
@@ -173,14 +189,14 @@ class PreparedRun:
         Args:
             failure: the error.
         """
-        return self._written(self.host.snapshot("failed", failure))
+        return self._written(self.host.snapshot("failed", failure), is_whole=False)
 
-    def _written(self, snapshot: RunSnapshot) -> Ended:
+    def _written(self, snapshot: RunSnapshot, *, is_whole: bool) -> Ended:
         report = build(snapshot)
         recording = snapshot.recording
         place = self.host.results_place
         page = "" if place is None else _page(self.host, snapshot, self.board_side, place)
-        is_complete = self.host.write_report(report, page, replaces_earlier=snapshot.processed > 0)
+        is_complete = self.host.write_report(report, page, replaces_earlier=is_whole)
         missing = [self.host.missing_files] if self.host.missing_files else []
         if recording is not None and not recording.is_whole:
             missing.append(f"the whole of {recording.file}")

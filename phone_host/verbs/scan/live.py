@@ -19,13 +19,20 @@ from phone_host.live.scan_view import ScanPicture
 from phone_host.recording.playback import Playback
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.host_settings import EndReason
+from phone_host.run.kept import partial_words
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.run.stereo_results import require_writable
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap
 from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import keep_other_report, require_alone, require_folder, spare_inputs, unwritable
+from phone_host.verbs.output_folders import (
+    announce_other_report,
+    require_alone,
+    require_folder,
+    spare_inputs,
+    unwritable,
+)
 from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run
 from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
 from phone_host.verbs.serve.choices import run_options
@@ -59,6 +66,9 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     signals = StopSignals()
     prepared = opened.prepared(sys.argv, (live.sink,))
 
+    def tell_of_partial(place: Path) -> None:
+        _tell(partial_words(place, options.out))
+
     def finished() -> FinishedScan:
         return live.finished(prepared.host.snapshot(), found.values.matcher, axes)
 
@@ -67,13 +77,13 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
     except BaseException:
         if live.scan.fused:
             with suppress(Exception):  # tell what ended the run, not what followed
-                write_scan(options.out, finished())
+                write_scan(options.out, finished(), tell_of_partial)
         raise
-    prepared.ended(ended)
+    over = prepared.ended(ended)
     last = finished()
     require_something(last.report)
     try:
-        write_scan(options.out, last)
+        write_scan(options.out, last, tell_of_partial if prepared.is_cut_short(over.snapshot, ended) else None)
     except OSError as error:
         raise unwritable(options.out, error) from error
     live.kept.done()
@@ -158,7 +168,7 @@ def _require_place(options: argparse.Namespace) -> None:
     inputs = {"--calibration": options.calibration, "--replay": options.replay, "--overlay": options.overlay}
     spare_inputs(options.out, NAMES, {name: path for name, path in inputs.items() if path})
     require_alone(options.out)
-    keep_other_report(options.out, "scan")
+    announce_other_report(options.out, "scan")
 
 
 def _tell(line: str) -> None:

@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> int:
         axes=output_options(options).axes,
         most_pixels=limit,
         mounted=orientations(options),
+        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
         commands=partial(next_commands, _typed(options)),
     )
     count = len(files.pairs)
