@@ -8,7 +8,9 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import MethodType
 from typing import Final
+from weakref import WeakMethod
 
 from common.errors import TandemError
 
@@ -29,6 +31,17 @@ class Removed:
 
     words: str = ""
     exit_code: int = 0
+
+
+def weakly(method: MethodType) -> Callable[[], str | None]:
+    """Return what calls a method as long as its object lives: the list of what is unfinished must not keep an object alive that nobody else holds."""
+    reference = WeakMethod(method)
+
+    def call() -> str | None:
+        alive = reference()
+        return None if alive is None else alive()
+
+    return call
 
 
 @contextmanager

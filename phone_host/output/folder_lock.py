@@ -10,8 +10,9 @@ nothing at all otherwise; a line in the log says so. Two commands of one process
 The table of locks belongs to the process, not to an object: flock asks for nothing else.
 
 Signals may raise an error between any two steps. So a lock acquires nothing before `acquire`, each descriptor is noted before it is locked, and whoever
-acquires releases in any case: with a context manager, or `release` in a `finally` that begins before `acquire`. A hidden file is only removed by
-whoever has it locked, and only if it still has its name: else it would be another program's.
+acquires releases in any case: with a context manager, or `release` in a `finally` that begins before `acquire`. Where the signal comes before the first
+step of that, the lock is released when its object goes. A hidden file is only removed by whoever has it locked, and only if it still has its name: else it
+would be another program's.
 """
 
 import errno
@@ -31,7 +32,7 @@ from typing import Final, Self
 from common.errors import UnavailableError
 from common.places import Kind, kind_of, make_folder, resolved
 from common.program.logs import event
-from common.unfinished import unfinished
+from common.unfinished import unfinished, weakly
 
 _LOG = logging.getLogger(__name__)
 
@@ -74,15 +75,16 @@ class FolderLock:
         option: with which the user gives another place.
     """
 
+    _folder = -1
+    _held: _Held | None = None
+
     def __init__(self, path: Path, file: str = "", *, length: Length = Length.COMMAND, option: str = "--out") -> None:
         self._name = f".{file}.lock" if file else LOCK
         self._path, self._length, self._option = path / file if file else path, length, option
         self._place, self._is_whole = path, not file
         self._made: list[Path] = []
         self._ending = ExitStack()
-        self._folder = -1
         self._key: _Key = 0, 0, ""
-        self._held: _Held | None = None
 
     def acquire(self) -> None:
         """Keep others from writing there from now on. Call `release` also if this fails.
@@ -99,20 +101,25 @@ class FolderLock:
         self._key = status.st_dev, status.st_ino, self._name
         with _TURN:
             self._take()
-        self._ending.enter_context(unfinished(self._unlink))
+        self._ending.enter_context(unfinished(weakly(self._unlink)))
 
     def __enter__(self) -> Self:
         try:
             self.acquire()
+            return self  # noqa: TRY300 - a signal may come before this line, too
         except BaseException:
             self.release()
             raise
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.release()
+
+    def __del__(self) -> None:
+        """Release a lock that nobody holds any more: a signal came before the first step of `release`. What a signal raises here is lost, so it does little."""
+        if self._held is not None or self._folder >= 0:
+            self.release()
 
     def release(self) -> None:
         """Let others write there. May be called again.

@@ -26,7 +26,7 @@ from typing import Final, Self
 from common.errors import DataError, UnavailableError
 from common.files import read_file, replacing_in, sync_folder
 from common.plain_text import writable
-from common.unfinished import unfinished
+from common.unfinished import unfinished, weakly
 from phone_host.output.folder_lock import FolderLock, Length
 from phone_host.output.move_up import STAGED, WHOLE, begin_move, finish_move, keep_under
 from phone_host.output.open_folders import (
@@ -104,10 +104,10 @@ class ListedFolder:
     def __enter__(self) -> Self:
         try:
             self.open()
+            return self  # noqa: TRY300 - a signal may come before this line, too
         except BaseException:
             self.close()
             raise
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -134,7 +134,7 @@ class ListedFolder:
             remove_tree(name, self.descriptor)
         os.mkdir(STAGED, dir_fd=self.descriptor)
         self._into = os.open(STAGED, FOLDER, dir_fd=self.descriptor)
-        self._ending.enter_context(unfinished(self.discard))
+        self._ending.enter_context(unfinished(weakly(self.discard)))
 
     def publish(self) -> None:
         """Let the new results, which are whole, take the place of the earlier ones, and of partial ones of this verb.

@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from traceback import clear_frames
 
 from common.program.interrupts import answering, is_heard, terminable
 from common.program.out_of_memory import is_out_of_memory
@@ -22,12 +23,14 @@ def kept_if_interrupted(write: Callable[[], None]) -> Iterator[None]:
     with terminable(), unfinished(last):
         try:
             yield
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
+            clear_frames(error.__traceback__)  # what the interrupted work holds is released: folders are written again
             with answering(), suppress(OSError):
                 last()
             raise
         except Exception as error:
             if is_out_of_memory(error):
+                clear_frames(error.__traceback__)  # and so is its memory
                 with suppress(OSError, MemoryError):
                     last()
             raise

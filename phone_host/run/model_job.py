@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError, TandemError
-from phone_host.output.atomic import write_bytes
+from phone_host.output.atomic import replacing
 from phone_host.output.data_folder import data_folder
 from phone_host.output.meshes.decimated import NoLibraryError, decimated
 from phone_host.output.meshes.formats import FORMATS, mesh_bytes
@@ -125,8 +125,9 @@ def export_model(
     solid, _ = fewer_triangles(read.solid, usual_tolerance_m(read) if tolerance_mm is None else tolerance_mm / 1000)
     paths = {Path(out) / f"{read.stem}.{kind}": kind for kind in to}
     spare_model(read, paths)
-    for path, kind in paths.items():
-        write_bytes(path, mesh_bytes(solid, kind, read.axes))
+    with ExitStack() as files:  # each takes its place when all are written
+        for path, kind in paths.items():
+            files.enter_context(replacing(path)).write(mesh_bytes(solid, kind, read.axes))
     return list(paths)
 
 

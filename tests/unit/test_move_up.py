@@ -2,9 +2,7 @@
 
 import errno
 import json
-import os
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -16,14 +14,6 @@ from phone_host.output.move_up import STAGED, WHOLE
 from phone_host.output.result_files import claim, replacing_results
 from tests.support.killed_at import killed_at
 from tests.unit.test_listed import tree
-
-
-@pytest.fixture
-def in_memory(tmp_path: Path) -> Iterator[Path]:
-    """A folder that needs no disk: hundreds of processes sync here."""
-    shared = Path("/dev/shm")
-    with tempfile.TemporaryDirectory(dir=shared if os.access(shared, os.W_OK) else tmp_path) as folder:
-        yield Path(folder)
 
 
 def placed(folder: Path, **texts: str) -> None:
@@ -114,7 +104,7 @@ def test_a_kill_at_every_step_of_a_replacing_leaves_one_set(next_one: Callable[[
         steps += 1
         folder = in_memory / str(steps)
         write_set(folder, "1", OLD)
-        ended = killed_at(steps, partial(write_set, folder, "2", NEW))
+        ended = killed_at(steps, partial(write_set, folder, "2", NEW)).code
         next_one(folder)
         if next_one is claim_elsewhere:
             sets = sets_in(folder)
@@ -133,11 +123,11 @@ def test_a_move_that_is_killed_again_and_again_comes_to_its_end(in_memory: Path)
     """Each program that finishes the move is killed one step later than the one before; the set is whole in the end."""
     write_set(in_memory, "1", OLD)
     first = 1
-    while killed_at(first, lambda: write_set(in_memory, "2", NEW)) is None and not (in_memory / WHOLE).exists():
+    while killed_at(first, lambda: write_set(in_memory, "2", NEW)).code is None and not (in_memory / WHOLE).exists():
         first += 1
     assert (in_memory / WHOLE).is_dir()
     step = 1
-    while killed_at(step, lambda: claim_elsewhere(in_memory)) is None:
+    while killed_at(step, lambda: claim_elsewhere(in_memory)).code is None:
         step += 1
     assert sets_in(in_memory) == expected(NEW, "2")
 
@@ -149,7 +139,7 @@ def test_another_verbs_report_stays_until_the_new_one_is_whole(in_memory: Path) 
         steps += 1
         folder = in_memory / str(steps)
         write_set(folder, "1", ("index.html",), "calibrate")
-        ended = killed_at(steps, partial(write_set, folder, "2", ("a.txt",), "quality"))
+        ended = killed_at(steps, partial(write_set, folder, "2", ("a.txt",), "quality")).code
         claim_elsewhere(folder)
         first, moved = (
             {"index.html": "1", "report.json": "1"},

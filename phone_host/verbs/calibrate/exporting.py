@@ -13,7 +13,7 @@ from phone_host.output.atomic import write_text
 from phone_host.output.rig_files.imported import RigKind, export_texts
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.verbs.calibrate.report import Exported
-from phone_host.verbs.output_folders import claim_names, unwritable
+from phone_host.verbs.output_folders import written_together
 
 _OF_RECTIFIED: Final = frozenset({RigKind.MIDDLEBURY, RigKind.KITTI})
 
@@ -47,17 +47,14 @@ def write_exports(
     written = []
     for kind, made in texts:
         folder = options.out.parent / kind.value
-        for each in made:
-            path = folder / each.name
-            if resolved(path) in kept:
-                raise SettingsError(
-                    f"--export {kind.value} would replace {path}, which is imported", "name another --out"
-                )
-            claim_names(path.parent, options.out, path.name)
-            try:
-                write_text(path, each.text)
-            except OSError as error:
-                raise unwritable(options.out, error) from error
+        replaced = [path for each in made if resolved(path := folder / each.name) in kept]
+        if replaced:
+            raise SettingsError(
+                f"--export {kind.value} would replace {replaced[0]}, which is imported", "name another --out"
+            )
+        with written_together(folder, *(each.name for each in made)) as place:
+            for each in made:
+                write_text(place / each.name, each.text)
         written.append(Exported(kind, tuple(folder / each.name for each in made)))
     return tuple(written)
 

@@ -15,7 +15,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from tests.bench.machine import machine
-from tests.system.hostile import clocks, crowds, full_disks, lies, lying_host
+from tests.system.hostile import clocks, crowds, full_disks, killed, lies, lying_host
 from tests.system.hostile.attack import Attack, Outcome, Rounds
 
 ATTACKS: Final[tuple[Attack, ...]] = (
@@ -25,6 +25,7 @@ ATTACKS: Final[tuple[Attack, ...]] = (
     *lying_host.LONG,
     *crowds.LONG,
     *full_disks.LONG,
+    *killed.LONG,
 )
 _START_S: Final = 4.0
 """About this much of an attack's share goes to starting and ending the programs."""

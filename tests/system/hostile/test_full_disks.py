@@ -2,13 +2,13 @@
 
 import pytest
 
-from tests.system.hostile.full_disks import VERBS, can_mount, in_namespace
+from tests.system.hostile.full_disks import VERBS, can_mount, on_full_disks
 
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     """What was wrong, by verb and room."""
-    return in_namespace(tmp_path_factory.mktemp("full"))
+    return on_full_disks(tmp_path_factory.mktemp("full"))
 
 
 @pytest.mark.skipif(not can_mount(), reason="no mount namespace can be made here")
