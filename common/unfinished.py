@@ -8,7 +8,6 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from types import MethodType
 from typing import Final
 from weakref import WeakMethod
 
@@ -33,7 +32,7 @@ class Removed:
     exit_code: int = 0
 
 
-def weakly(method: MethodType) -> Callable[[], str | None]:
+def weakly(method: Callable[[], str | None]) -> Callable[[], str | None]:
     """Return what calls a method as long as its object lives: the list of what is unfinished must not keep an object alive that nobody else holds."""
     reference = WeakMethod(method)
 

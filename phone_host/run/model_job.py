@@ -127,7 +127,7 @@ def export_model(
     spare_model(read, paths)
     with ExitStack() as files:  # each takes its place when all are written
         for path, kind in paths.items():
-            files.enter_context(replacing(path)).write(mesh_bytes(solid, kind, read.axes))
+            files.enter_context(replacing(path, durable=True)).write(mesh_bytes(solid, kind, read.axes))
     return list(paths)
 
 

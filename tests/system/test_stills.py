@@ -85,7 +85,7 @@ def test_seconds_end_a_run_and_another_commands_report_is_kept(tmp_path: Path) -
     size = ["--board", "9x6", "--square", "25mm", "--out", str(out / "rig.yaml")]
     with host(["calibrate", str(film), str(boards), *size], tmp_path, "calibrate") as calibrating:
         assert calibrating.wait() == 4  # there is no chessboard
-    assert "kept what run had written" in calibrating.stderr
+    assert "what run has written in" in calibrating.stderr
     assert json.loads((out / "report-run.json").read_text())["pairs"] == report["pairs"]
     assert (out / "index-run.html").exists()
     assert json.loads((out / "report.json").read_text())["verdict"] == "reject"

@@ -104,7 +104,7 @@ class _Interrupt:
     def __init__(self, line: int, files: tuple[str, ...]) -> None:
         self._left, self._files = line, files
 
-    def __call__(self, frame: FrameType, event: str, argument: object) -> object:
+    def __call__(self, frame: FrameType, event: str, argument: object) -> "_Interrupt | None":
         del argument
         if not frame.f_code.co_filename.endswith(self._files):
             return self if event == "call" else None

@@ -77,13 +77,12 @@ def test_an_earlier_result_stays_where_a_later_one_is_ended_early(
     assert code in {0, 4}
     before = visible(out)
     capsys.readouterr()
+    partial, restart = out / f"partial-{verb}", ["--restart"] if verb == "scan" else []
     for _ in range(2 if verb == "stereo" else 1):  # the second partial set takes the place of the first
         second_pair.path, second_pair.is_out_of_memory = "left/1.png", is_out_of_memory
-        restart = ["--restart"] if verb == "scan" else []
         assert main([*words, *restart]) == (4 if is_out_of_memory else 130)
         told = capsys.readouterr().err
         assert visible(out) == before | {name: data for name, data in visible(out).items() if "submap" in name}
-        partial = out / f"partial-{verb}"
         report = json.loads((partial / "report.json").read_text())
         assert report["interrupted_of"] == 2
         assert (
@@ -133,14 +132,13 @@ def test_a_run_that_ends_before_its_pairs_replaces_no_whole_one(given: Path, tmp
 
 def test_notes_in_a_partial_set_stay(tmp_path: Path) -> None:
     """What somebody put beside the results of a part is kept under a name of its own when a whole set comes; a file of the partial set's name keeps the results hidden."""
-    folder = ListedFolder(tmp_path, r"a\.txt", command="stereo")
+    folder, partial = ListedFolder(tmp_path, r"a\.txt", command="stereo"), tmp_path / "partial-stereo"
     for number in range(2):
         with folder:
             folder.stage()
             folder.add("a.txt")
             folder.write_text("a.txt", str(number))
-            partial = folder.keep_staged()
-        assert partial == tmp_path / "partial-stereo"
+            assert folder.keep_staged() == partial
         assert (partial / "a.txt").read_text() == str(number)
     (partial / "notes.txt").write_text("mine")
     with folder:

@@ -47,11 +47,11 @@ def write_exports(
     written = []
     for kind, made in texts:
         folder = options.out.parent / kind.value
-        replaced = [path for each in made if resolved(path := folder / each.name) in kept]
-        if replaced:
-            raise SettingsError(
-                f"--export {kind.value} would replace {replaced[0]}, which is imported", "name another --out"
-            )
+        for path in (folder / each.name for each in made):
+            if resolved(path) in kept:
+                raise SettingsError(
+                    f"--export {kind.value} would replace {path}, which is imported", "name another --out"
+                )
         with written_together(folder, *(each.name for each in made)) as place:
             for each in made:
                 write_text(place / each.name, each.text)

@@ -21,7 +21,7 @@ from phone_host.calibration.sheets.screen import ScreenBoard, screen_board
 from phone_host.calibration.sheets.sheet import Paper, Sheet
 from phone_host.calibration.sheets.svg import svg
 from phone_host.calibration.target import Board
-from phone_host.output.atomic import write_bytes, write_text
+from phone_host.output.atomic import replacing
 from phone_host.output.json_text import json_text
 from phone_host.verbs.output_folders import require_folder, unwritable
 from phone_host.verbs.units import length_mm, square_mm
@@ -62,7 +62,8 @@ def run(options: argparse.Namespace) -> int:
     try:
         make_folder(options.out)
         for name, content in made.files.items():
-            _write(options.out / name, content)
+            with replacing(options.out / name, durable=True) as file:
+                file.write(content)
     except OSError as error:
         raise unwritable(options.out, error) from error
     files = [str(options.out / name) for name in made.files]
@@ -88,13 +89,6 @@ def _spare(out: Path, made: _Made) -> None:
             is_other = True
         if is_other:
             raise UnavailableError(f"{path} is another file, and would be replaced", "move it, or name another --out")
-
-
-def _write(path: Path, content: bytes) -> None:
-    if path.suffix == ".svg":
-        write_text(path, content.decode("ascii"))
-    else:
-        write_bytes(path, content)
 
 
 def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
