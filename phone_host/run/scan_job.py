@@ -156,6 +156,7 @@ class _Work:
         try:
             with noted_if_out_of_memory(f"{left} and {right}"):
                 self._pairs.append(self._taken(name, left, right))
+                self.kept.after_pair()  # an interrupt here finds the pair in the report, too
         except DataError as error:
             if self._cores.has_none:  # no pair can be computed without one
                 raise
@@ -175,7 +176,6 @@ class _Work:
         ):  # 0, 1, 2, 4, 8 ...: what is wrong with a rig is wrong with all of its pairs
             self._judge(core, processed)
         pair = self.scan.take(name, float(name) if self._job.files.by_number else float(index), processed)
-        self.kept.after_pair()
         if pair.weakness.advice:
             self._watcher.say(f"{name}: {pair.weakness.advice}")
         return pair
