@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.graph import Loop, connected, settled
+from phone_host.scan.graph import Loop, connected, settled, without_outliers
 
 TRUTH = {at: SE3.of(np.array([0.3 * at, -0.2 * at, 0.5 * at, 0.4 * at, 0.1 * at**2, -0.3 * at])) for at in range(5)}
 
@@ -58,3 +58,38 @@ def test_pieces_without_loops_stay() -> None:
     assert found[4] is start[4]
     assert found[3] is start[3]
     assert settled(start, [], 0) == start
+
+
+def shifted(x_m: float) -> SE3:
+    """Somewhere along a straight way."""
+    return SE3(np.eye(3), np.array([x_m, 0.0, 0.0]))
+
+
+def tracked(here: int) -> Loop:
+    """What tracking says of two parts 1 m apart."""
+    step = shifted(1.0)
+    return Loop(here=here, there=here + 1, here_there=step, turn=0.02, shift_m=0.06, is_tracked=True)
+
+
+def recognised(here: int, there: int, x_m: float) -> Loop:
+    """What a view that was recognised says of two parts."""
+    return Loop(here=here, there=there, here_there=shifted(x_m), turn=0.006, shift_m=0.01)
+
+
+def test_ties_do_not_shield_a_wrong_loop() -> None:
+    """Two loops side by side that agree are 0.5 m off, and the ties take that up; three true ones contradict them: the two are gone, the three stay."""
+    believed, ties = {at: shifted(float(at)) for at in range(9)}, [tracked(at) for at in range(8)]
+    right, wrong = (
+        [recognised(0, 6, 6.02), recognised(0, 7, 7.02), recognised(1, 8, 7.01)],
+        [recognised(0, 3, 3.5), recognised(0, 4, 4.5)],
+    )
+    found = without_outliers(believed, [*ties, *wrong, *right], 0, 4.0)
+    assert found.loops == (*ties, *right)
+    assert all(abs(found.poses[at].t_m[0] - at) < 0.03 for at in range(9))
+
+
+def test_drift_that_true_loops_take_out_makes_none_of_them_wrong() -> None:
+    """Tracking has lost 3 % of the way: loops that say so all stay, as does one that alone connects two parts."""
+    believed, ties = {at: shifted(float(at)) for at in range(10)}, [tracked(at) for at in range(8)]
+    loops = [recognised(0, 6, 6.18), recognised(0, 7, 7.2), recognised(1, 8, 7.22), recognised(4, 9, 7.0)]
+    assert without_outliers(believed, [*ties, *loops], 0, 4.0).loops == (*ties, *loops)
