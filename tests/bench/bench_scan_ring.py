@@ -3,9 +3,10 @@
 A camera goes around a rendered corridor, twice by default. Its walls, floor and posts repeat every 3 m, or nowhere (`--walls unlike --doors unlike`).
 Pairs are rendered, matched and scanned as `phone-host scan` does, with a rig that is rectified exactly.
 
-wrong: pairs in the model whose motion since the last such pair is more than 0.25 m or 6 degrees off. loops: closed between views half a lap apart
-and more, whose motion is as near to the truth; wrong loops: the others. ATE: of all pairs in the model, in the end. out: pairs that are not in the model. Pairs are kept in the folder of `--cache`,
-so that a second run of the same ring does not render again. Exit 4 when a figure is missed.
+wrong: pairs that have a row in the trajectory, in the model or not, and whose motion since the last such pair is more than 0.25 m or 6 degrees off: when they
+were taken, or in the end. loops: closed between views half a lap apart and more, whose motion is as near to the truth; wrong loops: the others. ATE: of all
+rows of the trajectory, in the end. out: pairs that are not in the model; of these, rowless ones have no row either. Pairs are kept in the folder of
+`--cache`, so that a second run of the same ring does not render again. Exit 4 when a figure is missed.
 """
 
 import argparse
@@ -31,6 +32,7 @@ from phone_host.model import Processed, RectifiedPair
 from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import PoseSource, ScannedPair
 from phone_host.scan.stretches import ClosedLoop
 from phone_host.scan.tracker import Tracker
 from phone_host.stereo.match import MatchSettings, create_matcher
@@ -41,6 +43,9 @@ from tests.bench.trajectory_errors import trajectory_errors
 
 _DISPARITIES: Final = 96
 _WRONG_M, _WRONG_RAD = 0.25, 0.105
+_MAX_OUT: Final = 0.05
+"""Share of the pairs of a ring: a scan that believes nothing has no wrong places either."""
+
 _MOST_ATE_MM: Final = {Walls.REPEATED: 100.0, Walls.UNLIKE: 56.0}
 
 
@@ -51,6 +56,7 @@ class Row:
     ring: Ring
     pairs: int
     out: int
+    rowless: int
     states: dict[str, int]
     wrong: int
     loops: int
@@ -90,8 +96,10 @@ def run(ring: Ring, options: argparse.Namespace) -> Row:
     cache = None if options.cache is None else options.cache / _key(ring)
     pairs, console = processed(scene, cache), Console(stderr=True)
     shown = track(pairs, "scanning", len(scene.poses), console=console, disable=not console.is_terminal)
+    taken = []
     for number, each in enumerate(shown):
         pair = scan.take(str(number), float(number), each)
+        taken.append(pair)
         if options.trace:
             off = (scene.poses[number].inverse() @ scene.poses[0] @ pair.world_camera).pose()
             figures = f"{pair.corners} {pair.overlap:.2f} {np.linalg.norm(off[3:]):.3f} {np.linalg.norm(off[:3]):.3f}"
@@ -99,17 +107,18 @@ def run(ring: Ring, options: argparse.Namespace) -> Row:
     scan.model()
     tracker = scan.tracker
     assert isinstance(tracker, Tracker)
-    fused = [at for at, pair in enumerate(scan.pairs) if pair.is_fused]
-    found, truth = [scan.pairs[at].world_camera for at in fused], [scene.poses[at] for at in fused]
+    rows = _rows(scan.pairs)
+    found, truth = [scan.pairs[at].world_camera for at in rows], [scene.poses[at] for at in rows]
     # Half a lap has some turns more than pairs along the way.
     loops = [loop for loop in tracker.closed_loops if loop.there - loop.here > scene.round_m / ring.step_m / 2]
     closed = [_is_near(loop.here_there, _between(scene, loop)) for loop in loops]
     return Row(
         ring=ring,
         pairs=len(scan.pairs),
-        out=len(scan.pairs) - len(fused),
+        out=len(scan.pairs) - scan.fused,
+        rowless=len(scan.pairs) - len(rows),
         states=dict(Counter(f"{pair.state.value}, {pair.weakness.value}" for pair in scan.pairs)),
-        wrong=sum(not _is_near(*steps) for steps in zip(_steps(found), _steps(truth), strict=True)),
+        wrong=len(_wrong(taken, scene.poses) | _wrong(scan.pairs, scene.poses)),
         loops=sum(closed),
         wrong_loops=len(closed) - sum(closed),
         ate_mm=trajectory_errors(found, truth).ate_mm,
@@ -122,8 +131,20 @@ def _key(ring: Ring) -> str:
     return hashlib.sha256(repr(ring).encode()).hexdigest()[:16]
 
 
-def _steps(poses: Sequence[SE3]) -> list[SE3]:
-    return [one.inverse() @ other for one, other in pairwise(poses)]
+def _rows(pairs: Sequence[ScannedPair]) -> list[int]:
+    """Return the numbers of the pairs that have a row in the trajectory."""
+    return [at for at, pair in enumerate(pairs) if pair.pose_source is not PoseSource.NONE]
+
+
+def _wrong(pairs: Sequence[ScannedPair], truth: Sequence[SE3]) -> set[int]:
+    """Return the numbers of the pairs at wrong places, as seen from the row before."""
+    return {
+        there
+        for here, there in pairwise(_rows(pairs))
+        if not _is_near(
+            pairs[here].world_camera.inverse() @ pairs[there].world_camera, truth[here].inverse() @ truth[there]
+        )
+    }
 
 
 def _between(scene: RingScene, loop: ClosedLoop) -> SE3:
@@ -138,7 +159,8 @@ def _is_near(found: SE3, truth: SE3) -> bool:
 
 def verdicts(rows: Sequence[Row]) -> list[Verdict]:
     """Judge all rings."""
-    worst = max(row.ate_mm for row in rows)
+    worst = float(np.max([row.ate_mm for row in rows]))  # NaN, of a ring without a trajectory, is no pass
+    out = float(np.max([row.out / row.pairs for row in rows]))
     limit = max(_MOST_ATE_MM[row.ring.walls] for row in rows)
     wrong, wrong_loops = sum(row.wrong for row in rows), sum(row.wrong_loops for row in rows)
     bare = sum(row.ring.laps > 1 and not row.loops for row in rows)
@@ -146,6 +168,7 @@ def verdicts(rows: Sequence[Row]) -> list[Verdict]:
         Verdict("wrong places", wrong == 0, f"{wrong}", "0"),
         Verdict("wrong loops", wrong_loops == 0, f"{wrong_loops}", "0"),
         Verdict("rings of more than a lap without a loop", bare == 0, f"{bare}", "0"),
+        Verdict("pairs out of a ring's model", out <= _MAX_OUT, f"{out:.1%}", f"at most {_MAX_OUT:.0%}"),
         Verdict("worst ATE", worst <= limit, f"{worst:.0f} mm", f"at most {limit:g} mm"),
     ]
 
@@ -208,7 +231,7 @@ def _print(rows: Sequence[Row]) -> None:
     for row in rows:
         ring = row.ring
         print(
-            f"seed {ring.seed}, {ring.walls.value}, period {ring.period_m:g} m, {ring.size_m[0]:g} x {ring.size_m[1]:g} m: {row.pairs} pairs, {row.out} out, wrong {row.wrong}, "
+            f"seed {ring.seed}, {ring.walls.value}, period {ring.period_m:g} m, {ring.size_m[0]:g} x {ring.size_m[1]:g} m: {row.pairs} pairs, {row.out} out, {row.rowless} without a row, wrong {row.wrong}, "
             f"loops {row.loops}, wrong loops {row.wrong_loops}, ATE {row.ate_mm:.0f} mm, {row.seconds:.0f} s; {row.states}",
             flush=True,
         )
