@@ -21,7 +21,7 @@ from phone_host.scan.cells import Cells
 from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings
 
-_HEAD: Final = b"tandemscan field 2\n"
+_HEAD: Final = b"tandemscan field 3\n"
 _LEVEL: Final = 1
 """Ten times as fast as the usual 6, for a tenth more bytes."""
 
@@ -154,7 +154,9 @@ def arrays_of(field: KeptField) -> Arrays:
     """Return what `field_in` reads."""
     of, blocks, carved = field.settings, field.blocks, field.carved
     return {
-        "model": np.array([of.voxel_m, of.far_m, of.most_bytes, of.truncation_voxels], np.float64),
+        "model": np.array(
+            [of.voxel_m, of.far_m, of.most_bytes, of.truncation_voxels, of.near_m, of.noise_per_m], np.float64
+        ),
         "block_places": blocks.places,
         "field": blocks.field,
         "weights": blocks.weights,
@@ -172,12 +174,18 @@ def field_in(held: Arrays) -> KeptField:
     Raises:
         ValueError, KeyError: they hold none.
     """
-    voxel_m, far_m, most_bytes, truncation_voxels = held["model"].astype(np.float64).tolist()
+    voxel_m, far_m, most_bytes, truncation_voxels, near_m, noise_per_m = held["model"].astype(np.float64).tolist()
     is_possible = _FINEST_M <= voxel_m < 1 and 0 < far_m <= _FARTHEST_M
+    is_possible &= 0 <= near_m <= _FARTHEST_M and 0 <= noise_per_m <= _FARTHEST_M
     if not (is_possible and 0 < most_bytes < 1e15 and 1 <= truncation_voxels < 100):
         raise ValueError("impossible settings")
     settings = VolumeSettings(
-        voxel_m=voxel_m, far_m=far_m, most_bytes=int(most_bytes), truncation_voxels=truncation_voxels
+        voxel_m=voxel_m,
+        far_m=far_m,
+        most_bytes=int(most_bytes),
+        truncation_voxels=truncation_voxels,
+        near_m=near_m,
+        noise_per_m=noise_per_m,
     )
     count = len(held["block_places"])
     blocks = BlockValues(

@@ -47,7 +47,14 @@ def fineness_for(view: View, voxel_m: float, most_bytes: int) -> VolumeSettings:
     wide = max(_TRUNCATION_VOXELS, _SIGMAS * noise_m / voxel_m, far_noise_m / voxel_m)
     truncation = min(wide, _MOST_TRUNCATION_VOXELS)
     far_m = max(math.sqrt(truncation * voxel_m / view.noise_per_m), near_m)
-    return VolumeSettings(voxel_m=voxel_m, far_m=far_m, most_bytes=most_bytes, truncation_voxels=truncation)
+    return VolumeSettings(
+        voxel_m=voxel_m,
+        far_m=far_m,
+        most_bytes=most_bytes,
+        truncation_voxels=truncation,
+        near_m=near_m,
+        noise_per_m=view.noise_per_m,
+    )
 
 
 def thinner(settings: VolumeSettings, share: float) -> VolumeSettings:

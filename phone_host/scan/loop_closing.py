@@ -6,7 +6,7 @@ put the stretches; each moves as a whole, and the field is built again from the 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from phone_host.geometry.se3 import SE3
@@ -143,7 +143,7 @@ class LoopCloser:
         self._stretches.move(by)
         model.places.move([by[stretch] for stretch in self._stretch_of])
         model.volume.emptied()
-        placed = [each for stretch in range(self._stretches.count) for each in self._stretches.views(stretch)]
+        placed = [replace(each, by=by[at]) for at in range(len(by)) for each in self._stretches.views(at)]
         self._fuse(model, placed[:-1], step)
         model.volume.fuse(self._newest, placed[-1].world_camera)  # whole: the next view follows it
         self._is_coarse = step > 1

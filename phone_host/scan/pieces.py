@@ -4,19 +4,21 @@ A camera that is lost begins a piece. A view that belongs to one and shows a pla
 with the model are put where all loops agree best (`graph`), and taken into its field; they move as a whole and are never warped.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.blocks import BLOCK_BYTES
-from phone_host.scan.graph import Loop, connected, without_outliers
+from phone_host.scan.graph import Loop, chained, connected, without_outliers
+from phone_host.scan.map_fragment import Found, FragmentView, Joined, Joining, MapFragment
+from phone_host.scan.model_motion import ModelMotion
 from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import STANDING, Piece, PoseGate
 from phone_host.scan.registration import Registered
-from phone_host.scan.relocalisation import Evidence, Sighting, are_independent, is_still_here, sighted
+from phone_host.scan.relocalisation import Evidence, PoseSupport, Sighting, are_independent, pose_support, sighted
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view
 from phone_host.scan.volume_settings import VolumeSettings
@@ -44,65 +46,6 @@ _MOST_SIGHTINGS: Final = 32
 """Of a piece that wait for a second one which agrees."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Joined:
-    """A view that was lost and has become part of the model.
-
-    Attributes:
-        number: of the view: 1 is the first that was tracked.
-        world_camera: where it was taken.
-        state: how sure that is.
-        weakness: why it is not surer.
-    """
-
-    number: int
-    world_camera: SE3
-    state: Tracking
-    weakness: Weakness
-
-
-@dataclass(frozen=True, slots=True)
-class Joining:
-    """What came of joining a piece to the model.
-
-    Attributes:
-        views: its views, which are part of the model now; none: it stays apart.
-        is_refused: whether the piece's own surface does not fit the model where it would lie.
-    """
-
-    views: tuple[Joined, ...] = ()
-    is_refused: bool = False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """A piece to which a view belongs, where it was taken in its axes, and how it lies there."""
-
-    piece: Piece
-    pose: SE3
-    fit: Registered
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Fused:
-    """A view of a piece: its number, where it was taken in the piece's axes, and why that is not surer."""
-
-    number: int
-    pose: SE3
-    weakness: Weakness
-
-
-class _Apart:
-    """A piece, where it is believed to be in the world, and its views."""
-
-    def __init__(self, piece: Piece, world_piece: SE3) -> None:
-        self.piece, self.world_piece = piece, world_piece
-        self.views: list[_Fused] = []
-        self.unconfirmed: list[
-            tuple[SE3, SE3]
-        ] = []  # views that saw the model where the piece can hardly be: their poses in either's axes
-
-
 class Pieces:
     """All pieces of a scan.
 
@@ -126,7 +69,7 @@ class Pieces:
         self._settings, self._threads, self._gate, self._library = settings, threads, gate, library
         self._coarsens = coarsens
         self.model = Piece(settings, threads, gate, library)
-        self._apart: dict[int, _Apart] = {}
+        self._apart: dict[int, MapFragment] = {}
         self._loops: list[Loop] = []
         self._active, self._next = _MODEL, _MODEL + 1
         self._beliefs = {_MODEL: Belief.at(SE3.identity())}  # in the axes of each piece
@@ -135,6 +78,7 @@ class Pieces:
         ] = {}  # where the camera was last in each piece, and what was believed then
         self._usual = UsualStep()
         self.is_ambiguous = False  # whether the last view shows a place, but not surely
+        self._is_held = False  # whether a plain surface alone holds the last view: that tells no motion along it
 
     @property
     def active(self) -> Piece:
@@ -158,7 +102,8 @@ class Pieces:
             moved: what odometry says.
             views: of the usual steps, how many may have passed, >= 1.
         """
-        self.is_ambiguous, is_followed = False, moved.is_known and moved.inliers >= self._gate.weak_inliers
+        self.is_ambiguous = self._is_held = False
+        is_followed = moved.is_known and moved.inliers >= self._gate.weak_inliers
         if is_followed:
             self._usual = self._usual.after(moved.before_now)
         for number, belief in self._beliefs.items():
@@ -167,9 +112,13 @@ class Pieces:
     def followed(self, pose: SE3) -> None:
         """Note where the camera is in the piece that is tracked: that tells how it has moved since it was last there, also where odometry does not.
 
+        A plain surface that only holds the view tells neither.
+
         Args:
             pose: in the piece's axes.
         """
+        if self._is_held:
+            return
         before, beliefs = self._last.get(self._active, (pose, {}))
         step = (before.inverse() @ pose).exact()
         for number in beliefs.keys() & self._beliefs.keys() - {self._active}:
@@ -177,6 +126,8 @@ class Pieces:
         self._beliefs[self._active] = Belief.at(pose)
 
     def _note(self, pose: SE3) -> None:
+        if self._is_held:
+            return
         self._beliefs[self._active] = Belief.at(pose)
         self._last[self._active] = pose, dict(self._beliefs)
 
@@ -184,15 +135,20 @@ class Pieces:
         """Note that the camera was last at a pose in the model, and that nobody knows what has happened since."""
         self._beliefs = {_MODEL: replace(Belief.at(pose).jumped(UsualStep()), is_open=True)}
 
-    def is_here(self, view: View, fit: Registered) -> bool:
-        """Return whether a view that fits where it is expected in the piece that is tracked may be believed to be there.
+    def is_here(self, view: View, believed: SE3, fit: Registered) -> bool:
+        """Return whether a view that fits where it is expected in the piece that is tracked may be taken into it there.
 
         Args:
             view: with depth.
+            believed: from where it was laid against the surface, in the piece's axes.
             fit: how it lies there.
         """
         belief = self._belief(self._active)
-        return not belief.is_broken or is_still_here(self.active, view, belief, fit)
+        if not belief.is_broken:
+            return True
+        support = pose_support(self.active, view, belief, believed @ fit.start_now, fit.told)
+        self._is_held = support is PoseSupport.SURFACE
+        return support is not PoseSupport.NONE
 
     def begin(self, number: int, view: View, believed: SE3, why: Weakness) -> SE3 | None:
         """Begin a piece.
@@ -217,7 +173,7 @@ class Pieces:
             return world
         piece = Piece(replace(self._settings, most_bytes=room), self._threads, self._gate, self._library)
         self._active, self._next = self._next, self._next + 1
-        self._apart[self._active] = _Apart(piece, world)
+        self._apart[self._active] = MapFragment(piece, world)
         self.fuse_apart(number, view, SE3.identity(), why, None)
         return SE3.identity()
 
@@ -234,7 +190,7 @@ class Pieces:
         of = self._apart[self._active]
         of.piece.fuse(view, pose, fit)
         self._note(pose)
-        of.views.append(_Fused(number, pose, weakness))
+        of.views.append(FragmentView(number, pose, weakness))
 
     def fuse(self, view: View, pose: SE3, fit: Registered | None) -> None:
         """Take a view into the model, which is tracked. Where it needs the memory of the pieces beside it, they are given up, the one with the fewest views first.
@@ -260,13 +216,27 @@ class Pieces:
         """Track in another piece from now on."""
         self._active = next((number for number, of in self._apart.items() if of.piece is piece), _MODEL)
 
-    def placed(self, pose: SE3) -> None:
-        """Note that the model was moved, and the camera with it.
+    def model_moved(self, motion: ModelMotion) -> None:
+        """Carry everything that is known in the model's axes along with a model that loops have moved.
+
+        Loops between fragments are not in these axes, and none with the model outlasts `join`.
 
         Args:
-            pose: of the camera in the model, which is tracked.
+            motion: of the model.
         """
-        self._note(pose)
+
+        def carried(beliefs: dict[int, Belief]) -> dict[int, Belief]:
+            of = beliefs.get(_MODEL)
+            return beliefs if of is None else {**beliefs, _MODEL: replace(of, anchor=motion.carry(of.anchor))}
+
+        self._beliefs = carried(self._beliefs)
+        self._last = {
+            number: (motion.carry(pose) if number == _MODEL else pose, carried(beliefs))
+            for number, (pose, beliefs) in self._last.items()
+        }
+        for of in self._apart.values():
+            of.world_piece = motion.carry(of.world_piece)
+            of.unconfirmed = [(here, motion.carry(there)) for here, there in of.unconfirmed]
 
     def recognised(self, view: View) -> Found | None:
         """Find a piece, one of whose places a view shows, and lay it there: first that which is tracked, where the camera is known best, then the model."""
@@ -338,13 +308,12 @@ class Pieces:
         is_refused = refused > (0 if is_strict else len(others))
         if is_refused or len(others) < least:
             return Joining(is_refused=is_refused)
-        self._loops += [loop, *others]
-        self._start(loop)
+        loops = [loop, *self._loops, *others]
         believed = {_MODEL: SE3.identity()} | {at: of.world_piece for at, of in self._apart.items()}
-        graph = without_outliers(believed, self._loops, _MODEL, _MOST_SIGMAS)
-        self._loops = list(graph.loops)
-        if loop not in self._loops:
+        graph = without_outliers(chained(believed, loops, _MODEL), loops, _MODEL, _MOST_SIGMAS)
+        if loop not in graph.loops:
             return Joining()
+        self._loops = list(graph.loops)
         joined: list[Joined] = []
         for number in sorted(connected(self._loops, _MODEL) - {_MODEL}):
             joined += self._taken_in(self._apart[number], graph.poses[number])
@@ -376,29 +345,13 @@ class Pieces:
     def _loop(self, here: int, here_active: SE3) -> Loop:
         return Loop(here=here, there=self._active, here_there=here_active, turn=_LOOP_TURN, shift_m=_LOOP_SHIFT_M)
 
-    def _start(self, first: Loop) -> None:
-        """Put the pieces where the loops, one after another, put them: the graph goes on from there."""
-        self._apart[first.there].world_piece, known, waiting = first.here_there, {_MODEL, first.there}, [first.there]
-        while waiting:
-            at = waiting.pop()
-            for loop in self._loops:
-                if loop.here == at and loop.there not in known:
-                    other, there = loop.there, self._apart[at].world_piece @ loop.here_there
-                elif loop.there == at and loop.here not in known:
-                    other, there = loop.here, self._apart[at].world_piece @ loop.here_there.inverse()
-                else:
-                    continue
-                self._apart[other].world_piece = there
-                known.add(other)
-                waiting.append(other)
-
     def _coarsen(self) -> None:
         """Make all fields coarser: a piece is averaged into the model, so their voxels are as wide."""
         for piece in (self.model, *(of.piece for of in self._apart.values())):
             piece.volume.coarsen()
         self._settings = self._settings.coarser
 
-    def _taken_in(self, of: _Apart, world_piece: SE3) -> list[Joined]:
+    def _taken_in(self, of: MapFragment, world_piece: SE3) -> list[Joined]:
         self.model.volume.take_in(of.piece.volume, world_piece)
         self.model.places.add(of.piece.places.moved(world_piece))
         result = []

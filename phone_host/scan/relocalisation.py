@@ -22,7 +22,6 @@ from phone_host.geometry.se3 import SE3
 from phone_host.scan.motion_belief import Belief, MotionBound
 from phone_host.scan.piece import Lying, Piece
 from phone_host.scan.places import Recognised, are_one_pose, is_bare
-from phone_host.scan.registration import Registered
 from phone_host.scan.view import View
 
 ALL_DIRECTIONS: Final = 6
@@ -58,6 +57,18 @@ class Evidence(Enum):
     AMBIGUOUS = "ambiguous"
     UNCONFIRMED = "unconfirmed"
     BELIEVED = "believed"
+
+
+class PoseSupport(Enum):
+    """What supports the pose of a view that fits where it is expected, while odometry does not follow the camera.
+
+    NONE: the view does not show what was seen from there. SURFACE: it has no features, and its plain surface lies there; the camera may have moved along that.
+    FEATURES: the features agree.
+    """
+
+    NONE = "none"
+    SURFACE = "surface"
+    FEATURES = "features"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,30 +118,31 @@ def _judged(piece: Piece, view: View, belief: Belief, lying: Lying, inliers: int
     return Evidence.BELIEVED if is_close else Evidence.UNCONFIRMED
 
 
-def is_still_here(piece: Piece, view: View, belief: Belief, fit: Registered) -> bool:
-    """Return whether a view that odometry does not follow is where the camera was last, because its depth lies on the surface there.
+def pose_support(piece: Piece, view: View, belief: Belief, pose: SE3, told: int) -> PoseSupport:
+    """Judge a view that odometry does not follow, and whose depth lies on the surface where the camera is expected.
 
-    Rooms have equal corners and equal walls: the features must show what was seen from there, unless there are none; such a view is weak.
+    Rooms have equal corners and equal walls: the features must show what was seen from there. A view without any goes on there, but it tells nothing of where the camera is.
 
     Args:
         piece: with field and places.
         view: with depth.
         belief: where the camera can be in the field's axes.
-        fit: how its depth lies against the surface, from where it was last.
+        pose: at which the view lies on the surface, in these axes.
+        told: directions that the surface tells there.
     """
-    pose, places = belief.pose @ fit.start_now, piece.places
-    if is_bare(view):  # a plain wall: nothing tells that the camera has moved along it, nor that it has not
-        return True
-    if fit.told < ALL_DIRECTIONS or not np.isfinite(pose.pose()).all():
-        return False
-    near = places.near(pose, _SIGHT_M, _SIGHT_DEG)
-    agreed = places.agreed(view, near)
-    if not agreed:
-        return False
-    if not are_one_pose(max(agreed, key=lambda each: each.inliers).world_camera, pose):
-        return False
+    voxel_m = piece.volume.settings.voxel_m
+    if not np.isfinite(pose.pose()).all() or not (belief.is_open or belief.admits(pose, voxel_m)):
+        return PoseSupport.NONE
+    if is_bare(view):
+        return PoseSupport.SURFACE
+    if told < ALL_DIRECTIONS:
+        return PoseSupport.NONE
+    agreed = piece.places.agreed(view, piece.places.near(pose, _SIGHT_M, _SIGHT_DEG))
+    best = max(agreed, key=lambda each: each.inliers, default=None)
+    if best is None or not are_one_pose(best.world_camera, pose):
+        return PoseSupport.NONE
     is_wide = belief.bound.shift_m > _WIDE_M or belief.is_open
-    return not (is_wide and _has_rival(piece, view, belief, pose))
+    return PoseSupport.NONE if is_wide and _has_rival(piece, view, belief, pose) else PoseSupport.FEATURES
 
 
 def shown_place(

@@ -18,9 +18,9 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.kept_depths import KeptDepths
+from phone_host.scan.map_fragment import Joined
 from phone_host.scan.mat_tracker import MatTracker, begun_on_mat
 from phone_host.scan.piece import PoseGate
-from phone_host.scan.pieces import Joined
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap

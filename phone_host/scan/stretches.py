@@ -7,7 +7,7 @@ says where one stretch is as seen from another that was seen long before. All ti
 import heapq
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -47,10 +47,12 @@ class Placed:
     Attributes:
         number: of the view.
         world_camera: where.
+        by: motion of the world by which loops have just brought it there.
     """
 
     number: int
     world_camera: SE3
+    by: SE3 = field(default_factory=SE3.identity)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,7 +17,7 @@ from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.tracker import TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 
-_HEAD: Final = b"tandemscan submap 3\n"
+_HEAD: Final = b"tandemscan submap 4\n"
 _MAT_VALUES: Final = 6
 _RIGID: Final = 1e-4
 _FARTHEST_M: Final = 1e5

@@ -8,6 +8,7 @@ belong to the model, and the piece stays apart (decision 0084). Nothing that a v
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,32 +16,21 @@ import numpy as np
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.loop_closing import LoopCloser, LoopSettings
+from phone_host.scan.map_fragment import Found, Joined, Joining
 from phone_host.scan.mat_pose import MatSaid
-from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
+from phone_host.scan.model_motion import ModelMotion
+from phone_host.scan.odometry import Moved, Odometry
 from phone_host.scan.piece import Piece, PoseGate
-from phone_host.scan.pieces import Found, Joined, Joining, Pieces
+from phone_host.scan.pieces import Pieces
 from phone_host.scan.places import Place
 from phone_host.scan.registration import Registered
+from phone_host.scan.street_tracking import odometry_for, pose_gate_for
 from phone_host.scan.stretches import ClosedLoop, Placed, WayCertainty
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View, reduced
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
-
-_ODOMETRY: Final = OdometrySettings(corners=400, apart_px=8, keyframe_share=0.6, keyframe_after=5)
-"""The model carries the accuracy; odometry, on half the image, only has to start near it. At VGA that saves 20 of 30 ms of processor time."""
-
-_STREET_ODOMETRY: Final = OdometrySettings(corners=400, apart_px=8, keyframe_share=0.7, keyframe_after=1)
-"""In a street odometry carries the accuracy, on the whole image: a depth at 15 m has 0.3 m of noise, and what was fused soon leaves the picture. On 24 pairs
-of KITTI the trajectory is 22 mm off, where half the image gives 131 mm; 1000 corners give 32 mm and take twice the time."""
-
-_POOR_NOISE_PER_M: Final = 0.006
-"""Noise of a depth 1 m away, m, from which a keyframe's new points are so far off that each view as a keyframe harms: with 0.010 (f = 400 px, b = 0.12 m) a
-rendered street's trajectory is 106 mm off, with every fifth view as a keyframe 29 mm; with 0.004 (b = 0.3 m) 17 and 22 mm."""
-
-_STREET_GATE: Final = PoseGate(most_shift_m=0.25, least_overlap=0.2)
-"""In a street a place tells the pose to some decimetres, and of what a car sees a fifth to a third lies on the model 1.2 m farther on; near 1.00 of it fits."""
 
 _SURE_SHARE, _SUREST_PX, _LEAST_SURE_PX = 0.1, 0.25, 1.0
 """How far off a view's pixels are after odometry: a share of the way of the corners, px, between the two. On real rooms and streets 1 px, 3 mm at 2 m. A camera at
@@ -137,13 +127,11 @@ class Tracker:
         coarsens: bool = False,
     ) -> None:
         found = native() if library is None else library
-        usual = _STREET_GATE if settings.is_of_street else PoseGate()
-        self._gate = usual if gate is None else gate
+        self._gate = pose_gate_for(settings) if gate is None else gate
         self._pieces = Pieces(settings, threads, self._gate, found, coarsens=coarsens)
         self._loops = None if loops is None else LoopCloser(loops, self._pieces.model, threads, self._gate, found)
         self._settings = settings
-        is_exact = settings.noise_per_m < _POOR_NOISE_PER_M
-        self._odometry = Odometry(_STREET_ODOMETRY if settings.is_of_street and is_exact else _ODOMETRY)
+        self._odometry = Odometry(odometry_for(settings))
         self._pose = SE3.identity() if start is None else start  # in the axes of the piece that is tracked
         self._was_lost = False
         self._waiting: _Waiting | None = None
@@ -193,7 +181,7 @@ class Tracker:
         doubt = active.doubt(moved, fit)
         if doubt is Weakness.LITTLE_OVERLAP and self.volume.left_out and self.volume.is_nearly_full:
             doubt = Weakness.FULL
-        if doubt is Weakness.NONE and not self._pieces.is_here(view, fit):
+        if doubt is Weakness.NONE and not self._pieces.is_here(view, believed, fit):
             doubt = Weakness.TOO_FAST
         if doubt is Weakness.NONE:
             pose, weakness = (believed @ fit.start_now).exact(), self._weakness(moved, fit)
@@ -208,9 +196,19 @@ class Tracker:
             return ()
         placed = self._loops.settled()
         if placed and self._pieces.active is self._model:
-            self._pose = placed[-1].world_camera
-            self._pieces.placed(self._pose)
+            self._pose = (placed[-1].by @ self._pose).exact()
+        self._carry(placed)
         return placed
+
+    def _carry(self, placed: Sequence[Placed]) -> None:
+        """Carry what is known in the model's axes along with a model that loops have moved; no views: they have not."""
+        if not placed:
+            return
+        motion = ModelMotion.of(placed)
+        self._pieces.model_moved(motion)
+        if self._waiting is not None:
+            found = self._waiting.found
+            self._waiting = replace(self._waiting, found=replace(found, pose=motion.carry(found.pose)))
 
     def kept(self, places_before: int) -> TrackerState:
         """Return what a later tracker needs to go on, beside the model's blocks.
@@ -362,7 +360,7 @@ class Tracker:
         placed = self._looped(view, pose, joined)
         self._was_lost, self._pose = False, placed[-1].world_camera if placed else pose
         self._is_followed = True
-        self._pieces.placed(self._pose)
+        self._carry(placed)
         return Tracked(
             world_camera=self._pose,
             state=state,

@@ -23,9 +23,9 @@ from phone_host.scan.cells import Cells
 from phone_host.scan.fineness import fineness_for, thinner
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.ground import Ground
+from phone_host.scan.map_fragment import Joined
 from phone_host.scan.merged_field import merged
 from phone_host.scan.piece import PoseGate
-from phone_host.scan.pieces import Joined
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted

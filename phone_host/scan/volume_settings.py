@@ -1,6 +1,5 @@
 """How fine a volume is, how far it sees, and how much memory it may take. Pure."""
 
-import math
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -18,9 +17,6 @@ LEAST_WEIGHT: Final = 8
 STREET_NEAR_M: Final = 5.0
 """The nearest quarter of the depths ends here or beyond: in a street 8 to 11 m, in two rooms 1.4 to 1.7 m."""
 
-_STREET_REACH_M: Final = math.sqrt(3) * STREET_NEAR_M
-"""So far the model of a street reaches at least (`fineness`): its truncation is three times the noise of the near depths."""
-
 _SURE_VOXELS: Final = 0.5
 
 
@@ -34,12 +30,17 @@ class VolumeSettings:
         most_bytes: memory of the blocks at most.
         truncation_voxels: distance from the surface, voxels, to which the field tells it; three or four standard deviations of the farthest
             depths, but thin parts must be thicker than that.
+        near_m: depth at which the nearest quarter of the first view's depths ends, m; 0: not known.
+        noise_per_m: noise of the rig's depths 1 m away, m; 0: not known. Neither follows from voxels and reach, which the user may choose, and which
+            change where the memory is full.
     """
 
     voxel_m: float = 0.01
     far_m: float = 4.0
     most_bytes: int = 300_000_000
     truncation_voxels: float = 4.0
+    near_m: float = 0.0
+    noise_per_m: float = 0.0
 
     @property
     def truncation_m(self) -> float:
@@ -53,13 +54,8 @@ class VolumeSettings:
 
     @property
     def is_of_street(self) -> bool:
-        """Whether the model reaches as far as that of a street: corners tell poses better there than its wide voxels do."""
-        return self.far_m >= _STREET_REACH_M
-
-    @property
-    def noise_per_m(self) -> float:
-        """Noise of a depth 1 m away, m, for which `fineness` chose the reach: at its end the noise is as large as the truncation."""
-        return self.truncation_m / self.far_m**2
+        """Whether the near depths are those of a street: corners tell poses better there than its wide voxels do."""
+        return self.near_m >= STREET_NEAR_M
 
     @property
     def coarser(self) -> "VolumeSettings":

@@ -23,7 +23,7 @@ from tests.scan.test_scan_submaps import POSES, WANTED, taken
 from tests.scan.test_scan_volume import NONE, SETTINGS, filled
 from tests.support.plane_films import GEOMETRY
 
-_SUBMAP, _FIELD = b"tandemscan submap 3\n", b"tandemscan field 2\n"
+_SUBMAP, _FIELD = b"tandemscan submap 4\n", b"tandemscan field 3\n"
 _MOST_MORE_BYTES = 250 << 20
 _SHAPE = (24, 32)
 _LIBRARIES = [NONE, *([native()] if isinstance(native(), Library) else [])]
@@ -59,6 +59,8 @@ ABSURD: dict[str, Callable[[Arrays], None]] = {
     "an endless far limit": _at("model", 1, np.inf),
     "a far limit of a million km": _at("model", 1, 1e9),
     "a far limit that is no number": _at("model", 1, np.nan),
+    "near depths that are no number": _at("model", 4, np.nan),
+    "endless noise": _at("model", 5, np.inf),
     "endless memory": _at("model", 2, np.inf),
     "voxels of a billionth of a mm": _at("model", 0, 1e-12),
     "a pose that is no number": _at("poses", (0, 0, 3), np.nan),

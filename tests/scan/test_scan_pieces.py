@@ -12,9 +12,10 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.loop_closing import LoopSettings
+from phone_host.scan.map_fragment import Joining
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Piece, PoseGate
-from phone_host.scan.pieces import Joining, Pieces
+from phone_host.scan.pieces import Pieces
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracker import Tracked, Tracker

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.places import LEAST_INLIERS, Place, Places
+from phone_host.scan.places import LEAST_INLIERS, Places
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking
 from phone_host.scan.volume_settings import VolumeSettings
@@ -74,19 +74,3 @@ def test_a_place_whose_shape_has_changed_is_not_believed() -> None:
     bumpy = far.depth_m + np.random.default_rng(1).normal(0, 0.09, far.depth_m.shape).astype(np.float32)
     assert tracker.track(replace(far, depth_m=bumpy)).state is Tracking.LOST
     assert np.array_equal(tracker.volume.blocks.weights, before)
-
-
-def test_any_number_of_places_is_compared() -> None:
-    """Among 5000 places, a million descriptors, a view is located by the one that it shows."""
-    random, here = np.random.default_rng(1), plane_view(SE3.identity(), PICTURE, CORNER)
-    shown = Places()
-    shown.remember(here, SE3.identity())
-    others = tuple(
-        Place(SE3.identity(), np.ones((200, 3)), random.integers(0, 256, (200, 32), np.uint8)) for _ in range(4999)
-    )
-    places = Places()
-    places.add((*others, *shown.since(0)))
-    found = places.recognised(here)
-    assert found is not None
-    assert found.number == 4999
-    assert (distance(found.world_camera, SE3.identity()) < (8e-3, 8e-3)).all()

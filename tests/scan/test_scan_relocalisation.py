@@ -11,7 +11,7 @@ from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Pieces
-from phone_host.scan.relocalisation import Evidence, is_still_here, sighted
+from phone_host.scan.relocalisation import Evidence, PoseSupport, pose_support, sighted
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View
@@ -84,10 +84,10 @@ def test_a_scan_that_goes_on_later_is_where_it_was_only_if_no_other_place_looks_
     pieces.model.usual_off_m = 0.004
     pieces.go_on(HERE)
     fit = pieces.model.laid(corner(), HERE)
-    assert pieces.is_here(corner(), fit)
+    assert pieces.is_here(corner(), HERE, fit)
     assert pieces.recognised(corner()) is not None
     pieces.model.fuse(corner(), along(6.0), None)
-    assert not pieces.is_here(corner(), fit)
+    assert not pieces.is_here(corner(), HERE, fit)
     assert pieces.recognised(corner()) is None
     assert pieces.is_ambiguous
 
@@ -99,7 +99,7 @@ def test_a_plane_alone_does_not_hold_a_camera_that_is_not_followed() -> None:
     piece.fuse(wall, HERE, None)
     fit = piece.laid(wall, HERE)
     assert fit.told < 6
-    assert not is_still_here(piece, wall, lost_at(HERE), fit)
+    assert pose_support(piece, wall, lost_at(HERE), HERE @ fit.start_now, fit.told) is PoseSupport.NONE
     assert sighted(piece, plane_view(HERE, texture(5), WALL), lost_at(HERE)).evidence is Evidence.NONE
 
 

@@ -19,6 +19,7 @@ from phone_host.scan.odometry import Odometry, OdometrySettings
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import PoseSource
+from phone_host.scan.street_tracking import odometry_for, pose_gate_for
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.view import View, reduced
@@ -71,6 +72,18 @@ def test_a_table_and_a_room_are_as_fine_as_their_near_depths(near_m: float, far_
     assert not settings.is_of_street
 
 
+@pytest.mark.parametrize("voxel_m", [math.nan, 0.002, 0.1, 0.25])
+@pytest.mark.parametrize("near_m", [0.4, 1.4, 6.0, 10.0])
+def test_rig_and_depths_decide_what_is_a_street(near_m: float, voxel_m: float) -> None:
+    """Not the voxels that the user gives; nor those that became coarser where the memory was full, which a scan that goes on begins with."""
+    is_street, settings = near_m > 5, fineness_for(depths(near_m, 3 * near_m, 525.0, 0.2), voxel_m, 1)
+    coarser = settings.coarser.coarser
+    assert settings.is_of_street is coarser.is_of_street is is_street
+    assert odometry_for(coarser) is odometry_for(settings) is odometry_for(replace(settings, voxel_m=0.01))
+    assert pose_gate_for(coarser) == pose_gate_for(settings)
+    assert (odometry_for(settings).keyframe_after == 1) is is_street
+
+
 @pytest.mark.parametrize("baseline_m", [0.12, 0.3, 1.0])
 def test_a_street_is_tracked_as_well_as_odometry_does(baseline_m: float) -> None:
     """Every view of a car that reverses is fused; the model makes the trajectory no worse than odometry, which is no worse than that of half images."""
@@ -102,6 +115,7 @@ def test_a_model_of_wide_voxels_becomes_coarser_and_goes_on_from_its_submap() ->
     mesh = scan.model().mesh
     assert len(mesh.triangles) > 100
     assert np.array_equal(again.model().mesh.points_m, mesh.points_m)
+    assert again.settings == scan.settings
     assert again.take("5", 5.0, processed_of(views[4])).is_fused
     assert again.take("6", 6.0, processed_of(views[5])).is_fused
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.view import View
-from tests.support.plane_films import Plane, plane_at, plane_view
+from tests.support.plane_films import Plane, nearest_view, plane_at, plane_view
 
 Paper = NDArray[np.uint8]
 
@@ -45,14 +45,5 @@ def room_view(world_camera: SE3, papers: Sequence[Paper], focal_share: float = 1
         for plane, paper in zip(walls(), papers, strict=True)
         if plane.axes[0] @ world_camera.R[:, 2] < 0.2
     ]
-    depths, greys = (np.array([getattr(view, name) for view in views]) for name in ("depth_m", "grey"))
-    nearest = np.argmin(depths, axis=0)[np.newaxis]
-    depth, grey = (np.take_along_axis(each, nearest, axis=0)[0] for each in (depths, greys))
-    of = views[0].geometry
-    return replace(
-        views[0],
-        depth_m=depth,
-        grey=grey,
-        colours=np.repeat(grey[..., np.newaxis], 3, axis=2),
-        geometry=replace(of, focal_px=focal_share * of.focal_px),
-    )
+    view = nearest_view(views)
+    return replace(view, geometry=replace(view.geometry, focal_px=focal_share * view.geometry.focal_px))

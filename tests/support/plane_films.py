@@ -1,5 +1,7 @@
 """Views of textured planes by a camera that moves, with exact depth: one plane, the corner of a room, or a street."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -21,10 +23,11 @@ _TEXTURE_PX = 800
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plane:
-    """Where rows of `axes` are the normal, towards the camera, and two directions in it; (3, 3)."""
+    """Where rows of `axes` are the normal, towards the camera, and two directions in it; (3, 3). `half_m`: half its sides along these, m."""
 
     through_m: Floats
     axes: Floats
+    half_m: tuple[float, float] = (math.inf, math.inf)
 
 
 def plane_at(through_m: list[float], turn: list[float]) -> Plane:
@@ -95,11 +98,12 @@ def plane_view(
     for plane in planes:
         there = (plane.axes[0] @ (plane.through_m - world_camera.t_m)) / (rays @ world_camera.R.T @ plane.axes[0])
         points = world_camera.apply(rays * there[..., np.newaxis]) - plane.through_m
-        texels = (points @ plane.axes[1:].T / texel_m + _TEXTURE_PX / 2).astype(np.float32)
+        across = points @ plane.axes[1:].T
+        texels = (across / texel_m + _TEXTURE_PX / 2).astype(np.float32)
         shown = np.asarray(
             cv2.remap(picture, texels[..., 0], texels[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
         )
-        nearer = (there > 0) & (there < depth)
+        nearer = (there > 0) & (there < depth) & (np.abs(across) <= plane.half_m).all(axis=-1)
         depth, grey = np.where(nearer, there, depth), np.where(nearer, shown, grey).astype(np.uint8)
     return View(
         grey=grey,
@@ -108,6 +112,14 @@ def plane_view(
         geometry=geometry,
         noise_px=noise_px,
     )
+
+
+def nearest_view(views: Sequence[View]) -> View:
+    """Put what one camera sees of several things into one view: each pixel shows the nearest of them."""
+    depths, greys = (np.array([getattr(view, name) for view in views]) for name in ("depth_m", "grey"))
+    nearest = np.argmin(depths, axis=0)[np.newaxis]
+    depth, grey = (np.take_along_axis(each, nearest, axis=0)[0] for each in (depths, greys))
+    return replace(views[0], depth_m=depth, grey=grey, colours=np.repeat(grey[..., np.newaxis], 3, axis=2))
 
 
 def path(count: int, step: Floats) -> list[SE3]:
