@@ -70,6 +70,9 @@ _VERBS: Final[dict[str, Arguments]] = {
 _NATIVE: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
 
+_WITHOUT_NUMPY: Final = frozenset({"doctor", "keys", "pair", "settings"})
+"""Verbs that run where numpy is missing; the doctor names it."""
+
 _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.
 
 try it without hardware, in half a minute:
@@ -120,6 +123,8 @@ def _run(options: argparse.Namespace) -> int:
     if options.verb is None:
         print(as_found(_NEXT_STEPS), end="")
         return 0
+    if options.verb not in _WITHOUT_NUMPY:
+        importlib.import_module("numpy")  # before OpenCV, which prints three lines on stdout where numpy is missing
     command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
     from phone_host.output.folder_lock import command_locks  # noqa: PLC0415 - the help needs none
 

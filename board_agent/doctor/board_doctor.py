@@ -11,11 +11,16 @@ from common.doctor.access import Account
 from common.doctor.camera_probe import examine_camera
 from common.doctor.finding import Finding, fail
 from common.doctor.machine_checks import check_clocks, check_disk, check_power, check_usb_log
+from common.doctor.package_probe import missing_packages
 from common.doctor.unit_check import Unit, check_unit
 from common.keys import SERVICE_FOLDER, KeyFolder
 from common.link.factory import needs_keys, parse_link
 
 UNIT: Final = "board-agent"
+
+_MODULES: Final = ("msgpack", "serial", "zmq")
+"""Modules of the packages that the board's package depends on (deploy/board/debian/control)."""
+
 _LOG_FOLDERS: Final = (Path("/var/log/journal"), Path("/run/log/journal"))
 
 
@@ -34,9 +39,12 @@ def examine(settings: BoardSettings | None) -> list[Finding]:
     unit = machine.read_unit(UNIT)
     account = machine.account_of(unit.user) if unit.installed and unit.user else None
     user = account or machine.own_account()
-    findings = [check_unit(unit)]
+    missing = missing_packages(_MODULES)
+    findings = [check_unit(unit), *missing]
     if settings is not None:
-        findings += _examine_stream(settings, user, unit, is_service=account is not None)
+        findings += _examine_camera(settings, user, unit)
+    if settings is not None and not missing:  # without its packages no link can be tried
+        findings += _examine_links(settings, user, unit, is_service=account is not None)
     log = machine.read_kernel_log()
     findings += check_clocks(machine.read_clocks(Path(__file__).parent))
     folders = [Path("/"), *(folder for folder in _LOG_FOLDERS if folder.is_dir())]
@@ -46,15 +54,16 @@ def examine(settings: BoardSettings | None) -> list[Finding]:
     return findings
 
 
-def _examine_stream(settings: BoardSettings, user: Account, unit: Unit, *, is_service: bool) -> list[Finding]:
-    """Check what the frames come from and where they go."""
-    findings: list[Finding] = []
+def _examine_camera(settings: BoardSettings, user: Account, unit: Unit) -> list[Finding]:
+    """Check what the frames come from."""
     if settings.camera:
-        findings += examine_camera(settings.camera, user, unit)
-    else:
-        findings.append(
-            fail("camera", "none is configured", "give --camera v4l2:auto, or set camera in the settings file")
-        )
+        return list(examine_camera(settings.camera, user, unit))
+    return [fail("camera", "none is configured", "give --camera v4l2:auto, or set camera in the settings file")]
+
+
+def _examine_links(settings: BoardSettings, user: Account, unit: Unit, *, is_service: bool) -> list[Finding]:
+    """Check where the frames go."""
+    findings: list[Finding] = []
     for uri in settings.link:
         findings += examine_link(uri, user, unit, listens_by_default=True)
     if any(needs_keys(parse_link(uri, listens_by_default=True)) for uri in settings.link):

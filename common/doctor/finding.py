@@ -31,12 +31,14 @@ class Finding:
         verdict: fail: nothing will work; warn: something works badly, or could not be checked.
         text: the finding.
         remedy: what to do about it; empty if nothing is to be done.
+        exit_code: the command's, if the check failed: 3 if something must be installed or plugged in before any other check means much.
     """
 
     what: str
     verdict: Grade
     text: str
     remedy: str = ""
+    exit_code: int = CHECK_FAILED
 
 
 def ok(what: str, text: str) -> Finding:
@@ -49,9 +51,9 @@ def warn(what: str, text: str, remedy: str) -> Finding:
     return Finding(what=what, verdict=Grade.WARN, text=text, remedy=remedy)
 
 
-def fail(what: str, text: str, remedy: str) -> Finding:
+def fail(what: str, text: str, remedy: str, *, exit_code: int = CHECK_FAILED) -> Finding:
     """A finding: something is broken without which nothing works."""
-    return Finding(what=what, verdict=Grade.FAIL, text=text, remedy=remedy)
+    return Finding(what=what, verdict=Grade.FAIL, text=text, remedy=remedy, exit_code=exit_code)
 
 
 def settings_finding(file: str, wrong: SettingsError | None) -> Finding:
@@ -88,7 +90,10 @@ def values(findings: Sequence[Finding]) -> dict[str, Any]:
 
 
 def exit_code(findings: Sequence[Finding], wrong: SettingsError | None = None) -> int:
-    """The command's exit code: 0 if nothing failed, with or without warnings, otherwise 4; with wrong settings theirs, as from every verb."""
+    """Return the command's exit code: 0 if nothing failed, with or without warnings.
+
+    Wrong settings give theirs, as from every verb. Otherwise it is 3 if a package is missing, and 4 if anything else failed.
+    """
     if wrong is not None:
         return wrong.exit_code
-    return CHECK_FAILED if any(item.verdict is Grade.FAIL for item in findings) else 0
+    return min((item.exit_code for item in findings if item.verdict is Grade.FAIL), default=0)

@@ -16,6 +16,7 @@ from common.link.base import Link, TakesNewHosts
 from common.link.uri import LINKS, LinkRequest, LinkUri, is_this_machine, needs_keys, parse_link
 from common.program.extensions import make_registered, named
 from common.program.logs import event
+from common.program.packages import package_error
 
 __all__ = ["LinkUri", "is_this_machine", "needs_keys", "open_link", "open_links", "parse_link", "tell_insecure"]
 
@@ -27,9 +28,6 @@ _TRANSPORTS: Final = {
     "serial": "common.link.serial:open_serial",
     "rfcomm": "common.link.rfcomm_opener:open_rfcomm",
 }
-
-_PACKAGES: Final = {"serial": "pyserial (apt: python3-serial)"}
-"""What a transport needs besides ZeroMQ."""
 
 
 def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = False, waits: bool = False) -> Link:
@@ -57,8 +55,7 @@ def open_link(uri: LinkUri, keys: KeyFolder | None = None, *, board: bool = Fals
     try:
         opener = named(_TRANSPORTS[scheme])
     except ImportError as error:
-        needed = _PACKAGES.get(scheme, "pyzmq (apt: python3-zmq)")
-        raise UnavailableError(f"{uri.address} cannot be opened ({error})", f"install {needed}") from None
+        raise package_error(error, uri.address) or error from None
     link: Link = opener(request)
     return link
 

@@ -17,6 +17,7 @@ from common.plain_text import printable
 from common.program import interrupts
 from common.program.invocation import as_found
 from common.program.out_of_memory import is_out_of_memory, remedy_of, words_of
+from common.program.packages import package_error
 from common.program.quantities import decimal_number, whole_number
 from common.program.streams import mend_streams
 from common.program.terminal import fitted
@@ -248,6 +249,12 @@ def _ran(
             raise
         _say(f"{parser.prog}: error: {error}")
         return error.exit_code
+    except ImportError as error:
+        missing = package_error(error)
+        if options.debug or missing is None:
+            raise
+        _say(f"{parser.prog}: error: {missing}")
+        return missing.exit_code
     except KeyboardInterrupt as error:
         number = error.number if isinstance(error, interrupts.StopRequested) else signal.SIGINT
         if not interrupts.is_heard():

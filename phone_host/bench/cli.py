@@ -43,6 +43,7 @@ def _next_steps(_: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """Import what the options ask for, and run it. The only place that imports by name."""
+    importlib.import_module("numpy")  # before OpenCV, as in phone_host/cli.py
     command = importlib.import_module(
         "phone_host.bench." + ("profile_list" if options.emulate == "list" else "command")
     )

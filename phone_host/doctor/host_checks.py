@@ -1,15 +1,17 @@
-"""Judges from readings what a host needs besides camera and link: Python, packages, rig, the board's answer. Pure."""
+"""Judges from readings what a host needs besides camera, link and rig: Python, packages, the board's answer. Pure.
+
+It needs no package, because it must be able to say which package is missing.
+"""
 
 import re
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, assert_never
 
-from common.android import INSTALL as TERMUX_INSTALL
 from common.doctor.finding import Finding, fail, ok, warn
+from common.doctor.package_probe import missing_package
 from common.errors import SettingsError
 from phone_host.stereo.native.library import VARIABLE, Library, Missing
-from phone_host.stereo.scaled_rig import fits_rig, is_scaling
 
 OPENCV_WHEELS: Final = (
     "opencv-python-headless",
@@ -21,9 +23,6 @@ OPENCV_WHEELS: Final = (
 
 _COST_OF_SGBM: Final = "six times the work for each pair"
 """CPU time of both at 640x480 with 64 disparities (docs/figures.md)."""
-
-_USABLE_PX: Final = 1.0
-"""With a stereo RMS above one pixel, the rows of the two images do not match, and no matcher finds much."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,31 +44,6 @@ class Package:
     least: str
     below: str = ""
     wheels: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class RigReadings:
-    """Readings of a rig file.
-
-    Attributes:
-        path: the file.
-        problem: what is wrong with it; empty if it could be read and rectified.
-        remedy: what to do about that.
-        rms_px: stereo RMS, px; NaN = unknown.
-        baseline_m: baseline, m.
-        host_size_px: image size of the host camera in the rig, px.
-        asked_size_px: image size that the host camera is asked for, px; None if the URI does not say.
-        is_rejected: whether its own calibration found it unfit.
-    """
-
-    path: str
-    problem: str = ""
-    remedy: str = ""
-    rms_px: float = float("nan")
-    baseline_m: float = float("nan")
-    host_size_px: tuple[int, int] = (0, 0)
-    asked_size_px: tuple[int, int] | None = None
-    is_rejected: bool = False
 
 
 class Answer(Enum):
@@ -125,11 +99,7 @@ def check_package(package: Package) -> Finding:
         both = f"{' and '.join(package.wheels)} are installed side by side and overwrite each other's files"
         return fail(package.name, both, f"pip uninstall {remove}, then pip install --force-reinstall --no-deps {keep}")
     if not package.version:
-        return fail(
-            package.name,
-            f"cannot be imported ({package.problem})",
-            f"install it: make run-venv in a checkout, or pipx reinstall tandemscan; in Termux: {TERMUX_INSTALL}",
-        )
+        return missing_package(package.name, f"cannot be imported ({package.problem})")
     text = f"{package.name} {package.version}" + (f" ({package.wheels[0]})" if package.wheels else "")
     found = _numbers(package.version)
     if found < _numbers(package.least) or (package.below and found >= _numbers(package.below)):
@@ -153,28 +123,6 @@ def check_native(library: Library | Missing | SettingsError, wanted: str = "") -
             return warn("native", f"own matcher {reason}; sgbm is used, {_COST_OF_SGBM}{idle}", remedy)
         case _:
             return fail("native", library.problem, library.remedy)
-
-
-def check_rig(rig: RigReadings) -> Finding:
-    """Judge a rig file."""
-    if rig.problem:
-        return fail("rig", rig.problem, rig.remedy)
-    width_px, height_px = rig.host_size_px
-    text = f"{rig.path}: baseline {rig.baseline_m * 1000:.1f} mm, host camera {width_px}x{height_px}"
-    if rig.rms_px == rig.rms_px:
-        text += f", stereo RMS {rig.rms_px:.2f} px"
-    asked_px = rig.asked_size_px
-    if asked_px is not None and asked_px != rig.host_size_px:
-        asked = f"{asked_px[0]}x{asked_px[1]}"
-        if not fits_rig(rig.host_size_px, asked_px):
-            remedy = f"ask for size={width_px}x{height_px} or another size of this shape, or calibrate at {asked}"
-            return fail("rig", f"{text}, but the camera is asked for {asked}, another shape", remedy)
-        text += f", scaled to {asked}" if is_scaling(rig.host_size_px, asked_px) else f", cropped to {asked}"
-    if rig.is_rejected:
-        return warn("rig", f"{text}, verdict reject", "calibrate again; report.json beside it says what was wrong")
-    if rig.rms_px > _USABLE_PX:
-        return warn("rig", text, "calibrate again with sharper pictures of a flat board")
-    return ok("rig", text)
 
 
 def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one return for each answer
@@ -209,7 +157,7 @@ def check_ports(ports: tuple[str, ...], problem: str) -> Finding:
         problem: why they could not be listed; empty if they could.
     """
     if problem:
-        return warn("serial", f"no serial links ({problem})", "pip install pyserial, or use another link")
+        return missing_package("serial", f"no serial links ({problem})")
     return ok("serial", ", ".join(ports) if ports else "no USB or Bluetooth serial port is there now")
 
 

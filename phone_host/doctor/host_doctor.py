@@ -26,6 +26,7 @@ from common.doctor.camera_probe import examine_camera
 from common.doctor.finding import Finding, Grade, fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.network_probe import examine_network
+from common.doctor.package_probe import missing_packages
 from common.doctor.unit_check import Unit
 from common.errors import SettingsError, TandemError, UnavailableError
 from common.keys import KeyFolder
@@ -49,11 +50,13 @@ from phone_host.doctor.host_checks import (
     check_package,
     check_ports,
     check_python,
-    check_rig,
 )
 from phone_host.stereo.native.library import VARIABLE, native
 
 _CONNECT_S: Final = 2.0
+
+_FURTHER_MODULES: Final = ("aiohttp", "rich", "segno", "yaml", *(() if is_android() else ("zeroconf",)), "cryptography")
+"""Modules of every installation of the host whose versions the doctor does not judge (pyproject.toml, dependencies)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +101,7 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
     yield check_python(sys.version_info[:3], sys.platform)
     if is_android():
         yield check_phone(_phone())
-    packages = [check_package(package) for package in _packages()]
+    packages = [*map(check_package, _packages()), *missing_packages(_FURTHER_MODULES)]
     yield from packages
     yield native_finding()
     works = all(finding.verdict is not Grade.FAIL for finding in packages)
@@ -116,10 +119,10 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
     for uri in question.links:
         yield from _examine_board(uri, question.wait_s, question.keys, works=works)
     if works and (question.calibration or question.camera):
-        from phone_host.doctor import vision_checks  # noqa: PLC0415 - numpy and OpenCV, seen to work
+        from phone_host.doctor import rig_checks, vision_checks  # noqa: PLC0415 - numpy and OpenCV, seen to work
 
         if question.calibration:
-            yield check_rig(vision_checks.read_rig_readings(question.calibration, question.camera))
+            yield rig_checks.check_rig(vision_checks.read_rig_readings(question.calibration, question.camera))
         if keeps and question.camera:
             yield from vision_checks.check_kept_capture(
                 question.calibration, question.camera, question.data, question.feed
@@ -160,12 +163,10 @@ def examine_out(out: Path) -> list[Finding]:
 def _packages() -> list[Package]:
     # Termux's own package bears the names of several wheels and is one.
     wheels = () if is_android() else tuple(name for name in OPENCV_WHEELS if _is_installed(name))
-    return [
-        _package("numpy", "1.24"),
-        _package("cv2", "4.10", "5", wheels),
-        _package("zmq", "24"),
-        _package("msgpack", "1.0.3"),
-    ]
+    numpy = _package("numpy", "1.24")
+    # OpenCV needs numpy, and prints lines of its own where it is missing.
+    opencv = [] if numpy.problem else [_package("cv2", "4.10", "5", wheels)]
+    return [numpy, *opencv, _package("zmq", "24"), _package("msgpack", "1.0.3")]
 
 
 def _is_installed(distribution: str) -> bool:

@@ -22,7 +22,8 @@ from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import camera_orientation, open_camera
 from phone_host.camera.http_uri import is_http
 from phone_host.doctor.capture import source_of
-from phone_host.doctor.host_checks import Answer, BoardReadings, RigReadings
+from phone_host.doctor.host_checks import Answer, BoardReadings
+from phone_host.doctor.rig_checks import RigReadings
 from phone_host.model import Side
 from phone_host.output.capture_json import capture_path, read_capture
 from phone_host.output.rig_files.imported import read_own_rig

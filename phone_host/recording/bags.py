@@ -17,13 +17,14 @@ from typing import Any, BinaryIO, Final
 
 from common.errors import DataError, UnavailableError
 from common.name_order import name_order
+from common.program.packages import package_error
 from common.recording.inflate import ZSTD, inflate, unzstd, unzstd_pieces
 from common.recording.mcap_records import MAGIC, MOST_CHUNK_BYTES, Channel, Damage, Message, Record
 from common.recording.mcap_writer import Topic
 from common.recording.opened import stored_data
 from common.recording.recorded import image_kind
 from common.recording.recording_file import RecordingFile, written
-from common.recording.ros1 import EXTRA, ROS1
+from common.recording.ros1 import ROS1
 from common.recording.ros_messages import SCHEMAS
 from common.recording.salvage import Salvage
 from common.words import counted
@@ -85,8 +86,7 @@ def as_recording(path: Path) -> Iterator[RecordingSource]:
         try:
             damages = _copy(path, copy, Path(name) / "parts")
         except ImportError as error:
-            package = (error.name or "rosbags").partition(".")[0]
-            raise DataError(f"{path} needs the package {package}", f"install it: {EXTRA}") from None
+            raise package_error(error, str(path)) or error from None
         try:
             yield RecordingSource(copy, tuple(damages))
         except DataError as error:

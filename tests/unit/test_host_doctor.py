@@ -11,15 +11,14 @@ from phone_host.doctor.host_checks import (
     Answer,
     BoardReadings,
     Package,
-    RigReadings,
     check_board,
     check_native,
     check_out,
     check_package,
     check_ports,
     check_python,
-    check_rig,
 )
+from phone_host.doctor.rig_checks import RigReadings, check_rig
 from phone_host.doctor.vision_checks import read_rig_readings
 from phone_host.model import Verdict
 from phone_host.output.rig_yaml import write_rig
@@ -119,9 +118,9 @@ def test_every_answer_of_a_board_is_judged(answer: Answer) -> None:
 
 
 def test_ports_and_folder() -> None:
-    """No serial port is no fault, no pyserial warns; a folder that is not writable fails."""
+    """No serial port is no fault, a missing pyserial fails, as does a folder that is not writable."""
     assert check_ports((), "").verdict is OK
-    assert check_ports((), "No module named 'serial'").verdict is WARN
+    assert check_ports((), "No module named 'serial'").verdict is FAIL
     assert check_out("scan", "") == []
     assert check_out("/proc", "Permission denied")[0].verdict is FAIL
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from common.errors import DataError, SettingsError
+from common.errors import DataError, SettingsError, UnavailableError
 from common.program.terminal import say
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
@@ -71,7 +71,7 @@ def _mended(points: NDArray[np.float64], triangles: NDArray[np.int32], printer: 
     try:
         return fixed(points, triangles, printer, needs_base=needs_base)
     except NoLibraryError:
-        raise DataError(
+        raise UnavailableError(
             "manifold3d is not installed, so nothing can be mended", "pip install 'tandemscan[print]'"
         ) from None
     except NotClosedError:
