@@ -15,7 +15,7 @@ from phone_host.report.stereo_report import (
     SharedRemark,
     depth_png_words,
     shared_remarks,
-    told_name,
+    told_names,
 )
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
@@ -60,7 +60,8 @@ def set_lines(report: SetReport, out: str) -> list[str]:
         report: all pairs.
         out: the results folder, as the user named it.
     """
-    lines = [_pair_line(pair, by_number=report.by_number) for pair in report.pairs]
+    names = told_names(report)
+    lines = [_pair_line(pair, names[pair.name]) for pair in report.pairs]
     lines += [_shared_line(shared, report) for shared in shared_remarks(report)]
     lines += [remark.line for remark in report.remarks]
     told = f"{len(report.computed)} of {counted(len(report.pairs), 'pair')} computed"
@@ -70,8 +71,7 @@ def set_lines(report: SetReport, out: str) -> list[str]:
     return [*lines, set_verdict(report)[1]]
 
 
-def _pair_line(pair: PairReport | FailedPair, *, by_number: bool) -> str:
-    name = told_name(pair, by_number=by_number)
+def _pair_line(pair: PairReport | FailedPair, name: str) -> str:
     if isinstance(pair, FailedPair):
         return f"{name}  failed: {pair.problem}: {pair.remedy}"
     points = "matched" if pair.written.points is None else f"have depth, {counted(pair.written.points, 'point')}"

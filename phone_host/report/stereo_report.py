@@ -6,6 +6,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Final, Self
 
 from common.errors import DataError, TandemError
@@ -228,6 +229,7 @@ def shared_remarks(report: SetReport) -> tuple[SharedRemark, ...]:
     Args:
         report: of all pairs.
     """
+    names = told_names(report)
     kinds: dict[tuple[str, str], list[tuple[PairReport, Remark]]] = {}
     for pair in report.computed:
         for remark in pair.remarks:
@@ -236,7 +238,7 @@ def shared_remarks(report: SetReport) -> tuple[SharedRemark, ...]:
         SharedRemark(
             remark=found[0][1],
             pairs=len({pair.name for pair, _ in found}),
-            first=told_name(found[0][0], by_number=report.by_number),
+            first=names[found[0][0].name],
             alike=len({remark.problem for _, remark in found}) == 1,
         )
         for found in kinds.values()
@@ -252,14 +254,31 @@ def depth_png_words(missing: int) -> str:
     return f"{counted(missing, 'depth')} beyond 65.5 m (or below 1 mm) missing from depth.png" if missing else ""
 
 
-def told_name(pair: PairReport | FailedPair, *, by_number: bool) -> str:
-    """Return a pair's name on a terminal: its folder, with its left file where that is no number of the user's.
+def told_names(report: SetReport) -> dict[str, str]:
+    """Return the pairs' names on a terminal, by their folders: a folder, with its left file where that is no number of the user's.
 
     Args:
-        pair: of several.
-        by_number: whether the files were paired by the numbers in their names.
+        report: of several pairs.
     """
-    return pair.name if by_number else f"{pair.name} {pair.left.rpartition('/')[2]}"
+    files = distinct_names([pair.left for pair in report.pairs])
+    return {pair.name: pair.name if report.by_number else f"{pair.name} {files[pair.left]}" for pair in report.pairs}
+
+
+def distinct_names(paths: Sequence[str]) -> dict[str, str]:
+    """Shorten paths to what tells them apart: the files' names, with as many folders before them as that needs.
+
+    Args:
+        paths: of files, as users name them.
+
+    Returns:
+        The short name of each path.
+    """
+    parts = {path: PurePath(path).parts for path in paths}
+    for count in range(1, 1 + max(map(len, parts.values()), default=0)):
+        names = {path: "/".join(each[-count:]) for path, each in parts.items()}
+        if len(set(names.values())) == len(names):
+            return names
+    return {path: path for path in paths}
 
 
 def alone_remarks(left: Sequence[str], right: Sequence[str], *, is_told: bool, pairs: int) -> tuple[Remark, ...]:

@@ -34,6 +34,7 @@ from phone_host.report.stereo_report import (
     SetReport,
     Size,
     alone_remarks,
+    distinct_names,
 )
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
@@ -164,7 +165,9 @@ def _of_the_job(job: StereoJob) -> tuple[Remark, ...]:
 
 
 def _alone(job: StereoJob) -> tuple[Remark, ...]:
-    left, right = ([path.name for path in alone] for alone in (job.files.left_alone, job.files.right_alone))
+    left, right = (
+        list(distinct_names([*map(str, alone)]).values()) for alone in (job.files.left_alone, job.files.right_alone)
+    )
     is_told = job.files.by_number or job.files.by_name
     return alone_remarks(left, right, is_told=is_told, pairs=len(job.files.pairs))
 

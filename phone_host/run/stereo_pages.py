@@ -18,7 +18,7 @@ from phone_host.report.stereo_page import (
     stereo_page,
     thumbnail,
 )
-from phone_host.report.stereo_report import FailedPair, PairReport, SetReport, depth_png_words
+from phone_host.report.stereo_report import FailedPair, PairReport, SetReport, depth_png_words, distinct_names
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 _WORDS: Final = {
@@ -78,13 +78,19 @@ def set_page(report: SetReport, thumbnails: Mapping[str, Picture], commands: Seq
         An HTML document.
     """
     verdict, sentence = set_verdict(report)
+    lefts, rights = (
+        distinct_names(side) for side in zip(*((pair.left, pair.right) for pair in report.pairs), strict=True)
+    )
     return stereo_index(
         StereoIndexData(
             title="Pairs of images",
             subtitle="",
             verdict=verdict,
             sentence=sentence,
-            pairs=tuple(_entry(pair, thumbnails.get(pair.name)) for pair in report.pairs),
+            pairs=tuple(
+                _entry(pair, f"{lefts[pair.left]}, {rights[pair.right]}", thumbnails.get(pair.name))
+                for pair in report.pairs
+            ),
             files=_files(["report.json"], ""),
             commands=tuple(commands),
             notes=tuple(remark.text for remark in report.remarks),
@@ -97,8 +103,7 @@ def pair_thumbnail(processed: Processed) -> Picture | None:
     return thumbnail(processed)
 
 
-def _entry(pair: PairReport | FailedPair, picture: Picture | None) -> PairEntry:
-    both = f"{PurePath(pair.left).name}, {PurePath(pair.right).name}"
+def _entry(pair: PairReport | FailedPair, both: str, picture: Picture | None) -> PairEntry:
     if isinstance(pair, FailedPair):
         sentence = f"{pair.problem}: {pair.remedy}."
         return PairEntry(

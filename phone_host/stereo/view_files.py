@@ -94,18 +94,30 @@ def _others(files: list[Path], paired: set[Path]) -> tuple[Path, ...]:
 
 
 def _named(left: list[Path], right: list[Path]) -> ViewFiles | None:
-    """Pair files of equal names, whose order alone would shift after a missing one; None if no name is on both sides."""
-    lefts, rights = ({path.stem: path for path in side} for side in (left, right))
-    shared = [path.stem for path in left if path.stem in rights]
-    if not shared or len(lefts) < len(left) or len(rights) < len(right):
-        return None
-    return ViewFiles(
-        pairs=tuple((name, lefts[name], rights[name]) for name in shared),
-        left_alone=tuple(path for path in left if path.stem not in rights),
-        right_alone=tuple(path for path in right if path.stem not in lefts),
-        by_number=False,
-        by_name=True,
-    )
+    """Pair files of equal names, or files in folders of equal names; None if no name is on both sides.
+
+    By their order alone the pairs would shift after a missing one.
+    """
+    for name_of in (_stem, _folder):
+        lefts, rights = ({name_of(path): path for path in side} for side in (left, right))
+        shared = [name for name in lefts if name in rights]
+        if shared and len(lefts) == len(left) and len(rights) == len(right):
+            return ViewFiles(
+                pairs=tuple((name, lefts[name], rights[name]) for name in shared),
+                left_alone=_others(left, {lefts[name] for name in shared}),
+                right_alone=_others(right, {rights[name] for name in shared}),
+                by_number=False,
+                by_name=True,
+            )
+    return None
+
+
+def _stem(path: Path) -> str:
+    return path.stem
+
+
+def _folder(path: Path) -> str:
+    return path.absolute().parent.name
 
 
 def _require_one_kind(left: str, right: str) -> None:

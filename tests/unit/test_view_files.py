@@ -8,6 +8,7 @@ from common.camera.image_numbers import numbers_of
 from common.camera.replay import find_images
 from common.errors import DataError, SettingsError
 from common.name_order import name_order
+from phone_host.report.stereo_report import distinct_names
 from phone_host.stereo.view_files import is_unread_photograph, pair_files, passed_over
 
 
@@ -50,6 +51,28 @@ def test_without_numbers_equal_names_are_pairs(tmp_path: Path) -> None:
     assert (files.by_number, files.by_name) == (False, True)
     assert [(a.name, b.name) for _, a, b in files.pairs] == [("desk.png", "desk.jpg"), ("room.png", "room.jpg")]
     assert [path.name for path in (*files.left_alone, *files.right_alone)] == ["board.png", "shelf.jpg"]
+
+
+def test_files_of_one_name_are_paired_by_their_folders(tmp_path: Path) -> None:
+    """A folder for each moment holds the images of both cameras; one lacks its right image."""
+    for folder, names in (("cup", ("left", "right")), ("desk", ("left",)), ("hall", ("left", "right"))):
+        _touch(tmp_path / folder, *(f"{name}.png" for name in names))
+    files = pair_files(str(tmp_path / "*" / "left.png"), str(tmp_path / "*" / "right.png"))
+    assert (files.by_number, files.by_name) == (False, True)
+    assert [(name, a.parent.name, b.parent.name) for name, a, b in files.pairs] == [
+        ("cup", "cup", "cup"), ("hall", "hall", "hall"),
+    ]  # fmt: skip
+    assert (files.left_alone, files.right_alone) == ((tmp_path / "desk" / "left.png",), ())
+
+
+def test_a_pair_is_named_by_what_differs() -> None:
+    """Files' names alone where they tell the files apart, else with as many folders as that needs."""
+    assert list(distinct_names(["l/1.png", "l/2.png"]).values()) == ["1.png", "2.png"]
+    assert list(distinct_names(["x/a/left.png", "x/b/left.png"]).values()) == ["a/left.png", "b/left.png"]
+    assert list(distinct_names(["a/0/left.png", "b/0/left.png", "b/1/left.png"]).values()) == [
+        "a/0/left.png", "b/0/left.png", "b/1/left.png",
+    ]  # fmt: skip
+    assert distinct_names([]) == {}
 
 
 def test_without_numbers_the_order_of_names_pairs(tmp_path: Path) -> None:
