@@ -14,13 +14,21 @@ _CONTROLS: Final = re.compile(
 """What an HTML document must not hold (WHATWG HTML, 13.3: controls other than white space, surrogates), and what is not seen in one or
 changes the order of the letters around it (Unicode UAX 9: bidirectional controls)."""
 
+_SPACES: Final = re.compile("[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000]")
+"""Unicode's spaces (category Zs) beside the usual one, such as the narrow one between a number and its unit."""
+
 _BYTES: Final = range(0xDC80, 0xDD00)
 """The surrogates that stand for single bytes."""
 
 
 def printable(text: str) -> str:
-    """Return the text as one line that cannot control the terminal, whatever name or value it quotes."""
-    return text if text.isprintable() else "".join(map(_shown, text))
+    """Return the text as one line that cannot control the terminal, whatever name or value it quotes. Other spaces become the usual one."""
+    return text if text.isprintable() else "".join(map(_shown, plain_spaces(text)))
+
+
+def plain_spaces(text: str) -> str:
+    """Return the text with the usual space in place of all others."""
+    return _SPACES.sub(" ", text)
 
 
 def printable_lines(text: str) -> str:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from common.plain_text import printable
+from common.plain_text import plain_spaces, printable
 
 
 def set_up(level: int = logging.INFO) -> None:
@@ -66,5 +66,5 @@ def event(name: str, **fields: object) -> str:
 
 
 def _value(value: object) -> str:
-    text = str(value).replace("\n", " ")
+    text = plain_spaces(str(value)).replace("\n", " ")
     return repr(text) if " " in text or not text else printable(text)

@@ -17,6 +17,7 @@ from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text, json_value
 from phone_host.report.page_frame import document
 from phone_host.report.page_script import Script
+from phone_host.svg.plot_scale import duration_text
 
 HOSTILE = "\x1b[31m\a\b\x7f\x9b\u202e\u2028\udcff"
 SHOWN = r"\x1b[31m\x07\x08\x7f\x9b\u202e\u2028\xff"
@@ -87,3 +88,15 @@ def test_a_command_to_paste_names_the_same_bytes() -> None:
         assert word.isprintable()
         assert subprocess.run(["bash", "-c", f"printf %s {word}"], capture_output=True, check=True).stdout == name
     assert shell_word("left 1.png") == "'left 1.png'"
+
+
+@pytest.mark.parametrize("space", ["\u00a0", "\u2009", "\u202f", "\u3000"])
+def test_a_number_and_its_unit_stay_apart_by_a_plain_space(space: str) -> None:
+    """Pages keep a number and its unit on one line by a special space; on terminals and in logs it is the usual one, never a code."""
+    assert printable(f"23.8{space}ms") == folded(f"23.8{space}ms", 0) == "23.8 ms"
+    assert event("slow", took=f"23.8{space}ms") == event("slow", took="23.8 ms")
+
+
+def test_delay_bench_writes_durations_in_ascii() -> None:
+    """Of the lines that are printed none holds a code, whatever the terminal's encoding."""
+    assert printable(duration_text(23.8e6)) == "23.8 ms"
