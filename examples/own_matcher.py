@@ -12,8 +12,7 @@ import sys
 import cv2
 import numpy as np
 
-from phone_host.api import open_scanner
-from phone_host.model import Disparity, Image, RectifiedPair
+from phone_host.api import Disparity, Image, RectifiedPair, open_scanner
 
 
 class BlockMatcher:

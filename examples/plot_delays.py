@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from phone_host.api import open_scanner
-from phone_host.measure.delays import DELAYS
+from phone_host.api import DELAYS, open_scanner
 
 WIDTH_PX, ROW_PX, LEFT_PX = 800, 28, 120
 

@@ -9,8 +9,7 @@ command; add --link tcp://127.0.0.1:5555):
 import sys
 from pathlib import Path
 
-from phone_host.api import open_scanner
-from phone_host.output.ply import write_ply
+from phone_host.api import open_scanner, write_ply
 
 
 def main(link: str, camera: str, rig: str, pairs: str = "100") -> None:

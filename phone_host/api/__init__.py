@@ -21,9 +21,11 @@ from phone_host.api.scanner import Scanner
 from phone_host.api.scans import save_scan, write_model
 from phone_host.geometry.se3 import SE3
 from phone_host.geometry.triangulate import Intersections, triangulate
+from phone_host.measure.delays import DELAYS
 from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.model import Result, StereoGeometry
+from phone_host.model import Disparity, Image, RectifiedPair, Result, StereoGeometry
 from phone_host.output.meshes.printable import Printer, Problem
+from phone_host.output.ply import write_ply
 from phone_host.output.rig_files.imported import Imported, import_rig
 from phone_host.printers.bed import Bed
 from phone_host.printers.door import Wishes
@@ -38,20 +40,27 @@ from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.ways import scan_for
+from phone_host.stereo.matcher_protocol import Matcher, ReportingMatcher
 
 __all__ = [
+    "DELAYS",
     "SE3",
     "Bed",
     "Box",
+    "Disparity",
     "Ended",
+    "Image",
     "Imported",
     "Intersections",
     "KeptField",
     "Mat",
+    "Matcher",
     "Phase",
     "Printer",
     "Problem",
     "Progress",
+    "RectifiedPair",
+    "ReportingMatcher",
     "Result",
     "RunSnapshot",
     "Scan",
@@ -72,4 +81,5 @@ __all__ = [
     "scan_for",
     "triangulate",
     "write_model",
+    "write_ply",
 ]

@@ -74,6 +74,7 @@ class LiveScan:
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
         self._is_board_left = board_side is Side.LEFT
         self._last: ScannedPair | None = None
+        self._has_ended = False
         self._first_ns: int | None = None
         self._counts = len(self._earlier), self.scan.fused
         self.patches = Patches(LEAST_WEIGHT)
@@ -123,9 +124,15 @@ class LiveScan:
         """What is to be told whoever holds the cameras: how many pairs are in the model, and what helps now."""
         last = self._last
         if last is None:
-            return "waiting for the first pair"
+            return "no pair has come" if self._has_ended else "waiting for the first pair"
         count = f"{counted(self._counts[1], 'pair')} in the model"
+        if self._has_ended:
+            return f"{count}: all pairs have come, the model is being made"
         return f"{count}: {last.weakness.advice}" if last.weakness.advice else f"{count}: go on"
+
+    def end(self) -> None:
+        """Note that no more pairs come: the run has ended."""
+        self._has_ended = True
 
     def finished(self, snapshot: RunSnapshot, matcher: str, axes: Axes) -> FinishedScan:
         """Make the surface and the report. The run has ended.
@@ -135,6 +142,7 @@ class LiveScan:
             matcher: its name.
             axes: of the files.
         """
+        self.end()
         remarks = [
             Remark(one.sentence, one.remedy, is_blocking=one.is_certain and one.doubt is not Doubt.NO_DEPTH)
             for one in concerns(snapshot)

@@ -41,8 +41,15 @@ class ScanPicture(Redrawn):
     def refresh(self) -> None:
         """Show the present state, at most four times a second."""
         now_ns = now.monotonic_ns()
-        if now_ns - self._drawn_ns < _EVERY_NS:
-            return
+        if now_ns - self._drawn_ns >= _EVERY_NS:
+            self._show(now_ns)
+
+    def end(self) -> None:
+        """Show once more how it stands: the run has ended."""
+        self._scan.end()
+        self._show(now.monotonic_ns())
+
+    def _show(self, now_ns: int) -> None:
         self._drawn_ns, words, picture = now_ns, self._scan.words, self._picture
         if now_ns - self._asked_ns >= _SURFACE_NS:
             self._asked_ns = now_ns

@@ -1,5 +1,6 @@
 """What a calibration's page shows: copied values of a series of board views and of the rig that came of it. No behaviour."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -170,6 +171,7 @@ class SeriesRig:
         far_m: depth beyond which it is a guess, m; NaN: not known.
         limits: of the figures.
         tried: the formulas that were tried for the left and for the right lens.
+        measured_m: the baseline as the user measured it, m; NaN: not given.
     """
 
     rig: Rig
@@ -183,6 +185,7 @@ class SeriesRig:
     far_m: float
     limits: Limits
     tried: tuple[tuple[LensTried, ...], tuple[LensTried, ...]] = ((), ())
+    measured_m: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

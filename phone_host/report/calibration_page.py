@@ -102,7 +102,8 @@ def _figures(series: CalibrationSeries, found: SeriesRig) -> tuple[Figure, ...]:
         figures.append(Figure(label="vertical error, 95 %", value=f"{p95_px:.3f}", unit="px", note=note))
     figures.append(Figure(label="RMS of all corners", value=f"{found.rig.rms_stereo_px:.3f}", unit="px"))
     sigma = f"± {millimetres(found.baseline_sigma_m)} mm; " if math.isfinite(found.baseline_sigma_m) else ""
-    note = f"{sigma}compare it with a ruler"
+    measured = f"you measured {found.measured_m * 1e3:.1f} mm" if math.isfinite(found.measured_m) else ""
+    note = f"{sigma}{measured or 'compare it with a ruler'}"
     figures.append(Figure(label="baseline", value=f"{baseline_mm:.2f}", unit="mm", note=note))
     sigma_m = depths.get(_DEPTH_M, math.nan)
     if math.isfinite(sigma_m):

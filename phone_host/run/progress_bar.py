@@ -62,6 +62,17 @@ def _numbers(amount: Amount) -> tuple[ProgressColumn, ...]:
             assert_never(amount)
 
 
+def announce(stage: str, console: Console) -> None:
+    """Say in one line that a stage begins, where its bar is hidden: in a pipe, a log or a service.
+
+    Args:
+        stage: what is being done.
+        console: where the bar would be drawn.
+    """
+    if not console.is_terminal:
+        print(f"phone-host: {stage}", file=console.file, flush=True)
+
+
 class ShareBar:
     """A bar that is set to a share of the work.
 

@@ -14,6 +14,7 @@ from phone_host.output.trajectory_text import Station, tum_text
 from phone_host.report.model_view import ShownModel
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_json import scan_json
+from phone_host.report.scan_next import next_commands
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
@@ -32,7 +33,7 @@ class FinishedScan:
     Attributes:
         report: of it.
         model: its surface.
-        commands: what to do next, for the page.
+        commands: what else to do next, for the page.
         field: its field as bytes, for another pass; empty: it takes none.
         command: the verb that made it.
         told: what that verb adds to report.json.
@@ -74,7 +75,7 @@ def write_scan(out: Path, scan: FinishedScan, partial: Callable[[Path], None] | 
             write_bytes(place / FIELD, scan.field)
         voxel_m = report.settings.voxel_m if report.settings else 1.0
         shown = ShownModel(mesh, scan.model.noise_m, voxel_m, upright=report.axes if report.axes.is_upright else None)
-        write_text(place / "index.html", scan_page(report, shown, scan.commands))
+        write_text(place / "index.html", scan_page(report, shown, (*next_commands(report, out), *scan.commands)))
 
 
 def report_values(scan: FinishedScan) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def test_what_is_no_mesh_is_refused_in_one_line(models: Path, verb: str, name: s
 
 
 def test_an_open_mesh_is_exported_with_a_note_and_cannot_be_mended(models: Path) -> None:
-    """Export keeps every triangle and says so; printcheck draws the hole; --fix refuses in one line."""
+    """Export keeps every triangle and says so; printcheck draws the hole if it is told where; --fix refuses in one line."""
     exported = said(models, "export", "open.stl", "--unit", "mm", "--to", "3mf", "--tolerance", "0.1", "--out", "out")
     assert exported.returncode == 0
     assert "note: the mesh is not closed" in exported.stdout
@@ -68,6 +68,12 @@ def test_an_open_mesh_is_exported_with_a_note_and_cannot_be_mended(models: Path)
     assert checked.returncode == 4
     assert "stop: 4 edges end in nothing" in checked.stdout
     assert (models / "out/open-printcheck.png").stat().st_size > 1000
+    before = sorted(models.rglob("*"))
+    assert (
+        said(models, "printcheck", "open.stl", "--unit", "mm").stdout.splitlines() == checked.stdout.splitlines()[:-1]
+    )
+    assert sorted(models.rglob("*")) == before, "without --out nothing is written"
+    assert said(models, "printcheck", "open.stl", "--unit", "mm", "--fix").returncode == 2
     mended = said(models, "printcheck", "open.stl", "--unit", "mm", "--fix", "--out", "out2")
     assert mended.returncode == 4
     assert "not closed" in mended.stderr

@@ -43,12 +43,18 @@ def test_the_model_is_the_thing_and_its_errors_are_told(scanned: tuple[Path, dic
     off_mm = np.abs(object_scene("speckled", Setting()).solid.signed_distance(points)) * 1000
     assert off_mm.mean() == pytest.approx(truth["mean_mm"], abs=0.1)
     assert str(out / "index.html") in told
+    stages = [line for line in told.splitlines() if line.startswith("phone-host: ")]
+    assert [stage.split()[1] for stage in stages] == ["rendering", "scanning", "making", "slicing"], "a line a stage"
+    assert "\x1b" not in told
+    assert "\r" not in told
 
 
 def test_the_page_shows_the_model_and_the_comparison(scanned: tuple[Path, dict[str, object], str]) -> None:
-    """The page tells how far the model is off, and is self-contained."""
+    """The page tells how far the model is off and what to do next, and is self-contained."""
     page = (scanned[0] / "index.html").read_text(encoding="utf-8")
     assert "against the true surface" in page
+    assert "export" in page
+    assert "printcheck" in page
     assert "<script src" not in page
     assert "https://" not in page
 

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -208,6 +209,15 @@ def test_a_good_rig_has_no_remedy_though_a_mistake_was_found(verdict: Verdict, r
     told = summary(calibration_report(Judged(calibration(), judgement, finding)), Path("rig.yaml"))
     assert ("note     the board is blurred; the light is poor" in told) == (verdict is Verdict.GOOD)
     assert [line for line in told if line.startswith("remedy")] == ([f"remedy   {remedy}"] if remedy else [])
+
+
+@pytest.mark.parametrize(("measured_m", "asks"), [(math.nan, True), (0.1, False)])
+def test_a_measured_baseline_is_compared_and_not_asked_for(measured_m: float, asks: bool) -> None:  # noqa: FBT001 - a case
+    """Without --baseline the user is asked to measure it; with it, the difference is shown."""
+    judged = Judged(calibration(), Assessment(Verdict.GOOD, ""), measured_m=measured_m)
+    told = "\n".join(summary(calibration_report(judged), Path("rig.yaml")))
+    assert ("compare it with a ruler" in told) is asks
+    assert ("% against the 100.0 mm that you measured" in told) is not asks
 
 
 def test_a_recording_gives_the_rig_of_its_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

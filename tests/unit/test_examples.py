@@ -1,6 +1,7 @@
 """What the programs suggest is what they take: examples in every help, and what a bare name prints."""
 
 import argparse
+import ast
 import shlex
 import sys
 from collections.abc import Callable
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import board_agent.cli
+import phone_host.api
 import phone_host.bench.cli
 import phone_host.cli
 from common.program.invocation import PROGRAMS
@@ -122,3 +124,19 @@ def test_help_is_a_word_too(program: str, capsys: pytest.CaptureFixture[str]) ->
         said = capsys.readouterr().out
         assert MAINS[program](meant) == 0
         assert said == capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "example", sorted((Path(__file__).parents[2] / "examples").glob("*.py")), ids=lambda path: path.stem
+)
+def test_examples_import_only_what_stays(example: Path) -> None:
+    """Of this project they import the API alone, and from it only names that it lists: all else may move."""
+    imports = [
+        node for node in ast.walk(ast.parse(example.read_text())) if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    for node in imports:
+        modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names]
+        ours = {module for module in modules if module.partition(".")[0] in {"phone_host", "board_agent", "common"}}
+        assert ours <= {"phone_host.api"}
+        if ours:
+            assert {alias.name for alias in node.names} <= set(phone_host.api.__all__)

@@ -167,12 +167,16 @@ def _limit(options: argparse.Namespace) -> int:
     return most_pixels(None, options.max_megapixels)
 
 
+def _measured_m(options: argparse.Namespace) -> float:
+    """Return the baseline as the user measured it, m; NaN: not given."""
+    return math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
+
+
 def _solved(files: ViewFiles, series: Series, options: argparse.Namespace, mounted: Mounted) -> Solved:
     """Search all images, calibrate, and look for mistakes."""
-    baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
     with step_bar("finding the board", len(files.pairs)) as step:
         views = look_for_boards(files, series.board, step, _limit(options), mounted)
-        return solve_series(series, views, baseline_m, step.say)
+        return solve_series(series, views, _measured_m(options), step.say)
 
 
 def _judged(
@@ -190,7 +194,7 @@ def _judged(
     judgement = assessed(found, (*views.rejected, *found.rejected), finding, hint)
     if not options.pose_only:  # its lenses come from other views
         judgement = with_corners(judgement, guessed_corners(found, solved.seen, series.board))
-    return Judged(found=found, judgement=judgement, finding=finding, hint=hint)
+    return Judged(found=found, judgement=judgement, finding=finding, hint=hint, measured_m=_measured_m(options))
 
 
 def _file_notes(files: ViewFiles, given: GivenPictures) -> list[str]:

@@ -73,7 +73,13 @@ def import_calibration(options: argparse.Namespace) -> int:
         print(json_text(import_values(report)))
     else:
         written = [] if same else [f"written to {options.out}{earlier_words(report.earlier_rig)}"]
-        say([*_lines(found), *export_lines(report.exported, rectification), *written])
+        say(
+            [
+                *_lines(found, is_measured=options.baseline is not None),
+                *export_lines(report.exported, rectification),
+                *written,
+            ]
+        )
     return 0
 
 
@@ -119,7 +125,7 @@ def _sizes_px(text: str | None) -> Sizes | None:
     return sizes[0], sizes[-1]
 
 
-def _lines(found: Imported) -> list[str]:
+def _lines(found: Imported, *, is_measured: bool) -> list[str]:
     rig = found.rig
     left, right = (size_text((model.width_px, model.height_px)) for model in (rig.left, rig.right))
     return [
@@ -128,7 +134,7 @@ def _lines(found: Imported) -> list[str]:
         f"images   left {left}, right {right} px",
         f"focal    left {rig.left.matrix[0, 0]:.1f}, right {rig.right.matrix[0, 0]:.1f} px",
         f"baseline {np.linalg.norm(rig.t_right_left_m) * 1e3:.2f} mm",
-        "         compare it with a ruler: it shows a wrong unit",
+        *([] if is_measured else ["         compare it with a ruler: it shows a wrong unit"]),
         *([] if rig.verdict is None else [f"verdict  {rig.verdict.value}"]),
         *([REFUSED] if rig.is_rejected else []),
     ]

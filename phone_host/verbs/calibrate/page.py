@@ -45,7 +45,7 @@ def series_of_rig(taken: Taken, result: Judged, rig: Rig, rejected: tuple[Reject
         board=_board_words(taken.board),
         sizes_px=taken.views.sizes_px,
         views=series_views(taken, found, rejected),
-        found=series_rig(found, rig, result.depth_limit_m),
+        found=replace(series_rig(found, rig, result.depth_limit_m), measured_m=result.measured_m),
         turns=view_turns(kept, found.poses, taken.board.points_m(), found.rig),
         is_straightened=taken.is_straightened,
     )

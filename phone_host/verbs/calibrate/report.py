@@ -37,12 +37,14 @@ class Judged:
         judgement: the verdict with its remedy.
         finding: what is wrong with the series; None: nothing.
         hint: what to do about a turned or mirrored side; empty: it is none.
+        measured_m: the baseline as the user measured it, m; NaN: not given.
     """
 
     found: Calibration
     judgement: Assessment
     finding: Finding | None = None
     hint: str = ""
+    measured_m: float = math.nan
 
     @property
     def cause_words(self) -> str:

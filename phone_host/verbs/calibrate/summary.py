@@ -87,6 +87,14 @@ def _turn_rows(views: BoardViews) -> list[str]:
     ]
 
 
+def baseline_words(result: Judged) -> str:
+    """Say how the baseline agrees with what the user measured; or ask to measure it."""
+    if not math.isfinite(result.measured_m):
+        return "compare it with a ruler"
+    off = float(np.linalg.norm(result.found.rig.t_right_left_m)) / result.measured_m - 1
+    return f"{off:+.1%} against the {result.measured_m * 1e3:.1f} mm that you measured"
+
+
 def _figure_rows(result: Judged) -> list[str]:
     found, rig = result.found, result.found.rig
     rows = [f"RMS      left {rig.rms_left_px:.3f}, right {rig.rms_right_px:.3f}, stereo {rig.rms_stereo_px:.3f} px"]
@@ -95,7 +103,9 @@ def _figure_rows(result: Judged) -> list[str]:
         rows.append(f"vertical mean {px.mean():.3f}, 95 % {np.percentile(px, 95):.3f}, max {px.max():.3f} px")
     rows.append(_baseline_row(float(np.linalg.norm(rig.t_right_left_m)) * 1e3, found.baseline_sigma_m))
     if found.obstacle is None:
-        rows.append("         compare it with a ruler: it shows a wrong --square")
+        rows.append(
+            f"         {baseline_words(result)}{'' if math.isfinite(result.measured_m) else ': it shows a wrong --square'}"
+        )
     rows += _lens_rows(found)
     errors = ", ".join(
         f"{_sigma_mm(sigma_m)} mm at {depth_m:g} m" for depth_m, sigma_m in found.depths if math.isfinite(sigma_m)

@@ -29,7 +29,7 @@ from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
-from phone_host.run.progress_bar import busy_bar, progress_bar
+from phone_host.run.progress_bar import announce, busy_bar, progress_bar
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
@@ -67,6 +67,7 @@ def run(options: argparse.Namespace) -> int:
         with socket_folder() as sockets:
             demo = DemoRun(film, rig, out, sockets, with_origins(None, vars(options), sys.argv))
             live = LiveTable(demo.host.snapshot, console, seconds=options.seconds) if console.is_terminal else None
+            announce(f"streaming and computing depth for {options.seconds:g} s", console)
             try:
                 with live or nullcontext():
                     demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
@@ -75,7 +76,9 @@ def run(options: argparse.Namespace) -> int:
                 demo.host.write_report(failed, replaces_earlier=False)
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
-        with busy_bar("comparing the depth with the known scene, writing the page", console):
+        stage = "comparing the depth with the known scene, writing the page"
+        announce(stage, console)
+        with busy_bar(stage, console):
             errors = demo.check(scene)
             report = build(snapshot, "demo") | {"truth": truth_json(errors)}
             page = demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film))
@@ -121,8 +124,10 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         _StoppedError: a stop signal came.
         OSError: the folder cannot be written to.
     """
+    stage = "rendering a moving scene for two cameras"
+    announce(stage, console)
     with progress_bar(console) as progress:
-        task = progress.add_task("rendering a moving scene for two cameras", total=2 * FPS * DEMO_PERIOD_S)
+        task = progress.add_task(stage, total=2 * FPS * DEMO_PERIOD_S)
 
         def advance() -> None:
             progress.advance(task)

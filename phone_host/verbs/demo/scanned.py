@@ -36,7 +36,7 @@ from phone_host.printers.printer_uri import FileUri
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_lines import scan_lines
-from phone_host.run.progress_bar import busy_bar, progress_bar, step_bar
+from phone_host.run.progress_bar import announce, busy_bar, progress_bar, step_bar
 from phone_host.run.scan_files import FinishedScan, report_values, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
@@ -110,20 +110,27 @@ def _scanned(
     """
     _claim(out)
     views = scene.setting.views
+    stage = f"rendering {views} views of a thing for two cameras"
+    announce(stage, console)
     with progress_bar(console) as progress:
-        task = progress.add_task(f"rendering {views} views of a thing for two cameras", total=2 * views)
+        task = progress.add_task(stage, total=2 * views)
         pictures = render_pictures(scene, out / "film", lambda: progress.advance(task), lambda: signals.stop)
     if pictures is None:
         return None
     write_rig(out / "rig.yaml", scene.rig, rectify_rig(scene.rig))
     with socket_folder() as sockets:
         demo = ScanDemo(scene, pictures, out, sockets, default_matcher())
+        announce("scanning with both programs", console)
         picture = ScanPicture(demo.live, console) if console.is_terminal else None
         with picture or nullcontext():
             demo.run(lambda: signals.stop, picture.refresh if picture else None)
+            if picture:
+                picture.end()
     if signals.stop and not demo.live.counts[1]:
         return None
-    with busy_bar("making the surface, comparing it with the thing", console):
+    stage = "making the surface, comparing it with the thing"
+    announce(stage, console)
+    with busy_bar(stage, console):
         scan, errors = demo.finished()
     demo.live.kept.done()
     return replace(with_truth(scan, errors), commands=_by_hand(out)), errors
@@ -155,6 +162,7 @@ def _printed(out: Path, console: Console) -> dict[str, Any]:
     write_bytes(out / _STL, mesh_bytes(solid, "stl", None))
     found: dict[str, Any] = {"stl": str(out / _STL), "gcode": None, "seconds": None, "problem": None}
     wanted = Wanted(SlicingWanted(_BED))
+    announce("slicing", console)
     try:
         with (
             step_bar("slicing", None, console) as watcher,

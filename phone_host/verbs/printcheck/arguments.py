@@ -8,7 +8,7 @@ from phone_host.verbs.printer_bed import BED_HELP
 SUMMARY = "tell whether a scan or mesh can be printed, and what to do if not"
 
 EXAMPLES = """  phone-host printcheck scan                          # scan: the folder that phone-host scan wrote
-  phone-host printcheck part.stl --unit mm --bed 180,180,180
+  phone-host printcheck part.stl --unit mm --bed 180,180,180 --out print    # and draws what is wrong
   phone-host printcheck scan --fix --out print        # cuts a base, drops crumbs, scales; says what it did
 """
 
@@ -37,7 +37,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         type=Path,
-        default=Path(),
         metavar="DIR",
-        help="folder for the picture and the mended model (default: the current folder)",
+        help="folder for a picture of what is wrong and for the mended model (default: nothing is written)",
     )

@@ -32,7 +32,10 @@ _CHECK_FAILED: Final = 4
 def run(options: argparse.Namespace) -> int:
     """Check the model, draw what is wrong, mend it if asked, and check what came of that."""
     printer = _printer(options)
-    require_folder(options.out)
+    if options.out is not None:
+        require_folder(options.out)
+    elif options.fix:
+        raise SettingsError("--fix writes a mended model, but no --out is given", "add --out DIR")
     upright = upright_model(Path(options.model), options.unit, options.up)
     model, points = upright.model, upright.points_mm
     triangles = model.solid.triangles
@@ -40,22 +43,32 @@ def run(options: argparse.Namespace) -> int:
         found = problems(points, triangles, printer, watcher.say)
         mended = _mended(points, triangles, printer, found) if options.fix else None
         left = found if mended is None else problems(mended.points_mm, mended.triangles, printer, watcher.say)
-        watcher.say("drawing")
-        drawing = _png(points, triangles, found)
-    files = {f"{model.stem}-printcheck.png": drawing}
-    if mended is not None:
-        solid = Solid((mended.points_mm / 1000).astype(np.float32), mended.triangles, np.zeros((0, 3), np.uint8))
-        files[f"{model.stem}-fixed.stl"] = mesh_bytes(solid, "stl", None)
-    require_alone(options.out)
-    with written_together(options.out, *files) as place:
-        for name, content in files.items():
-            write_bytes(place / name, content)
-    paths = [str(options.out / name) for name in files]
+        paths: list[str] = []
+        if options.out is not None:
+            watcher.say("drawing")
+            files = {f"{model.stem}-printcheck.png": _png(points, triangles, found)}
+            if mended is not None:
+                files[f"{model.stem}-fixed.stl"] = _stl(mended)
+            paths = _written(options.out, files)
     if options.json:
         print(json_text(_told(model, found, left, mended, paths)))
     else:
         say(_lines(found, left, mended, paths))
     return _CHECK_FAILED if any(problem.blocks for problem in left) else 0
+
+
+def _stl(mended: Fixed) -> bytes:
+    points_m = (mended.points_mm / 1000).astype(np.float32)
+    return mesh_bytes(Solid(points_m, mended.triangles, np.zeros((0, 3), np.uint8)), "stl", None)
+
+
+def _written(out: Path, files: dict[str, bytes]) -> list[str]:
+    """Write the files into a folder; return their paths, as the user named it."""
+    require_alone(out)
+    with written_together(out, *files) as place:
+        for name, content in files.items():
+            write_bytes(place / name, content)
+    return [str(out / name) for name in files]
 
 
 def _printer(options: argparse.Namespace) -> Printer:
@@ -118,7 +131,7 @@ def _lines(found: list[Problem], left: list[Problem], mended: Fixed | None, file
     if mended is not None:
         lines += [f"done: {done}" for done in mended.said] or ["done: nothing, there was nothing to mend"]
         lines += [f"now: {_verdict(left)}", *_sentences(left)]
-    return [*lines, f"written to {' and '.join(files)}"]
+    return [*lines, f"written to {' and '.join(files)}"] if files else lines
 
 
 def _verdict(found: list[Problem]) -> str:

@@ -9,6 +9,7 @@ from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
+from phone_host.report.scan_next import next_lines
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES
@@ -40,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json_text(scan_json(report)))
     else:
-        say(scan_lines(report, str(options.out)))
+        say([*scan_lines(report, str(options.out)), *next_lines(report, options.out)])
     return code or (0 if report.is_sound else _CHECK_FAILED)
 
 

@@ -110,7 +110,9 @@ def _followed(prepared: PreparedRun, live: LiveScan, signals: StopSignals) -> En
     """Run, and tell whoever holds the cameras what helps: beside the surface on a terminal, else a line when it changes."""
     if sys.stderr.isatty():
         with ScanPicture(live) as picture:
-            return prepared.host.run(lambda: signals.stop, picture.refresh)
+            ended = prepared.host.run(lambda: signals.stop, picture.refresh)
+            picture.end()
+            return ended
     told = ""
 
     def tell() -> None:
@@ -120,7 +122,10 @@ def _followed(prepared: PreparedRun, live: LiveScan, signals: StopSignals) -> En
             _tell(live.words)
         told = advice
 
-    return prepared.host.run(lambda: signals.stop, tell)
+    ended = prepared.host.run(lambda: signals.stop, tell)
+    live.end()
+    _tell(live.words)
+    return ended
 
 
 def _run_options(options: argparse.Namespace) -> argparse.Namespace:
