@@ -6,8 +6,7 @@ Rerun also opens the file itself (`rerun session.mcap`). This example shows how 
 import sys
 from pathlib import Path
 
-from common.frame import PixelFormat
-from common.recording.opened import open_recorded
+from phone_host.api import PixelFormat, open_recorded
 
 _TYPES = {PixelFormat.MJPEG: "image/jpeg", PixelFormat.PNG: "image/png"}
 

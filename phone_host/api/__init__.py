@@ -16,6 +16,8 @@ program and skips no result.
 This door stays backward compatible. The modules below it may change.
 """
 
+from common.frame import PixelFormat
+from common.recording.opened import open_recorded
 from phone_host.api.opening import open_scanner
 from phone_host.api.scanner import Scanner
 from phone_host.api.scans import save_scan, write_model
@@ -56,6 +58,7 @@ __all__ = [
     "Mat",
     "Matcher",
     "Phase",
+    "PixelFormat",
     "Printer",
     "Problem",
     "Progress",
@@ -73,6 +76,7 @@ __all__ = [
     "check_model",
     "export_model",
     "import_rig",
+    "open_recorded",
     "open_scanner",
     "parse_mat",
     "print_model",
