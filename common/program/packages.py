@@ -1,4 +1,4 @@
-"""Says which Python package is missing and what installs it. Pure, and light: every start of a command imports it, and it imports none of them."""
+"""Says which Python package is missing and what installs it. Light: every start of a command imports it, and it imports none of them."""
 
 import sys
 from dataclasses import dataclass

@@ -6,7 +6,6 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import PurePath
 from typing import Final, Self
 
 from common.errors import DataError, TandemError
@@ -273,7 +272,7 @@ def distinct_names(paths: Sequence[str]) -> dict[str, str]:
     Returns:
         The short name of each path.
     """
-    parts = {path: PurePath(path).parts for path in paths}
+    parts = {path: path.split("/") for path in paths}
     for count in range(1, 1 + max(map(len, parts.values()), default=0)):
         names = {path: "/".join(each[-count:]) for path, each in parts.items()}
         if len(set(names.values())) == len(names):
