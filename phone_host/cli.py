@@ -75,7 +75,7 @@ _WITHOUT_NUMPY: Final = frozenset({"doctor", "keys", "pair", "settings"})
 
 _NEXT_STEPS = """phone-host makes depth out of two cameras: this machine's and a board's, or of two folders of photographs.
 
-try it without hardware, in half a minute:
+try it without hardware, in a minute or two:
   phone-host demo
 
 your own photographs, taken by two cameras side by side (first of a chessboard that you print, then of the scene):

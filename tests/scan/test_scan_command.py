@@ -170,13 +170,17 @@ def test_a_box_behind_all_that_is_seen_is_no_model(
 
 
 def test_two_cameras_give_the_model_of_the_files(walk: Path, tmp_path: Path) -> None:
-    """The same pictures from a board's camera and this machine's, shown on demand: the same bytes."""
+    """The same pictures from a board's camera and this machine's, shown on demand: the same bytes. At their end the user is told what goes on, and what to do next."""
     link = f"ipc://{tmp_path}/link"
     words = ["scan", "--link", link, "--camera", f"replay:{walk / 'right'}", "--calibration", str(walk / "rig.yaml")]
     with board(["run", "--camera", f"replay:{walk / 'left'}", "--link", link], tmp_path) as sender:
         with host([*words, "--pairs", "5", "--out", str(tmp_path / "live")], tmp_path) as receiver:
             assert receiver.wait() == 0
         sender.wait()
+    assert "5 pairs in the model: all pairs have come, the model is being made" in receiver.stderr
+    told = receiver.out.read_text()
+    assert "try next" in told
+    assert re.search(r"phone-host export \S*live --to ", told)
     scan_here(walk, tmp_path / "files")
     for name in ("model.ply", "trajectory.txt"):
         assert (tmp_path / "live" / name).read_bytes() == (tmp_path / "files" / name).read_bytes()
