@@ -37,6 +37,20 @@ _WORK: Final = {
     "write": "handing over the result",
 }
 
+_LOSSES: Final = {
+    "spoiled_on_board": ("frame", "damaged on the board"),
+    "no_host_on_board": ("frame", "came before the host connected"),
+    "replaced_on_board": ("frame", "replaced on the board by a newer one"),
+    "link_full_on_board": ("frame", "dropped on the board because the link was full"),
+    "stopped_on_board": ("frame", "left on the board when it stopped"),
+    "lost_on_link": ("frame", "lost on the link"),
+    "stale": ("frame", "came twice or from an earlier session"),
+    "before_clock": ("frame", "came before the clock was known"),
+    "dropped_in_fifo": ("pair", "dropped from the full FIFO"),
+    "undecodable": ("pair", "could not be decoded"),
+}
+"""Says what happened to frames or pairs, by the reason that `losses` gives."""
+
 FIT_COLUMNS: Final = (
     "interface",
     "latency",
@@ -134,7 +148,7 @@ def _cell(value_ns: float) -> str:
 
 def summary_line(result: CaseResult) -> str:
     """Summarise pairs, rate, losses and clock of one run in a line. The clock's uncertainty and bound are of the same moment, so the bound is wider."""
-    lost = ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in losses(result).items()) or "nothing"
+    lost = ", ".join(_loss_text(reason, count) for reason, count in losses(result).items()) or "nothing lost"
     if result.ledgers:
         worst_us = statistics_of(result).spread("uncertainty").p95_ns / 1e3
         pairs = f"{counted(len(result.ledgers), 'pair')}, {result.pairs_per_second:.1f}/s, clock of the pairs +-{worst_us:.0f} us (p95)"
@@ -145,7 +159,16 @@ def summary_line(result: CaseResult) -> str:
         if math.isnan(result.bound_ns)
         else f"at the end +-{result.uncertainty_ns / 1e3:.0f} us (+-{result.bound_ns / 1e3:.0f} us whatever the link does)"
     )
-    return f"{pairs}, {at_end}, whole run lost: {lost}"
+    return f"{pairs}, {at_end}; whole run: {lost}"
+
+
+def _loss_text(reason: str, count: int) -> str:
+    """Say what happened to so many frames or pairs: `7 frames came before the host connected`."""
+    if reason in _LOSSES:
+        noun, words = _LOSSES[reason]
+        return f"{counted(count, noun)} {words}"
+    why = reason.removesuffix("_board_frame").removeprefix("disbelieved_").replace("_", " ")
+    return f"{counted(count, 'frame')} not used ({why})"
 
 
 def regime_lines(result: CaseResult, fifo: FifoSettings) -> tuple[str, ...]:

@@ -194,7 +194,7 @@ class _Filming:
                 return False
             raise UnavailableError(
                 f"{self._said.name} gives no image",
-                "see whether another program uses it, and whether it is awake and in front",
+                "check whether another program uses it, and whether it is awake and in front",
             ) from None
         if (luma := _luma(frame, self._said)) is not None:
             arrived_ns = max(arrived_ns, frame.grabbed.ns)

@@ -19,7 +19,7 @@ _UNMATCHED: Final = Concern(
 )
 _AT_ZERO: Final = Concern(
     Doubt.NO_DEPTH,
-    "no pair has depth: no disparity is larger than the noise of zero, as if all points were infinitely far",
+    "no pair has depth: all points are too far to measure",
     "move nearer or mount the cameras farther apart; check that --calibration or --rectified fits the cameras",
 )
 

@@ -21,7 +21,7 @@ def cut_rows(cut: CutCounts, limits: DepthLimits | None) -> tuple[tuple[str, int
     rows = (
         ("have a point", cut.kept),
         ("found no match", cut.unmatched),
-        ("have a disparity no larger than the noise of zero", cut.at_zero),
+        ("are too far to measure", cut.at_zero),
         (far, cut.too_far),
         (near, cut.too_near),
         ("outside the crop", cut.outside),

@@ -18,6 +18,7 @@ from phone_host.report.report_page import Figure, figures_row, heading
 from phone_host.report.scan_lines import area_text, mat_line
 from phone_host.report.scan_report import (
     MODEL,
+    SURFACE_ERROR_SCOPE,
     TRAJECTORY,
     ModelFigures,
     ScanReport,
@@ -94,10 +95,10 @@ def _known(model: ModelFigures) -> tuple[Figure, ...]:
         return ()
     return (
         Figure(
-            label="surface known to",
-            value=f"\u00b1 {two_digits(model.noise_m * 1e3)}",
+            label="expected surface error",
+            value=f"\u00b1{two_digits(model.noise_m * 1e3)}",
             unit="mm",
-            note=f"median; 19 in 20 points to \u00b1 {two_digits(model.noise_p95_m * 1e3)} mm, if the pairs err independently",
+            note=f"median; 95 % of the points: \u00b1{two_digits(model.noise_p95_m * 1e3)} mm ({SURFACE_ERROR_SCOPE})",
         ),
     )
 
@@ -159,7 +160,9 @@ def _border(model: ModelFigures) -> Figure:
     """Tell what nobody saw: how much of a closed surface, or where an open one ends."""
     if math.isfinite(model.unseen_share):
         share, unit = share_text(model.unseen_share).split(" ")
-        return Figure(label="not seen", value=share, unit=unit, note="of the surface: closed, and pink in the model")
+        return Figure(
+            label="never in view", value=share, unit=unit, note="of the surface: filled in, and pink in the model"
+        )
     border, unit = distance_text(model.size.border_m).split(" ")
     note = "where the surface ends, because nothing more was seen; 0 is closed"
     return Figure(label="open border", value=border, unit=unit, note=note)

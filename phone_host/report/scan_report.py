@@ -29,6 +29,9 @@ _LEAST_SHARE: Final = 0.5
 
 _USUAL_SHARE: Final = 0.9
 
+SURFACE_ERROR_SCOPE: Final = "drift not included"
+"""What the stated error of the surface covers: the noise of the pairs, not the error of the way between them."""
+
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
@@ -188,11 +191,19 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
         return Headline.BAD, f"Only {told}."
     sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
     noise_m = report.model.noise_m
-    noise = f"; its surface is known to \u00b1 {two_digits(noise_m * 1e3)} mm if the pairs err independently"
-    known = noise if math.isfinite(noise_m) else ""
+    known = f". {surface_error_sentence(noise_m)}" if math.isfinite(noise_m) else ""
     verdict = Headline.GOOD if min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
-    closed = "" if math.isnan(unseen) else f"; {share_text(unseen)} of it was not seen"
+    closed = "" if math.isnan(unseen) else f". {share_text(unseen)} was never in view and is filled in"
     return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}{known}{closed}."
+
+
+def surface_error_sentence(error_m: float) -> str:
+    """State the expected error of a model's surface, without a full stop: the only place that says what it includes.
+
+    Args:
+        error_m: median standard deviation of the surface's points, m.
+    """
+    return f"Expected surface error: \u00b1{two_digits(error_m * 1e3)} mm ({SURFACE_ERROR_SCOPE})"
 
 
 def share_text(share: float) -> str:

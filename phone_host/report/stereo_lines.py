@@ -109,7 +109,7 @@ def cut_lines(report: PairReport) -> list[str]:
     parts = (
         (cut.too_far, f"farther than {distance_text(limits.far_m)}{why}"),
         (cut.too_near, f"nearer than {distance_text(limits.near_m)}"),
-        (cut.at_zero, "with a disparity no larger than the noise of zero"),
+        (cut.at_zero, "too far to measure"),
     )
     said = [f"{share_text(count, cut.inside)} {words}" for count, words in parts if count]
     kept = f"points up to {distance_text(limits.far_m)} are kept"

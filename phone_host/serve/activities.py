@@ -18,9 +18,9 @@ _PATIENCE_S: Final = 1.5
 _WORDS: Final = {
     Activity.ENROLLING: "a board is being enrolled",
     Activity.CHECKING: "the cameras are being checked",
-    Activity.CALIBRATING: "a calibration is going on",
-    Activity.RUNNING: "a run is going on",
-    Activity.SCANNING: "a scan is going on",
+    Activity.CALIBRATING: "a calibration is running",
+    Activity.RUNNING: "a run is active",
+    Activity.SCANNING: "a scan is running",
     Activity.ENDING: "the last activity is still ending",
 }
 
@@ -115,7 +115,7 @@ class Activities:
         task = Task(activity)
         with self._lock:
             if self._task is not None:
-                return Trouble(_WORDS[self.now], "stop it first, or wait for its end")
+                return Trouble(_WORDS[self.now], "stop it, or wait until it ends")
             if self._is_closed:
                 return Trouble("the program is ending", "start phone-host serve again")
             self._begins()

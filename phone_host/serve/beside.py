@@ -22,7 +22,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.web.source import Activity, Answer, Command, Do, Measured, Newest, PageState, Surface
 
 _NEEDS_SERVE: Final = Trouble(
-    "this page stands beside a run that was started on the command line",
+    "this page only shows a run that was started on the command line",
     "stop it and run `phone-host serve`, where the page sets everything",
 )
 

@@ -30,5 +30,5 @@ class CaptureGuide:
         if now == self._shown:
             return
         self._shown = now
-        done = f"{100 * now[1] // _STEPS} % done, {min(progress.told, ENOUGH)} of {ENOUGH} stretches of film told something"
+        done = f"{100 * now[1] // _STEPS} % done, {min(progress.told, ENOUGH)} of {ENOUGH} segments were usable"
         self._show([Checked("film", "ok", now[0], done)])

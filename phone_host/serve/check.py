@@ -17,7 +17,7 @@ def checked(findings: Iterable[Finding]) -> list[Checked]:
 
 
 def _remedy(finding: Finding) -> str:
-    return "press \u201cCheck the film\u201d" if finding.remedy == CHECK_AGAIN else finding.remedy
+    return "press \u201cCheck for image stabilisation\u201d" if finding.remedy == CHECK_AGAIN else finding.remedy
 
 
 def obstacle(findings: list[Finding]) -> Trouble | None:
@@ -36,8 +36,8 @@ def seen(snapshot: RunSnapshot) -> str:
         return ""
     skew_ms = snapshot.delays.spread("time_skew").p50_ns / 1e6
     rate = (snapshot.processed - 1) / snapshot.seconds if snapshot.seconds > 0 else math.nan
-    speed = f", {rate:.0f} a second" if math.isfinite(rate) else ""
-    return f"both cameras are seen: {counted(snapshot.processed, 'pair')}{speed}, time skew {skew_ms:.1f} ms"
+    speed = f", {rate:.0f} pairs/s" if math.isfinite(rate) else ""
+    return f"both cameras work: {counted(snapshot.processed, 'pair')}{speed}, time skew {skew_ms:.1f} ms"
 
 
 def unseen(snapshot: RunSnapshot) -> Trouble:
@@ -50,7 +50,7 @@ def unseen(snapshot: RunSnapshot) -> Trouble:
     if not received:
         return Trouble("no image came from the board", "see what board-agent says there, or run board-agent doctor")
     if not own:
-        return Trouble("no image came from this machine's camera", "see whether another program uses it")
+        return Trouble("no image came from this machine's camera", "check whether another program uses it")
     return Trouble(
-        "images came from both cameras, but none belong together", "give a greater tolerance, or the same frame rate"
+        "images came from both cameras, but none match in time", "give a greater tolerance, or the same frame rate"
     )

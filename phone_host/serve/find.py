@@ -56,7 +56,7 @@ def browser_choice(words: str) -> Choice:
         words: what is known of it; empty: none gives it yet.
     """
     name = words[:1].upper() + words[1:]
-    note = "" if words else "start it on the page: here, or on the phone"
+    note = "" if words else "start it on this page, here or on the phone"
     return Choice(uri=SCHEME, name=name or "A browser's camera", note=note)
 
 

@@ -10,7 +10,7 @@ from phone_host.stereo.measured_point import SIGMAS_95, Within, distance_between
 from phone_host.web.source import Measured
 
 _NO_DEPTH: Final = "this pair has no depth in metres: give a calibration, and run"
-_GONE: Final = "this pair is gone by now: tap again"
+_GONE: Final = "this pair is no longer in memory: tap again"
 _NOTHING: Final = "there is no pair yet: run first"
 
 
@@ -65,7 +65,7 @@ def _is_found(outcome: Outcome | None) -> bool:
 
 def _problem(number: int, outcome: Outcome | None) -> str:
     assert not isinstance(outcome, FoundPoint)
-    return f"point {number} {'lies nowhere' if outcome is None else outcome.problem}"
+    return f"point {number} {'has no depth' if outcome is None else outcome.problem}"
 
 
 def _place(outcome: Outcome | None) -> tuple[float, float, float] | None:

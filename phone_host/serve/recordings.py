@@ -44,12 +44,12 @@ class Recordings:
             folder: of recordings; created if missing.
 
         Raises:
-            SettingsError: no run goes on, or it cannot be recorded, or is already.
+            SettingsError: no run is active, or it cannot be recorded, or is already.
             UnavailableError: the file cannot be made.
         """
         host = self._host
         if host is None:
-            raise SettingsError("no run goes on", "start it first")
+            raise SettingsError("no run is active", "start it first")
         if host.recording is None:
             raise SettingsError("this run plays a recording", "record while cameras are live")
         try:

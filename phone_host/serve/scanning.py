@@ -58,12 +58,12 @@ class Scanning:
             box: None: everything.
 
         Raises:
-            SettingsError: no scan goes on.
+            SettingsError: no scan is active.
         """
         if (live := self._live) is None:
-            raise SettingsError("no scan goes on", "begin one: the box is set at its start, too")
+            raise SettingsError("no scan is active", "start one: the box can also be set before it starts")
         live.crop(box)
-        return "everything is kept" if box is None else "only what lies in the box is kept"
+        return "everything is saved" if box is None else "only what is inside the box is saved"
 
     @property
     def folder(self) -> str:
@@ -80,7 +80,7 @@ class Scanning:
             return None
         (pairs, fused), over = self._counts, self._over
         if over is None:
-            return ScanState(words="it ended, and nothing of it was written", pairs=pairs, fused=fused)
+            return ScanState(words="the scan ended without a result", pairs=pairs, fused=fused)
         return ScanState(
             words=over.words, level=over.level, pairs=pairs, fused=fused, folder=str(over.folder), files=over.files
         )

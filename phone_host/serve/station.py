@@ -228,9 +228,9 @@ class Station:
 
     def _set(self, values: Choices) -> Answer:
         self._choose(values)
-        done = "set" if any(value.strip() for value in values.values()) else "taken back"
+        done = "set" if any(value.strip() for value in values.values()) else "removed"
         is_busy = self._activities.now is not Activity.IDLE
-        return Answer(words=f"{done}; it counts from the next run on: stop, then run" if is_busy else done)
+        return Answer(words=f"{done}; it takes effect with the next run: stop, then start" if is_busy else done)
 
     def _choose(self, changes: Choices) -> None:
         """Change choices and keep them.
@@ -303,7 +303,7 @@ class Station:
                 self._shelf.clear()  # these pairs are not those of a run
             if task.stopped():
                 views = counted(ready.live.snapshot().views, "view")
-                self._memory.calibration_stopped(f"stopped: {views} taken and kept, nothing computed from them")
+                self._memory.calibration_stopped(f"stopped: {views} saved, no calibration computed")
                 return
             done = ready.finish(task.go_on)
             if done.rig is not None:
@@ -365,7 +365,7 @@ class Station:
     def _stop(self, values: Choices) -> Answer:
         del values
         if not self._activities.stop():
-            return Answer(words="nothing goes on")
+            return Answer(words="nothing is running")
         return Answer(words="stopped" if self._activities.now is Activity.IDLE else "it is ending")
 
     def _snapshot(self, values: Choices) -> Answer:

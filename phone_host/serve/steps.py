@@ -59,7 +59,7 @@ def _scan(facts: Facts, *, has_both: bool) -> Step:
         return Step(name=StepName.SCAN, done=False, words="choose both cameras first")
     if not {"calibration", "rectified"} & facts.choices.keys():
         return Step(name=StepName.SCAN, done=False, words="calibrate first: a scan needs metres")
-    words = "start, and move the cameras around the thing, slowly; press Stop when all of it was seen"
+    words = "press Start and move the cameras slowly around the object; press Stop when every side has been in view"
     return Step(name=StepName.SCAN, done=False, words=words)
 
 

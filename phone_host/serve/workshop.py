@@ -179,7 +179,7 @@ class Workshop:
             if self._state.stage is PrintStage.ASKS:
                 self._put_away("not printed")
             else:
-                self._show(PrintStage.PREPARING, "it is given up")
+                self._show(PrintStage.PREPARING, "print cancelled")
         return "not printed"
 
     def close(self) -> None:
@@ -226,7 +226,7 @@ class Workshop:
             if isinstance(wanted.uri, FileUri):
                 words = f"write {job.name} to {wanted.uri.path} {facts}?"
             else:
-                words = f"print {asks} {facts}? See that the bed is empty"
+                words = f"print {asks} {facts}? Make sure that the bed is empty"
             self._show(PrintStage.ASKS, words, asks=asks)
 
     def _not_prepared(self, words: str) -> None:
@@ -281,9 +281,9 @@ class Workshop:
 
     def _require_free(self) -> None:
         if self._state is not None and self._state.stage is PrintStage.PREPARING and self._is_unwanted:
-            raise SettingsError("the print before is still given up", "try again in a moment")
+            raise SettingsError("the previous print is still being cancelled", "try again in a moment")
         if self._state is not None and self._state.stage is not PrintStage.OVER:
-            raise SettingsError("a print is prepared or goes on", "cancel it first")
+            raise SettingsError("another print is active", "cancel it first")
 
     def _require_running(self) -> RunningPrint:
         if self._running is None:

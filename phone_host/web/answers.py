@@ -48,7 +48,7 @@ _KINDS: Final = {
     ".png": "image/png",
     ".jpg": "image/jpeg",
 }
-_NOT_YET: Final = Trouble("there is no such thing yet", "start a run and wait for its first pair")
+_NOT_YET: Final = Trouble("there is nothing here yet", "start a run and wait for its first pair")
 _NO_DEPTH: Final = Trouble("this run has no depth", "give it a calibration")
 _NOT_SAVED: Final = Trouble("this file was not saved", "see /api/pairs; save pairs with --save-every")
 _NO_SCAN: Final = Trouble("there is no scan yet", "begin one on the page, or with the command scan")

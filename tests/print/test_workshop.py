@@ -71,7 +71,7 @@ def test_a_print_needs_an_answer_that_names_file_and_printer(tmp_path: Path) -> 
         workshop = Workshop(lambda: None)
         wanted = asked_print({"printer": f"serial:{there.path}?baud=115200", "bed": "100,100,100"}, None)
         workshop.prepare(folder, wanted)
-        with pytest.raises(SettingsError, match="goes on"):
+        with pytest.raises(SettingsError, match="is active"):
             workshop.prepare(folder, wanted)
         until(lambda: state(workshop).stage is PrintStage.ASKS, "it asks")
         asks = state(workshop).asks
@@ -155,7 +155,7 @@ def test_cancelling_while_it_is_sliced_ends_the_slicer(tmp_path: Path, slow_slic
         assert folders
         assert all(folder.is_dir() for folder in folders)
         end()
-        until(lambda: state(workshop).stage is PrintStage.OVER, "it is given up")
+        until(lambda: state(workshop).stage is PrintStage.OVER, "print cancelled")
         assert state(workshop).words == "not printed"
         assert not _is_there(process)
         assert not any(folder.exists() for folder in folders)

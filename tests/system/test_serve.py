@@ -76,7 +76,7 @@ def test_from_nothing_to_depth_by_the_api_alone(film: Path, tmp_path: Path) -> N
             assert place[2] == pytest.approx(DEPTH_M, abs=max(4 * sigma, 0.01))
             assert 0 < sigma < 0.02
         assert tapped["length_m"] == pytest.approx(DEPTH_M / 260 * np.hypot(80, 60), abs=0.01)
-        assert client.do("run")["problem"] == "a run is going on"
+        assert client.do("run")["problem"] == "a run is active"
         assert "next run" in client.do("set", matcher="sgbm")["words"]
         assert client.do("snapshot")["words"].endswith("pair-000000")
         assert client.do("stop") == {"words": "stopped"}
@@ -228,7 +228,7 @@ def test_two_pages_on_one_settings_file_lose_nothing(tmp_path: Path) -> None:
         assert "set" in one.do("set", link="tcp://127.0.0.1:1")["words"]
         assert "set" in two.do("set", board_side="right")["words"]
         assert "set" in one.do("set", matcher="block")["words"]
-        assert "taken back" in two.do("set", board_side="")["words"]
+        assert "removed" in two.do("set", board_side="")["words"]
         assert "set" in two.do("set", fifo="2")["words"]
     assert link.is_symlink()
     text = real.read_text()

@@ -142,10 +142,13 @@ def test_losses_name_what_became_of_each_frame() -> None:
 
 
 def test_the_line_of_a_run_never_sets_an_uncertainty_above_its_bound() -> None:
-    """Uncertainty and hard bound are from one moment, 45 and 70 us; the uncertainty that the pairs had (40 us) is given separately, with the number of pairs."""
+    """Uncertainty and hard bound are from one moment, 45 and 70 us; the uncertainty that the pairs had (40 us) is given separately, with the number of pairs; each loss is a sentence."""
     line = summary_line(result())
     assert line.startswith(
         f"{len(result().ledgers)} pairs, 30.3/s, clock of the pairs +-40 us (p95), at the end +-45 us (+-70 us "
+    )
+    assert line.endswith(
+        "; whole run: 3 frames came before the host connected, 2 frames lost on the link, 1 frame not used (no partner), 1 pair dropped from the full FIFO"
     )
     assert fit_rows(analysed(result()))[0][7:9] == ("\u00b145.0\u202f\u00b5s", "\u00b170.0\u202f\u00b5s")
     nothing = dataclasses.replace(result(pairs=0), uncertainty_ns=math.nan, bound_ns=math.nan)

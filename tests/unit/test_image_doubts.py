@@ -249,7 +249,7 @@ OF_RIG = DepthLimits(near_m=0.3, far_m=38.0, disparity_error_px=0.25, from_rig=T
         (CutCounts(too_far=60, too_near=40), GIVEN, "most points lie farther than --far 2 mm", "larger --far"),
         (CutCounts(too_far=100), OF_RIG, "all points lie farther than 38 m", "farther apart"),
         (CutCounts(too_near=100, outside=900), OF_RIG, "all points lie nearer than --near 300 mm", "smaller --near"),
-        (CutCounts(at_zero=90, too_far=10), OF_RIG, "noise of zero", "farther apart"),
+        (CutCounts(at_zero=90, too_far=10), OF_RIG, "too far to measure", "farther apart"),
         (CutCounts(unmatched=90, too_far=10), OF_RIG, "no pair has depth", "--calibration or --rectified fits"),
     ],
 )

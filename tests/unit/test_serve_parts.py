@@ -98,7 +98,7 @@ def test_a_tap_without_depth_says_why() -> None:
     shelf = Shelf()
     assert "no pair" in answered(shelf, [(1, 1)], None).words
     shelf.put(_result(0), None)
-    assert "gone" in answered(shelf, [(1, 1), (2, 2)], 7).words
+    assert "no longer in memory" in answered(shelf, [(1, 1), (2, 2)], 7).words
     without = answered(shelf, [(1, 1), (2, 2)], None)
     assert "no depth" in without.words
     assert (without.places_m, without.length_m) == ((None, None), None)
@@ -158,7 +158,7 @@ def test_one_activity_at_a_time_stopped_at_any_moment() -> None:
     assert seen.now == "running"
     refused = seen.all.begin(Activity.CHECKING, work)
     assert refused is not None
-    assert refused.problem == "a run is going on"
+    assert refused.problem == "a run is active"
     assert seen.all.stop(60)
     assert seen.now == "idle"
     assert (seen.begun, seen.failures) == (1, [])
@@ -224,7 +224,7 @@ def test_the_steps_lead_from_nothing_to_a_run_and_a_scan() -> None:
     ready = steps(Facts(choices={**both, "calibration": "rig.yaml"}, checked="seen", pairs=2))
     assert [step.done for step in ready] == [True] * 5 + [False]
     assert ready[4].words == "the last run gave 2 pairs"
-    assert "move the cameras around" in ready[5].words
+    assert "move the cameras slowly" in ready[5].words
     scanned = steps(Facts(choices=both, scan="3 of 3 pairs are in the model", has_scan=True))[5]
     assert (scanned.done, scanned.words) == (True, "3 of 3 pairs are in the model")
     assert steps(Facts(choices={**both, "rectified": "yes"}, is_running=True))[3].done
@@ -248,13 +248,16 @@ def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
     assert check.obstacle([ok("a", "b"), fail("camera", "gone", "plug it in")]) == Trouble("camera: gone", "plug it in")
     phone = CaptureSource(camera=CameraIdentity("browser", "back"), width_px=640, height_px=480)
     never = stored_finding(None, phone, has_lens=True)
-    assert [each.remedy for each in check.checked([never, ok("a", "b")])] == ["press \u201cCheck the film\u201d", ""]
-    assert check.seen(run(21)) == "both cameras are seen: 21 pairs, 20 a second, time skew 0.0 ms"
+    assert [each.remedy for each in check.checked([never, ok("a", "b")])] == [
+        "press \u201cCheck for image stabilisation\u201d",
+        "",
+    ]
+    assert check.seen(run(21)) == "both cameras work: 21 pairs, 20 pairs/s, time skew 0.0 ms"
     assert check.seen(run(0)) == ""
     nothing = run(0)
     assert "board" in check.unseen(nothing).problem
     assert "this machine" in check.unseen(replace(nothing, counts=PairCounts(received=3))).problem
-    assert "belong" in check.unseen(replace(nothing, counts=PairCounts(received=3, host_frames=3))).problem
+    assert "match in time" in check.unseen(replace(nothing, counts=PairCounts(received=3, host_frames=3))).problem
 
 
 def test_a_calibration_that_was_stopped_is_told_from_one_that_was_computed() -> None:
@@ -322,7 +325,7 @@ def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
         assert told(PageState(activity=Activity.SCANNING, scan=state())) == "scanning: waiting for the first pair"
     ended = state()
     assert ended is not None
-    assert "nothing of it was written" in ended.words
+    assert "ended without a result" in ended.words
     over = Scanned(words="3 pairs", level="good", folder=tmp_path, files=("model.ply",), snapshot=run(0))
     scanning.over(over)
     assert state() == ScanState(words="3 pairs", level="good", folder=str(tmp_path), files=("model.ply",))

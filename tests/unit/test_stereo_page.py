@@ -166,7 +166,7 @@ def test_cut_pixels_are_told_in_words() -> None:
     """Shares are of all pixels; zeros are left out; a small share is never called 0 %."""
     cut = CutCounts(kept=50_000, unmatched=20_000, at_zero=30, too_far=12_000, too_near=3_000, outside=15_000 - 30)
     assert cut_sentence(cut, LIMITS) == (
-        "< 0.1 % have a disparity no larger than the noise of zero, 12 % farther than 4 m, 3.0 % nearer than 500 mm, 15 % outside the crop"
+        "< 0.1 % are too far to measure, 12 % farther than 4 m, 3.0 % nearer than 500 mm, 15 % outside the crop"
     )
     assert cut_rows(CutCounts(kept=5), None) == (("have a point", 5),)
     assert not cut_sentence(CutCounts(kept=5, unmatched=5), LIMITS)

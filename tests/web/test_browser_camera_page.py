@@ -108,7 +108,7 @@ def test_without_credit_nothing_is_sent_and_what_is_dropped_is_counted(camera: P
     """The page sends exactly what was granted; each frame's count of dropped ones is what its sequence says."""
     camera.window = None
     page = started(opened)
-    says(page, "Ready: nobody asks for frames")
+    says(page, "Ready: no step needs frames now")
     assert camera.frames == []
     camera.grant(3)
     camera.until(lambda: len(camera.frames) == 3)
@@ -156,13 +156,13 @@ def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: PlayedFeed,
     assert "allow the camera" in says(page, "The browser does not allow the camera")
     assert page.text_content("#own-go") == "Start"
     page.click("#own-go")
-    assert "Close other camera apps" in says(page, "Another program holds the camera")
+    assert "Close other camera apps" in says(page, "Another program is using the camera")
     assert says(page, "Streaming")
     assert camera.frames
     page.evaluate(
         "() => { const track = document.getElementById('own-video').srcObject.getVideoTracks()[0]; track.stop(); track.dispatchEvent(new Event('ended')); }"
     )
-    assert "it is tried again" in says(page, "The camera was taken away")
+    assert "it is tried again" in says(page, "The camera was disconnected")
     camera.until(lambda: any(not each["live"] for each in camera.of_kind("track")))
     says(page, "Streaming")
     assert len({each["track"] for each in camera.of_kind("hello")}) == 2
@@ -323,7 +323,7 @@ def test_an_address_that_the_browser_does_not_trust_is_told_with_the_ways_out(
 ) -> None:
     """Where the browser keeps its camera back, three ways are named, with the page's own port; nothing is offered that cannot work."""
     page = opened("camera", url=server.url_at(OTHER_NAME))
-    words = says(page, "At this address the browser keeps its camera back")
+    words = says(page, "The browser blocks its camera at this address")
     assert "Open the page in one of these ways" in words
     ways = page.text_content("#own-ways")
     assert f"adb reverse tcp:{server.port} tcp:{server.port}" in ways

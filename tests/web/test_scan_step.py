@@ -186,7 +186,7 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
     page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
     page.wait_for_function("() => document.getElementById('scan-model').dataset.drawn")
     page.click("#scan-draw")
-    page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Keep everything'")
+    page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Remove box'")
     until(lambda: bool(program.commands), "the box reaches the scan")
     assert program.commands[-1].do is Do.CROP
     assert program.commands[-1].values == {"box": page.input_value("#scan-box")}
@@ -221,7 +221,7 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
     page.dispatch_event("#scan-box", "change")
     page.wait_for_function("() => !document.getElementById('scan-answer').textContent")
     page.click("#scan-draw")
-    page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Draw the box'")
+    page.wait_for_function("() => document.getElementById('scan-draw').textContent === 'Draw box'")
     assert page.input_value("#scan-box") == ""
     until(lambda: program.commands[-1].values == {"box": ""}, "the scan keeps everything again")
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")

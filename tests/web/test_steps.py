@@ -97,12 +97,12 @@ def test_nothing_is_claimed_that_nobody_looked_for(program: Played, opened: Open
     program.change(boards=None, cameras=(), settings={"link": "tcp://10.0.0.9:5555"}, stranger="tcp://10.0.0.9:5555")
     page = opened("board")
     page.wait_for_selector("#enrol[open]")  # a typed address, too, leads to the code
-    assert page.text_content("#link-none") == "Nobody has looked yet: press Find."
+    assert page.text_content("#link-none") == "Press Find to search for boards."
     program.answers[Do.FIND] = Answer(words="found 0 boards and 0 cameras")
     page.click("#link-find")
     page.wait_for_selector("#link-answer:has-text('Found 0 boards')")
     page.click("#step-camera")
-    assert page.text_content("#camera-none") == "Nobody has looked yet: press Find."
+    assert page.text_content("#camera-none") == "Press Find to search for cameras."
     program.change(boards=())
     page.wait_for_selector("#camera-none:has-text('None on this machine. ')")
     program.change(trouble=Trouble("tcp://10.0.0.9:5555 does not answer", "see /etc/hosts"))

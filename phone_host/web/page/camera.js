@@ -149,7 +149,7 @@ export class CameraBox {
     const track = feed.opened?.track;
     const settings = track?.getSettings() ?? {};
     const capabilities = track ? capabilitiesOf(track) : {};
-    const devices = this.devices.length ? this.devices : [{ id: '', name: 'the usual one' }];
+    const devices = this.devices.length ? this.devices : [{ id: '', name: 'default' }];
     const chosen = settings.deviceId ?? feed.chosen.device ?? '';
     const device = devices.some(({ id }) => id === chosen) ? chosen : devices[0].id;
     options(byId('own-device'), devices.map(({ id, name }) => ({ value: id, words: name })), device);
@@ -174,7 +174,7 @@ export class CameraBox {
       const isHeld = group === 'torch' ? !!settings.torch : locks?.settling.has(group) || !!locks?.held[group];
       if (input.checked !== isHeld) input.checked = !!isHeld;
       const refusal = locks?.refused[group] ?? '';
-      text(output, refusal ? sentence(refusal) : locks?.settling.has(group) ? 'finding its value \u2026' : isHeld || group === 'torch' ? valuesInWords(group, settings) : 'automatic');
+      text(output, refusal ? sentence(refusal) : locks?.settling.has(group) ? 'measuring \u2026' : isHeld || group === 'torch' ? valuesInWords(group, settings) : 'automatic');
       data(output, 'level', refusal ? 'bad' : '');
     });
     const isNone = !groups.length;

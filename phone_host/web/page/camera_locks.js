@@ -89,7 +89,7 @@ export class Locks {
   isKnown(group) {
     delete this.refused[group];
     const isKnown = canHold(this.capabilities, group);
-    if (!isKnown) this.refused[group] = 'this camera cannot hold it';
+    if (!isKnown) this.refused[group] = 'this camera cannot lock it';
     return isKnown;
   }
 

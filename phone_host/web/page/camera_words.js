@@ -22,33 +22,33 @@
 const said = (level, words, remedy = '') => ({ level, words, remedy });
 
 const FAILURES = /** @type {Record<string, Said>} */ ({
-  NotAllowedError: said('bad', 'The browser does not allow the camera', 'Press the sign left of the address, allow the camera, then start again.'),
+  NotAllowedError: said('bad', 'The browser does not allow the camera', 'Press the icon left of the address, allow the camera, then start again.'),
   NotFoundError: said('bad', 'This device has no camera that the browser sees', 'Plug one in; on a phone, allow the browser the camera in the system\u2019s settings.'),
-  NotReadableError: said('bad', 'Another program holds the camera', 'Close other camera apps and calls: it is tried again by itself.'),
-  OverconstrainedError: said('bad', 'The camera cannot be had in any size', 'Choose another camera.'),
-  NotSupportedError: said('bad', 'This browser cannot hand over single frames', 'Use Chrome, Edge or Firefox in its present version.'),
+  NotReadableError: said('bad', 'Another program is using the camera', 'Close other camera apps and calls. The page tries again by itself.'),
+  OverconstrainedError: said('bad', 'The camera offers no usable image size', 'Choose another camera.'),
+  NotSupportedError: said('bad', 'This browser cannot deliver single frames', 'Use a current version of Chrome, Edge or Firefox.'),
 });
-const OTHER_FAILURE = said('bad', 'The camera does not start', 'Close other camera apps, or choose another camera; it is tried again by itself.');
+const OTHER_FAILURE = said('bad', 'The camera does not start', 'Close other camera apps, or choose another camera. The page tries again by itself.');
 
 /** Failures that end by themselves: it is tried again. @param {string} name */
 export const passes = (name) => !['NotAllowedError', 'SecurityError', 'OverconstrainedError', 'NotSupportedError'].includes(name);
 
 /** @param {Facts} facts @returns {Said} */
 export function stateOf(facts) {
-  if (!facts.isSecure) return said('bad', 'At this address the browser keeps its camera back', 'Open the page in one of these ways:');
+  if (!facts.isSecure) return said('bad', 'The browser blocks its camera at this address', 'Open the page in one of these ways:');
   if (facts.phase === 'failed') return FAILURES[facts.failure] ?? FAILURES[{ AbortError: 'NotReadableError', SecurityError: 'NotAllowedError' }[facts.failure] ?? ''] ?? OTHER_FAILURE;
   if (facts.phase === 'off') return said('unknown', 'The camera is off', 'Start it; the browser asks for permission once.');
   if (facts.phase === 'opening') return said('warning', 'Waiting for the camera', 'Allow it if the browser asks.');
-  if (facts.isEnded) return said('bad', 'The camera was taken away', 'End the call or the app that has it, or plug it in: it is tried again by itself.');
+  if (facts.isEnded) return said('bad', 'The camera was disconnected', 'End the call or the app that uses it, or plug it in. The page tries again by itself.');
   if (!facts.isVisible) return said('warning', 'This tab is in the background', 'Bring it to the front: browsers stop the camera of hidden tabs.');
   if (facts.isMuted) return said('bad', 'The browser has paused the camera', 'End the call or the app that uses it; unlock the screen.');
   if (facts.line === 'refused') return said('bad', facts.refusal.problem, facts.refusal.remedy);
-  if (facts.line === 'connecting') return said('unknown', 'Calling the program');
-  if (facts.line !== 'open') return said('warning', 'The program does not answer', 'See whether phone-host still runs; it is tried again by itself.');
+  if (facts.line === 'connecting') return said('unknown', 'Connecting to the program');
+  if (facts.line !== 'open') return said('warning', 'The program does not answer', 'Check that phone-host is running. The page tries again by itself.');
   if (facts.trouble) return said('bad', 'The browser cannot encode a frame', `Choose another size; it says: ${facts.trouble}`);
   if (facts.isTurned) return said('warning', 'The phone was turned', 'Turn it back: a calibration holds for one position.');
   if (facts.told) return said('warning', facts.told);
-  if (!facts.isAsked) return said('good', 'Ready: nobody asks for frames', 'Go on with the next step.');
+  if (!facts.isAsked) return said('good', 'Ready: no step needs frames now', 'Go on with the next step.');
   return said('good', 'Streaming', 'Keep this tab in front; the screen stays on.');
 }
 

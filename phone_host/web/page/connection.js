@@ -94,8 +94,8 @@ export class Connection {
 
 /** @typedef {{problem: string, remedy: string}} Trouble */
 
-const NO_TOKEN = { problem: 'this browser may look but not steer', remedy: 'open the address that phone-host printed, with its token' };
-const UNREACHED = { problem: 'the program does not answer', remedy: 'see whether phone-host still runs' };
+const NO_TOKEN = { problem: 'this browser may watch, but not control', remedy: 'open the address that phone-host printed, with its token' };
+const UNREACHED = { problem: 'the program does not answer', remedy: 'check that phone-host is running' };
 
 /**
  * Ask the server for something.

@@ -86,14 +86,14 @@ export class Controls {
   /** What to do stands at the pictures: on a phone they are far from the button. @param {boolean} on */
   draw(on) {
     if (on && !this.size()) {
-      tell(this.settingsAnswer, { problem: 'there is no picture yet to draw on', remedy: 'start a run' });
+      tell(this.settingsAnswer, { problem: 'there is no image to draw on yet', remedy: 'start a run' });
       return;
     }
     this.drawing = on;
     byId('crop-draw').setAttribute('aria-pressed', String(on));
     data(byId('views'), 'drawing', on ? 'yes' : 'no');
     tell(this.settingsAnswer, {});
-    tell(this.cropAnswer, { words: on ? 'drag a rectangle over what shall have depth, on the depth or the left picture' : '' });
+    tell(this.cropAnswer, { words: on ? 'drag a rectangle around the area that needs depth, on the depth or the left image' : '' });
     if (!on) {
       if (this.state()) this.show(this.state());
       return;
@@ -152,7 +152,7 @@ export class Controls {
     byId('snapshot').setAttribute('aria-disabled', String(!running));
     this.showRecording(state.live?.recording ?? null);
     const names = state.matchers.map((/** @type {string} */ name) => ({ value: name, words: name }));
-    options(byId('matcher'), [{ value: '', words: 'the default' }, ...names], state.settings.matcher ?? '');
+    options(byId('matcher'), [{ value: '', words: 'default' }, ...names], state.settings.matcher ?? '');
     for (const name of NAMES) follow(byId(name), state.settings[name] ?? '');
     show(byId('crop-clear'), !!state.settings.crop);
     if (!this.drawing) this.outline(parsedCrop(state.settings.crop ?? ''));

@@ -94,7 +94,7 @@ export function showGuide(state) {
   const verdict = byId('guide-verdict');
   data(verdict, 'level', VERDICTS[guide.verdict ?? ''] ?? 'unknown');
   text(verdict, guide.verdict ? `so far: ${guide.verdict}` : 'no verdict yet');
-  text(byId('guide-remedy'), guide.remedy ? sentence(`to mend: ${guide.remedy}`) : '');
+  text(byId('guide-remedy'), guide.remedy ? sentence(`to improve: ${guide.remedy}`) : '');
   for (const side of ['left', 'right']) {
     const camera = guide.cameras[side] ?? null;
     const picture = pictures?.[/** @type {'left' | 'right'} */ (side)] ?? null;

@@ -69,7 +69,7 @@ export class Live {
     data(frame, 'pair', String(pair.head.number));
     const lines = !pair.head.range ? 'none' : pair.head.way[1] ? 'columns' : 'rows';
     data(frame, 'lines', lines);
-    text(byId('pictures-words'), lines === 'none' ? 'As the cameras see it: nothing is rectified in this run' : 'Rectified: a point lies on the same line in both');
+    text(byId('pictures-words'), lines === 'none' ? 'Not rectified: shown as the cameras see it' : 'Rectified: each point lies on the same line in both images');
     if (!this.hasAskedForCloud) this.startCloud();
     const aspect = `${pair.head.width} / ${pair.head.height}`;
     if (frame.style.getPropertyValue('--aspect') !== aspect) frame.style.setProperty('--aspect', aspect);
@@ -95,7 +95,7 @@ export class Live {
     const isFlat = !!head && !head.range;
     text(byId('no-pair'), isFlat ? NO_DEPTH : 'No pair yet');
     show(byId('no-pair'), !head?.range);
-    text(byId('cloud-wait'), isFlat ? NO_DEPTH : 'Metres need a calibration: no cloud yet');
+    text(byId('cloud-wait'), isFlat ? NO_DEPTH : 'No cloud yet: it needs a calibration');
     show(byId('cloud-wait'), !!head && !head.geometry);
     if (head?.range) return;
     this.map.clear();

@@ -27,7 +27,7 @@ const LINES = /** @type {Record<import('./connection.js').Line, string>} */ ({
 
 /** What is shown is old then; it stays, greyed. */
 const OLD = /** @type {Record<string, string>} */ ({
-  lost: 'Connection lost: what stands here is old. Trying again', ended: 'The program has ended: what stands here is what it showed last',
+  lost: 'Connection lost: this page shows old data. Trying again', ended: 'The program has ended: this page shows its last state',
 });
 
 /** @type {any} */

@@ -8,7 +8,7 @@ import { GrowingSurface } from './surface.js';
 
 const ASK_MS = 1000;
 const NO_WEBGL = 'This browser cannot draw the surface (no WebGL 2). Everything else works; the model can be saved.';
-const NO_BOX = { problem: 'that is no box', remedy: 'give its sides and its middle in mm, such as 300x300x200@0,0,600' };
+const NO_BOX = { problem: 'this is not a box', remedy: 'give its size and its centre in mm, such as 300x300x200@0,0,600' };
 const EMPTY = { words: '', level: 'unknown', pairs: 0, fused: 0, folder: '', files: [] };
 
 export class ScanPanel {
@@ -85,7 +85,7 @@ export class ScanPanel {
     this.crop?.show(box);
     this.model?.within(box);
     byId('scan-draw').setAttribute('aria-pressed', String(!!box));
-    text(byId('scan-draw'), box ? 'Keep everything' : 'Draw the box');
+    text(byId('scan-draw'), box ? 'Remove box' : 'Draw box');
   }
 
   /** @param {any} state */

@@ -6,11 +6,11 @@ import { byId, data, follow, keep, make, onPress, sentence, show, tell, text } f
 /** @typedef {{uri: string, name: string, note: string}} Choice */
 
 const NONE = {
-  link: 'None. Plug the board in, or bring it into the same network.',
-  camera: "None on this machine. A phone's camera app that serves MJPEG works by its address.",
+  link: 'None found. Plug the board in, or connect it to the same network.',
+  camera: "None found on this machine. For a phone’s camera app that serves MJPEG, type its address.",
 };
 const BROWSER = 'browser:';
-const NOT_LOOKED = 'Nobody has looked yet: press Find.';
+const NOT_LOOKED = { link: 'Press Find to search for boards.', camera: 'Press Find to search for cameras.' };
 
 /** Give a command and show what became of it. @param {HTMLElement} place @param {string} name @param {Record<string, string>} [values] */
 async function ask(place, name, values) {
@@ -41,7 +41,7 @@ function showChoices(option, found, chosen, hasLooked) {
   });
   // A browser's camera is always there.
   show(byId(`${option}-none`), choices.every((one) => one.uri === BROWSER));
-  text(byId(`${option}-none`), hasLooked ? NONE[option] : NOT_LOOKED);
+  text(byId(`${option}-none`), hasLooked ? NONE[option] : NOT_LOOKED[option]);
   follow(byId(`${option}-typed`), choices.some((one) => one.uri === chosen) ? '' : chosen);
 }
 
@@ -92,11 +92,11 @@ export function showSetup(state) {
   const [film] = isFilming(state) ? state.checks : [];
   text(byId('film-words'), film ? sentence(film.words) : '');
   text(byId('film-done'), film ? sentence(film.remedy) : '');
-  text(byId('capture-go'), isFilming(state) ? 'Stop' : 'Check the film');
+  text(byId('capture-go'), isFilming(state) ? 'Stop' : 'Check for image stabilisation');
   showChecks(film ? [] : state.checks ?? []);
   text(byId('calibrate-go'), state.activity === 'calibrating' ? 'Stop' : 'Start live calibration');
   follow(byId('calibration-typed'), state.settings.calibration ?? '');
-  text(byId('command'), state.command || 'not enough is chosen yet');
+  text(byId('command'), state.command || 'Command: appears once board and camera are chosen');
   byId('command-copy').setAttribute('aria-disabled', String(!state.command));
 }
 
@@ -137,6 +137,6 @@ async function copy(words) {
     return { words: 'copied' };
   } catch {
     getSelection()?.selectAllChildren(byId('command'));
-    return { words: 'selected: copy it with the keys' };
+    return { words: 'selected: copy it with the keyboard' };
   }
 }

@@ -13,13 +13,13 @@ export function before(state) {
   const done = state.steps.map((/** @type {any} */ step) => step.done);
   // A step that was left out is not asked for again.
   const next = state.steps.slice(done.lastIndexOf(true) + 1).find((/** @type {any} */ step) => !step.done) ?? state.steps[done.indexOf(false)];
-  const todo = state.trouble ? 'Read what went wrong' : next ? `Next: ${next.words}` : state.steps.length ? 'Everything is set: start a run' : 'The run has ended';
+  const todo = state.trouble ? 'See what went wrong' : next ? `Next: ${next.words}` : state.steps.length ? 'Everything is set: start a run' : 'The run has ended';
   return { level: 'unknown', headline: `No depth yet. ${todo}`, concerns: [] };
 }
 
 /** What is said while something else than a run goes on: its pairs say nothing about depth. */
 const DOING = /** @type {Record<string, string>} */ ({
-  checking: 'Checking: what is found stands below', calibrating: 'Calibrating: do what the words below say',
+  checking: 'Checking: the results appear below', calibrating: 'Calibrating: follow the instructions below',
 });
 
 /** The run whose doubts are shown, and how tall they have been in it, px: what comes and goes must not move the pictures. */
