@@ -1,10 +1,11 @@
 """Finds a board for `phone-host run` without --link.
 
-It tries the last board, the board on the USB cable, one on this machine, one whose own Wi-Fi this machine is in, and then
+It tries the last board, one on this machine's documented ipc socket, the board on the USB cable, one on this machine's port, one whose own Wi-Fi this machine is in, and then
 one that announces itself on the network. Only a port with ZeroMQ's greeting counts as a board's port. The key, not an answer on the network, decides
 whether it is the right board.
 """
 
+import os
 import socket
 import sys
 import threading
@@ -32,6 +33,9 @@ THIS_MACHINE: Final = "tcp://127.0.0.1:5555"
 
 _NEAR: Final = (GADGET, THIS_MACHINE, ACCESS_POINT)
 
+_SOCKET: Final = "board"
+"""Name of the socket in $XDG_RUNTIME_DIR that docs/links.md gives to a board on the same machine."""
+
 _LAST_FILE: Final = "last-board"
 _MOST_BYTES: Final = 4096
 _ANSWER_S: Final = 0.7
@@ -57,8 +61,8 @@ def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) ->
         UnavailableError: no board was found in time, or there are several.
     """
     deadline_s = float("inf") if wait_s is None else now_s() + wait_s
-    near = tuple(dict.fromkeys((*_last(state), *_NEAR)))
     while True:
+        near = _near(state)
         if there := answering(near):
             return there[0]
         announced = _announced()
@@ -90,7 +94,7 @@ def list_boards(state: Path) -> list[Found]:
     """
     announced = _announced()
     names = {board.link: board.name for board in announced}
-    asked = tuple(dict.fromkeys((*_last(state), *_NEAR, *names)))
+    asked = tuple(dict.fromkeys((*_near(state), *names)))
     found = [Found(names.get(link, ""), link) for link in answering(asked)]
     with suppress(TandemError):
         found.append(Found("board on the USB cable", f"serial:/dev/{find_usb_board(None).device}"))
@@ -108,11 +112,25 @@ def remember(state: Path, link: str) -> None:
 
 
 def answering(links: Sequence[str]) -> list[str]:
-    """Return those of the tcp links that answer with ZeroMQ's greeting, in the same order."""
+    """Return those of the tcp and ipc links that answer with ZeroMQ's greeting, in the same order."""
     if not links:
         return []
     with ThreadPoolExecutor(min(16, len(links))) as pool:
         return [link for link, greets in zip(links, pool.map(_greets, links), strict=True) if greets]
+
+
+def _near(state: Path) -> tuple[str, ...]:
+    """Return the links to try before the network: the last board's, this machine's, those of a cable and of a board's own Wi-Fi."""
+    return tuple(dict.fromkeys((*_last(state), *_sockets(), *_NEAR)))
+
+
+def _sockets() -> list[str]:
+    """Return the ipc link to a board on this machine, if its socket exists."""
+    path = Path(os.environ.get("XDG_RUNTIME_DIR", "")) / _SOCKET
+    with suppress(OSError):
+        if path.is_absolute() and path.is_socket():
+            return [f"ipc://{path}"]
+    return []
 
 
 def _last(state: Path) -> list[str]:
@@ -127,12 +145,30 @@ def _last(state: Path) -> list[str]:
 
 def _greets(link: str) -> bool:
     """Return whether ZMTP's signature comes (RFC 23: ff, eight bytes, 7f), which both sides send unasked."""
-    host, _, port = link.removeprefix("tcp://").rpartition(":")
     greeting = b""
-    with suppress(OSError, OverflowError), socket.create_connection((host.strip("[]"), int(port)), _ANSWER_S) as probe:
+    with suppress(OSError, OverflowError), _connected(link) as probe:
         while len(greeting) < _GREETING_BYTES and (part := probe.recv(_GREETING_BYTES - len(greeting))):
             greeting += part
     return len(greeting) == _GREETING_BYTES and greeting[0] == 0xFF and greeting[-1] == 0x7F
+
+
+def _connected(link: str) -> socket.socket:
+    """Connect to a tcp or ipc link.
+
+    Raises:
+        OSError: nobody listens there.
+    """
+    if link.startswith("ipc://"):
+        probe = socket.socket(socket.AF_UNIX)
+        probe.settimeout(_ANSWER_S)
+        try:
+            probe.connect(link.removeprefix("ipc://"))
+        except OSError:
+            probe.close()
+            raise
+        return probe
+    host, _, port = link.removeprefix("tcp://").rpartition(":")
+    return socket.create_connection((host.strip("[]"), int(port)), _ANSWER_S)
 
 
 def _why_not() -> str:
