@@ -142,7 +142,7 @@ def headline(run: RunSnapshot) -> Answer:
     if run.images.wants_depth:
         gone = [concern for concern in found if concern.doubt in GONE]
         of_depth = (concern for concern in found if concern.doubt not in GONE and not concern.spares_depth)
-        said = _with_range(_with_lone(_of_images(run, tuple(of_depth)), found), run)
+        said = _with_range(_with_age(_with_lone(_of_images(run, tuple(of_depth)), found), found), run)
         return said if not gone or said.grade is Grade.BAD else _while_it_was_there(gone[0], said)
     if found:
         sentence = f"{_capital(found[0].sentence)}. Remedy: {found[0].remedy}."
@@ -156,6 +156,14 @@ def _with_lone(said: Answer, found: tuple[Concern, ...]) -> Answer:
     if said.grade is not Grade.GOOD or not lone:
         return said
     return Answer(said.grade, f"{said.sentence} {_capital(lone[0])}.")
+
+
+def _with_age(said: Answer, found: tuple[Concern, ...]) -> Answer:
+    """Warn instead of good news if the results are too old: the depth is right, but not where things are by now."""
+    old = next((item.sentence for item in found if item.doubt is Doubt.AGE), "")
+    if said.grade is not Grade.GOOD or not old:
+        return said
+    return Answer(Grade.WARNING, f"{said.sentence} But {old}.")
 
 
 def _with_range(said: Answer, run: RunSnapshot) -> Answer:

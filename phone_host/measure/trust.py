@@ -305,7 +305,7 @@ def timing_concerns(timing: Timing) -> tuple[Concern, ...]:
             Concern(
                 Doubt.AGE,
                 f"results are {timing.end_to_end_ns / 1e6:.0f} ms old while {moves}: the scene has moved {lag_px:.0f} px since",
-                "move slower; the summary says what delays the results",
+                "move more slowly, or shorten the largest delay",
                 spares_depth=True,
             )
         )

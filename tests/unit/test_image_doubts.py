@@ -200,6 +200,15 @@ def test_the_headline_of_a_good_run_says_how_far_to_trust_it() -> None:
     assert summary(with_images()).startswith(said.sentence)
 
 
+def test_depth_that_is_right_but_old_is_no_good_news() -> None:
+    """Results that lag behind a moving scene by a twentieth of its width make the headline a warning that says so, wherever it is shown."""
+    fast = replace(with_images(), motion_px_s=5000.0, width_px=640, stamps_exact=True)
+    lag = next(concern for concern in concerns(fast) if concern.doubt is Doubt.AGE)
+    said = headline(fast)
+    assert said.grade is Grade.WARNING
+    assert said.sentence == f"{headline(with_images()).sentence} But {lag.sentence}."
+
+
 def test_a_far_scene_is_answered_for_at_its_own_depth() -> None:
     """At 5 px the scene is 10 m away: 100 * 0.5 / 50 = 1 m of error with the core's own half pixel; without geometry there are no metres."""
     far = ImageFigures(density=0.9, disparity_px=5.0)

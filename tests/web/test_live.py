@@ -251,6 +251,19 @@ def test_doubts_stand_on_top_in_words_with_what_to_do(running: Played, opened: O
     assert page.locator("#concerns").is_hidden()
 
 
+@pytest.mark.parametrize("step", ["run", "scan"])
+def test_results_that_are_too_old_are_amber_and_lead_to_the_delays(running: Played, opened: Opener, step: str) -> None:
+    """No tick stands over a scene that has moved since: the sign is a warning, and its link shows the chart of the delays from any step."""
+    old = "results are 300 ms old while the picture moves: the scene has moved 30 px since"
+    running.change(concerns=(Concern(Doubt.AGE, old, "move more slowly", spares_depth=True),))
+    page = opened(step)
+    page.wait_for_selector("#trust[data-level=warning]")
+    assert f"But {old}." in page.text_content("#headline")
+    page.click("#concerns a")
+    page.wait_for_selector("#panel-run:not([hidden])")
+    until(page, "document.querySelector('#title-delays').getBoundingClientRect().top < innerHeight")
+
+
 def test_range_and_crop_are_set_typed_or_drawn(running: Played, opened: Opener) -> None:
     """Far is sent as typed; a rectangle drawn on the depth picture becomes the crop in pixels of the left image, outlined on both pictures."""
     page = opened("run")

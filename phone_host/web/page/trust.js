@@ -2,7 +2,7 @@
 
 import { byId, data, keep, make, say, sentence, show, text } from './dom.js';
 
-/** @typedef {{problem: string, remedy: string}} Concern */
+/** @typedef {{problem: string, remedy: string, doubt?: string}} Concern */
 /** @typedef {{level: string, headline: string, concerns: Concern[]}} Trust */
 
 const SIGNS = /** @type {Record<string, string>} */ ({ good: '\u2713', warning: '!', bad: '\u2715', unknown: '?' });
@@ -36,8 +36,22 @@ function last(state) {
 export function unsaid({ headline, concerns }) {
   const said = headline.toLowerCase();
   return concerns
-    .map(({ problem, remedy }) => ({ problem: said.includes(problem.toLowerCase()) ? '' : problem, remedy }))
+    .map(({ problem, remedy, doubt }) => ({ problem: said.includes(problem.toLowerCase()) ? '' : problem, remedy, doubt }))
     .filter(({ problem, remedy }) => problem || !said.includes(remedy.toLowerCase()));
+}
+
+/** Make a link to the chart of the delays, which is on the step of the run. @returns {HTMLAnchorElement} */
+function delaysLink() {
+  const link = make('a', '', 'See the delays');
+  link.href = '#run';
+  link.addEventListener('click', (event) => {
+    event.preventDefault();
+    const scroll = () => byId('title-delays').scrollIntoView({ block: 'start' });
+    if (['run', ''].includes(document.body.dataset.step ?? '') || document.body.dataset.beside === 'yes') return scroll();
+    window.addEventListener('hashchange', scroll, { once: true }); // after the listener that shows the step
+    location.hash = 'run';
+  });
+  return link;
 }
 
 /** @param {HTMLElement} box @param {any} state */
@@ -61,9 +75,10 @@ export function showTrust(state) {
   const list = byId('concerns');
   const others = unsaid(trust);
   show(list, others.length > 0);
-  keep(list, others, (one) => one.problem.replace(/\d+([.,]\d+)?/g, '#'), () => make('li', '', make('b'), ' ', make('span')), (item, one) => {
+  keep(list, others, (one) => one.problem.replace(/\d+([.,]\d+)?/g, '#'), () => make('li', '', make('b'), ' ', make('span'), ' ', delaysLink()), (item, one) => {
     text(item.children[0], sentence(one.problem));
     text(item.children[1], sentence(one.remedy));
+    show(/** @type {HTMLElement} */ (item.children[2]), one.doubt === 'age');
   });
   keepHeight(box, state);
   const trouble = byId('trouble');
