@@ -8,6 +8,7 @@ from typing import Final
 from common.doctor.finding import Finding, fail, ok, warn
 from common.words import times
 
+LOG_UNREADABLE: Final = "the kernel's log may not be read"
 _MB: Final = 1_000_000
 
 _LITTLE_BYTES: Final = 50 * _MB
@@ -221,7 +222,7 @@ def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Finding:
 
 
 def _unreadable(what: str) -> Finding:
-    return warn(what, "the kernel's log may not be read", "ask again as root: sudo")
+    return warn(what, LOG_UNREADABLE, "ask again as root: sudo")
 
 
 def _matching(log: KernelLog, pattern: re.Pattern[str]) -> list[LogLine]:

@@ -27,11 +27,11 @@ _NAMED: Final = {
     Arrangement.SWAPPED: Concern(
         Doubt.SWAPPED,
         "left and right are exchanged: the scene moves the wrong way from the left image to the right one",
-        "swap LEFT and RIGHT or --board-side; if each is where it should be, both cameras are on their heads (rotate=180) or both mirror their images (flip=h)",
+        "swap LEFT and RIGHT or --board-side; if each is where it should be, both cameras are upside down (rotate=180) or both mirror their images (flip=h)",
     ),
     Arrangement.TURNED: Concern(
         Doubt.TURNED,
-        "one camera is on its head: the two images are turned by 180 degrees to each other",
+        "one camera is upside down: the two images are turned by 180 degrees to each other",
         "mount it upright, or give that camera rotate=180",
         arrangement=Arrangement.TURNED,
     ),
@@ -43,13 +43,13 @@ _NAMED: Final = {
     ),
     Arrangement.BOTH_TURNED: Concern(
         Doubt.TURNED,
-        "both cameras are on their heads: only turned by 180 degrees do their images fit the calibration",
+        "both cameras are upside down: their images fit the calibration only when turned by 180 degrees",
         "mount them upright, or give both cameras rotate=180",
         arrangement=Arrangement.BOTH_TURNED,
     ),
     Arrangement.BOTH_MIRRORED: Concern(
         Doubt.MIRRORED,
-        "both images are mirror images: only mirrored do they fit the calibration",
+        "both images are mirrored: they fit the calibration only when flipped",
         "switch mirroring off in both cameras, or give both flip=h (flip=v if top and bottom are exchanged)",
         arrangement=Arrangement.BOTH_MIRRORED,
     ),

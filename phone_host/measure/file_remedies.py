@@ -37,11 +37,11 @@ _RIGHT_180: Final = ("--rotate-right", "180")
 
 FILE_REMEDIES: Final[Mapping[Arrangement, FileRemedy]] = {
     Arrangement.SWAPPED: FileRemedy(
-        "swap LEFT and RIGHT; if each is what it should be, both are on their heads (--rotate-left 180 --rotate-right 180) or both are mirror images (--flip-left h --flip-right h)",
+        "swap LEFT and RIGHT; if each is what it should be, both are upside down (--rotate-left 180 --rotate-right 180) or both are mirror images (--flip-left h --flip-right h)",
         ((EXCHANGE,),),
     ),
     Arrangement.TURNED: FileRemedy(
-        "give --rotate-left 180 or --rotate-right 180, for the image that is on its head",
+        "give --rotate-left 180 or --rotate-right 180, for the image that is upside down",
         (_LEFT_180, _RIGHT_180),
     ),
     Arrangement.TURNED_BY_QUARTER: FileRemedy(

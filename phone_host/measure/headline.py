@@ -76,7 +76,7 @@ def answer(
     if figures.scattered_share > _SPECKS:
         parts.append(f"{figures.scattered_share:.0%} of it in specks that may be wrong")
     if figures.consistency < _PATCHY:
-        parts.append(f"of which {figures.consistency:.0%} are found again from right to left")
+        parts.append(f"of which {figures.consistency:.0%} are confirmed from right to left")
     if checked:
         only = "only " if figures.vertical_px * figures.matched_scale > _ROWS_GOOD_PX else ""
         parts.append(f"rows agree {only}to {max(figures.vertical_px, 0.1):.1f} px")

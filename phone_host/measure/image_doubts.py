@@ -39,7 +39,7 @@ SGBM found 3 to 22 % of the former depth again, except on two of 463 px of width
 _MOST_SKEW_PX: Final = 0.9
 """Given pairs measure 0.78 px (KITTI) and less; a camera turned aside by 1 degree 1.04 px and more on 800 to 1280 px of width."""
 
-_MOVED: Final = "check that both images are of one moment; else the calibration does not fit these cameras any more, or never did: calibrate the rig again"
+_MOVED: Final = "check that both images were taken at the same moment; otherwise the calibration does not fit these cameras: calibrate the rig again"
 _NOT_RECTIFIED: Final = "these images are not rectified: calibrate your cameras and give --calibration rig.yaml"
 
 _EDGE_TO_EDGE: Final = 3.5
@@ -168,7 +168,7 @@ def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Co
         found.append(
             Concern(
                 Doubt.LOW_CONSISTENCY,
-                f"only {figures.consistency:.0%} of the depth is found again from right to left",
+                f"only {figures.consistency:.0%} of the depth is confirmed from right to left",
                 "light the scene well, and give it texture; plain and repeated surfaces deceive the matcher",
             )
         )

@@ -17,7 +17,7 @@ class ImageFigures:
 
     Attributes:
         density: share of the left image's pixels that have a disparity.
-        consistency: share of sampled disparities that are found again from right to left.
+        consistency: share of sampled disparities that are confirmed from right to left.
         vertical_px: distance of features from their rows, px.
         vertical_offset_px: how far too low the right image lies, px.
         disparity_px: the middle one of the disparities between the limits of depth, px.

@@ -47,7 +47,7 @@ def _is_dark(exposure: Exposure) -> bool:
 
 
 def dark_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
-    """Say which camera sees almost nothing for want of light; empty if neither."""
+    """Say which camera sees almost nothing because it is too dark; empty if neither."""
     dark = [name for name, exposure in (("left", left), ("right", right)) if _is_dark(exposure)]
     if not dark:
         return ()
@@ -56,7 +56,7 @@ def dark_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
     return (
         Concern(
             Doubt.DARK,
-            f"{camera_sees} almost nothing for want of light (mean level {level:.0f} of 255)",
+            f"{camera_sees} almost nothing because it is too dark (mean level {level:.0f} of 255)",
             "switch on a light, or give the camera a longer exposure",
         ),
     )

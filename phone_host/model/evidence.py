@@ -79,7 +79,7 @@ class Evidence:
         left: the left image.
         right: the right image.
         density: share of the left image's pixels that have a disparity.
-        consistency: share of sampled disparities that are found again from right to left.
+        consistency: share of sampled disparities that are confirmed from right to left.
         vertical_px: median distance of matched features from their rows, px.
         vertical_offset_px: how far too low the right image lies, px.
         supports: how many features agree with each arrangement; empty without a core.

@@ -31,12 +31,12 @@ from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_parts import legend
 
 _FITS: Final = (
-    "Each pair is laid against the model that the pairs before it have made. How far its depths lie off, on average, tells how well all"
-    " of them agree; it does not tell an error that they share, such as a wrong baseline."
+    "Each pair is aligned to the model made from the earlier pairs. The mean distance of its depths from the model shows how well they"
+    " agree; an error that all pairs share, such as a wrong baseline, does not show."
 )
 _SHARES: Final = (
-    "Depth: the pixels that the matcher could measure. On the model: of these, what lies on surface that earlier pairs have seen; below 15 % a pair"
-    " is not believed, below 35 % if few corners agree on its motion."
+    "Depth: the pixels that the matcher could measure. On the model: the share of these on surface that earlier pairs have measured. A pair below 15 %"
+    " is rejected, and one below 35 % if few corners agree on its motion."
 )
 
 
@@ -129,7 +129,12 @@ def _off(off_m: float) -> tuple[Figure, ...]:
     if not math.isfinite(off_m):
         return ()
     return (
-        Figure(label="pairs off the model", value=two_digits(off_m * 1e3), unit="mm", note="mean; median of the pairs"),
+        Figure(
+            label="distance of pairs from the model",
+            value=two_digits(off_m * 1e3),
+            unit="mm",
+            note="mean; median of the pairs",
+        ),
     )
 
 
@@ -164,7 +169,7 @@ def _border(model: ModelFigures) -> Figure:
             label="never in view", value=share, unit=unit, note="of the surface: filled in, and pink in the model"
         )
     border, unit = distance_text(model.size.border_m).split(" ")
-    note = "where the surface ends, because nothing more was seen; 0 is closed"
+    note = "length of the edges where the surface ends; 0 is closed"
     return Figure(label="open border", value=border, unit=unit, note=note)
 
 

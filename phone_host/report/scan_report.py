@@ -48,7 +48,7 @@ class Stretch:
         """Which pairs, what happened, what helps."""
         first, last, one = self.pairs[0].name, self.pairs[-1].name, len(self.pairs) == 1
         which = f"pair {first} is" if one else f"pairs {first} to {last} are"
-        how = "not in the model" if not self.pairs[0].is_fused else "in the model, but not surely"
+        how = "not in the model" if not self.pairs[0].is_fused else "in the model, but uncertain"
         return f"{which} {how}: {self.pairs[0].weakness.advice}"
 
 
@@ -179,12 +179,12 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
     if blocking:
         return Headline.BAD, f"The model cannot be right: {blocking}."
     if not report.model.triangles:
-        return Headline.BAD, f"There is no surface: {fused} of {counted(count, 'pair')} could be put together."
+        return Headline.BAD, f"There is no surface: {fused} of {counted(count, 'pair')} could be aligned."
     unseen = report.model.unseen_share
     if unseen >= 1:
         return (
             Headline.BAD,
-            f"Nothing of the surface was seen: {fused} of {counted(count, 'pair')} could be put together.",
+            f"No part of the surface was in view: {fused} of {counted(count, 'pair')} could be aligned.",
         )
     told = f"{fused} of {counted(count, 'pair')} are in the model"
     if fused < max(2, _LEAST_SHARE * count):

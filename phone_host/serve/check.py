@@ -2,13 +2,55 @@
 
 import math
 from collections.abc import Iterable
+from typing import Final
 
 from common.doctor.finding import Finding, Grade
+from common.doctor.machine_checks import LOG_UNREADABLE
 from common.words import counted
 from phone_host.calibration.capture.words import CHECK_AGAIN
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.trouble import Trouble
 from phone_host.web.source import Checked
+
+_OF_THE_CHOICE: Final = frozenset(
+    {
+        "camera",
+        "format",
+        "controls",
+        "stamps",
+        "stream",
+        "board",
+        "network",
+        "permission",
+        "rig",
+        "capture",
+        "out",
+        "disk",
+    }
+)
+"""Findings about the chosen cameras, their link, the calibration and the results: shown although nothing is wrong."""
+
+_OF_A_LINK: Final = {"serial": "serial:", "bluetooth": "rfcomm:"}
+"""Findings that matter only to a link of this scheme."""
+
+
+def relevant(findings: Iterable[Finding], links: str) -> list[Finding]:
+    """Return the findings that matter to the chosen cameras and links; of the rest of the machine only what is wrong.
+
+    Args:
+        findings: of the doctor.
+        links: addresses of the chosen links, with spaces between.
+    """
+    return [each for each in findings if _matters(each, links.split())]
+
+
+def _matters(finding: Finding, links: list[str]) -> bool:
+    scheme = _OF_A_LINK.get(finding.what)
+    if scheme is not None:
+        return any(link.startswith(scheme) for link in links)
+    if finding.verdict is Grade.OK:
+        return finding.what in _OF_THE_CHOICE
+    return finding.text != LOG_UNREADABLE  # a page cannot ask as root
 
 
 def checked(findings: Iterable[Finding]) -> list[Checked]:

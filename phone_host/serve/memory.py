@@ -158,6 +158,7 @@ class Memory:
         stranger: str = "",
         browser: Choice | None = None,
         scan: ScanState | None = None,
+        scan_command: str = "",
         printing: PrintState | None = None,
     ) -> PageState:
         """Return everything.
@@ -170,6 +171,7 @@ class Memory:
             stranger: the chosen board that has to be enrolled first.
             browser: the camera of whichever browser gives one; None: no browser can.
             scan: the newest scan; None: there was none.
+            scan_command: the command line of a scan with these choices; empty: there is none.
             printing: the newest print; None: there was none.
         """
         with self._lock:
@@ -190,6 +192,7 @@ class Memory:
                 activity,
                 told,
                 command,
+                scan_command,
                 settings,
                 self._boards,
                 cameras,
@@ -205,6 +208,7 @@ class Memory:
                 activity=activity,
                 steps=told,
                 command=command,
+                scan_command=scan_command,
                 settings=settings,
                 boards=self._boards,
                 cameras=cameras,

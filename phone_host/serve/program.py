@@ -185,6 +185,9 @@ class Program(Protocol):
     def command(self, choices: Choices) -> str:
         """Return the command line that does the same, quoted for a shell."""
 
+    def scan_command(self, choices: Choices) -> str:
+        """Return the command line of a scan of the same cameras, quoted for a shell; empty: a command cannot do it, or a camera is missing."""
+
     def run(self, choices: Choices, sinks_of: SinksOf) -> ReadyRun:
         """Open everything that a run needs."""
 

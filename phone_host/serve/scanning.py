@@ -1,6 +1,6 @@
 """The scan that goes on on the page, or the last one: how it goes in words, its surface, and where its files lie. Any thread may use it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final
 
@@ -31,16 +31,19 @@ class Scanning:
         self._patches: Patches | None = None  # of a scan that is over: its volume, which is large, is not kept
         self._counts, self._axes = (0, 0), Axes.CAMERA.value
         self._over: Scanned | None = None
+        self._options: Mapping[str, str] = {}
 
     @contextmanager
-    def shown(self, live: LiveScan, begun: int) -> Iterator[None]:
+    def shown(self, live: LiveScan, begun: int, options: Mapping[str, str]) -> Iterator[None]:
         """While the block runs, this scan goes on; after it, its surface stays.
 
         Args:
             live: the scan.
             begun: number of its activity.
+            options: of `scan` by name, with which it was started.
         """
         self._live, self._begun, self._over, self._patches = live, begun, None, None
+        self._options = dict(options)
         self._axes = (Axes.CAMERA if live.axes is None else Axes.MAT).value
         try:
             yield
@@ -51,11 +54,12 @@ class Scanning:
         """Take what came of it; None: nothing was written."""
         self._over = scanned
 
-    def crop(self, box: Box | None) -> str:
+    def crop(self, box: Box | None, text: str) -> str:
         """Keep only what lies in a box; return what to say.
 
         Args:
             box: None: everything.
+            text: the box as it was typed.
 
         Raises:
             SettingsError: no scan is active.
@@ -63,6 +67,7 @@ class Scanning:
         if (live := self._live) is None:
             raise SettingsError("no scan is active", "start one: the box can also be set before it starts")
         live.crop(box)
+        self._options = {**self._options, "box": text}
         return "everything is saved" if box is None else "only what is inside the box is saved"
 
     @property
@@ -75,14 +80,20 @@ class Scanning:
         """How it goes; None: there was none."""
         if (live := self._live) is not None:
             pairs, fused = live.counts
-            return ScanState(words=live.words, level=_level(live.last), pairs=pairs, fused=fused)
+            return ScanState(words=live.words, level=_level(live.last), pairs=pairs, fused=fused, options=self._options)
         if self._patches is None:
             return None
         (pairs, fused), over = self._counts, self._over
         if over is None:
-            return ScanState(words="the scan ended without a result", pairs=pairs, fused=fused)
+            return ScanState(words="the scan ended without a result", pairs=pairs, fused=fused, options=self._options)
         return ScanState(
-            words=over.words, level=over.level, pairs=pairs, fused=fused, folder=str(over.folder), files=over.files
+            words=over.words,
+            level=over.level,
+            pairs=pairs,
+            fused=fused,
+            folder=str(over.folder),
+            files=over.files,
+            options=self._options,
         )
 
     def surface(self, since: int, most_points: int) -> Surface | None:

@@ -87,7 +87,7 @@ class Station:
             Do.CALIBRATE: self._calibrate,
             Do.RUN: self._run,
             Do.SCAN: self._scan,
-            Do.CROP: lambda values: Answer(words=self._scanning.crop(self._program.box(values))),
+            Do.CROP: lambda values: Answer(words=self._scanning.crop(self._program.box(values), values.get("box", ""))),
             Do.STOP: self._stop,
             Do.SNAPSHOT: self._snapshot,
             Do.RECORD: self._record,
@@ -120,6 +120,7 @@ class Station:
             stranger=self._stranger(choices.get("link", "")),
             browser=find.browser_choice(self.feed.words),
             scan=self._scanned_state(),
+            scan_command=self._program.scan_command(choices),
             printing=self._workshop.state,
         )
 
@@ -253,7 +254,7 @@ class Station:
                 if task.stopped():
                     return
                 findings.append(finding)
-                self._memory.checking(check.checked(findings))
+                self._memory.checking(check.checked(check.relevant(findings, choices["link"])))
             if (trouble := check.obstacle(findings)) is not None:
                 self._memory.fail(trouble)
                 return
@@ -333,7 +334,11 @@ class Station:
         def work(task: Task) -> None:
             ready = self._program.scan(choices, values, self._sinks)
             host = ready.host
-            with task.held(), self._memory.live(host.snapshot), self._scanning.shown(ready.live, self._memory.begun):
+            with (
+                task.held(),
+                self._memory.live(host.snapshot),
+                self._scanning.shown(ready.live, self._memory.begun, values),
+            ):
                 try:
                     done = ready.finish(host.run(task.stopped))
                 except Exception:

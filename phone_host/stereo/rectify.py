@@ -174,7 +174,7 @@ def _rotations(rig: Rig) -> tuple[Matrix, Matrix, float, Epipolar]:
         raise DataError(
             f"the right camera stands to the left of the left one (by {-x * baseline_m * 1e3:.1f} mm)",
             "swap LEFT and RIGHT; if each is where it should be, both mirror their images (--flip-left h --flip-right h) or both"
-            " stand on their heads (--rotate-left 180 --rotate-right 180)",
+            " are upside down (--rotate-left 180 --rotate-right 180)",
         )
     turn = _shortest_turn(np.array([x, y, z]), _TO_RIGHT[epipolar])
     return turn @ left_to_middle, turn @ right_to_middle, baseline_m, epipolar

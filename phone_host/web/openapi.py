@@ -89,6 +89,7 @@ def _schemas() -> _Json:
         fused=_WHOLE,
         folder=_TEXT,
         files={"type": "array", "items": _TEXT},
+        options={"type": "object", "additionalProperties": _TEXT},
     )
     printing = _object(
         stage={"enum": [each.value for each in PrintStage]},
@@ -102,6 +103,7 @@ def _schemas() -> _Json:
         activity={"enum": [each.value for each in Activity]},
         steps={"type": "array", "items": step},
         command=_TEXT,
+        scan_command=_TEXT,
         settings={"type": "object", "additionalProperties": _TEXT},
         boards=choices,
         cameras=choices,

@@ -97,6 +97,7 @@ class ScanState:
         fused: of these in the model.
         folder: where its files lie; empty: they are not written yet.
         files: their names.
+        options: of `scan` by name, with which it was started: voxel, box, mat, turntable, object; every viewer shows these.
     """
 
     words: str
@@ -105,6 +106,7 @@ class ScanState:
     fused: int = 0
     folder: str = ""
     files: tuple[str, ...] = ()
+    options: Mapping[str, str] = field(default_factory=dict)
 
 
 class PrintStage(Enum):
@@ -195,6 +197,7 @@ class PageState:
         activity: what the program does now.
         steps: the way to a run; empty: the run was started elsewhere, and nothing can be set here.
         command: the command line that does what the page's choices do; empty: not enough is chosen.
+        scan_command: the command line of a scan with these choices, without the options of the scan itself; empty: there is none.
         settings: the choices, by the option's name without dashes, as the command line takes them.
         boards: boards that were found; None: nobody has looked yet.
         cameras: cameras of this machine; None likewise.
@@ -213,6 +216,7 @@ class PageState:
     activity: Activity
     steps: tuple[Step, ...] = ()
     command: str = ""
+    scan_command: str = ""
     settings: Mapping[str, str] = field(default_factory=dict)
     boards: tuple[Choice, ...] | None = None
     cameras: tuple[Choice, ...] | None = None

@@ -99,6 +99,7 @@ def state_text(state: PageState, samples: Sequence[Sample], now_ns: int) -> Stat
         "activity": state.activity.value,
         "steps": [{"name": step.name.value, "done": step.done, "words": step.words} for step in state.steps],
         "command": state.command,
+        "scan_command": state.scan_command,
         "settings": dict(state.settings),
         "boards": _choices(state.boards),
         "cameras": _choices(state.cameras),

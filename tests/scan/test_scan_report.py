@@ -76,9 +76,9 @@ LOST = report(*(pair(number, L, Weakness.TOO_FAST) if number in {2, 3} else pair
         (LOST, Headline.WARNING, "3 of 5 pairs are in the model. Expected surface error"),
         (report(pair(0), *(pair(n, W, Weakness.FLAT) for n in range(1, 5))), Headline.WARNING, "All 5 pairs"),
         (report(pair(0), *(pair(n, L) for n in range(1, 5))), Headline.BAD, "Only 1 of 5 pairs are in the model."),
-        (replace(GOOD, model=ModelFigures()), Headline.BAD, "There is no surface: 5 of 5 pairs could be put together."),
+        (replace(GOOD, model=ModelFigures()), Headline.BAD, "There is no surface: 5 of 5 pairs could be aligned."),
         (replace(GOOD, model=replace(MODEL, unseen_share=1.0, noise_m=math.nan)), Headline.BAD,
-         "Nothing of the surface was seen: 5 of 5 pairs could be put together."),
+         "No part of the surface was in view: 5 of 5 pairs could be aligned."),
         (replace(GOOD, model=replace(MODEL, noise_m=math.nan)), Headline.GOOD, "All 5 pairs are in the model."),
         (replace(GOOD, model=replace(MODEL, unseen_share=0.25)), Headline.GOOD,
          "All 5 pairs are in the model. Expected surface error: ±1.2 mm (drift not included). 25 % was never in view and is filled in."),
@@ -109,7 +109,7 @@ def test_what_went_wrong_is_told_by_stretches() -> None:
     pairs = [pair(0), pair(1, L, Weakness.TOO_FAST), pair(2, L, Weakness.TOO_FAST), pair(3, W, Weakness.FLAT)]
     lost, weak = (stretch.sentence for stretch in stretches(pairs))
     assert lost == "pairs 1 to 2 are not in the model: moved too fast: move more slowly, back to where it was"
-    assert weak.startswith("pair 3 is in the model, but not surely: only a plane is in view")
+    assert weak.startswith("pair 3 is in the model, but uncertain: only a plane is in view")
 
 
 def test_figures_come_from_the_pairs_in_the_model() -> None:
@@ -164,7 +164,7 @@ def test_the_page_shows_the_model_and_what_went_wrong() -> None:
     assert "dim: give light" in page.words
     assert [one for one in page.elements if one[1].get("class") == "clouds modelview"]
     assert {attributes["href"] for tag, attributes in page.elements if tag == "a"} >= {"model.ply", "trajectory.txt"}
-    assert "pairs off the model" in page.words
+    assert "distance of pairs from the model" in page.words
     on_mat = replace(GOOD, pairs=tuple(replace(each, off_m=math.nan) for each in GOOD.scanned))
     assert "pairs off the model" not in Page(scan_page(on_mat, shown)).words
     empty = replace(report(pair(0)), model=ModelFigures())

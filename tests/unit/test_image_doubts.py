@@ -315,11 +315,11 @@ def test_which_doubts_block() -> None:
 
 
 def test_depth_with_specks_is_not_called_right_without_reserve() -> None:
-    """Boards before bare walls: 43 % of the depth is found again; no doubt stands, but the first line says where to trust it."""
+    """Boards before bare walls: 43 % of the depth is confirmed; no doubt stands, but the first line says where to trust it."""
     said = answer(ImageFigures(density=0.28, consistency=0.43, vertical_px=0.2, disparity_px=50.0), (), GEOMETRY)
     assert said.grade is Grade.GOOD
     assert said.sentence.startswith("Depth looks right where the scene has texture, specks elsewhere: 28%")
-    assert "43% are found again" in said.sentence
+    assert "43% are confirmed" in said.sentence
     strewn = ImageFigures(density=0.37, consistency=0.68, vertical_px=0.3, disparity_px=50.0, scattered_share=0.21)
     assert (
         "specks elsewhere: 37% of the pixels have depth, 21% of it in specks" in answer(strewn, (), GEOMETRY).sentence

@@ -1,11 +1,14 @@
 """What the page is set to: choices as a command line, what is kept of them, and its address."""
 
+import argparse
+import shlex
 from pathlib import Path
 
 import pytest
 
 from common.errors import DataError, SettingsError
 from phone_host.output.axes import Axes
+from phone_host.verbs.scan.arguments import add_arguments
 from phone_host.verbs.serve.choices import choices_of, run_options, run_words, shown_words, with_changes, without_depth
 from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.page import address_of, page_settings
@@ -56,6 +59,24 @@ def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
     (tmp_path / "folder").touch()
     with pytest.raises(SettingsError):
         keep(tmp_path / "folder" / "host.toml", choices)
+
+
+def test_the_command_of_a_scan_has_the_choices_that_scan_takes(tmp_path: Path) -> None:
+    """Options that only `run` has are left out, the folder of the results is one of its own, and `scan` takes all of it; there is none for a browser's camera."""
+    commands = Commands(tmp_path / "host.toml", str(tmp_path / "keys"), lambda _: None)
+    cameras = {"link": "tcp://10.0.0.2:5555", "camera": "v4l2:/dev/video0"}
+    line = commands.scan_command({**cameras, "calibration": "my rig.yaml", "near": "300", "fifo": "4", "out": "there"})
+    words = shlex.split(line)
+    assert (Path(words[0]).name, words[1]) == ("phone-host", "scan")
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    options = parser.parse_args(words[2:])
+    assert (options.link, options.camera, options.calibration, options.out, options.keys) == (
+        [cameras["link"]], cameras["camera"], "my rig.yaml", Path("there/scan"), str(tmp_path / "keys"),
+    )  # fmt: skip
+    assert "--fifo" not in line
+    assert commands.scan_command({"camera": cameras["camera"]}) == ""
+    assert commands.scan_command({**cameras, "camera": "browser:"}) == ""
 
 
 def test_what_is_set_is_checked_as_on_the_command_line(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from common.camera_identity import CameraIdentity
-from common.doctor.finding import fail, ok
+from common.doctor.finding import fail, ok, warn
+from common.doctor.machine_checks import LOG_UNREADABLE
 from common.errors import DataError, SettingsError, UnavailableError
 from common.ledger import StageTimes
 from common.peers import Peer
@@ -20,6 +21,7 @@ from phone_host.measure.trouble import Trouble
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side
 from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes
+from phone_host.scan.box import Box
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.serve import check
 from phone_host.serve.activities import Activities, Task
@@ -242,6 +244,17 @@ def test_a_board_across_the_network_needs_its_code_once() -> None:
     assert stranger("ipc:///tmp/x tcp://10.0.0.3:5555", ()) == "tcp://10.0.0.3:5555"
 
 
+def test_a_check_lists_only_what_matters_to_the_chosen_cameras() -> None:
+    """What is right with the rest of the machine is left out, what is wrong with it stays; serial ports and Bluetooth count only for such links, and a log that only root may read never."""
+    camera, python = ok("camera", "there"), ok("python", "3.11")
+    power, log = warn("power", "under-voltage", "a stronger supply"), warn("usb-log", LOG_UNREADABLE, "ask as root")
+    serial, bluetooth = warn("serial", "no pyserial", "install it"), ok("bluetooth", "no adapter was found")
+    found = [python, camera, serial, bluetooth, power, log]
+    assert check.relevant(found, "tcp://10.0.0.2:5555") == [camera, power]
+    assert check.relevant(found, "tcp://10.0.0.2:5555 serial:/dev/ttyACM0") == [camera, serial, power]
+    assert check.relevant(found, "rfcomm:00:11:22:33:44:55") == [camera, bluetooth, power]
+
+
 def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
     """Pairs, rate and skew; or which camera sent nothing; or the finding that stops everything."""
     assert check.obstacle([ok("python", "there")]) is None
@@ -310,7 +323,7 @@ def test_the_terminal_tells_what_goes_on() -> None:
 
 
 def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
-    """Nothing before the first; then what helps; then what came of it. Its surface stays, what it was made of does not."""
+    """Nothing before the first; then what helps; then what came of it. Its surface stays, what it was made of does not. Its options, with the newest box, are told all the time."""
     scanning = Scanning()
 
     def state() -> ScanState | None:
@@ -319,8 +332,9 @@ def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
     assert state() is None
     assert scanning.surface(0, 10) is None
     live = LiveScan(ScanWanted(), Side.LEFT, tmp_path, waits=False, is_timeless=False)
-    with scanning.shown(live, 7):
-        assert state() == ScanState(words="waiting for the first pair")
+    with scanning.shown(live, 7, {"voxel": "2mm", "box": ""}):
+        assert state() == ScanState(words="waiting for the first pair", options={"voxel": "2mm", "box": ""})
+        scanning.crop(Box((0, 0, 0), (1, 1, 1)), "1000x1000x1000@500,500,500")
         assert scanning.surface(0, 10) == Surface(7, ())
         assert told(PageState(activity=Activity.SCANNING, scan=state())) == "scanning: waiting for the first pair"
     ended = state()
@@ -328,6 +342,9 @@ def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
     assert "ended without a result" in ended.words
     over = Scanned(words="3 pairs", level="good", folder=tmp_path, files=("model.ply",), snapshot=run(0))
     scanning.over(over)
-    assert state() == ScanState(words="3 pairs", level="good", folder=str(tmp_path), files=("model.ply",))
+    options = {"voxel": "2mm", "box": "1000x1000x1000@500,500,500"}
+    assert state() == ScanState(
+        words="3 pairs", level="good", folder=str(tmp_path), files=("model.ply",), options=options
+    )
     assert scanning.folder == str(tmp_path)
     assert scanning.surface(0, 10) == Surface(7, ())

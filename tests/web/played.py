@@ -1,5 +1,6 @@
 """A program behind the page that plays rendered pairs with known truth, and does at once what it is told."""
 
+import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -111,6 +112,7 @@ class Played:
     guide: GuideSnapshot | None = None
     trouble: Trouble | None = None
     concerns: tuple[Concern, ...] = ()
+    motion_px_s: float = math.nan
     recording: RecordingAccount | None = None
     folder: str = ""
     scan: ScanState | None = None
@@ -170,6 +172,7 @@ class Played:
             activity=self.activity,
             steps=steps,
             command=f"phone-host run {options}" if {"link", "camera"} <= self.settings.keys() else "",
+            scan_command=f"phone-host scan {options}" if {"link", "camera"} <= self.settings.keys() else "",
             settings=dict(self.settings),
             boards=self.boards,
             cameras=self.cameras,
@@ -292,6 +295,9 @@ class Played:
             carrier="usb",
             estimate=estimate,
             images=images,
+            motion_px_s=self.motion_px_s,
+            width_px=640,
+            stamps_exact=True,
             depth=replace(base.depth, limits=limits),
             recording=self.recording,
         )

@@ -162,7 +162,7 @@ def test_a_camera_that_cannot_be_had_is_told_with_its_remedy(camera: PlayedFeed,
     page.evaluate(
         "() => { const track = document.getElementById('own-video').srcObject.getVideoTracks()[0]; track.stop(); track.dispatchEvent(new Event('ended')); }"
     )
-    assert "it is tried again" in says(page, "The camera was disconnected")
+    assert "tries again by itself" in says(page, "The camera was disconnected")
     camera.until(lambda: any(not each["live"] for each in camera.of_kind("track")))
     says(page, "Streaming")
     assert len({each["track"] for each in camera.of_kind("hello")}) == 2

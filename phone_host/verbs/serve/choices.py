@@ -12,6 +12,7 @@ from common.program.commandline import ExamplesFirstParser
 from phone_host.camera.browser_uri import is_browser
 from phone_host.verbs.calibrate import arguments as calibrate_arguments
 from phone_host.verbs.run import arguments as run_arguments
+from phone_host.verbs.scan import arguments as scan_arguments
 
 _YES: Final = frozenset({"yes", "true", "on", "1"})
 _NO: Final = frozenset({"", "no", "false", "off", "0"})
@@ -52,6 +53,12 @@ def _declared() -> dict[str, argparse.Action]:
     return _parser(run_arguments.add_arguments).declared
 
 
+@cache
+def _declared_by_scan() -> dict[str, argparse.Action]:
+    """Return the options of `scan`."""
+    return _parser(scan_arguments.add_arguments).declared
+
+
 def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict[str, str]:
     """Return choices with some changed; an empty value takes one back.
 
@@ -90,7 +97,17 @@ def placed(path: str) -> str:
 
 def run_words(choices: Mapping[str, str]) -> list[str]:
     """Return choices as the words of a command line, after `run`."""
-    declared, words = _declared(), []
+    return _words(choices, _declared())
+
+
+def scan_words(choices: Mapping[str, str]) -> list[str]:
+    """Return those choices that `scan` takes, too, as the words of a command line, after `scan`."""
+    declared = _declared_by_scan()
+    return _words({name: value for name, value in choices.items() if name in declared}, declared)
+
+
+def _words(choices: Mapping[str, str], declared: Mapping[str, argparse.Action]) -> list[str]:
+    words: list[str] = []
     for name, value in choices.items():
         action = declared[name]
         if _is_switch(action):

@@ -17,6 +17,7 @@ from common.stamp import HOST_CLOCK
 from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.verdict import Verdict
 from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera, require_replayed
 from phone_host.camera.http_uri import without_password
 from phone_host.doctor.capture import check_capture
@@ -43,6 +44,7 @@ from phone_host.verbs.serve.choices import (
     placed,
     run_options,
     run_words,
+    scan_words,
     shown_words,
     with_changes,
     without_depth,
@@ -125,6 +127,15 @@ class Commands:
     def command(self, choices: Choices) -> str:
         """See Program."""
         return command_line("phone-host", "run", *self._fixed, *shown_words(self.shown(choices)))
+
+    def scan_command(self, choices: Choices) -> str:
+        """See Program."""
+        if not {"link", "camera"} <= choices.keys() or is_browser(choices["camera"]):
+            return ""
+        fixed = dict(zip(self._fixed[::2], self._fixed[1::2], strict=True))
+        own = {name.removeprefix("--"): value for name, value in fixed.items()}
+        out = {"out": str(Path(choices.get("out", "")) / "scan")}
+        return command_line("phone-host", "scan", *scan_words({**own, **self.shown(choices), **out}))
 
     def run(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
         """See Program."""

@@ -4,7 +4,7 @@ import { canHoldOrientation, holdOrientation } from './camera_awake.js';
 import { CameraFeed } from './camera_feed.js';
 import { cameras, capabilitiesOf, ratesOf, sizesOf } from './camera_track.js';
 import { GROUP_WORDS, stateOf, valuesInWords } from './camera_words.js';
-import { byId, data, keep, make, onPress, options, say, sentence, show, text } from './dom.js';
+import { byId, data, keep, make, onPress, options, say, sentence, show, startOrStop, text } from './dom.js';
 import { isBrowsers } from './own_camera.js';
 
 /** @typedef {import('./camera_locks.js').Group} Group */
@@ -119,8 +119,7 @@ export class CameraBox {
     if (feed.isOn || facts.phase === 'failed') say(`${now.words}. ${now.remedy}`);
     show(byId('own-ways'), !facts.isSecure);
     for (const id of ['own-parts', 'own-buttons']) show(byId(id), facts.isSecure);
-    text(byId('own-go'), feed.isOn ? 'Stop' : 'Start');
-    data(byId('own-go'), 'running', feed.isOn ? 'yes' : 'no');
+    startOrStop(byId('own-go'), feed.isOn);
     show(byId('own-chip'), feed.isOn);
     text(byId('own-chip'), `camera ${CHIPS[now.level]}`);
     byId('own-chip').setAttribute('aria-label', `camera: ${now.words}`);

@@ -1,7 +1,7 @@
 // What steers a run: start and stop, snapshot, recording, matcher, near and far, crop.
 
 import { begin, command } from './connection.js';
-import { byId, data, follow, onPress, options, say, sentence, show, tell, text } from './dom.js';
+import { byId, data, follow, onPress, options, say, sentence, show, startOrStop, tell, text } from './dom.js';
 
 /** @typedef {import('./pointing.js').Spot} Spot */
 
@@ -146,9 +146,8 @@ export class Controls {
   /** @param {any} state */
   show(state) {
     const running = this.isRunning();
-    text(byId('go'), running ? 'Stop' : 'Start');
+    startOrStop(byId('go'), running);
     show(byId('go'), running || state.steps.length > 0);
-    data(byId('go'), 'running', running ? 'yes' : 'no');
     byId('snapshot').setAttribute('aria-disabled', String(!running));
     this.showRecording(state.live?.recording ?? null);
     const names = state.matchers.map((/** @type {string} */ name) => ({ value: name, words: name }));

@@ -81,6 +81,15 @@ export function say(words) {
 }
 
 /**
+ * Show on a button what a press does now: start or stop. Stop looks the same everywhere.
+ * @param {HTMLElement} button @param {boolean} isOn @param {string} start - its words while nothing goes on
+ */
+export function startOrStop(button, isOn, start = 'Start') {
+  text(button, isOn ? 'Stop' : start);
+  data(button, 'running', isOn ? 'yes' : 'no');
+}
+
+/**
  * Run what a button does, once at a time; its answer is shown beside it.
  * @param {HTMLButtonElement} button
  * @param {() => Promise<{words?: string, problem?: string, remedy?: string} | void>} action

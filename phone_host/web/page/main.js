@@ -1,6 +1,7 @@
 // Puts the page together: one newest state and one newest pair; every part shows them in place.
 
 import { Charts } from './charts.js';
+import { connectCommand, showCommand } from './command_card.js';
 import { Connection } from './connection.js';
 import { Controls } from './controls.js';
 import { byId, data, show, text } from './dom.js';
@@ -83,6 +84,7 @@ function draw() {
   showFigures(state.live, charts.delay());
   controls.show(state);
   scan.show(state);
+  showCommand(state, document.body.dataset.step ?? '', scan.options());
   workshop.show(state);
   text(byId('activity'), state.activity);
   data(document.body, 'activity', state.activity);
@@ -135,3 +137,5 @@ for (const input of /** @type {NodeListOf<HTMLInputElement>} */ (document.queryS
 byId('lines').addEventListener('change', (event) => data(byId('views'), 'withLines', /** @type {HTMLInputElement} */ (event.target).checked ? 'yes' : 'no'));
 byId('stacked').addEventListener('change', (event) => charts.stack(/** @type {HTMLInputElement} */ (event.target).checked));
 connectSetup(() => state);
+connectCommand();
+byId('panel-scan').addEventListener('input', draw);

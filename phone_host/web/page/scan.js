@@ -1,7 +1,7 @@
 // The scan: start and stop, how it goes, the surface as it grows, the box that is kept, and what to save of it.
 
 import { begin, command } from './connection.js';
-import { byId, data, keep, make, onPress, sentence, show, tell, text } from './dom.js';
+import { byId, data, keep, make, onPress, sentence, show, startOrStop, tell, text } from './dom.js';
 import { GrowingSurface } from './surface.js';
 
 /** @typedef {import('./crop_box.js').Box} Box */
@@ -9,7 +9,7 @@ import { GrowingSurface } from './surface.js';
 const ASK_MS = 1000;
 const NO_WEBGL = 'This browser cannot draw the surface (no WebGL 2). Everything else works; the model can be saved.';
 const NO_BOX = { problem: 'this is not a box', remedy: 'give its size and its centre in mm, such as 300x300x200@0,0,600' };
-const EMPTY = { words: '', level: 'unknown', pairs: 0, fused: 0, folder: '', files: [] };
+const EMPTY = { words: '', level: 'unknown', pairs: 0, fused: 0, folder: '', files: [], options: {} };
 
 export class ScanPanel {
   /** @param {() => any} state - the newest */
@@ -27,6 +27,8 @@ export class ScanPanel {
     /** Whether the person looks at it in a way of his own. */
     this.isHeld = false;
     this.wasEnding = false;
+    /** The options of a scan that were shown last, JSON. */
+    this.followed = '{}';
     this.field = /** @type {HTMLInputElement} */ (byId('scan-box'));
     this.surface = new GrowingSurface((name, part, axes) => {
       this.model?.stands(axes);
@@ -46,11 +48,33 @@ export class ScanPanel {
 
   go() {
     if (this.isScanning() || this.state()?.activity === 'ending') return command('stop');
-    const value = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (byId(id)).value.trim();
     this.isHeld = false;
+    return begin('scan', this.options());
+  }
+
+  /** What is chosen, as options of `phone-host scan`; an empty value is not given. @returns {Record<string, string>} */
+  options() {
+    const value = (/** @type {string} */ id) => field(id).value.trim();
     const kind = value('scan-kind');
     const mat = kind === 'mat' ? value('scan-mat') || 'usual' : '';
-    return begin('scan', { voxel: value('scan-voxel'), box: value('scan-box'), mat, turntable: kind === 'turntable' ? 'yes' : '', object: kind === 'object' ? 'yes' : '' });
+    return { voxel: value('scan-voxel'), box: value('scan-box'), mat, turntable: kind === 'turntable' ? 'yes' : '', object: kind === 'object' ? 'yes' : '' };
+  }
+
+  /** Show the options of the newest scan, whichever viewer chose them; they may be changed for the next one. @param {Record<string, string>} options */
+  follow(options) {
+    const isOn = this.isScanning();
+    for (const id of ['scan-kind', 'scan-mat', 'scan-voxel']) if (field(id).disabled !== isOn) field(id).disabled = isOn;
+    const told = JSON.stringify(options);
+    if (told === this.followed) return;
+    this.followed = told;
+    const { voxel = '', box = '', mat = '', turntable = '', object = '' } = options;
+    field('scan-kind').value = mat ? 'mat' : turntable ? 'turntable' : object ? 'object' : '';
+    field('scan-mat').value = mat === 'usual' ? '' : mat;
+    field('scan-voxel').value = voxel;
+    this.kind();
+    if (box === this.field.value.trim() || document.activeElement === this.field) return;
+    this.field.value = box;
+    this.outline(this.boxOf(box));
   }
 
   /** Only a mat has a sheet to be named. */
@@ -93,7 +117,8 @@ export class ScanPanel {
     const scan = state.scan ?? EMPTY;
     const step = state.steps.find((/** @type {any} */ each) => each.name === 'scan');
     const isOn = this.isScanning();
-    text(byId('scan-go'), isOn ? 'Stop' : 'Start');
+    startOrStop(byId('scan-go'), isOn);
+    this.follow(scan.options);
     const isEnding = state.activity === 'ending';
     if (this.wasEnding && !isEnding) tell(byId('scan-answer'), {}); // it said that it ends
     this.wasEnding = isEnding;
@@ -149,6 +174,9 @@ export class ScanPanel {
     if (has && !this.isHeld) this.model.view('turned');
   }
 }
+
+/** @param {string} id @returns {HTMLInputElement} */
+const field = (id) => byId(id);
 
 /** @param {string} name */
 function link(name) {

@@ -1,7 +1,7 @@
-// The steps before a run: board, camera, check, calibration. Choices become options of the command line (`set`), shown below to copy.
+// The steps before a run: board, camera, check, calibration. Choices become options of the command line (`set`), shown in the card below (command_card.js).
 
 import { begin, command } from './connection.js';
-import { byId, data, follow, keep, make, onPress, sentence, show, tell, text } from './dom.js';
+import { byId, data, follow, keep, make, onPress, sentence, show, startOrStop, tell, text } from './dom.js';
 
 /** @typedef {{uri: string, name: string, note: string}} Choice */
 
@@ -92,12 +92,10 @@ export function showSetup(state) {
   const [film] = isFilming(state) ? state.checks : [];
   text(byId('film-words'), film ? sentence(film.words) : '');
   text(byId('film-done'), film ? sentence(film.remedy) : '');
-  text(byId('capture-go'), isFilming(state) ? 'Stop' : 'Check for image stabilisation');
+  startOrStop(byId('capture-go'), isFilming(state), 'Check for image stabilisation');
   showChecks(film ? [] : state.checks ?? []);
-  text(byId('calibrate-go'), state.activity === 'calibrating' ? 'Stop' : 'Start live calibration');
+  startOrStop(byId('calibrate-go'), state.activity === 'calibrating', 'Start live calibration');
   follow(byId('calibration-typed'), state.settings.calibration ?? '');
-  text(byId('command'), state.command || 'Command: appears once board and camera are chosen');
-  byId('command-copy').setAttribute('aria-disabled', String(!state.command));
 }
 
 /** Connect the forms, once. @param {() => any} current - the newest state */
@@ -120,7 +118,6 @@ export function connectSetup(current) {
   onPress(byId('check-go'), () => begin('check'), byId('check-answer'));
   onPress(byId('capture-go'), () => (isFilming(current()) ? command('stop') : begin('capture')), byId('check-answer'));
   onPress(byId('calibrate-go'), () => calibrate(current()), byId('calibration-answer'));
-  onPress(byId('command-copy'), () => copy(byId('command').textContent ?? ''), byId('command-answer'));
 }
 
 /** @param {any} state */
@@ -128,15 +125,4 @@ function calibrate(state) {
   if (state.activity === 'calibrating') return command('stop');
   const value = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (byId(id)).value.trim();
   return begin('calibrate', { board: value('board-kind') || 'auto', square: value('board-square') });
-}
-
-/** @param {string} words */
-async function copy(words) {
-  try {
-    await navigator.clipboard.writeText(words);
-    return { words: 'copied' };
-  } catch {
-    getSelection()?.selectAllChildren(byId('command'));
-    return { words: 'selected: copy it with the keyboard' };
-  }
 }

@@ -37,7 +37,7 @@ export function unsaid({ headline, concerns }) {
   const said = headline.toLowerCase();
   return concerns
     .map(({ problem, remedy, doubt }) => ({ problem: said.includes(problem.toLowerCase()) ? '' : problem, remedy, doubt }))
-    .filter(({ problem, remedy }) => problem || !said.includes(remedy.toLowerCase()));
+    .filter(({ problem, remedy, doubt }) => problem || doubt === 'age' || !said.includes(remedy.toLowerCase()));
 }
 
 /** Make a link to the chart of the delays, which is on the step of the run. @returns {HTMLAnchorElement} */
@@ -75,10 +75,9 @@ export function showTrust(state) {
   const list = byId('concerns');
   const others = unsaid(trust);
   show(list, others.length > 0);
-  keep(list, others, (one) => one.problem.replace(/\d+([.,]\d+)?/g, '#'), () => make('li', '', make('b'), ' ', make('span'), ' ', delaysLink()), (item, one) => {
+  keep(list, others, (one) => `${one.doubt} ${one.problem.replace(/\d+([.,]\d+)?/g, '#')}`, (one) => make('li', '', make('b'), ' ', make('span'), ...(one.doubt === 'age' ? [' ', delaysLink()] : [])), (item, one) => {
     text(item.children[0], sentence(one.problem));
     text(item.children[1], sentence(one.remedy));
-    show(/** @type {HTMLElement} */ (item.children[2]), one.doubt === 'age');
   });
   keepHeight(box, state);
   const trouble = byId('trouble');
