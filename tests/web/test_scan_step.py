@@ -216,7 +216,7 @@ def test_a_box_is_drawn_pulled_typed_and_taken_away(
     until(lambda: program.commands[-1].values == {"box": pulled}, "the pulled box reaches the scan")
     page.fill("#scan-box", "300x300")
     page.dispatch_event("#scan-box", "change")
-    page.wait_for_function("() => document.getElementById('scan-answer').textContent.includes('no box')")
+    page.wait_for_function("() => document.getElementById('scan-answer').textContent.includes('not a box')")
     page.fill("#scan-box", "300x200x100@0,10,600")
     page.dispatch_event("#scan-box", "change")
     page.wait_for_function("() => !document.getElementById('scan-answer').textContent")
