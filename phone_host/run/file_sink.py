@@ -31,6 +31,7 @@ from phone_host.output.axes import Axes
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.output.json_text import json_text
 from phone_host.output.listed import ListedFolder
+from phone_host.output.open_folders import remove_result
 from phone_host.output.overlay_yaml import OVERLAY_NAME
 from phone_host.output.pair_files import RUN_FILES, write_pair
 from phone_host.run.sinks import NotWrittenError, SinkQueue
@@ -298,9 +299,13 @@ class FileSink:
             self._let_go()
 
     def abandon(self) -> None:
-        """Release the folder of a run that does not begin."""
+        """Release the folder of a run that does not begin, and leave nothing there that a later run takes for its results."""
         if self._own is not None:
             self.finish()
+            if not self._own.is_staged:
+                for name in ("settings.json", "delays.jsonl"):
+                    with suppress(OSError):
+                        remove_result(name, self._own.descriptor)
             self._let_go()
 
     def _published(self) -> dict[str, OSError]:
