@@ -5,21 +5,19 @@ that a recording may hold are copied as they are; of others only that they are t
 What is missing or spoiled in a part is left out and reported.
 """
 
-import bz2
-import struct
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 from common.errors import DataError, UnavailableError
 from common.name_order import name_order
 from common.program.packages import package_error
 from common.recording.inflate import ZSTD, inflate, unzstd, unzstd_pieces
-from common.recording.mcap_records import MAGIC, MOST_CHUNK_BYTES, Channel, Damage, Message, Record
+from common.recording.mcap_records import MAGIC, Channel, Damage, Message, Record
 from common.recording.mcap_writer import Topic
 from common.recording.opened import stored_data
 from common.recording.recorded import image_kind
@@ -27,20 +25,16 @@ from common.recording.recording_file import RecordingFile, written
 from common.recording.ros1 import ROS1
 from common.recording.ros_messages import SCHEMAS
 from common.recording.salvage import Salvage
+from common.unfinished import unfinished
 from common.words import counted
+from phone_host.recording.bag_limits import bound_chunks, most_bytes, require_plain_tables
 
 _ROS1_BAG: Final = b"#ROSBAG V2.0\n"
 _SQLITE: Final = b"SQLite format 3\0"
 _METADATA: Final = "metadata.yaml"
 _HEAD_BYTES: Final = 16
 _SUFFIXES: Final = frozenset({".db3", ".mcap", ".zstd"})
-_MOST_RATIO: Final = 64
-_ALWAYS_BYTES: Final = 64 << 20
-"""A compressed file may become this large, or so many times its size."""
-
-_PIECE_BYTES: Final = 1 << 20
 _MOST_TOPICS: Final = 4096
-_CHUNK_OP: Final = b"\x05"
 
 
 def is_bag(path: Path) -> bool:
@@ -81,7 +75,7 @@ def as_recording(path: Path) -> Iterator[RecordingSource]:
         folder = TemporaryDirectory(prefix="tandemscan-bag-")
     except OSError as error:
         raise UnavailableError(f"{path} cannot be copied ({error.strerror})", "make room in TMPDIR") from None
-    with folder as name:
+    with folder as name, unfinished(folder.cleanup):
         copy = Path(name) / "bag.mcap"
         try:
             damages = _copy(path, copy, Path(name) / "parts")
@@ -112,6 +106,7 @@ def _copy(path: Path, copy: Path, folder: Path) -> list[Damage]:
     if len(channels) > _MOST_TOPICS:
         raise DataError(f"{path} has {len(channels)} topics: more than is believed", "give a bag with fewer")
     lost: Counter[str] = Counter()
+    left = most_bytes(sum(part.stat().st_size for part in parts))  # an index may name one message a million times
     with written(copy, tuple(channels.values())) as file:
         for part in parts:
             for number, record in enumerate(_records(part, path)):
@@ -119,6 +114,9 @@ def _copy(path: Path, copy: Path, folder: Path) -> list[Damage]:
                     case Damage():
                         damages.append(replace(record, words=f"{record.words} ({part.name})"))
                     case Message():
+                        left -= len(record.data)
+                        if left < 0:
+                            raise DataError(f"{path} becomes larger than is believed", "copy it again")
                         lost += _add(file, record, number)
                     case _:
                         pass
@@ -177,7 +175,7 @@ def _plain(path: Path, folder: Path, damages: list[Damage]) -> Path:
     if not _head(path).startswith(ZSTD):
         return path
     out = folder / path.with_suffix("").name
-    most, size = max(_ALWAYS_BYTES, _MOST_RATIO * path.stat().st_size), 0
+    most, size = most_bytes(path.stat().st_size), 0
     with path.open("rb") as packed, out.open("wb") as plain:
         try:
             for piece in unzstd_pieces(packed):
@@ -219,6 +217,8 @@ def _records(part: Path, bag: Path) -> Iterator[Record]:
                 connection, log_ns, data = next(messages)
             except StopIteration:
                 return
+            except DataError:
+                raise
             except Exception as error:
                 raise _broken(bag, error) from error
             yield Message(channels[connection.id], connection.id, 0, log_ns, log_ns, memoryview(data))
@@ -237,10 +237,10 @@ def _opened(part: Path, bag: Path) -> Iterator[Any]:
         ImportError: rosbags is not installed.
         DataError: the file is broken, or not believed.
     """
-    if _head(part).startswith(_ROS1_BAG):
+    is_ros1 = _head(part).startswith(_ROS1_BAG)
+    if is_ros1:
         import rosbags.rosbag1  # noqa: PLC0415 - an extra
 
-        _require_believable(part)
         reader: Any = rosbags.rosbag1.Reader(part)
     elif not _head(part).startswith(_SQLITE):
         raise DataError(f"{bag} is no bag, or broken ({part.name})", "give a .bag, a rosbag2 folder, or FILE.mcap")
@@ -249,12 +249,15 @@ def _opened(part: Path, bag: Path) -> Iterator[Any]:
     else:
         import rosbags.rosbag2  # noqa: PLC0415 - an extra
 
+        require_plain_tables(part)
         reader = rosbags.rosbag2.Reader(part)
     try:
         reader.open()
     except Exception as error:
         raise _broken(bag, error) from error
     try:
+        if is_ros1:
+            bound_chunks(reader, part)
         yield reader
     finally:
         reader.close()
@@ -263,66 +266,3 @@ def _opened(part: Path, bag: Path) -> Iterator[Any]:
 def _broken(bag: Path, error: Exception) -> DataError:
     words = " ".join(str(error).split())[:200]
     return DataError(f"{bag} cannot be read ({words})", "mend it first: rosbag reindex, or ros2 bag reindex")
-
-
-def _require_believable(path: Path) -> None:
-    """Refuse a bag of ROS 1 whose chunks become larger than they say, before the library holds one of them.
-
-    Source: ROS Bag Format Version 2.0, section Records.
-
-    Raises:
-        DataError: so it is.
-    """
-    length = struct.Struct("<I")
-    total, most = 0, _MOST_RATIO * path.stat().st_size + _ALWAYS_BYTES
-    refusal = DataError(f"{path} becomes larger than is believed", "undo its compression: rosbag decompress FILE")
-    with path.open("rb") as file:
-        file.seek(len(_ROS1_BAG))
-        while len(head := file.read(length.size)) == length.size:
-            fields = _fields(file.read(min(length.unpack(head)[0], _PIECE_BYTES)))
-            size = length.unpack(file.read(length.size).ljust(length.size, b"\0"))[0]
-            behind = file.tell() + size
-            if fields.get(b"op") == _CHUNK_OP:
-                total += _chunk_bytes(file, size, fields, most - total, refusal)
-            file.seek(behind)
-
-
-def _fields(data: bytes) -> dict[bytes, bytes]:
-    """Return the fields of a record's header."""
-    fields, at = {}, 0
-    while at + 4 <= len(data):
-        size = int.from_bytes(data[at : at + 4], "little")
-        name, _, value = data[at + 4 : at + 4 + size].partition(b"=")
-        fields[name] = value
-        at += 4 + size
-    return fields
-
-
-def _chunk_bytes(file: BinaryIO, size: int, fields: dict[bytes, bytes], most: int, refusal: DataError) -> int:
-    """Return how many bytes a chunk becomes. None of them is kept.
-
-    Raises:
-        DataError: the refusal: it becomes more than it may.
-    """
-    limit = min(most, MOST_CHUNK_BYTES)
-    match fields.get(b"compression", b"none"):
-        case b"bz2":
-            begin: Callable[[], Any] = bz2.BZ2Decompressor
-        case b"lz4":
-            import lz4.frame  # noqa: PLC0415 - rosbags brings it
-
-            begin = lz4.frame.LZ4FrameDecompressor
-        case _:
-            return size
-    total, packed, decompressor = 0, file.read(size), begin()
-    try:
-        while packed or not decompressor.needs_input:
-            total += len(decompressor.decompress(packed, _PIECE_BYTES))
-            if total > limit:
-                raise refusal
-            packed = b""
-            if decompressor.eof:  # the library goes on with the stream behind it
-                packed, decompressor = decompressor.unused_data or b"", begin()
-    except (OSError, RuntimeError, EOFError, ValueError):
-        return total  # the library says what is wrong with it
-    return total

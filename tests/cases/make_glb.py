@@ -122,6 +122,10 @@ def glb_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], box: di
         file.bytes([primitive], nodes, (0, 1)),
         {"triangles": 24, "size": [140, 20, 30], "area": 10400, "volume": 48000},
     )
+    cases["nodes-without-a-scene"] = (
+        file.bytes([primitive], [{}, {"children": [2]}, *nodes], scenes=[]),
+        {"triangles": 24, "size": [140, 20, 30], "area": 10400, "volume": 48000},
+    )
     for kind, white in (("f4", 1), ("u1", 255), ("u2", 65535)):
         file, primitive = plain()
         shades = np.rint(np.tile(linear, (8, 1)) * white) if white > 1 else np.tile(linear, (8, 1))

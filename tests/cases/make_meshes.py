@@ -130,6 +130,7 @@ def obj_cases() -> list[Case]:
         ("continued-windows-lines.obj", (v + "".join(f"f {a} \\\r\n {b} \\\r\n {c} {d}\r\n" for a, b, c, d in ones)).encode(), BOX),
         ("comments-that-end-in-a-backslash.obj", (v + f.replace("\n", " # C:\\parts\\\n")).encode(), BOX),
         ("continued-behind-the-key-word.obj", (v + "".join(f"f \\\n{a} {b}\\\n{c} {d}\n" for a, b, c, d in ones)).encode(), BOX),
+        ("continued-behind-a-comment.obj", (v + "".join(f"f {a} {b} \\\n# the rest\n {c} {d}\n" for a, b, c, d in ones)).encode(), BOX),
         ("comments-behind.obj", (v.replace("\n", " # corner\n") + f.replace("\n", " # side\n")).encode(), BOX),
         ("one-point-with-a-tab.obj", (v + "v\t500 500 500\n" + _text((CORNERS + np.array([60, 0, 0])).tolist(), "v ") + f + _text([[n + 9 for n in each] for each in ones], "f ")).encode(), {"triangles": 24, "size": [100, 30, 20], "area": 10400, "volume": 48000}),
         ("one-face-with-tabs.obj", (v + _text(ones[:5], "f ") + _text(ones[5:], "f\t", "\t")).encode(), BOX),

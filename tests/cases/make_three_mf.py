@@ -109,6 +109,7 @@ def three_mf_cases(corners: NDArray[Any], triangles: Sequence[Sequence[int]], bo
         "bomb": (whole(_model(thing(1, mesh()), item) + " " * (1 << 25)), {"refused": "times its size"}),
         "empty-object": (whole(_model(thing(1, mesh()) + thing(2, "<mesh><vertices/><triangles/></mesh>"), item + '<item objectid="2"/>')), box),
         "of-type-surface": (whole(_model(thing(1, mesh()).replace('type="model"', 'type="surface"'), item)), box),
+        "of-type-support": (whole(_model(thing(1, mesh()) + thing(5, mesh()).replace('type="model"', 'type="support"'), f'{item}<item objectid="5" {move}/>')), box),
         "item-that-is-not-printed": (whole(_model(thing(1, mesh()), f'{item}<item objectid="1" {move} printable="0"/>')), box),
         "path-in-another-case": (
             _zipped({"_rels/.rels": _RELATIONS.format("3D/3DModel.model"), "3D/3dmodel.model": _model(apart.replace("Objects/box", "objects/Box"), item), "3D/Objects/box.model": _model(thing(7, mesh()), "")}),

@@ -3,8 +3,8 @@
 import bz2
 import json
 import sqlite3
-import struct
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -16,7 +16,7 @@ from common.recording.ros_messages import CAMERA_INFO, CameraInfo, camera_info_m
 from common.recording.salvage import Salvage
 from phone_host.cli import main
 from tests.support import foreign_recordings as other
-from tests.support.foreign_bags import BAGS, PAIRS
+from tests.support.foreign_bags import BAGS, PAIRS, ros1_with_more
 from tests.support.foreign_recordings import COMPRESSED, Sent, picture
 from tests.support.measured_command import run_measured
 
@@ -174,23 +174,25 @@ def test_a_part_that_is_there_twice_is_read_once(tmp_path: Path) -> None:
     assert _image_counts(out) == (4, 4)
 
 
-def _ros1_bomb(streams: int) -> bytes:
-    """A chunk that becomes 48 MB for each of its streams, and says that it becomes a few bytes."""
+def _ros1_bomb(folder: Path, more: bytes, *, is_hidden: bool = False) -> Path:
+    bag = folder / "bag.bag"
+    BAGS["rosbag1, bz2"](bag)
+    return _file(folder / "bomb.bag", ros1_with_more(bag.read_bytes(), more, is_hidden=is_hidden))
 
-    def fields(**values: bytes) -> bytes:
-        each = [name.encode() + b"=" + value for name, value in values.items()]
-        return b"".join(struct.pack("<I", len(one)) + one for one in each)
 
-    def record(head: bytes, data: bytes) -> bytes:
-        return struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data
-
-    numbers = {"conn_count": 0, "chunk_count": 1}
-    packed = bz2.compress(bytes(48 << 20)) * streams
-    head = fields(
-        op=b"\x03", index_pos=struct.pack("<Q", 0), **{name: struct.pack("<I", n) for name, n in numbers.items()}
-    )
-    chunk = fields(op=b"\x05", compression=b"bz2", size=struct.pack("<I", 10))
-    return b"#ROSBAG V2.0\n" + record(head, b"") + record(chunk, packed)
+def _computing_bag(folder: Path) -> Path:
+    """A database that gives 300 MB for each message and holds none of them."""
+    bag = folder / "bag"
+    BAGS["rosbag2, sqlite3"](bag)
+    (part,) = bag.glob("*.db3")
+    with closing(sqlite3.connect(part)) as database, database:
+        database.execute("ALTER TABLE messages RENAME TO held")
+        computed = "data BLOB GENERATED ALWAYS AS (zeroblob(300000000)) VIRTUAL"
+        database.execute(
+            f"CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, {computed})"
+        )
+        database.execute("INSERT INTO messages(id, topic_id, timestamp) SELECT id, topic_id, timestamp FROM held")
+    return bag
 
 
 def _bag_that_grows(folder: Path) -> Path:
@@ -211,9 +213,18 @@ BOMBS: dict[str, tuple[Callable[[Path], Path], str]] = {
         "becomes larger than is believed: undo",
     ),
     "ROS 1, a chunk of 40 streams of bz2 becomes 1.9 GB": (
-        lambda folder: _file(folder / "bomb.bag", _ros1_bomb(40)),
+        lambda folder: _ros1_bomb(folder, bz2.compress(bytes(48 << 20)) * 40),
         "becomes larger than is believed: undo",
     ),
+    "ROS 1, a chunk that only the index leads to becomes 1.9 GB": (
+        lambda folder: _ros1_bomb(folder, bz2.compress(bytes(48 << 20)) * 40, is_hidden=True),
+        "becomes larger than is believed: undo",
+    ),
+    "ROS 1, a chunk of 50 000 empty streams": (
+        lambda folder: _ros1_bomb(folder, bz2.compress(b"") * 50_000),
+        "becomes larger than is believed: undo",
+    ),
+    "rosbag2, a table that computes 300 MB a message": (_computing_bag, "computes what is in its table messages"),
     "rosbag2, a message of zstd becomes 1 GB": (
         _bag_that_grows,
         "1 message of /stereo/left/image_raw cannot be decompressed (it becomes larger than is believed",

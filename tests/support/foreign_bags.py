@@ -1,6 +1,7 @@
 """Small bags of ROS 1 and folders of rosbag2, written by the library rosbags: in each storage and compression."""
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -76,3 +77,51 @@ BAGS: dict[str, Callable[[Path], None]] = {
     "rosbag1, lz4": lambda path: _ros1(path, rosbag1.Writer.CompressionFormat.LZ4),
     "rosbag1, bz2": lambda path: _ros1(path, rosbag1.Writer.CompressionFormat.BZ2),
 }
+
+
+def ros1_with_more(bag: bytes, more: bytes, *, is_hidden: bool = False) -> bytes:
+    """Put bytes behind those of the only chunk of a ROS 1 bag; a hidden chunk lies in a record of another kind, where only its index leads to it.
+
+    Source: ROS Bag Format Version 2.0.
+    """
+    out, chunk_at, index_at = b"#ROSBAG V2.0\n", 0, 0
+    records = list(_ros1_records(bag))
+    for fields, data in records:
+        match fields[b"op"]:
+            case b"\x05":
+                chunk = _ros1_record(fields, data + more)
+                if is_hidden:
+                    head = _ros1_record({b"op": b"\x04"}, b"")[:-4]
+                    out += head + struct.pack("<I", len(chunk))
+                chunk_at = len(out)
+                out += chunk
+            case b"\x06":
+                out += _ros1_record(fields | {b"chunk_pos": struct.pack("<Q", chunk_at)}, data)
+            case op:
+                index_at = index_at or (len(out) if op == b"\x07" else 0)
+                out += _ros1_record(fields, data)
+    fields, data = records[0]
+    head = _ros1_record(fields | {b"index_pos": struct.pack("<Q", index_at)}, data)
+    return out[:13] + head + out[13 + len(head) :]
+
+
+def _ros1_record(fields: dict[bytes, bytes], data: bytes) -> bytes:
+    each = [name + b"=" + value for name, value in fields.items()]
+    head = b"".join(struct.pack("<I", len(one)) + one for one in each)
+    return struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data
+
+
+def _ros1_records(bag: bytes) -> Iterator[tuple[dict[bytes, bytes], bytes]]:
+    at = 13
+    while at < len(bag):
+        (size,) = struct.unpack_from("<I", bag, at)
+        head, at = bag[at + 4 : at + 4 + size], at + 4 + size
+        (size,) = struct.unpack_from("<I", bag, at)
+        data, at = bag[at + 4 : at + 4 + size], at + 4 + size
+        fields, place = dict[bytes, bytes](), 0
+        while place < len(head):
+            (size,) = struct.unpack_from("<I", head, place)
+            name, _, value = head[place + 4 : place + 4 + size].partition(b"=")
+            fields[name] = value
+            place += 4 + size
+        yield fields, data

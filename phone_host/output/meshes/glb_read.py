@@ -214,9 +214,11 @@ def _parts(file: _File) -> Iterator[Part]:
             meshes[-1].append(part)
     nodes = file.tree.get("nodes", ())
     scenes = file.tree.get("scenes", ())
-    roots = scenes[file.tree.get("scene", 0)].get("nodes", ()) if scenes else range(len(nodes) and 1)
     if len(nodes) > _MAX_NODES:
         raise DataError(f"{file.name} has more than {_MAX_NODES} nodes", "join its meshes")
+    children = {child for node in nodes for child in node.get("children", ())}
+    whole = [number for number in range(len(nodes)) if number not in children]
+    roots = scenes[file.tree.get("scene", 0)].get("nodes", ()) if scenes else whole
     waiting, visits = [(root, np.eye(4), 0) for root in roots], 0
     while waiting:
         number, transform, depth = waiting.pop()

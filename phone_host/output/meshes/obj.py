@@ -80,7 +80,7 @@ def read_obj(content: bytes, name: str, unit_m: float) -> Solid:
 def _statements(content: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield statements, each with the number of the line where it begins.
 
-    A backslash continues a point or a face. In a name or a comment it is part of a path.
+    A backslash continues a point or a face, also behind a comment. In a name or a comment it is part of a path.
     """
     first, parts = 0, list[bytes]()
     for number, line in enumerate(text_lines(content), start=1):
@@ -88,6 +88,8 @@ def _statements(content: bytes) -> Iterator[tuple[int, bytes]]:
         if begin.endswith(b"\\") and b"#" not in line and (parts or _FIGURE.match(begin)):
             first = first if parts else number
             parts.append(begin[:-1])
+        elif parts and line.lstrip().startswith(b"#"):
+            continue
         elif parts:
             yield first, b" ".join([*parts, line])
             parts = []

@@ -46,6 +46,9 @@ _MAX_VISITS: Final = 10_000
 _MAX_ENTRIES: Final = 100_000
 """Objects, components, items and groups of colours: each takes far more memory than text."""
 
+_SUPPORTS: Final = ("support", "solidsupport")
+"""Types of objects that are printed below the model and taken off (Core Specification, 4.1)."""
+
 _ENTRIES: Final = ("object", "component", "item", "colorgroup", "basematerials")
 _NO_COLOUR: Final = -1
 
@@ -61,6 +64,7 @@ class _Object:
     triangles: "array[int]" = field(default_factory=lambda: array("i"))
     paints: "array[int]" = field(default_factory=lambda: array("i"))
     components: list[tuple[Key, NDArray[np.float64]]] = field(default_factory=list)
+    is_support: bool = False
 
 
 @dataclass(slots=True)
@@ -182,7 +186,8 @@ class _Reader:
                 if self._package.groups:
                     self._object.paints.extend(self._paints(attributes))
             case "object":
-                self._object, self._paint = _Object(), (attributes.get("pid"), attributes.get("pindex"))
+                self._object = _Object(is_support=attributes.get("type") in _SUPPORTS)
+                self._paint = attributes.get("pid"), attributes.get("pindex")
                 self._package.objects[self._part, attributes["id"]] = self._object
             case "component":
                 self._object.components.append((self._key(attributes), _matrix(attributes)))
@@ -240,6 +245,8 @@ def _build_parts(package: _Package, name: str) -> Iterator[Part]:
         if key not in package.objects:
             raise DataError(f"{name} places an object that it does not hold", "export it anew")
         thing = package.objects[key]
+        if thing.is_support:
+            continue
         waiting += [
             (inner, transform @ way, depth + 1)
             for inner, way in thing.components
