@@ -43,10 +43,12 @@ def _next_steps(_: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """Import what the options ask for, and run it. The only place that imports by name."""
-    importlib.import_module("numpy")  # before OpenCV, as in phone_host/cli.py
-    command = importlib.import_module(
-        "phone_host.bench." + ("profile_list" if options.emulate == "list" else "command")
-    )
+    if options.emulate == "list":
+        module = "profile_list"
+    else:
+        module = "command"
+        importlib.import_module("numpy")  # before OpenCV, as in phone_host/cli.py
+    command = importlib.import_module(f"phone_host.bench.{module}")
     from phone_host.output.folder_lock import command_locks  # noqa: PLC0415 - the help needs none
 
     with interruptible(), command_locks():

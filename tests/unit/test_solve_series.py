@@ -112,7 +112,7 @@ def test_pictures_from_folders_are_judged_as_live_ones(verdict: Verdict, *, pose
     assert judge(found, ()).verdict is Verdict.GOOD
     views = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=_SIZES)
     solved = Solved(views=views, seen=pairs, pairs=pairs, found=replace(found, bends=(Bend.WIDE, Bend.USUAL)))
-    options = argparse.Namespace(live=False, pose_only=pose_only, max_megapixels=None)
+    options = argparse.Namespace(live=False, pose_only=pose_only, max_megapixels=None, baseline=None)
     files = ViewFiles(pairs=(), by_number=True, by_name=False, left_alone=(), right_alone=())
     series = Series(board=BOARD, side=Side.LEFT, path=Path())
     judged = _judged(files, series, solved, options, (UPRIGHT, UPRIGHT))

@@ -1,6 +1,7 @@
 """phone-host calibrate --export: rig.yaml becomes files of other programs."""
 
 import argparse
+from itertools import groupby
 from pathlib import Path
 from typing import Final
 
@@ -52,10 +53,13 @@ def write_exports(
                 raise SettingsError(
                     f"--export {kind.value} would replace {path}, which is imported", "name another --out"
                 )
-        with written_together(folder, *(each.name for each in made)) as place:
-            for each in made:
-                write_text(place / each.name, each.text)
-        written.append(Exported(kind, tuple(folder / each.name for each in made)))
+        paths = {folder / each.name: each.text for each in made}
+        for inner, group in groupby(paths, lambda path: path.parent):  # EuRoC's lie in a folder for each camera
+            names = [path.name for path in group]
+            with written_together(inner, *names) as place:
+                for name in names:
+                    write_text(place / name, paths[inner / name])
+        written.append(Exported(kind, tuple(paths)))
     return tuple(written)
 
 
