@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
 
 from tests.support.programs import PATIENCE_S, until
 from tests.vm import uvc
@@ -24,17 +25,26 @@ pytestmark = pytest.mark.timeout(600)  # the first test boots the machine
 GUEST_PYTHON = (3, 11)
 """Debian 12's; packages with compiled parts fit one version only."""
 
-WHEELS = ("numpy", "opencv-python-headless", "rich", "pygments", "markdown-it-py", "mdurl")
-"""What phone-host needs beside the board's packages."""
-
 BY_ID = "v4l2:/dev/v4l/by-id/usb-tandemscan_Board_Test_Camera_{}-video-index0?" + CAMERA.partition("?")[2]
 HOST = "PYTHONPATH=/mnt python3 -P -m phone_host.cli"
+
+
+def required_packages() -> set[str]:
+    """Return the names of all packages that an installation of the host without extras brings."""
+    names, waiting = set[str](), ["tandemscan"]
+    while waiting:
+        for line in metadata.requires(waiting.pop()) or ():
+            needed = Requirement(line)
+            if needed.name not in names and (needed.marker is None or needed.marker.evaluate({"extra": ""})):
+                names.add(needed.name)
+                waiting.append(needed.name)
+    return names
 
 
 def write_disk(folder: Path) -> Path:
     """An image with phone-host and its packages as installed here, without tests."""
     root = folder / "root"
-    for name in WHEELS:
+    for name in required_packages():
         for file in metadata.files(name) or ():
             if file.parts[0] != ".." and "tests" not in file.parts and file.suffix != ".pyc":
                 (root / file).parent.mkdir(parents=True, exist_ok=True)
