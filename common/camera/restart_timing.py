@@ -4,6 +4,7 @@ A webcam whose sensor runs only while it streams takes its first exposure a fixe
 single stamps and single starts are tens of ms late, so no figure here rests on one of them.
 """
 
+import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from statistics import median
@@ -22,7 +23,12 @@ def typical_phase(moments_ns: Sequence[int], period_ns: int) -> int:
         period_ns: time between two exposures, > 0.
     """
     last_ns, half_ns = moments_ns[-1], period_ns // 2
-    return last_ns + round(median((moment_ns - last_ns + half_ns) % period_ns - half_ns for moment_ns in moments_ns))
+    # The median is taken around the circular mean: around a moment that is half a period off, the others would lie at both ends.
+    turns = [math.tau * ((moment_ns - last_ns) % period_ns) / period_ns for moment_ns in moments_ns]
+    mean = math.atan2(math.fsum(map(math.sin, turns)), math.fsum(map(math.cos, turns)))
+    middle_ns = last_ns + round(mean / math.tau * period_ns)
+    offs_ns = ((moment_ns - middle_ns + half_ns) % period_ns - half_ns for moment_ns in moments_ns)
+    return middle_ns + round(median(offs_ns))
 
 
 class RestartTiming:

@@ -125,9 +125,9 @@ def _plan(whole: int, listed: Collection[str]) -> tuple[list[str], dict[str, str
         return [], {}
     remove, rename = plan.get(_REMOVE), plan.get(_RENAME)
     ours = {name for name in listed if "/" not in name and "\0" not in name and name not in {"", ".", ".."}}
-    removed = [name for name in remove if name in ours] if isinstance(remove, list) else []
+    removed = [name for name in remove if isinstance(name, str) and name in ours] if isinstance(remove, list) else []
     pairs = rename.items() if isinstance(rename, dict) else ()
-    return removed, {name: other for name, other in pairs if name in ours and other in ours}
+    return removed, {name: other for name, other in pairs if isinstance(other, str) and {name, other} <= ours}
 
 
 def _make_place(name: str, whole: int, folder: int) -> None:

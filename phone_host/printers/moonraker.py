@@ -88,7 +88,7 @@ class Moonraker:
     def cancel(self) -> None:
         """See PrintServer. The macro behind it is the user's own; many leave heaters on, so `cool` follows."""
         with suppress(ServerLostError):
-            self._ordered("/printer/print/cancel")
+            require_good(self._ordered("/printer/print/cancel"), "to end the print")
 
     def cool(self) -> bool:
         """See PrintServer."""

@@ -83,7 +83,7 @@ class OctoPrint:
 
     def cancel(self) -> None:
         """See PrintServer."""
-        self._command("/api/job", {"command": "cancel"})
+        require_good(self._command("/api/job", {"command": "cancel"}), "to end the print")
 
     def cool(self) -> bool:
         """See PrintServer."""

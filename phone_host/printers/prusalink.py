@@ -104,7 +104,7 @@ class PrusaLink:
         if not self._job:
             self.state()
         if self._job:
-            self._ask("DELETE", f"/api/v1/job/{self._job}", ORDER_S)
+            require_good(self._ask("DELETE", f"/api/v1/job/{self._job}", ORDER_S), "to end the print")
 
     def cool(self) -> bool:
         """See PrintServer."""

@@ -224,8 +224,10 @@ class _Watch:
                 return Ended(phase=Phase.CANCELLED, share=share)
             self._tell(Phase.CANCELLING)
             _pause(_SOON_S)
-        if self._wishes.is_left and self._end_and_cool(is_first=True):
-            return Ended(phase=Phase.CANCELLED, share=share, notes=() if self._is_cold() else (_UNPROVED,))
+        if self._wishes.is_left:
+            is_taken, is_cold = self._end_and_cool(is_first=not asked_ns), self._is_cold()
+            if is_taken or is_cold:
+                return Ended(phase=Phase.CANCELLED, share=share, notes=() if is_cold else (_UNPROVED,))
         while (
             now.monotonic_ns() - began_ns < obey_ns + round(self._patience.halted_s * _SECOND_NS)
             and not self._wishes.is_left

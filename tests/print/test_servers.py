@@ -327,6 +327,23 @@ def test_orders_that_get_no_answer_do_not_keep_each_other_back(kind: ServerKind,
         assert (there.goal, there.bed) == (0.0, 0.0)
 
 
+@KINDS
+def test_a_refused_end_is_not_reported_as_ended(kind: ServerKind, job: Job) -> None:
+    """The server answers 500 to the order to end the print, and the user leaves: the print goes on, and the error says to go and look."""
+    wishes = Wishes()
+
+    def watch(progress: Progress) -> None:
+        if progress.phase is Phase.CANCELLING:
+            wishes.leave()
+        elif progress.phase is Phase.PRINTING:
+            wishes.cancel()
+
+    faults = ServerFaults(rate=0.001, cools=False, refuses_to_end=True)
+    with print_server(kind, faults) as there, pytest.raises(PrinterGoneError, match="does not say") as left:
+        printed(there, job, wishes=wishes, tell=watch)
+    assert "go and look" in left.value.remedy
+
+
 def test_an_order_to_cool_that_is_refused_is_no_cold_printer(tmp_path: Path) -> None:
     """A server that answers 404 to the order after a print that leaves its heaters on has not switched them off."""
     hot = tmp_path / "hot.gcode"

@@ -37,6 +37,7 @@ class ServerFaults:
         starts: whether a file that was handed over is begun.
         cools: whether the heaters can be switched off.
         refuses_to_cool: whether the order to switch heaters off gets 404.
+        refuses_to_end: whether the order to end the print gets 500.
         raw: sent in place of every answer; empty: the answer.
         forbids: end of the paths that the key does not open; empty: it opens all.
         silent_after: answers after which it hangs up on everybody.
@@ -54,6 +55,7 @@ class ServerFaults:
     starts: bool = True
     cools: bool = True
     refuses_to_cool: bool = False
+    refuses_to_end: bool = False
     raw: bytes = b""
     forbids: str = ""
     silent_after: int = 1 << 30
@@ -176,6 +178,8 @@ class _Handler(BaseHTTPRequestHandler):
         self._say(status, said)
 
     def _refusal(self, path: str) -> tuple[int, Any] | None:
+        if self.server_of.faults.refuses_to_end and self.command in {"POST", "DELETE"} and path in _ENDS:
+            return 500, {"error": "the macro failed"}
         if self.server_of.faults.wants_digest:
             return None if self._proves() else (401, {"error": "Unauthorized"})
         forbids = self.server_of.faults.forbids
@@ -337,6 +341,7 @@ def _ordered(there: PrintServerStandIn, order: str) -> tuple[int, Any]:
     return 204, None
 
 
+_ENDS: Final = ("/api/job", "/printer/print/cancel", "/api/v1/job/7")
 _ANSWERS: Final = {
     ServerKind.OCTOPRINT: _octoprint,
     ServerKind.MOONRAKER: _moonraker,

@@ -53,3 +53,15 @@ def test_without_a_frame_no_start_is_known() -> None:
 def test_the_typical_phase_is_that_of_most_moments() -> None:
     """Moments a little before and after a multiple of the period share a phase; one that is far off does not move it."""
     assert typical_phase([998, 1102, 1201, 1250, 1301], 100) == 1301
+
+
+@pytest.mark.parametrize("late_ms", [10, 16, 17, 20, 25, 30])
+@pytest.mark.parametrize("count", [5, 14, 15])
+def test_a_last_moment_that_is_late_does_not_count(late_ms: int, count: int) -> None:
+    """Whatever part of a period the newest of several moments is late, the phase is that of the others to 2 ms."""
+    chance, period_ns = random.Random(late_ms), 33_333_333
+    for _ in range(50):
+        moments_ns = [10**12 + number * period_ns + round(chance.uniform(-1, 1) * MS) for number in range(count)]
+        moments_ns[-1] += late_ms * MS
+        off_ns = (typical_phase(moments_ns, period_ns) - 10**12 + period_ns // 2) % period_ns - period_ns // 2
+        assert abs(off_ns) < 2 * MS
