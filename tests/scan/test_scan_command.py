@@ -84,6 +84,11 @@ def surface_of(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     return vertices["at"].astype(np.float64), triangles["of"]
 
 
+def written(folder: Path, name: str) -> bytes:
+    """Return a file of a scan, without the name of the folder, which is in the commands that its page gives for what comes next."""
+    return (folder / name).read_bytes().replace(str(folder).encode(), b"FOLDER")
+
+
 def test_a_walk_around_a_still_life_gives_its_surfaces(walk: Path, tmp_path: Path) -> None:
     """All pairs are in the model; ball, cube and table lie within 2 mm of the truth on average; a second run writes the same bytes."""
     report = scan(walk, tmp_path / "one")
@@ -102,7 +107,7 @@ def test_a_walk_around_a_still_life_gives_its_surfaces(walk: Path, tmp_path: Pat
     assert turned_deg == pytest.approx(np.array(TURNS_DEG), abs=0.5)
     scan_here(walk, tmp_path / "two")
     for name in ("model.ply", "trajectory.txt", "report.json", "index.html"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+        assert written(tmp_path / "one", name) == written(tmp_path / "two", name)
 
 
 def test_what_somebody_moved_meanwhile_does_not_spoil_the_rest(walk: Path, tmp_path: Path) -> None:

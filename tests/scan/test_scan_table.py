@@ -199,7 +199,11 @@ def test_equal_pairs_give_equal_bytes_and_a_box_overrides(pictures: Path, scan_o
     """The second time all files are the same; --box, in the table's axes, keeps the figure's upper part alone."""
     assert scanned(pictures, tmp_path / "again", "--object") == 0
     for name in ("model.ply", "trajectory.txt", "report.json", "index.html"):
-        assert (tmp_path / "again" / name).read_bytes() == (scan_of_it / name).read_bytes()
+        again, first = (
+            (folder / name).read_bytes().replace(str(folder).encode(), b"FOLDER")
+            for folder in (tmp_path / "again", scan_of_it)
+        )  # the page gives commands with the folder's name
+        assert again == first
     assert scanned(pictures, tmp_path / "box", "--object", "--box", "120x120x60@0,10,80") == 0
     points = model_of(tmp_path / "box").points_m
     assert points[:, 2].min() >= 0.05 - 1e-5

@@ -99,6 +99,9 @@ def test_two_webcams_are_paired_and_a_pulled_one_comes_back(
     host = machine.popen(f"cd /; {run} > /srv/report 2> /srv/host.err & echo $!; wait; cat /srv/report")
     assert host.stdout is not None
     pid = host.stdout.readline().decode().strip()
+    until(
+        lambda: pairs_so_far(machine) > 0, "the program has started"
+    )  # an emulated processor takes its time to load OpenCV
     until(lambda: pairs_so_far(machine) >= 40, "40 pairs of two webcams")
     right.unplug()
     until(lambda: "camera_lost" in machine.sh("cat /srv/host.err"), "the host notices that its camera is gone")
