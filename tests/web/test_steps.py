@@ -104,7 +104,7 @@ def test_nothing_is_claimed_that_nobody_looked_for(program: Played, opened: Open
     page.click("#step-camera")
     assert page.text_content("#camera-none") == "Press Find to search for cameras."
     program.change(boards=())
-    page.wait_for_selector("#camera-none:has-text('None on this machine. ')")
+    page.wait_for_selector("#camera-none:has-text('None found on this machine. ')")
     program.change(trouble=Trouble("tcp://10.0.0.9:5555 does not answer", "see /etc/hosts"))
     page.wait_for_selector("#trouble:not([hidden])")
     assert page.text_content("#trouble") == "tcp://10.0.0.9:5555 does not answer. See /etc/hosts"
