@@ -66,7 +66,7 @@ def test_from_nothing_to_depth_by_the_api_alone(film: Path, tmp_path: Path) -> N
         state = client.until_idle()
         assert state["trouble"] is None, state
         assert {each["grade"] for each in state["checks"]} <= {"ok", "warn"}
-        assert "both cameras are seen" in client.step("check")["words"]
+        assert "both cameras work" in client.step("check")["words"]
         client.do("set", calibration=f"{film}/rig.yaml", near="600")
         client.do("run")
         until(lambda: client.pairs() >= 5, "five pairs")
