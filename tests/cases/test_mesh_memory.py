@@ -21,7 +21,7 @@ from tests.cases.make_three_mf import package
 ROOT: Final = Path(__file__).resolve().parents[2]
 SIDE: Final = 210
 TEXTS: Final = (".obj", "-text.ply", "-text.stl", "many-objects.3mf", "nested.3mf")
-SLACK: Final = 4 << 20
+SLACK: Final = 6 << 20
 """What the interpreter and parts of fixed size take beside the file, bytes."""
 
 
