@@ -19,9 +19,9 @@ from phone_host.output.meshes.solid import NO_COLOURS, Solid
 from tests.cases.make_three_mf import package
 
 ROOT: Final = Path(__file__).resolve().parents[2]
-SIDE: Final = 210
+SIDE: Final = 300
 TEXTS: Final = (".obj", "-text.ply", "-text.stl", "many-objects.3mf", "nested.3mf")
-SLACK: Final = 6 << 20
+SLACK: Final = 4 << 20
 """What the interpreter and parts of fixed size take beside the file, bytes."""
 
 
@@ -34,7 +34,7 @@ def _header(form: str, vertices: int, faces: int) -> str:
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """A rough surface of 87 000 triangles in each format, and what takes most memory for its size."""
+    """A rough surface of 180 000 triangles in each format, and what takes most memory for its size."""
     folder = tmp_path_factory.mktemp("files")
     x, y = np.meshgrid(np.arange(SIDE), np.arange(SIDE))
     z = np.random.default_rng(1).random((SIDE, SIDE))
