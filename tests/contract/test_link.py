@@ -192,7 +192,7 @@ def test_a_reader_that_does_not_read_makes_the_link_full(pair: tuple[End, End, d
     assert dialler.headers == taken
     assert all(payload.strip() == header for _, header, payload in dialler.packets if size)
     send_until_sent(listener, connection, b"after", b"", dialler)
-    wait_until(lambda: dialler.headers[-1] == b"after", dialler)
+    wait_until(lambda: dialler.headers[-1] == b"after", dialler, listener)
 
 
 def test_one_full_lane_does_not_stop_the_other(pair: tuple[End, End, dict[Lane, bytes]]) -> None:
@@ -203,8 +203,8 @@ def test_one_full_lane_does_not_stop_the_other(pair: tuple[End, End, dict[Lane, 
         refusals += listener.link.send(names[Lane.FRAMES], b"frame", bytes(MB)) is SendResult.FULL
     assert listener.link.send(names[Lane.CONTROL], b"control", b"") is SendResult.SENT
     wait_until(lambda: b"control" in dialler.headers, dialler, listener)
-    send_until_sent(dialler, dialler.link.dialled[Lane.CONTROL], b"answer", b"")
-    wait_until(lambda: b"answer" in listener.headers, listener)
+    send_until_sent(dialler, dialler.link.dialled[Lane.CONTROL], b"answer", b"", listener)
+    wait_until(lambda: b"answer" in listener.headers, listener, dialler)
 
 
 def test_before_the_peer_is_there_a_dialler_is_full(ends: Ends) -> None:
@@ -228,7 +228,7 @@ def test_a_listener_that_restarts_is_found_again(ends: Ends) -> None:
         listener = ends.listen()
         names = meet(listener, dialler, b"life %d " % life)
         send_until_sent(listener, names[Lane.FRAMES], b"back", b"again", dialler)
-        wait_until(lambda: b"back" in dialler.headers, dialler)
+        wait_until(lambda: b"back" in dialler.headers, dialler, listener)
         dialler.packets.clear()
 
 
@@ -242,7 +242,7 @@ def test_a_dialler_that_restarts_is_a_new_connection(pair: tuple[End, End, dict[
     renewed = meet(listener, later, b"later ")
     assert not set(renewed.values()) & set(names.values())
     send_until_sent(listener, renewed[Lane.CONTROL], b"welcome", b"", later)
-    wait_until(lambda: b"welcome" in later.headers, later)
+    wait_until(lambda: b"welcome" in later.headers, later, listener)
     assert later.headers == [b"welcome"]
 
 

@@ -42,7 +42,10 @@ class End:
 
 
 def wait_until(condition: Callable[[], bool], *ends: End) -> None:
-    """Take what arrives at these ends until the condition holds; check it at least every 20 ms."""
+    """Take what arrives at these ends until the condition holds; check it at least every 20 ms.
+
+    An accepted packet leaves only while its sender is among them: a link moves when it is called.
+    """
     waiter = Waiter(pollable for end in ends for pollable in end.link.pollables)
     deadline = time.monotonic() + PATIENCE_S
     while not condition():
