@@ -46,9 +46,6 @@ class PhoneHostSettings:
         "time for each pair, ms: working size, search range and matcher are chosen, and chosen again, to hold it; 0: no budget",
         milliseconds,
     )
-    temporal: bool = setting(
-        default=False, doc="search each pair where the last one found something, if its own images agree: faster"
-    )
     align_phase: str = setting(
         "", "which camera may be shifted until both expose together: either, board or host; empty: none"
     )

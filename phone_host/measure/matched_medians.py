@@ -1,7 +1,6 @@
 """What the matcher corrected over a run: the median of each figure. Pure."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from statistics import median
 from typing import Final
 
@@ -26,7 +25,7 @@ class MatchedMedians:
         """Take one pair's report; None is passed over."""
         if report is None:
             return
-        self._told = self._told or replace(report, searched=None) != _SILENT  # in which range is no correction
+        self._told = self._told or report != _SILENT
         if self._count % self._stride == 0:
             self._reports.append(report)
             if len(self._reports) > _MOST:

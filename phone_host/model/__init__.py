@@ -61,7 +61,6 @@ from phone_host.model.run import (
     Result,
     Unwritten,
 )
-from phone_host.model.temporal import Searched, SearchedAs, TemporalAccount
 
 __all__ = [
     "AS_CALIBRATED",
@@ -105,13 +104,10 @@ __all__ = [
     "Result",
     "Rig",
     "Search",
-    "Searched",
-    "SearchedAs",
     "Seen",
     "Side",
     "StereoGeometry",
     "Support",
-    "TemporalAccount",
     "Tiles",
     "TimeOffset",
     "Trend",

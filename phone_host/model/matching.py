@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model.images import Disparity
-from phone_host.model.temporal import Searched
 
 Confidence = NDArray[np.uint8]
 """(H, W) uint8: 0 = no value, 255 = most certain. It orders the values of one pair; it is no probability."""
@@ -26,7 +25,6 @@ class MatchReport:
         shading_percent: by how much the factors of opposite edges differ, where they differ most, percent: a lamp at one side.
         confidence_histogram: number of pixels with a value by their confidence, in classes of equal width over 1 .. 255;
             None if the matcher has no confidence.
-        searched: which part of the range was looked at; None: always the full range.
     """
 
     vertical_px: float = 0.0
@@ -35,7 +33,6 @@ class MatchReport:
     vignetting_percent: float = 0.0
     shading_percent: float = 0.0
     confidence_histogram: tuple[int, ...] | None = None
-    searched: Searched | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

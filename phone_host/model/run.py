@@ -19,7 +19,6 @@ from phone_host.model.images import (
     StereoGeometry,
 )
 from phone_host.model.matching import Completed, Confidence, MatchReport
-from phone_host.model.temporal import TemporalAccount
 
 
 @value(kw_only=True)
@@ -130,7 +129,6 @@ class DepthAccount:
         match_report: what the matcher corrected in the newest pair; None without a core.
         median_report: the median of what it corrected in all pairs; None if the matcher tells nothing.
         epipolar: which way the newest pair's epipolar lines run.
-        temporal: how the pairs were searched; None: all in the full range, because nobody asked for less.
     """
 
     cut: CutCounts | None = None
@@ -139,7 +137,6 @@ class DepthAccount:
     match_report: MatchReport | None = None
     median_report: MatchReport | None = None
     epipolar: Epipolar = Epipolar.LEFT
-    temporal: TemporalAccount | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

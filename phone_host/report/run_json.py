@@ -17,7 +17,7 @@ from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, dis
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
-from phone_host.model import DepthAccount, SearchedAs, TemporalAccount, TimeOffset
+from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.budget_report import budget_values
 from phone_host.report.drift_report import drift_values
 from phone_host.report.match_words import corrected_values
@@ -170,20 +170,8 @@ def _depth(depth: DepthAccount) -> dict[str, object] | None:
         "disparities": None if depth.search is None else depth.search.disparities or None,
         "corrected": corrected_values(depth.match_report),
         "corrected_median": corrected_values(depth.median_report),
-        "temporal": _temporal(depth.temporal),
         "limits": None if depth.limits is None else asdict(depth.limits),
         "cut": asdict(depth.cut),
-    }
-
-
-def _temporal(account: TemporalAccount | None) -> dict[str, object] | None:
-    """Return how many pairs were searched in a part of the range, and why the others were not; None without --temporal."""
-    if account is None:
-        return None
-    return {
-        "narrowed_pairs": account.narrowed,
-        "full_pairs": {why.value: account.of(why) for why in SearchedAs if why is not SearchedAs.NARROWED},
-        "searched_share": _number(account.share),
     }
 
 

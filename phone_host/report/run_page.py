@@ -18,7 +18,6 @@ from phone_host.measure.headline import headline, pixels_text
 from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import Regime, judge
 from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
-from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.model import Processed, Side
 from phone_host.report.budget_report import budget_tables
@@ -103,7 +102,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         *(f"Warning: {item.sentence}." for item in concerns(run)),
         *(f"Warning: {line}." for line in past_lines(run)),
         *(_sentence(line) for line in (*corrected_lines(run.depth), *budget_lines(run.budget))),
-        *(_sentence(line) for line in (*temporal_lines(run.depth.temporal), *drift_lines(run.drift))),
+        *(_sentence(line) for line in drift_lines(run.drift)),
         *(_sentence(line) for line in (*phase_lines(run.phase, run.alignment), *rung_lines(run.link))),
     )
 

@@ -17,7 +17,6 @@ from phone_host.measure.numbers import pairing_words
 from phone_host.measure.regime import judge
 from phone_host.measure.replay_facts import side_by_side
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history
-from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
@@ -67,7 +66,6 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += drift_lines(run.drift)
     lines += [f"note: {run.matcher_note}"] if run.matcher_note else []
     lines += budget_lines(run.budget)
-    lines += temporal_lines(run.depth.temporal)
     lines += [] if run.recording is None else [run.recording.words]
     lines += [] if run.replay is None else side_by_side(run.replay, run.delays, is_timeless=run.timeless)
     lines += camera_troubles(run.camera)

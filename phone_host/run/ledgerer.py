@@ -11,7 +11,7 @@ from common.ledger import HostMarks, PairLedger
 from phone_host.measure.delays import DelayStatistics, Sample
 from phone_host.measure.matched_medians import MatchedMedians
 from phone_host.measure.trouble import Trouble, Troubles
-from phone_host.model import CutCounts, DepthAccount, FramePair, Processed, TemporalAccount
+from phone_host.model import CutCounts, DepthAccount, FramePair, Processed
 
 _MOST_GAPS: Final = 4096
 """This many pairs after a gap are remembered, the latest: as many as a page can show."""
@@ -177,12 +177,10 @@ def _with(depth: DepthAccount, processed: Processed) -> DepthAccount:
     """Return the account with one more pair."""
     if processed.cut is None:
         return depth
-    searched = None if processed.match_report is None else processed.match_report.searched
     return DepthAccount(
         cut=(depth.cut or CutCounts()) + processed.cut,
         limits=processed.limits,
         search=processed.search,
         match_report=processed.match_report,
         epipolar=processed.pair.epipolar,
-        temporal=depth.temporal if searched is None else (depth.temporal or TemporalAccount()).plus(searched),
     )

@@ -17,7 +17,6 @@ from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, IDLE_STAGE_NS, STAG
 from phone_host.measure.headline import headline
 from phone_host.measure.regime import judge
 from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
-from phone_host.measure.temporal_words import temporal_lines
 from phone_host.measure.unused import unused
 from phone_host.report.summary import camera_troubles, corrected_lines, depth_lines, phase_lines
 from phone_host.run.redrawn import Part, Redrawn
@@ -89,12 +88,7 @@ class LiveTable(Redrawn):
             *(Part(3, line) for line in _cameras(run)),
             *(
                 Part(5, Text(line))
-                for line in (
-                    *depth_lines(run.images),
-                    *corrected_lines(run.depth),
-                    *budget_lines(run.budget),
-                    *temporal_lines(run.depth.temporal),
-                )
+                for line in (*depth_lines(run.images), *corrected_lines(run.depth), *budget_lines(run.budget))
             ),
             *([] if run.recording is None else [Part(4, Text(run.recording.words))]),
             Part(2, _table(run, self._rate, width)),

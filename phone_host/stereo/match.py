@@ -5,8 +5,7 @@ Rules that every matcher keeps (tests/contract/test_matcher.py, test_matcher_inp
 - disparity d = left x - right x, px, float32, the left image's size; NaN where it cannot be trusted; every value in [0,
   N);
 - any N >= 1 and any image size, down to 1 x 1 and narrower than N;
-- the result depends on the pair alone: not on earlier pairs, not on the number of OpenCV's threads (`match_temporal`
-  is the exception that a user asks for).
+- the result depends on the pair alone: not on earlier pairs, not on the number of OpenCV's threads.
 
 This module is the registry of matchers: it knows them, they do not know it.
 
@@ -15,7 +14,7 @@ user types. The entry point is a callable that takes the number of disparities (
 `Matcher`, which keeps the rules above.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import assert_never
 
 from common.errors import SettingsError
@@ -26,7 +25,6 @@ from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.match_tandem import TandemMatcher
-from phone_host.stereo.match_temporal import TemporalMatcher
 from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.native.library import native, required
@@ -40,8 +38,6 @@ class MatchSettings:
     Attributes:
         matcher: the algorithm; by default that of this machine.
         disparities: N, px: 0 <= d < N is searched. Any number from 1; far above the image's width it costs no more.
-        temporal: search each pair where the last one found something, if its images agree (match_temporal). The result then
-            depends on earlier pairs.
 
     Raises:
         SettingsError: disparities below 1.
@@ -49,7 +45,6 @@ class MatchSettings:
 
     matcher: AnyMatcher = field(default_factory=default_matcher)
     disparities: int = 64
-    temporal: bool = False
 
     def __post_init__(self) -> None:
         if self.disparities < 1:
@@ -69,19 +64,11 @@ def create_matcher(settings: MatchSettings) -> Matcher:
         The matcher.
 
     Raises:
-        SettingsError: another package's matcher cannot be loaded or does not fit, a network's file is not there, or a network
-            is to search the last pair's range.
+        SettingsError: another package's matcher cannot be loaded or does not fit, or a network's file is not there.
         UnavailableError: onnxruntime, which a network needs, is not installed; or the native library, which tandem needs,
             is not built.
         DataError: the file is no network that matches two images.
     """
-    if settings.temporal:
-        if isinstance(settings.matcher, NetworkMatcher):
-            raise SettingsError("--temporal has no effect with a network, which searches no range", "leave it out")
-        once = replace(settings, temporal=False)
-        return TemporalMatcher(
-            lambda disparities: create_matcher(replace(once, disparities=disparities)), settings.disparities
-        )
     match settings.matcher:
         case MatcherName.BLOCK:
             return BlockMatcher(settings.disparities)

@@ -53,7 +53,6 @@ def build_core(
     images: Path | None = None,
     *,
     rig: Rig | None = None,
-    temporal: bool = False,
 ) -> tuple[StereoCore | None, Side | None]:
     """Build the stereo core from the options.
 
@@ -65,7 +64,6 @@ def build_core(
         images: an image file of either side, or its folder; None: not from files. KITTI's calib.txt holds two pairs of
             cameras, and only the folder's name tells which of them took the images.
         rig: what the calibration holds, if it is known already; None: it is read.
-        temporal: whether pairs are searched where the last one found something.
 
     Returns: The core (None if neither a rig nor rectified images are given), and the side of the board's camera in the
         rig (None without a rig).
@@ -81,16 +79,12 @@ def build_core(
         raise SettingsError("--calibration and --rectified contradict each other", "give only one of the two")
     _refuse_idle_geometry(options, calibration)
     if of_rectified:
-        core = _by_calib_txt(
-            options, Path(calibration), chosen, wanted, size_px, cameras=_kitti_cameras(images), temporal=temporal
-        )
+        core = _by_calib_txt(options, Path(calibration), chosen, wanted, size_px, cameras=_kitti_cameras(images))
         return core, None
     if calibration:
         rig = rig or read_own_rig(Path(calibration))
         refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
-        return StereoCore(
-            _matcher(chosen, options.disparities, temporal=temporal), Rectifier(rig), None, wanted
-        ), rig.board_side
+        return StereoCore(_matcher(chosen, options.disparities), Rectifier(rig), None, wanted), rig.board_side
     if not options.rectified:
         _refuse_idle_limits(options, ("near", "far", "crop", "scale", "complete"), "--calibration or --rectified")
         return None, None
@@ -101,7 +95,7 @@ def build_core(
             raise SettingsError(
                 "--rectified without --disparities", "give the number of disparities, for example --disparities 64"
             )
-    return StereoCore(_matcher(chosen, options.disparities, temporal=temporal), None, geometry, wanted), None
+    return StereoCore(_matcher(chosen, options.disparities), None, geometry, wanted), None
 
 
 def metric_core(options: argparse.Namespace, matcher: str, size_px: tuple[int, int], images: Path) -> StereoCore:
@@ -189,8 +183,8 @@ def depth_wanted(options: argparse.Namespace) -> DepthWanted:
     )
 
 
-def _matcher(chosen: AnyMatcher, disparities: int | None, *, temporal: bool) -> MatchSettings:
-    settings = MatchSettings(chosen, temporal=temporal)
+def _matcher(chosen: AnyMatcher, disparities: int | None) -> MatchSettings:
+    settings = MatchSettings(chosen)
     return settings if disparities is None else replace(settings, disparities=disparities)
 
 
@@ -227,7 +221,6 @@ def _by_calib_txt(
     size_px: tuple[int, int],
     *,
     cameras: KittiCameras,
-    temporal: bool,
 ) -> StereoCore:
     """Build the core for rectified images from the file that their publisher gave; N is ndisp unless the user says otherwise."""
     found = read_calib_txt(path, cameras)
@@ -239,7 +232,7 @@ def _by_calib_txt(
         scale = 1.0 if found.size_px is None else size_px[0] / found.size_px[0]
         disparities = math.ceil(found.disparities * scale)
         wanted = depth_wanted(argparse.Namespace(**{**vars(options), "disparities": disparities}))
-    return StereoCore(_matcher(chosen, disparities, temporal=temporal), None, geometry, wanted)
+    return StereoCore(_matcher(chosen, disparities), None, geometry, wanted)
 
 
 def _refuse_idle_geometry(options: argparse.Namespace, calibration: str) -> None:

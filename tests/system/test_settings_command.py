@@ -23,12 +23,11 @@ def test_every_setting_of_the_host_is_an_option_and_named_as_its_origin() -> Non
         "max_megapixels": "12", "budget": "40",
     }  # fmt: skip
     words = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", value)]
-    words += ["--link", "tcp://board:5555", "--interpolate", "--temporal"]
+    words += ["--link", "tcp://board:5555", "--interpolate"]
     done = settings("phone_host.cli", "--json", *words)
     assert done.returncode == 0, done.stderr
     read = given | {
         "interpolate": True,
-        "temporal": True,
         "tolerance": 5.0,
         "budget": 40.0,
         "max_megapixels": 12,

@@ -15,8 +15,6 @@ from phone_host.model import (
     Matched,
     MatchReport,
     RectifiedPair,
-    Searched,
-    SearchedAs,
     Side,
 )
 from phone_host.report.match_words import corrected_words, run_corrected_words
@@ -132,7 +130,6 @@ def test_a_run_says_nothing_of_a_matcher_that_reports_nothing() -> None:
     """`block` reports nothing: no line; a matcher that found nothing to correct says so."""
     medians = MatchedMedians()
     medians.add(MatchReport())
-    medians.add(MatchReport(searched=Searched(why=SearchedAs.NARROWED, share=0.5)))  # block with --temporal
     assert medians.report() is None
     silent = replace(run(5), depth=DepthAccount(cut=CutCounts(kept=5)))
     assert "corrected" not in summary(silent)

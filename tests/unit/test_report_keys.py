@@ -18,7 +18,7 @@ from phone_host.measure.replay_facts import replay_facts
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
-from phone_host.model import CutCounts, DepthAccount, DepthLimits, Drift, MatchReport, Search, TemporalAccount
+from phone_host.model import CutCounts, DepthAccount, DepthLimits, Drift, MatchReport, Search
 from phone_host.report.quality_json import quality_json
 from phone_host.report.run_json import build
 from phone_host.report.stereo_json import pair_json, set_json
@@ -90,7 +90,6 @@ def _eventful_run() -> RunSnapshot:
             limits=DepthLimits(near_m=0.0, far_m=9.0, disparity_error_px=0.25, from_rig=True),
             search=Search(disparities=64),
             median_report=MatchReport(vertical_px=0.4),
-            temporal=TemporalAccount(counts=(9, 1, 0, 0, 0, 0), share_sum=4.0),
         ),
     )
 

@@ -48,7 +48,7 @@ def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
     """Settings become keys that `run --config` reads, other options a table of the page; keys of the program are not the page's."""
     file = tmp_path / "new" / "host.toml"
     assert kept(file) == ({}, [])
-    choices = {"link": "tcp://a:1", "tolerance": "5ms", "temporal": "yes", "near": "300"}
+    choices = {"link": "tcp://a:1", "tolerance": "5ms", "interpolate": "yes", "near": "300"}
     keep(file, choices)
     assert file.stat().st_mode & 0o777 == 0o600
     file.write_text('keys = "k"  # mine\n' + file.read_text())

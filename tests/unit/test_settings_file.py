@@ -36,13 +36,13 @@ def test_a_key_is_changed_where_it_stood_and_the_rest_stays() -> None:
 
 def test_an_empty_file_begins_with_what_is_set() -> None:
     """Without a file there are only the keys; with nothing in the table there is no table."""
-    assert changed("", {"temporal": True, "fifo": "1:block"}, "page", {}) == 'temporal = true\nfifo = "1:block"\n'
+    assert changed("", {"interpolate": True, "fifo": "1:block"}, "page", {}) == 'interpolate = true\nfifo = "1:block"\n'
 
 
 @settings(max_examples=40)
 @given(
     values=st.dictionaries(
-        st.sampled_from(["link", "camera", "fifo", "budget", "temporal"]),
+        st.sampled_from(["link", "camera", "fifo", "budget", "interpolate"]),
         st.none() | st.text(max_size=9) | st.booleans() | st.integers(-99, 99) | st.tuples(st.text(max_size=3)),
     ),
     content=st.dictionaries(st.text(max_size=5), st.text(max_size=9), max_size=3),

@@ -67,12 +67,6 @@ def _add_pairing(parser: argparse.ArgumentParser) -> None:
         help="time for each pair: choose working size, search range and matcher to hold it, and follow when the machine slows down; --scale, --matcher, --disparities and --near stay as given (default: no budget)",
     )
     parser.add_argument(
-        "--temporal",
-        action="store_true",
-        default=None,
-        help="search each pair only where the last one found something, unless its own images say that something lies elsewhere: faster, above all with a large range",
-    )
-    parser.add_argument(
         "--align-phase",
         nargs="?",
         const="either",

@@ -340,18 +340,12 @@ def _core(
         size_px,
         Path(images) if images else None,
         rig=rig,
-        temporal=settings.temporal,
     )
     board_side = Side(options.board_side) if options.board_side else rig_side or usual
     if rig_side not in {None, board_side}:
         raise SettingsError(
             f"--board-side {board_side.value} contradicts {settings.calibration}",
             "leave it out, or calibrate with the board there",
-        )
-    if core is None and options.temporal:
-        raise SettingsError(
-            "--temporal without --calibration or --rectified, so no depth is computed",
-            "add one of them, or leave it out",
         )
     if options.record_topics is not None and (core is None or core.geometry is None):
         raise SettingsError(
