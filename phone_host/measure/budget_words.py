@@ -51,7 +51,7 @@ def missed_words(account: BudgetAccount | None) -> str:
     return (
         f"--budget {account.budget_ns / _MS:g} cannot be held: pairs take {account.processing_ns / _MS:.1f} ms,"
         f" of which matching takes {account.match_ns / _MS:.1f} ms, and nothing is left to choose that would hold it:"
-        f" {'drop --complete, ' if account.completes else ''}give a longer --budget, or smaller images"
+        " give a longer --budget, or smaller images"
     )
 
 

@@ -35,7 +35,6 @@ from phone_host.model.images import (
     StereoGeometry,
 )
 from phone_host.model.matching import (
-    Completed,
     Confidence,
     Matched,
     MatchReport,
@@ -76,7 +75,6 @@ __all__ = [
     "Change",
     "ChangeKind",
     "CloudImage",
-    "Completed",
     "Confidence",
     "Crop",
     "CutCounts",

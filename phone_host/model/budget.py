@@ -69,7 +69,6 @@ class BudgetAccount:
         changed: how often the way was changed.
         changes: the newest changes, in order.
         is_missed: whether pairs take too long, and no way is expected to hold the budget.
-        completes: whether holes are completed in most pairs, which takes its time, too.
     """
 
     budget_ns: int
@@ -83,7 +82,6 @@ class BudgetAccount:
     changed: int = 0
     changes: tuple[BudgetChange, ...] = ()
     is_missed: bool = False
-    completes: bool = False
 
     @property
     def is_narrowed(self) -> bool:

@@ -48,16 +48,3 @@ class Matched:
     disparity: Disparity
     confidence: Confidence | None = None
     report: MatchReport = MatchReport()  # frozen
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Completed:
-    """A disparity map whose holes were completed from their surroundings: for the eye, not for measuring.
-
-    Attributes:
-        disparity: (H, W) float32, px: measured and completed values, NaN = neither.
-        mask: (H, W) bool: the completed ones.
-    """
-
-    disparity: Disparity
-    mask: NDArray[np.bool_]

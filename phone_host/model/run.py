@@ -18,7 +18,7 @@ from phone_host.model.images import (
     Search,
     StereoGeometry,
 )
-from phone_host.model.matching import Completed, Confidence, MatchReport
+from phone_host.model.matching import Confidence, MatchReport
 
 
 @value(kw_only=True)
@@ -83,7 +83,6 @@ class Processed:
         search: how the pair was matched; None without a core.
         confidence: of each disparity; None without a core, or if the matcher has none.
         match_report: what the matcher corrected, in px of the rectified images; None without a core.
-        completed: the disparity with completed holes, marked; None if nobody asked for it. The cloud never contains them.
         overlay: how the right camera was taken to depart from the rig that was calibrated.
     """
 
@@ -97,7 +96,6 @@ class Processed:
     search: Search | None = None
     confidence: Confidence | None = None
     match_report: MatchReport | None = None
-    completed: Completed | None = None
     overlay: Departure = AS_CALIBRATED
 
 

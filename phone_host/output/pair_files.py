@@ -10,14 +10,12 @@ from enum import Enum
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
-from phone_host.model import Completed, Processed, StereoGeometry
+from phone_host.model import Processed
 from phone_host.output.axes import Axes
 from phone_host.output.depth_png import write_depth
 from phone_host.output.pfm import write_pfm, write_xyz
 from phone_host.output.ply import write_ply
-from phone_host.output.preview import completed_picture, depth_picture, disparity_picture, write_png
+from phone_host.output.preview import depth_picture, disparity_picture, write_png
 
 
 class PairFile(Enum):
@@ -31,13 +29,9 @@ class PairFile(Enum):
     XYZ = "xyz.pfm"
     DEPTH = "depth.png"
     DEPTH_VIEW = "depth_view.png"
-    COMPLETED = "completed.pfm"
-    COMPLETED_MARKS = "completed.png"
-    COMPLETED_VIEW = "completed_view.png"
 
 
 _OF_DISPARITY: Final = frozenset({PairFile.DISPARITY, PairFile.DISPARITY_VIEW})
-_OF_COMPLETED: Final = frozenset({PairFile.COMPLETED, PairFile.COMPLETED_MARKS, PairFile.COMPLETED_VIEW})
 _OF_IMAGES: Final = frozenset({PairFile.LEFT, PairFile.RIGHT})
 
 RUN_FILES: Final = (
@@ -46,9 +40,6 @@ RUN_FILES: Final = (
     PairFile.DISPARITY,
     PairFile.CLOUD,
     PairFile.DEPTH,
-    PairFile.COMPLETED,
-    PairFile.COMPLETED_MARKS,
-    PairFile.COMPLETED_VIEW,
 )
 """What a run saves of a pair."""
 
@@ -60,9 +51,6 @@ STEREO_FILES: Final = (
     PairFile.DEPTH_VIEW,
     PairFile.DISPARITY_VIEW,
     PairFile.DISPARITY,
-    PairFile.COMPLETED,
-    PairFile.COMPLETED_MARKS,
-    PairFile.COMPLETED_VIEW,
 )
 """What `stereo` writes of a pair."""
 
@@ -96,14 +84,10 @@ class WrittenPair:
     not_in_depth_png: int = 0
 
 
-def available(
-    wanted: Sequence[PairFile], *, has_disparity: bool, has_cloud: bool, has_completed: bool = False
-) -> tuple[PairFile, ...]:
+def available(wanted: Sequence[PairFile], *, has_disparity: bool, has_cloud: bool) -> tuple[PairFile, ...]:
     """Return those of the wanted files that can be written."""
 
     def can_be(file: PairFile) -> bool:
-        if file in _OF_COMPLETED:
-            return has_completed
         return file in _OF_IMAGES or (has_disparity if file in _OF_DISPARITY else has_cloud)
 
     return tuple(file for file in wanted if can_be(file))
@@ -135,7 +119,6 @@ def write_pair(
         wanted,
         has_disparity=processed.disparity is not None,
         has_cloud=processed.cloud is not None,
-        has_completed=processed.completed is not None,
     )
     counts = dict(
         zip(files, run_all(lambda file: _write(folder / file.value, file, processed, axes), files), strict=True)
@@ -160,10 +143,6 @@ def _write(path: Path, file: PairFile, processed: Processed, axes: Axes) -> int:
         else:
             write_png(path, disparity_picture(disparity, processed.geometry))
         return 0
-    if file in _OF_COMPLETED:
-        assert processed.completed is not None
-        _write_completed(path, file, processed.completed, processed.geometry)
-        return 0
     assert cloud is not None
     match file:
         case PairFile.CLOUD:
@@ -175,12 +154,3 @@ def _write(path: Path, file: PairFile, processed: Processed, axes: Axes) -> int:
         case _:
             write_png(path, depth_picture(cloud))
     return 0
-
-
-def _write_completed(path: Path, file: PairFile, completed: Completed, geometry: StereoGeometry | None) -> None:
-    if file is PairFile.COMPLETED:
-        write_pfm(path, completed.disparity)
-    elif file is PairFile.COMPLETED_MARKS:
-        write_png(path, np.where(completed.mask, np.uint8(255), np.uint8(0)))
-    else:
-        write_png(path, completed_picture(completed, geometry))

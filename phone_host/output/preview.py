@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import CloudImage, Completed, Disparity, Image, StereoGeometry
+from phone_host.model import CloudImage, Disparity, Image, StereoGeometry
 from phone_host.output.atomic import write_bytes
 from phone_host.output.scale_bar import Tick, ticks, with_scale
 from phone_host.output.strips import strips
@@ -19,7 +19,6 @@ _LEVELS: Final = 255  # level 0 means none
 _SAMPLES: Final = 50_000  # give the same percentiles as all pixels to within one colour level
 # Single wrong matches at the ends must not use up the colours.
 _LOW_PERCENT, _HIGH_PERCENT = 1.0, 99.0
-_STRIPE_PERIOD_PX, _STRIPE_PX = 6, 2  # diagonal; holes of a few pixels still hold a stripe
 _LEAST_DEPTH_SHARE: Final = 0.02  # of the depth: on a flat wall, noise must not become colours
 
 
@@ -100,23 +99,6 @@ def disparity_picture(disparity: Disparity, geometry: StereoGeometry | None = No
         return ticks(near_m, far_m, lambda z: (product / z - doffs_px - low_px) / span_px, pitch)
 
     return with_scale(image, _scale_colours(), in_metres, "m")
-
-
-def completed_picture(completed: Completed, geometry: StereoGeometry | None = None) -> Image:
-    """Colour a disparity map with completed holes as `disparity_picture` does; dark stripes lie over what was completed.
-
-    Args:
-        completed: the map.
-        geometry: its scale is in metres; None: in px.
-
-    Returns:
-        (H, W + scale, 3) BGR; without any value black and without a scale.
-    """
-    image = disparity_picture(completed.disparity, geometry)
-    y, x = np.nonzero(completed.mask)
-    striped = (x + y) % _STRIPE_PERIOD_PX < _STRIPE_PX
-    image[y[striped], x[striped]] //= 3
-    return image
 
 
 def depth_picture(cloud: CloudImage) -> Image:

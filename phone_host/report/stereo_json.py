@@ -37,7 +37,6 @@ def pair_json(report: PairReport) -> dict[str, Any]:
         "limits": None if report.limits is None else asdict(report.limits),
         "cut": None if report.cut is None else asdict(report.cut),
         "density": round(report.density, 5),
-        "completed_pixels": report.completed,
         "points": written.points,
         "unit": "metre" if written.points is not None else None,
         "axes": report.axes.text if written.points is not None else None,

@@ -5,7 +5,6 @@ import math
 from common.imagesize.head import size_text
 from common.words import counted, distance_text
 from phone_host.measure.headline import pixels_text
-from phone_host.model import CutCounts
 from phone_host.report.cut_words import share_text
 from phone_host.report.stereo_report import (
     ALWAYS,
@@ -45,8 +44,6 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
             f"f = {report.geometry.focal_px:.1f} px, b = {report.geometry.baseline_m * 1e3:.2f} mm",
             *cut_lines(report),
         ]
-    if report.completed is not None:
-        lines.append(completed_words(report.completed, report.cut, report.rectified_px))
     lines += [remark.line for remark in report.remarks_beside_headline]
     if missing := depth_png_words(written.not_in_depth_png):
         lines.append(f"note: {missing}")
@@ -83,19 +80,6 @@ def _shared_line(shared: SharedRemark, report: SetReport) -> str:
     such = "" if shared.alike else f", such as {shared.first}"
     kind = "note" if shared.remark.is_note else "warning"
     return f"{kind}: in {shared.pairs} of {len(report.pairs)} pairs{such}: {shared.remark.text}"
-
-
-def completed_words(count: int, cut: CutCounts | None, size_px: tuple[int, int]) -> str:
-    """Say how many pixels were completed, and where they are.
-
-    Args:
-        count: pixels.
-        cut: what became of all pixels; None: not counted.
-        size_px: width and height of the image.
-    """
-    share = count / max(1, size_px[0] * size_px[1] if cut is None else cut.inside)
-    told = f"{share:.1%} {pixels_text(cut)}, guessed from their surroundings"
-    return f"completed: {told}: only in completed.pfm, marked in completed.png"
 
 
 def cut_lines(report: PairReport) -> list[str]:

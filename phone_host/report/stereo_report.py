@@ -68,7 +68,6 @@ class PairReport:
         matcher: its name.
         search: how the pair was matched.
         match_report: what the matcher corrected before; None: not known.
-        completed: pixels whose disparity was completed from their surroundings; None: nobody asked for it.
         geometry: None: unknown, so there is no cloud.
         limits: of the cloud; None without one.
         cut: what became of the pixels; None: not counted.
@@ -98,7 +97,6 @@ class PairReport:
     trust: PairTrust
     remarks: tuple[Remark, ...] = ()
     match_report: MatchReport | None = None
-    completed: int | None = None
 
     @property
     def share(self) -> float:

@@ -50,8 +50,6 @@ _LINES: Final = 16384
 _WRITERS: Final = 2
 """Threads that write one pair's files. Of 640x480 they take 41 ms with depth.png; one thread took 53 ms without it (decision 0033)."""
 
-_OFTEN: Final = 2
-
 NAMES: Final = r"delays\.jsonl|report\.json|settings\.json|cameras\.json|overlay\.yaml|index\.html|pair-[0-9]{6,}"
 """The names that a run writes into its folder."""
 
@@ -361,19 +359,6 @@ class FileSink:
             os.close(self._file)
         self._own.close()
         self._own = None
-
-    @property
-    def saves_often(self) -> bool:
-        """Whether every pair or every second one is saved: then the median of their times shows what is done for saved pairs alone."""
-        return self._own is not None and 0 < self._save_every <= _OFTEN
-
-    def saves(self, number: int) -> bool:
-        """Tell whether the pair of a number is to be saved.
-
-        Args:
-            number: of the pair in the run, from 0.
-        """
-        return self._own is not None and self._is_due(number)
 
     def _is_due(self, number: int) -> bool:
         return self._save_every > 0 and number % self._save_every == 0

@@ -135,11 +135,7 @@ class Host:
         self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
         interpolator = Interpolator() if settings.interpolate else None
         wanted = settings.budget
-        self._budget = (
-            None
-            if core is None or wanted is None
-            else PairBudget(wanted, core, completes=core.wanted.complete and self._files.saves_often)
-        )
+        self._budget = None if core is None or wanted is None else PairBudget(wanted, core)
         pipeline = Pipeline(
             core,
             settings.board_side,
@@ -155,7 +151,6 @@ class Host:
             pipeline,
             self._ledgerer,
             self._sinks,
-            is_saved=self._files.saves,
             most_pairs=settings.pairs,
             taken=self._receiver.wake,
         )

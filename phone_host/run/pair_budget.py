@@ -59,11 +59,10 @@ class PairBudget:
     Args:
         wanted: the budget, and what may change to hold it.
         core: matches the pairs; built from settings.
-        completes: whether holes are completed in most pairs, too.
     """
 
-    def __init__(self, wanted: BudgetWanted, core: StereoCore, *, completes: bool = False) -> None:
-        self._wanted, self._core, self._completes = wanted, core, completes
+    def __init__(self, wanted: BudgetWanted, core: StereoCore) -> None:
+        self._wanted, self._core = wanted, core
         self._held: _Held | None = None
         self._first_ns = 0
         self._pairs = self._within = self._narrowed = self._changed = 0
@@ -142,7 +141,6 @@ class PairBudget:
             changed=self._changed,
             changes=tuple(self._changes),
             is_missed=held.controller.is_missed,
-            completes=self._completes,
         )
 
 

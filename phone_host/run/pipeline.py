@@ -68,12 +68,11 @@ class Pipeline:
         self._board_side = board_side
         self._clock = clock
 
-    def process(self, pair: FramePair, *, is_saved: bool = True) -> Processed:
+    def process(self, pair: FramePair) -> Processed:
         """Compute a pair's depth.
 
         Args:
             pair: two encoded frames.
-            is_saved: whether its files will be written: holes are completed for them alone.
 
         Returns:
             Images, disparity, cloud and stage times.
@@ -101,7 +100,7 @@ class Pipeline:
         else:
             sizes = self._in_sides(*decoding.whole_px)
             choice = None if self._budget is None else self._budget.choice(*sizes)
-            processed = self._core.compute(left, right, self._clock, whole_px=sizes, choice=choice, is_saved=is_saved)
+            processed = self._core.compute(left, right, self._clock, whole_px=sizes, choice=choice)
         stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
         if self._budget is not None:
             end_ns = self._clock()

@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Protocol
 
-import numpy as np
-
 from common import now
 from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS
@@ -255,7 +253,6 @@ class _Work:
             STEREO_FILES,
             has_disparity=processed.disparity is not None,
             has_cloud=processed.cloud is not None,
-            has_completed=processed.completed is not None,
         )
         names = [*(file.value for file in planned), "report.json", "index.html"]
         with (
@@ -283,7 +280,6 @@ class _Work:
                 matcher=self._job.matcher,
                 search=processed.search,
                 match_report=processed.match_report,
-                completed=None if processed.completed is None else int(np.count_nonzero(processed.completed.mask)),
                 geometry=processed.geometry,
                 limits=processed.limits,
                 cut=processed.cut,

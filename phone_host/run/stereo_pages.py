@@ -28,9 +28,6 @@ _WORDS: Final = {
     "depth_view.png": "depth as a picture with its scale",
     "disparity.png": "disparity as a picture with its scale",
     "disparity.pfm": "disparity in px, +inf = none, not cut by limits",
-    "completed.pfm": "disparity with completed holes: for the eye, not for measuring",
-    "completed.png": "white where completed.pfm was completed",
-    "completed_view.png": "completed.pfm as a picture, striped where it was completed",
     "report.json": "all figures",
 }
 

@@ -30,7 +30,6 @@ class Worker:
         pipeline: computes their depth.
         ledgerer: keeps the books.
         sinks: take the results.
-        is_saved: tells of a pair's number whether its files will be written.
         most_pairs: the worker ends after this many pairs; 0 for no limit.
         taken: called when a place in the queue becomes free.
     """
@@ -42,12 +41,11 @@ class Worker:
         ledgerer: Ledgerer,
         sinks: Sequence[Sink],
         *,
-        is_saved: Callable[[int], bool],
         most_pairs: int,
         taken: Callable[[], None],
     ) -> None:
         self._queue, self._pipeline, self._ledgerer, self._sinks = queue, pipeline, ledgerer, tuple(sinks)
-        self._is_saved, self._most_pairs, self._taken = is_saved, most_pairs, taken
+        self._most_pairs, self._taken = most_pairs, taken
         self._thread = threading.Thread(target=self._work, name="worker", daemon=True)
         self.finished = threading.Event()
         self.failure: Exception | None = None
@@ -90,7 +88,7 @@ class Worker:
     def _process(self, pair: FramePair, dequeued_ns: int) -> None:
         try:
             with noted_if_out_of_memory(f"pair {self._ledgerer.processed}"):
-                processed = self._pipeline.process(pair, is_saved=self._is_saved(self._ledgerer.processed))
+                processed = self._pipeline.process(pair)
         except (DataError, SettingsError) as error:  # or a --crop that lies outside images of this size
             self._note_failed(error)
             return

@@ -137,7 +137,7 @@ class PageSink:
 def _lean(shelved: Shelved) -> Shelved:
     """Leave away what measuring does not need: the cloud is the larger half."""
     newest = shelved.newest
-    processed = replace(newest.result.processed, cloud=None, confidence=None, completed=None)
+    processed = replace(newest.result.processed, cloud=None, confidence=None)
     return Shelved(replace(newest, result=replace(newest.result, processed=processed)), shelved.core)
 
 

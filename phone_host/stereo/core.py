@@ -17,7 +17,6 @@ from common.ledger import StageTimes
 from phone_host.model import (
     AS_CALIBRATED,
     CloudImage,
-    Completed,
     CutCounts,
     Departure,
     DepthLimits,
@@ -31,7 +30,6 @@ from phone_host.model import (
     StereoGeometry,
 )
 from phone_host.stereo.budget_ladder import Choice, Extent
-from phone_host.stereo.completion import completed
 from phone_host.stereo.depth_limits import (
     DepthWanted,
     above_zero,
@@ -152,7 +150,6 @@ class StereoCore:
         *,
         whole_px: _Sizes | None = None,
         choice: Choice | None = None,
-        is_saved: bool = True,
     ) -> Processed:
         """Run and time all stages: rectify or pass through, match, and reproject if the geometry is known.
 
@@ -163,7 +160,6 @@ class StereoCore:
             whole_px: width and height of left and right image before they were decoded smaller by `reductions`, px;
                 None: they were not.
             choice: how to match this pair; None: as the core was built. Only for a core that was built from settings.
-            is_saved: whether anybody will look at completed holes; if not, they are not completed, whatever is wanted.
 
         Returns:
             The rectified pair, its disparity, its cloud (None without geometry), how they were found, and the times of
@@ -183,7 +179,6 @@ class StereoCore:
         confidence = matched.confidence
         if confidence is not None:
             confidence = confidence_of_known(confidence, disparity)
-        filled = _completed(pair, matched.disparity, disparity, ready) if self.wanted.complete and is_saved else None
         times = StageTimes(
             rectify=rectified_ns - start_ns, match=matched_ns - rectified_ns, reproject=clock() - matched_ns
         )
@@ -198,7 +193,6 @@ class StereoCore:
             search=ready.search,
             confidence=confidence,
             match_report=matched.report,
-            completed=filled,
             overlay=AS_CALIBRATED if rectifier is None else rectifier.overlay,
         )
 
@@ -362,22 +356,6 @@ def _match(pair: RectifiedPair, ready: _Ready) -> Matched:
             confidence = part.placed(confidence, ready.width_px, ready.height_px)
     report = replace(found.report, vertical_px=found.report.vertical_px / scale)
     return Matched(disparity=disparity, confidence=confidence, report=report)
-
-
-def _completed(pair: RectifiedPair, matched: Disparity, disparity: Disparity, ready: _Ready) -> Completed:
-    """Complete the holes that the matcher left, inside the crop. What was dropped as no measurement stays dropped."""
-    rows, columns = slice(None), slice(None)
-    if ready.part is not None:
-        crop = ready.part.crop
-        rows, columns = slice(crop.y_px, crop.y_px + crop.height_px), slice(crop.x_px, crop.x_px + crop.width_px)
-    inside = completed(pair.left[rows, columns], matched[rows, columns], pair.epipolar)
-    mask = np.zeros(disparity.shape, np.bool_)
-    mask[rows, columns] = inside.mask
-    values = disparity.copy()
-    values[rows, columns][inside.mask] = inside.disparity[inside.mask]
-    least_px = ready.error_px - (0.0 if ready.geometry is None else ready.geometry.doffs_px)
-    mask &= values > least_px
-    return Completed(disparity=np.where(mask | np.isfinite(disparity), values, np.float32(np.nan)), mask=mask)
 
 
 def _reproject(matched: Disparity, ready: _Ready) -> tuple[Disparity, CloudImage | None, CutCounts]:

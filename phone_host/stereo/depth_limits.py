@@ -41,7 +41,6 @@ class DepthWanted:
         far_m: points with a coordinate beyond it are cut, m; NaN: as follows from the rig.
         crop: only its pixels get a disparity and a depth; None: all.
         scale: size of the images to match, as a share of the rectified ones', in (0, 1]; NaN: chosen by their size.
-        complete: also give a disparity whose holes are completed from their surroundings.
     """
 
     search_from_m: float = math.nan
@@ -49,7 +48,6 @@ class DepthWanted:
     far_m: float = math.nan
     crop: Crop | None = None
     scale: float = math.nan
-    complete: bool = False
 
 
 def disparity_error_px(scale: float, zero_sigma_px: float) -> float:

@@ -24,11 +24,6 @@ def add_stereo_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare --calibration, --rectified and their related options, and those that say which points are written."""
     add_core_arguments(parser)
     add_limit_arguments(parser)
-    parser.add_argument(
-        "--complete",
-        action="store_true",
-        help="also write completed.pfm: the disparity with its holes completed from their surroundings, and completed.png, which marks them; no other file contains them",
-    )
 
 
 def add_limit_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,7 +56,7 @@ def add_overlay_argument(parser: argparse.ArgumentParser) -> None:
 
 def add_core_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what a stereo core needs: --calibration, --rectified and their related options, and how to match."""
-    parser.set_defaults(far=None, crop=None, complete=False, axes="camera")
+    parser.set_defaults(far=None, crop=None, axes="camera")
     parser.add_argument(
         "--calibration",
         metavar="FILE",

@@ -86,7 +86,7 @@ def build_core(
         refuse_rejected(rig, calibration, allowed=options.use_rejected_rig)
         return StereoCore(_matcher(chosen, options.disparities), Rectifier(rig), None, wanted), rig.board_side
     if not options.rectified:
-        _refuse_idle_limits(options, ("near", "far", "crop", "scale", "complete"), "--calibration or --rectified")
+        _refuse_idle_limits(options, ("near", "far", "crop", "scale"), "--calibration or --rectified")
         return None, None
     geometry = rectified_geometry(options, size_px)
     if geometry is None:
@@ -179,7 +179,6 @@ def depth_wanted(options: argparse.Namespace) -> DepthWanted:
         far_m=far_m,
         crop=None if options.crop is None else crop_of(options.crop),
         scale=math.nan if options.scale is None else scale_of(options.scale),
-        complete=options.complete,
     )
 
 

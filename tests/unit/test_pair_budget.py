@@ -201,8 +201,6 @@ def test_a_missed_budget_is_a_warning() -> None:
     assert f"warning: {words}" in summary(with_account(missed))
     assert words in html.unescape(run_page(with_account(missed), None, Side.LEFT, ()))
     assert missed_words(ACCOUNT) == missed_words(None) == ""
-    assert "--complete" not in words
-    assert ": drop --complete, give a longer --budget" in missed_words(replace(missed, completes=True))
 
 
 def wanted_of(*words: str, core: StereoCore | None = None) -> BudgetWanted | None:

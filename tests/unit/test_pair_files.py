@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 from common.ledger import StageTimes
-from phone_host.model import Completed, Processed, RectifiedPair, StereoGeometry
+from phone_host.model import Processed, RectifiedPair, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.depth_png import depth_mm
 from phone_host.output.pair_files import RUN_FILES, STEREO_FILES, PairFile, available, write_pair
 from phone_host.output.pfm import read_pfm, read_xyz
 from phone_host.output.ply import read_ply
-from phone_host.output.preview import completed_picture, disparity_picture
 from phone_host.stereo.reproject import project, reproject
 
 _GEOMETRY = StereoGeometry(focal_px=50, baseline_m=0.1, cx_px=9.5, cy_px=7.5, doffs_px=2)
@@ -44,35 +43,6 @@ def test_the_names_are_those_that_other_programs_rely_on(tmp_path: Path, process
     assert {path.name for path in (tmp_path / "r").iterdir()} == {
         "left.png", "right.png", "disparity.pfm", "cloud.ply", "depth.png",
     }  # fmt: skip
-
-
-def test_completed_holes_have_files_of_their_own(tmp_path: Path, processed: Processed) -> None:
-    """Three more files: values with the holes filled, marks that are 255 just there, and a picture; all others keep their bytes."""
-    assert processed.disparity is not None
-    mask = np.isnan(processed.disparity)
-    filled = Completed(disparity=np.where(mask, np.float32(5), processed.disparity), mask=mask)
-    for name, pair in (("without", processed), ("with", replace(processed, completed=filled))):
-        (tmp_path / name).mkdir()
-        write_pair(tmp_path / name, pair, (*RUN_FILES, *STEREO_FILES))
-    before, after = ({path.name: path.read_bytes() for path in (tmp_path / n).iterdir()} for n in ("without", "with"))
-    assert set(after) - set(before) == {"completed.pfm", "completed.png", "completed_view.png"}
-    assert all(after[name] == content for name, content in before.items())
-    assert read_pfm(tmp_path / "with" / "completed.pfm").tobytes() == filled.disparity.tobytes()
-    marks = cv2.imread(str(tmp_path / "with" / "completed.png"), cv2.IMREAD_UNCHANGED)
-    assert marks is not None
-    assert np.array_equal(marks, np.where(mask, 255, 0))
-
-
-def test_completed_pixels_are_striped_in_the_picture() -> None:
-    """Dark stripes lie over completed pixels and over no other: the rest looks as without marks."""
-    disparity = np.tile(np.linspace(10, 40, 60, dtype=np.float32), (40, 1))
-    mask = np.zeros(disparity.shape, np.bool_)
-    mask[10:30, 20:40] = True
-    plain = disparity_picture(disparity)
-    striped = completed_picture(Completed(disparity=disparity, mask=mask))
-    darker = np.less(striped, plain).max(axis=2)[:, :60]
-    assert not darker[~mask].any()
-    assert 0.2 < darker[mask].mean() < 0.5
 
 
 def test_without_metres_only_disparities_are_written_and_without_depth_only_images(

@@ -12,7 +12,7 @@ from common.ledger import StageTimes
 from phone_host.measure.budget_words import budget_lines
 from phone_host.measure.headline import Answer, Grade
 from phone_host.measure.image_trust import ImageFigures
-from phone_host.model import CutCounts, MatchReport, Processed, RectifiedPair
+from phone_host.model import MatchReport, Processed, RectifiedPair
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report import depth_data
@@ -22,7 +22,7 @@ from phone_host.report.quality_lines import quality_lines
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import QualityReport, quality_verdict
 from phone_host.report.report_page import Headline
-from phone_host.report.stereo_lines import completed_words, cut_lines, pair_lines, set_lines
+from phone_host.report.stereo_lines import cut_lines, pair_lines, set_lines
 from phone_host.report.stereo_page import stereo_page, thumbnail
 from phone_host.report.stereo_report import FailedPair, PairReport, SetReport
 from phone_host.report.stereo_trust import PairTrust
@@ -61,14 +61,6 @@ def test_a_pair_without_geometry_has_size_and_density_and_no_word_of_metres() ->
         "written to out: disparity.pfm, report.json, index.html",
     ]
     assert cut_lines(_BARE) == []
-
-
-def test_completed_pixels_are_a_share_of_the_image_or_of_the_crop() -> None:
-    """100 of 40 x 25 pixels are a tenth; of a crop of 200 pixels they are half, and the words name the crop."""
-    assert completed_words(100, None, (40, 25)).startswith("completed: 10.0% of the pixels, guessed")
-    cropped = CutCounts(kept=100, unmatched=100, outside=800)
-    assert completed_words(100, cropped, (40, 25)).startswith("completed: 50.0% of the pixels inside the crop, guessed")
-    assert completed_words(100, None, (40, 25)) in pair_lines(replace(_BARE, completed=100), "out")
 
 
 @pytest.mark.parametrize("by_number", [True, False])

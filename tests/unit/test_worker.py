@@ -39,7 +39,7 @@ def test_a_stopped_run_gives_up_a_pair_that_takes_long() -> None:
     queue = PairQueue(FifoSettings(), None, PERIOD_NS)
     pipeline = Pipeline(StereoCore(matcher, None, None), Side.LEFT, now.monotonic_ns)
     taken: list[int] = []
-    worker = Worker(queue, pipeline, books, (), is_saved=lambda _: False, most_pairs=0, taken=lambda: taken.append(1))
+    worker = Worker(queue, pipeline, books, (), most_pairs=0, taken=lambda: taken.append(1))
     queue.begin(camera_of(PERIOD_NS))
     at_ns, image = now.monotonic_ns(), encoded(".png", draw(1))
     worker.start()

@@ -54,7 +54,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         far=None,
         crop=None,
         scale=None,
-        complete=False,
         focal=None,
         baseline=None,
         doffs=None,

@@ -46,4 +46,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--disparities", type=int, metavar="N", help="search disparities from 0 to N-1 px")
     parser.add_argument("--matcher", metavar="NAME", help=f"as for phone-host stereo ({default_words()})")
     add_image_arguments(parser)
-    parser.set_defaults(rectified=False, scale=None, complete=False, focal=None, baseline=None, doffs=None, center=None)
+    parser.set_defaults(rectified=False, scale=None, focal=None, baseline=None, doffs=None, center=None)

@@ -259,8 +259,6 @@ def open_run(
         keys = key_folder(settings.keys)
         named, links = open_named(settings.link, keys, patience_s(options.wait, options.seconds))
         opened.pop_all()
-    if core is not None and options.complete and (options.out is None or not options.save_every):
-        tell("--complete does nothing here: no pair is saved; give --out DIR and --save-every N")
     return Opened(options, found, camera, links, tuple(named), keys.path, core, board_side)
 
 

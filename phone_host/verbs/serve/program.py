@@ -66,7 +66,7 @@ _RIG: Final = Path("rig") / "rig.yaml"
 _CAPTURE_S: Final = 60.0
 """So long a phone is watched for growing hot; half a minute tells about its film."""
 
-_OF_DEPTH: Final = ("near", "far", "crop", "scale", "complete")
+_OF_DEPTH: Final = ("near", "far", "crop", "scale")
 _OF_CALIBRATION: Final = ("board", "square", "baseline", "views")
 
 
