@@ -1,6 +1,7 @@
 """What a recording tells of the board's clock: written while it grows, read when it is played or joined. Pure."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -56,3 +57,23 @@ def told_clocks(recorded: Recorded) -> list[ToldClock]:
         except (ValueError, TypeError, AttributeError, OverflowError):
             continue
     return found
+
+
+def narrowest(told: Iterable[ToldClock], boot_id: str, span_ns: tuple[int, int]) -> ClockEstimate | None:
+    """Choose the estimate of a board's clock that is least uncertain over a span.
+
+    Args:
+        told: estimates, all on one host's clock.
+        boot_id: of the board.
+        span_ns: first and last moment on the board's clock, ns.
+
+    Returns:
+        The estimate; None if none is of that boot.
+    """
+    known = [one.estimate for one in told if boot_id and one.boot_id == boot_id]
+    return min(known, key=lambda one: worst_ns(one, span_ns), default=None)
+
+
+def worst_ns(estimate: ClockEstimate, span_ns: tuple[int, int]) -> int:
+    """Return the half-width that holds the true offset in 99.9 % at either end of a span on the board's clock, ns."""
+    return max(estimate.uncertainty_at(moment_ns) for moment_ns in span_ns)

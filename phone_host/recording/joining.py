@@ -1,7 +1,7 @@
 """Joins what a board recorded alone with what its host recorded meanwhile, into one recording that plays as any other."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -12,13 +12,13 @@ from common.recording.inflate import inflate
 from common.recording.layout import ABOUT, CAPTURE, CLOCK, camera_name, image_topic
 from common.recording.mcap_records import CHANNELS, Message
 from common.recording.opened import open_recorded, stored_data
-from common.recording.recorded import Recorded, Shown
+from common.recording.recorded import Recorded, Shown, period_ns
 from common.recording.recording_file import RecordingFile, written
 from common.recording.ros_messages import RecordedImage, image_parts, image_type
 from common.recording.salvage import Salvage
 from phone_host.model import Side
-from phone_host.recording.clock_messages import ToldClock, clock_text, told_clocks
-from phone_host.recording.relation import Relation, Stream, relate
+from phone_host.recording.clock_messages import ToldClock, clock_text, narrowest, told_clocks, worst_ns
+from phone_host.sync.clock import ClockEstimate
 
 _LINK: Final = "joined"
 _PART: Final = re.compile(r"-\d{6,9}\.mcap$")
@@ -27,6 +27,14 @@ _PART: Final = re.compile(r"-\d{6,9}\.mcap$")
 _SECOND_NS: Final = 1_000_000_000
 _MARGIN_NS: Final = _SECOND_NS
 """What only one of the cameras saw is left out, but for this."""
+
+_USABLE: Final = 0.5
+"""A clock known to this share of a period finds every pair."""
+
+_TO_95: Final = 1.96 / 3.2905
+"""From a half-width that holds 99.9 % to one that holds 95 %."""
+
+_EXCHANGE: Final = "give --clock a recording that this host made over the link, near in time, with neither machine switched off or asleep in between"
 
 _SLEPT_NS: Final = 5_000_000
 """A host whose Unix time moved by more against its own clock has slept, or its time was set: an exchange of before says nothing."""
@@ -45,34 +53,46 @@ class JoinAccount:
     """What was joined.
 
     Attributes:
-        relation: of the clocks.
+        clock: of the board.
+        uncertainty_ns: half-width that holds the true offset in 95 %, where it is known worst.
         images: of each side.
         left_out: images that only one camera saw, or that the host's recording has of its own board.
         empty: parts of a ring that hold no images: their board died right after they were begun.
         seconds: how long both cameras recorded at once.
     """
 
-    relation: Relation
+    clock: ClockEstimate
+    uncertainty_ns: int
     images: dict[Side, int]
     left_out: int
     seconds: float
     empty: tuple[Path, ...]
 
 
-def join_recordings(
-    paths: Sequence[Path], out: Path, clock: Path | None, advance: Callable[[float], None]
-) -> JoinAccount:
+@dataclass(frozen=True, slots=True)
+class _Stream:
+    """A camera's images in the order of their exposure, and what was added to each time of the clock of their stamps, ns."""
+
+    shown: Sequence[Shown]
+    unix_ns: int
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """First and last exposure on the clock of whoever recorded, ns."""
+        return self.shown[0].image.stamp_ns - self.unix_ns, self.shown[-1].image.stamp_ns - self.unix_ns
+
+
+def join_recordings(paths: Sequence[Path], out: Path, clock: Path | None) -> JoinAccount:
     """Write one recording.
 
     Args:
         paths: the host's recording and the board's, or all parts of the board's, in any order.
         out: the new recording; it must not exist.
         clock: another recording of the same host that has heard the board's clock; None: there is none.
-        advance: called with the share that is done, 0 to 1.
 
     Raises:
         SettingsError: these are not one recording of a host and one of a board.
-        DataError: one cannot be read, or nothing tells how their clocks relate.
+        DataError: one cannot be read, or no stored clock exchange relates their clocks.
         UnavailableError: the file cannot be made, or the disk is full.
     """
     opened, empty = _opened(paths)
@@ -81,27 +101,26 @@ def join_recordings(
     own = host.recorded.images.get(host.recorded.topic_of(side.other.value))
     if not own:
         raise DataError(f"{host.path} holds no images of the host's own camera", "record with phone-host record")
-    board = _board_stream(parts)
-    stream = Stream(_ascending(own), host.recorded.about.unix_ns, str(host.path))
-    told = [*told_clocks(host.recorded), *_told_elsewhere(clock, host)]
-    boot_id = parts[0].recorded.about.board_boot_id
-    relation = relate(board, stream, told, boot_id, advance)
-    moved = [_moved(shown, relation, board.unix_ns, stream.unix_ns) for shown in board.shown]
+    board, stream = _board_stream(parts), _Stream(_ascending(own), host.recorded.about.unix_ns)
+    estimate = _clock_of(board, stream, parts[0], host, clock)
+    moved = [_moved(shown, estimate, board.unix_ns, stream.unix_ns) for shown in board.shown]
     first_ns = max(moved[0].image.stamp_ns, stream.shown[0].image.stamp_ns)
     last_ns = min(moved[-1].image.stamp_ns, stream.shown[-1].image.stamp_ns)
     if first_ns > last_ns:
         apart = f"{(first_ns - last_ns) / 1e9:.0f} s apart"
-        raise DataError(f"{board.name} and {host.path} were recorded {apart}", "give recordings of the same time")
+        raise DataError(f"{parts[0].path} and {host.path} were recorded {apart}", "give recordings of the same time")
     kept = {
         side: _between(moved, first_ns - _MARGIN_NS, last_ns + _MARGIN_NS),
         side.other: _between(stream.shown, first_ns - _MARGIN_NS, last_ns + _MARGIN_NS),
     }
     with written(out) as file:
-        _write_begin(file, host, parts[0], relation, first_ns)
+        _write_begin(file, host, parts[0], estimate, first_ns)
         _write_images(file, kept, side)
     every = len(moved) + sum(map(len, host.recorded.images.values()))
     images = {each: len(shown) for each, shown in kept.items()}
-    return JoinAccount(relation, images, every - sum(images.values()), (last_ns - first_ns) / 1e9, empty)
+    uncertainty_ns = round(worst_ns(estimate, board.span_ns) * _TO_95)
+    left_out = every - sum(images.values())
+    return JoinAccount(estimate, uncertainty_ns, images, left_out, (last_ns - first_ns) / 1e9, empty)
 
 
 def _opened(paths: Sequence[Path]) -> tuple[list[Opened], tuple[Path, ...]]:
@@ -142,7 +161,7 @@ def sorted_out(opened: Sequence[Opened]) -> tuple[list[Opened], Opened]:
     return parts, hosts[0]
 
 
-def _board_stream(parts: Sequence[Opened]) -> Stream:
+def _board_stream(parts: Sequence[Opened]) -> _Stream:
     """Return the images of all parts, with stamps on the first one's Unix time."""
     unix_ns = parts[0].recorded.about.unix_ns
     every: list[Shown] = []
@@ -150,7 +169,27 @@ def _board_stream(parts: Sequence[Opened]) -> Stream:
         later_ns = unix_ns - part.recorded.about.unix_ns
         shown = next(iter(part.recorded.images.values()))
         every += [_later(one, later_ns) for one in shown] if later_ns else shown
-    return Stream(_ascending(every), unix_ns, str(parts[0].path))
+    return _Stream(_ascending(every), unix_ns)
+
+
+def _clock_of(board: _Stream, own: _Stream, part: Opened, host: Opened, clock: Path | None) -> ClockEstimate:
+    """Return how the board's clock relates to the host's, by the narrowest exchange that a host stored.
+
+    Raises:
+        SettingsError: the recording that --clock names does not fit the host's.
+        DataError: no exchange with this boot of the board is stored, or none that finds every pair.
+    """
+    told = [*told_clocks(host.recorded), *_told_elsewhere(clock, host)]
+    found = narrowest(told, part.recorded.about.board_boot_id, board.span_ns)
+    if found is None:
+        raise DataError(f"no clock exchange between {part.path} and {host.path} is stored", _EXCHANGE)
+    known_ns = worst_ns(found, board.span_ns)
+    if known_ns > _USABLE * max(period_ns(board.shown), period_ns(own.shown)):
+        raise DataError(
+            f"the clock exchange that is stored for {part.path} and {host.path} is known only to +-{known_ns / 1e6:.0f} ms",
+            _EXCHANGE,
+        )
+    return found
 
 
 def _ascending(shown: Sequence[Shown]) -> list[Shown]:
@@ -163,10 +202,10 @@ def _later(shown: Shown, by_ns: int, frame_id: str = "") -> Shown:
     return Shown(moved, shown.sequence, shown.log_ns + by_ns, shown.publish_ns + by_ns, shown.grabbed_ns + by_ns)
 
 
-def _moved(shown: Shown, relation: Relation, board_unix_ns: int, host_unix_ns: int) -> Shown:
+def _moved(shown: Shown, clock: ClockEstimate, board_unix_ns: int, host_unix_ns: int) -> Shown:
     """Return an image of the board with the host's times."""
     board_ns = shown.image.stamp_ns - board_unix_ns
-    return _later(shown, relation.to_host(board_ns) + host_unix_ns - shown.image.stamp_ns)
+    return _later(shown, board_ns + clock.offset_at(board_ns) + host_unix_ns - shown.image.stamp_ns)
 
 
 def _between(shown: Sequence[Shown], first_ns: int, last_ns: int) -> list[Shown]:
@@ -184,17 +223,18 @@ def _told_elsewhere(clock: Path | None, host: Opened) -> list[ToldClock]:
     other, about = open_recorded(clock), host.recorded.about
     if other.about.host_boot_id != about.host_boot_id or not about.host_boot_id:
         raise SettingsError(
-            f"{clock} and {host.path} are of two boots of a host", "leave --clock out: the content may tell"
+            f"{clock} and {host.path} are of two boots of a host",
+            "name one that the host recorded since it was switched on",
         )
     if abs(other.about.unix_ns - about.unix_ns) > _SLEPT_NS:
         raise SettingsError(
             f"between {clock} and {host.path} the host slept, or its time was set",
-            "leave --clock out: the content may tell",
+            "name one that the host recorded after that",
         )
     return told_clocks(other)
 
 
-def _write_begin(file: RecordingFile, host: Opened, board: Opened, relation: Relation, at_ns: int) -> None:
+def _write_begin(file: RecordingFile, host: Opened, board: Opened, clock: ClockEstimate, at_ns: int) -> None:
     """Write all that is no image: what the host's recording tells, the board's camera, and how they were joined."""
     board_about, side = board.recorded.about, host.recorded.about.board_side
     for name, values in host.recorded.metadata.items():
@@ -204,8 +244,7 @@ def _write_begin(file: RecordingFile, host: Opened, board: Opened, relation: Rel
         file.tell(ABOUT, host.recorded.about.values())
     camera = dict(board.recorded.metadata.get(camera_name(board_about.board_side), {}))
     file.tell(camera_name(side), {**camera, "link": _LINK, "began_ns": "0"})
-    told = {"by": relation.by.value, "uncertainty_ns": str(relation.uncertainty_ns), "board_file": board.path.name}
-    file.tell(_LINK, {**told, "board_boot_id": board_about.board_boot_id})
+    file.tell(_LINK, {"board_file": board.path.name, "board_boot_id": board_about.board_boot_id})
     for name, data in host.recorded.attachments.items():
         file.attach(name, "application/octet-stream", bytes(data), at_ns)
     if "settings.json" in board.recorded.attachments:
@@ -214,7 +253,7 @@ def _write_begin(file: RecordingFile, host: Opened, board: Opened, relation: Rel
     for record in Salvage(stored_data(host.path), inflate).records():
         if isinstance(record, Message) and record.channel is not None and record.channel.topic.endswith("camera_info"):
             file.add(record.channel.topic, record.data, sequence=0, log_ns=record.log_ns, publish_ns=record.publish_ns)
-    text = clock_text(relation.clock, board_about.board_boot_id).encode()
+    text = clock_text(clock, board_about.board_boot_id).encode()
     file.add(CLOCK, text, sequence=0, log_ns=at_ns - _MARGIN_NS, publish_ns=at_ns - _MARGIN_NS)
 
 

@@ -91,14 +91,6 @@ def _page(data: Data) -> Iterator[Figure]:
         )
 
 
-def _joining(data: Data) -> Iterator[Figure]:
-    yield from _verdicts(data)
-    for row in data["rows"]:
-        if row["told"]:
-            found = f"{_number(row['rms_ms'])} ms; {_number(row['stated_ms'])} ms"
-            yield Figure(f"{row['case']}: error, RMS; stated with 95 %, median", found)
-
-
 def _depth(data: Data) -> Iterator[Figure]:
     yield from _verdicts(data)
     means = {(row["method"], row["case"]): row for row in data["means"]}
@@ -351,7 +343,6 @@ SOURCES: Final = (
     Source("age", Topic.AGE, "A host ten times slower than the camera: how old are the frames that it gets?", f"{_BENCH}bench_age --seconds 15 --json", _age, 75),
     Source("recording", Topic.RECORDINGS, "A recording of 2 x 30 images of 51 KB a second, files with damages, runs with and without `--record` in turn, and replays.", f"{_BENCH}bench_recording --json", _verdicts, 400),
     Source("recording-memory", Topic.RECORDINGS, "Ten minutes of 2 x 30 images a second recorded, then replayed on demand: memory of each program, without pages of the file.", f"{_BENCH}bench_recording --parts memory --json", _verdicts, 1000),
-    Source("joining", Topic.RECORDINGS, "Two recordings whose offset is found by what both saw: films rendered of hands that hold two unlike cameras, and simulated sights.", f"{_BENCH}bench_joining --films 12 --json", _joining, 200),
     Source("board", Topic.BOARD, "A booted virtual board (armhf, emulated) with a 640x480 MJPEG webcam at 30 per second.", f"{_BENCH}bench_board --runs 1 --seconds 8 --json", _board, 180),
 )  # fmt: skip
 """Everything on the page."""

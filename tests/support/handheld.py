@@ -1,4 +1,4 @@
-"""What a hand does to two cameras on one rig, and what each of them then sees of it: with known times."""
+"""What a hand does to two cameras on one rig, and the images that each of them then takes: with known times."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from common.frame import PixelFormat
 from common.recording.recorded import Shown
 from common.recording.ros_messages import RecordedImage
-from phone_host.recording.sight import Sight
 
 Floats = NDArray[np.float64]
 RATE_HZ = 400
@@ -36,14 +35,12 @@ def at(positions: Floats, moments_s: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Eye:
-    """A camera: from when to when it films, its rate, the error of each shift, and what its clock shows at true time t: t (1 + drift) + offset."""
+    """A camera: from when to when it films, its rate, and what its clock shows more than the true time."""
 
     begin_s: float
     end_s: float
     rate_hz: float = 30.0
-    noise_px: float = 0.1
     offset_s: float = 0.0
-    drift: float = 0.0
     missing: float = 0.01
 
     def moments(self, chance: np.random.Generator) -> Floats:
@@ -53,23 +50,7 @@ class Eye:
 
     def clock(self, moments_s: Floats) -> Floats:
         """Return what its clock shows."""
-        return moments_s * (1 + self.drift) + self.offset_s
-
-
-def simulated_sight(chance: np.random.Generator, positions: Floats, eye: Eye, mixing: Floats | None = None) -> Sight:
-    """Return what a camera sees of a hand's motion: 10 px/s of shift, 5 %/s of brightness.
-
-    Args:
-        chance: for its errors.
-        positions: of `hand`.
-        eye: the camera.
-        mixing: how it is turned, (3, 3).
-    """
-    moments = eye.moments(chance)
-    steps = np.diff(at(positions, moments) @ (np.eye(3) if mixing is None else mixing), axis=0) * [10.0, 10.0, 0.05]
-    steps = np.column_stack([steps, np.abs(steps[:, :2]).sum(axis=1)])
-    steps += chance.standard_normal(steps.shape) * eye.noise_px * [1.0, 1.0, 0.005, 1.0]
-    return Sight(eye.clock(moments), np.vstack([np.zeros(4), np.cumsum(steps, axis=0)]))
+        return moments_s + self.offset_s
 
 
 def panned(chance: np.random.Generator, positions: Floats, eye: Eye) -> list[Shown]:

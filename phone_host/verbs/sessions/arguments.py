@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--clock",
         type=Path,
         metavar="FILE.mcap",
-        help="join: another recording of the same host, made over the link since both machines were switched on (default: the host's own, else what both cameras saw)",
+        help="join: another recording of the same host, made over the link since both machines were switched on (default: the host's own)",
     )
     parser.add_argument(
         "--times",

@@ -7,8 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
-from rich.console import Console
-
 from common.errors import DataError, SettingsError
 from common.places import make_folder
 from common.plain_text import printable
@@ -32,7 +30,7 @@ from phone_host.recording.joining import JoinAccount, join_recordings
 from phone_host.recording.other_topics import ImportOptions, import_topics
 from phone_host.recording.session_info import SessionInfo, session_info
 from phone_host.recording.timed_images import TimeOptions
-from phone_host.run.progress_bar import busy_bar, share_bar
+from phone_host.run.progress_bar import busy_bar
 from phone_host.verbs.output_folders import require_alone, unwritable
 from phone_host.verbs.sessions.page import info_page
 
@@ -193,16 +191,13 @@ def _copied(options: argparse.Namespace, account: CopyAccount) -> Told:
 
 
 def _join(options: argparse.Namespace) -> Told:
-    with share_bar("sessions join", "watching what both saw", Console(stderr=True)) as bar:
-        account = join_recordings(options.paths, options.out, options.clock, bar)
-    relation = account.relation
+    with busy_bar("joining"):
+        account = join_recordings(options.paths, options.out, options.clock)
     values = {
         "file": str(options.out),
-        "by": relation.by.value,
-        "offset_ns": relation.clock.offset_ns,
-        "skew": relation.clock.skew,
-        "uncertainty_ns": relation.uncertainty_ns,
-        "content": None if relation.content is None else asdict(relation.content),
+        "offset_ns": account.clock.offset_ns,
+        "skew": account.clock.skew,
+        "uncertainty_ns": account.uncertainty_ns,
         "seconds": account.seconds,
         "images": {side.value: count for side, count in account.images.items()},
         "left_out": account.left_out,
@@ -212,14 +207,9 @@ def _join(options: argparse.Namespace) -> Told:
 
 
 def _join_lines(out: Path, account: JoinAccount) -> list[str]:
-    relation, images = account.relation, account.images
+    images = account.images
     written = f"{images[Side.LEFT]} left and {counted(images[Side.RIGHT], 'right image')} of {account.seconds:.1f} s written to {out}"
-    known = f"known to +-{relation.uncertainty_ns / 1e6:.2f} ms (95 %)"
-    if relation.content is None:
-        how = f"joined by the clock exchange that the host stored, {known}"
-    else:
-        seen = relation.content
-        how = f"joined by what both saw in {seen.overlap_s:.0f} s, {known}; drift {-seen.drift * 1e6:+.0f} ppm, {seen.likeness:.0%} of the movement agrees"
+    how = f"joined by the clock exchange that the host stored, known to +-{account.uncertainty_ns / 1e6:.2f} ms (95 %)"
     left_out = f"; {counted(account.left_out, 'image')} that only one camera has left out" if account.left_out else ""
     return [written + left_out, f"  {how}", *(f"  {path} holds no images" for path in account.empty)]
 
