@@ -1,4 +1,4 @@
-"""The time offset of two cameras, from a screen, a lamp and a scene with known truth; and what is reported if nothing can be measured."""
+"""The time offset of two cameras, from a screen and a scene with known truth; and what is reported if nothing can be measured."""
 
 import math
 from dataclasses import replace
@@ -11,7 +11,6 @@ import pytest
 from common.errors import DataError
 from common.frame import PixelFormat
 from phone_host.calibration.misfit_plot import misfit_svg
-from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
 from phone_host.calibration.timing.screen import (
     COUNT,
     HEIGHT,
@@ -149,68 +148,6 @@ def test_a_screen_that_cannot_serve_is_named(count: int, moves: bool | None, wor
     with pytest.raises(DataError, match=words) as caught:
         measure_screen(counted(times, readings), counted(times, readings))
     assert caught.value.remedy
-
-
-# A lamp.
-
-
-def film_lamp(offset_s: float, switches: Times, host_fps: float, exposure_s: float) -> Measured:
-    """Film a lamp that changes at these times, in the corner of one image and the middle of the other."""
-    shown = tuple(switches.tolist())
-    board = side_of_lamp(shown, 30.0, 0.003, exposure_s, host=False)
-    host = side_of_lamp(shown, host_fps, 0.019, exposure_s, host=True)
-    return measure_lamp(board, replace(host, times_s=host.times_s + offset_s))
-
-
-@cache
-def side_of_lamp(
-    switches: tuple[float, ...], fps: float, phase_s: float, exposure_s: float, *, host: bool
-) -> Brightness:
-    """One camera's view of the lamp; filmed once."""
-    moments = stamps(switches[-1] + 0.5, fps, phase_s)
-    chance = np.random.default_rng(int(host))
-    noise = chance.normal(0, 4, (97, 96, 128)).astype(np.float32)
-    cells = []
-    for moment in moments:
-        inside = np.linspace(moment - exposure_s / 2, moment + exposure_s / 2, 50)
-        light = float(np.mean(np.searchsorted(switches, inside) % 2))
-        image = 60 + noise[chance.integers(len(noise))]
-        place = (slice(40, 56), slice(50, 70)) if host else (slice(0, 96), slice(0, 30))
-        image[place] += 90 * light
-        cells.append(brightness(np.asarray(np.clip(image, 0, 255), dtype=np.uint8)))
-    return Brightness(moments, np.array(cells))
-
-
-@pytest.mark.parametrize("offset", [0.0, 0.013, -0.070])
-@pytest.mark.parametrize(("host_fps", "exposure_s"), [(30.0, 0.001), (30.0, 0.02), (24.0, 0.01)])
-def test_a_lamp_gives_the_offset(offset: float, host_fps: float, exposure_s: float) -> None:
-    """Sixty changes of a lamp at random times give the offset within the stated uncertainty, for any rates and exposure times."""
-    chance = np.random.default_rng(5)
-    switches = np.cumsum(chance.uniform(0.12, 0.6, 60))
-    measured = film_lamp(offset, switches, host_fps, exposure_s)
-    found, doubt = offset_ms(measured)
-    assert measured.samples > 40
-    assert abs(found - offset * 1e3) <= doubt < 20
-
-
-@pytest.mark.parametrize("pause_s", [10 / 30, 0.347])
-def test_a_lamp_that_blinks_regularly_is_refused(pause_s: float) -> None:
-    """A regular lamp may be in step with the frames, and then every change would be off by the same unknown time."""
-    with pytest.raises(DataError, match="regularly"):
-        film_lamp(0.0, np.linspace(pause_s, 40 * pause_s, 40) + 0.021, 30.0, 0.001)
-
-
-@pytest.mark.parametrize(("switches", "words"), [(3, "only 3 changes"), (0, "saw no lamp")])
-def test_a_lamp_that_says_too_little_is_named(switches: int, words: str) -> None:
-    """Too few changes and an unseen lamp give different errors."""
-    moments = np.array([1.0, 2.2, 3.1][:switches] + ([] if switches else [100.0]))
-    if not switches:
-        still = Brightness(stamps(4, 30, 0), np.random.default_rng(1).normal(60, 0.2, (120, 108)))
-        with pytest.raises(DataError, match=words):
-            measure_lamp(still, still)
-        return
-    with pytest.raises(DataError, match=words):
-        film_lamp(0.0, moments, 30.0, 0.005)
 
 
 # A scene.

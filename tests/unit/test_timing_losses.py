@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.frame import PixelFormat
-from phone_host.calibration.timing.lamp import CELLS, Brightness, measure_lamp
 from phone_host.calibration.timing.screen import COUNT, Counted, PatternReader, Reading, counted, draw, measure_screen
 from phone_host.calibration.timing.shared_motion import measure_shared_motion
 from phone_host.calibration.timing.shots import Measured, Shot, Times
@@ -55,7 +54,7 @@ def test_stamps_that_jump_a_little_are_allowed_for() -> None:
 def test_stamps_that_jump_by_periods_are_refused() -> None:
     """Stamps with random errors of up to 60 ms fit no steady count: the error names the other ways to measure."""
     off_s = np.random.default_rng(2).uniform(-0.06, 0.06, len(HOST_S))
-    with pytest.raises(DataError, match=r"do not fit the screen's count.*--by lamp"):
+    with pytest.raises(DataError, match=r"do not fit the screen's count.*--by scene"):
         measure_screen(read_at(BOARD_S), read_at(HOST_S, off_s))
 
 
@@ -68,60 +67,6 @@ def test_a_pattern_half_out_of_view_or_too_faint_is_not_read() -> None:
     assert reader.read(np.asarray(whole[:150, :150], np.uint8)) is None
     faint = np.asarray(120 + whole / 255.0 * 16, np.uint8)
     assert reader.read(faint) is None
-
-
-# A lamp.
-
-Lost = NDArray[np.bool_] | None
-SWITCHES_S = np.cumsum(np.random.default_rng(5).uniform(0.15, 0.6, 30))
-FILM_S = np.arange(0.0, 12.0, 1 / 30)
-
-
-def lamp_seen(times_s: Times, late_s: float = 0.0, *, switches_s: Times | None = None, lost: Lost = None) -> Brightness:
-    """What a camera with zero exposure time sees of a lamp that fills the image; frames may be lost."""
-    kept = times_s if lost is None else times_s[~lost]
-    light = 60.0 + 90.0 * (np.searchsorted(SWITCHES_S if switches_s is None else switches_s, kept) % 2)
-    return Brightness(kept + late_s, np.repeat(light[:, np.newaxis], CELLS[0] * CELLS[1], axis=1))
-
-
-def test_a_change_that_falls_into_a_gap_counts_for_nothing() -> None:
-    """If three frames are lost around every fourth change, those changes could be anywhere. They are left out, and the others give the offset."""
-    gaps = np.abs(FILM_S[:, np.newaxis] - SWITCHES_S[::4]).min(axis=1) < 0.05
-    whole = measure_lamp(lamp_seen(FILM_S), lamp_seen(FILM_S + 0.011, 0.025))
-    holed = measure_lamp(lamp_seen(FILM_S, lost=gaps), lamp_seen(FILM_S + 0.011, 0.025))
-    assert holed.samples <= whole.samples - 7
-    for measured in (whole, holed):
-        found, doubt = offset_ms(measured)
-        assert abs(found - 25.0) <= doubt < 15.0
-
-
-def test_a_regular_lamp_is_refused_though_a_change_was_missed() -> None:
-    """Two changes in gaps make two pauses of double length: the lamp still blinks regularly, and may be in step."""
-    regular_s = np.arange(0.368, 10.6, 0.347)
-    gaps = np.abs(FILM_S[:, np.newaxis] - regular_s[[8, 17]]).min(axis=1) < 0.05
-    seen_by_host = lamp_seen(FILM_S + 0.011, 0.025, switches_s=regular_s)
-    with pytest.raises(DataError, match="regularly"):
-        measure_lamp(lamp_seen(FILM_S, switches_s=regular_s, lost=gaps), seen_by_host)
-
-
-def test_a_switch_that_bounces_tells_nothing_where_it_does() -> None:
-    """A fast camera sees every third change three times within 40 ms, a slow one once, and which of the three is unknown. These changes are left out, and the others give the offset."""
-    bounces_s = np.sort(np.concatenate([SWITCHES_S, SWITCHES_S[::3] + 0.02, SWITCHES_S[::3] + 0.04]))
-    swift_s = np.arange(0.0, 12.0, 1 / 100)
-    once = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025))
-    bounced = measure_lamp(lamp_seen(FILM_S), lamp_seen(swift_s, 0.025, switches_s=bounces_s))
-    assert (once.samples, bounced.samples) == (30, 20)
-    for measured in (once, bounced):
-        found, doubt = offset_ms(measured)
-        assert abs(found - 25.0) <= doubt < 30.0
-
-
-def test_films_that_overlap_little_are_compared_where_they_do() -> None:
-    """The host films only from the middle of the board's film on: offsets that leave less than half to compare are no candidates, and the true one is found."""
-    measured = measure_lamp(lamp_seen(FILM_S), lamp_seen(FILM_S[FILM_S > 5.8] + 0.011, -0.030))
-    assert np.isinf(measured.misfits).any()
-    found, doubt = offset_ms(measured)
-    assert abs(found + 30.0) <= doubt < 20.0
 
 
 # A scene.

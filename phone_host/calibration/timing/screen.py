@@ -193,7 +193,7 @@ def _interval(left: _Read, right: _Read, refresh_s: float) -> tuple[float, float
             return float(least), float(most), float(np.median(ticks_s[possible]))
     raise DataError(
         "the stamps do not fit the screen's count",
-        "use a screen with a constant refresh rate, or use --by lamp",
+        "use a screen with a constant refresh rate, or use --by scene",
     )
 
 

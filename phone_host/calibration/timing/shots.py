@@ -31,7 +31,6 @@ class Method(Enum):
     """What is filmed."""
 
     SCREEN = "screen"
-    LAMP = "lamp"
     SCENE = "scene"
 
 
@@ -55,7 +54,7 @@ class Measured:
     Attributes:
         offset: with its uncertainty (99.9 %).
         method: how it was measured.
-        samples: number of edges, decoded frames or features behind it.
+        samples: number of decoded frames or features behind it.
         offsets_s: (M,) offsets that were tried.
         misfits: (M,) how badly each fits, in the measure that `misfit` names.
         misfit: name and unit of that measure.

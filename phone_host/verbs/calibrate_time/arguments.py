@@ -6,11 +6,10 @@ from pathlib import Path
 from common.program.quantities import reading, seconds
 from phone_host.verbs.source_arguments import add_source_arguments
 
-SUMMARY = "measure the time offset between the two cameras with a screen, a lamp or a moving scene"
+SUMMARY = "measure the time offset between the two cameras with a screen or a moving scene"
 
 EXAMPLES = """  phone-host calibrate-time --pattern pattern.html    # open it full screen in a browser, in view of both cameras
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
-  phone-host calibrate-time --by lamp --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
   phone-host calibrate-time --by scene --frames timing --calibration rig.yaml --out timing
   phone-host calibrate-time --by scene --frames session.mcap --calibration rig.yaml --out timing    # of a recording
 """
@@ -23,9 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--by",
-        choices=("screen", "lamp", "scene"),
+        choices=("screen", "scene"),
         default="screen",
-        help="what both cameras film: the page of --pattern on a screen; a lamp that you switch at irregular moments; or, with"
+        help="what both cameras film: the page of --pattern on a screen; or, with"
         " --calibration, any textured thing that moves up and down (default screen)",
     )
     add_source_arguments(parser, several=False)

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, TypeVar
 
-import numpy as np
-
 from common import now
 from common.errors import SettingsError
 from common.frame import SpoiledImageError
@@ -23,7 +21,6 @@ from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
 from phone_host.boards.opened import open_named
 from phone_host.calibration.misfit_plot import misfit_svg
-from phone_host.calibration.timing.lamp import Brightness, brightness, measure_lamp
 from phone_host.calibration.timing.screen import PatternReader, counted, measure_screen
 from phone_host.calibration.timing.screen_page import pattern_page
 from phone_host.calibration.timing.shared_motion import measure_shared_motion
@@ -85,9 +82,7 @@ def _check(options: argparse.Namespace) -> None:
             f"--camera {EXAMPLE}, --frames DIR of an earlier --keep, or --frames FILE.mcap",
         )
     if options.by == "scene" and options.calibration is None:
-        raise SettingsError(
-            "--by scene without --calibration", "add --calibration rig.yaml, or use --by screen or --by lamp"
-        )
+        raise SettingsError("--by scene without --calibration", "add --calibration rig.yaml, or use --by screen")
     if not (math.isfinite(options.seconds) and 0 < options.seconds <= 600):
         raise SettingsError(f"--seconds is {options.seconds:g}", "give 1 to 600 seconds")
     if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
@@ -136,12 +131,7 @@ def _measure(by: str, footage: Footage, rig: Rig | None) -> Measured:
                 footage.board, footage.host, Rectifier(rig), lambda shot: decode_frame(shot.image), advance
             )
         board_s, host_s, _ = to_seconds(*([shot.exposed_ns for shot in side] for side in (footage.board, footage.host)))
-        return (_by_lamp if by == "lamp" else _by_screen)(footage, board_s, host_s, advance)
-
-
-def _by_lamp(footage: Footage, board_s: Times, host_s: Times, advance: Callable[[float], None]) -> Measured:
-    board, host = _seen(footage, board_s, host_s, brightness, advance)
-    return measure_lamp(*(Brightness(seconds, np.array(levels)) for seconds, levels in (board, host)))
+        return _by_screen(footage, board_s, host_s, advance)
 
 
 def _by_screen(footage: Footage, board_s: Times, host_s: Times, advance: Callable[[float], None]) -> Measured:
