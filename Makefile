@@ -21,7 +21,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor docs docs-run figures test test-slow test-fresh coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
+.PHONY: help run-venv venv demo native vendor vendor-check docs docs-run figures test test-slow test-fresh coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -134,8 +134,11 @@ printers: ## install what judges prints, other programs' servers and senders, in
 	@build/printers/meshes/bin/python -m pip -qq --no-input install pymeshlab trimesh manifold3d lib3mf lxml networkx
 	@cd build/printers && if apt-get -qq download cura 2>/dev/null; then dpkg -x cura_*.deb cura && rm cura_*.deb; fi # its definitions, for cura-engine
 
-vendor: ## build the page's libraries and the static pages' scripts again (after changing phone_host/web/page; needs node; FETCH=1: take npm's files, too)
-	@$(if $(FETCH),node .ci/vendor.mjs fetch &&) node .ci/vendor.mjs build
+vendor: ## build the page's libraries and the static pages' scripts again, from npm's tarballs (after changing phone_host/web/page; needs node; PIN=1: note the tarballs of other versions)
+	@$(if $(PIN),node .ci/vendor.mjs pin &&) node .ci/vendor.mjs build
+
+vendor-check: ## build them elsewhere and compare: they are what npm's tarballs and our modules give
+	@node .ci/vendor.mjs check
 
 lock: ## update pins that no longer fit pyproject.toml (UPGRADE=1: pin the newest of everything)
 	@.ci/lock $(if $(UPGRADE),--upgrade)

@@ -1,33 +1,27 @@
 // Makes the libraries that the page ships from npm's tarballs: `make vendor`. Users never run this.
 //
-//   node .ci/vendor.mjs fetch           take the files of the pinned tarballs into phone_host/web/vendor, unchanged
-//   node .ci/vendor.mjs build [ROOT]    make the prebuilt modules from them (below ROOT instead of the checkout: the test compares)
+//   node .ci/vendor.mjs pin       note the hash of npm's tarballs of the versions in versions.json (after changing a version)
+//   node .ci/vendor.mjs build     make the prebuilt modules from the pinned tarballs
+//   node .ci/vendor.mjs check     make them elsewhere and compare with those of the checkout
 //
-// phone_host/web/vendor/versions.json pins versions and the sha256 of npm's tarballs and of each file taken, and lists the
-// sha256 of each file made. One esbuild version, pinned here, so that the same sources give the same bytes.
+// phone_host/web/vendor/versions.json pins versions and the sha256 of npm's tarballs, and lists the sha256 of each file made and of
+// each of our own files in it. One esbuild version, pinned here, so that the same sources give the same bytes.
 import { execFileSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { basename, dirname, join, resolve } from 'node:path';
+import { dirname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { brotliCompressSync, constants, gzipSync } from 'node:zlib';
 
 const ESBUILD = 'esbuild@0.28.2';
 const HERE = resolve(dirname(fileURLToPath(import.meta.url)), '..');
-const SOURCES = join(HERE, 'phone_host/web/vendor');
-const PINS = join(SOURCES, 'versions.json');
-
-/** Files taken from each tarball: where they lie there. Here they lie side by side. */
-const TAKEN = {
-  three: ['LICENSE', 'package.json', 'build/three.core.js', 'build/three.module.js', 'examples/jsm/controls/OrbitControls.js'],
-  uplot: ['LICENSE', 'package.json', 'dist/uPlot.esm.js', 'dist/uPlot.min.css'],
-};
+const PINS = join(HERE, 'phone_host/web/vendor/versions.json');
 
 /** Modules made: from which entry, in which form, where to. The page's own modules are shipped as they are written. */
 const MADE = [
   { entry: 'phone_host/web/vendor/three.entry.js', of: 'three', format: 'esm', to: 'phone_host/web/page/vendor/three.js' },
-  { entry: 'phone_host/web/vendor/uplot/uPlot.esm.js', of: 'uplot', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
+  { entry: 'npm:uplot/dist/uPlot.esm.js', of: 'uplot', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
   { entry: 'phone_host/web/page/static_depth.js', of: 'three', format: 'iife', to: 'phone_host/report/page_depth.js' },
   { entry: 'phone_host/web/page/static_charts.js', of: 'uplot', format: 'iife', to: 'phone_host/report/page_charts.js' },
   { entry: 'phone_host/web/page/static_copy.js', of: '', format: 'iife', to: 'phone_host/report/page_copy.js' },
@@ -35,9 +29,9 @@ const MADE = [
 
 /** Files that go to the page unchanged. */
 const COPIED = [
-  ['phone_host/web/vendor/uplot/uPlot.min.css', 'phone_host/web/page/vendor/uplot.css'],
-  ['phone_host/web/vendor/three/LICENSE', 'phone_host/web/page/vendor/LICENSE.three'],
-  ['phone_host/web/vendor/uplot/LICENSE', 'phone_host/web/page/vendor/LICENSE.uplot'],
+  ['npm:uplot/dist/uPlot.min.css', 'phone_host/web/page/vendor/uplot.css'],
+  ['npm:three/LICENSE', 'phone_host/web/page/vendor/LICENSE.three'],
+  ['npm:uplot/LICENSE', 'phone_host/web/page/vendor/LICENSE.uplot'],
 ];
 
 const sha256 = (bytes) => createHash('sha256').update(bytes).digest('hex');
@@ -49,50 +43,64 @@ function npm(program, ...words) {
   return execFileSync(program, words, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'], cwd: tmpdir() });
 }
 
-/** Take the pinned tarballs' files, and note their hashes. */
-function fetch() {
+/** Fetch a library's tarball and unpack it below `sources`. Return its hash. */
+function fetched(name, version, sources) {
+  const folder = join(sources, name);
+  mkdirSync(folder);
+  const tarball = join(folder, npm('npm', 'pack', '--silent', '--pack-destination', folder, `${name}@${version}`).trim());
+  execFileSync('tar', ['xzf', tarball, '-C', folder, '--strip-components=1']);
+  return sha256(readFileSync(tarball));
+}
+
+/** Note the hashes of the tarballs that npm gives for the pinned versions. */
+function pin(sources) {
   const noted = pins();
-  for (const [name, files] of Object.entries(TAKEN)) {
-    const folder = mkdtempSync(join(tmpdir(), 'vendor-'));
-    const tarball = join(folder, npm('npm', 'pack', '--silent', '--pack-destination', folder, `${name}@${noted.packages[name].version}`).trim());
-    execFileSync('tar', ['xzf', tarball, '-C', folder]);
-    noted.packages[name] = { version: noted.packages[name].version, tarball_sha256: sha256(readFileSync(tarball)), files: {} };
-    rmSync(join(SOURCES, name), { recursive: true, force: true });
-    for (const file of files) {
-      cpSync(join(folder, 'package', file), join(SOURCES, name, basename(file)));
-      noted.packages[name].files[file] = sha256(readFileSync(join(SOURCES, name, basename(file))));
-    }
-    rmSync(folder, { recursive: true });
+  for (const [name, { version }] of Object.entries(noted.packages)) {
+    noted.packages[name] = { version, tarball_sha256: fetched(name, version, sources) };
   }
   keep(noted);
 }
 
-/** Bundle one entry. The licence's notice stays in it. */
-function bundle({ entry, of, format, to }, root) {
-  const out = join(root, to);
-  const holder = of && readFileSync(join(SOURCES, of, 'LICENSE'), 'utf8').match(/Copyright.*/)[0].replace(/ ?[^ -~]+/g, '');
-  const notice = of && `/* ${of} ${pins().packages[of].version}, MIT License, ${holder} */`;
-  const words = [
-    '--yes', ESBUILD, join(HERE, entry), '--bundle', '--minify', `--format=${format}`, '--target=es2022', '--charset=ascii',
-    '--legal-comments=none', ...(notice ? [`--banner:js=${notice}`] : []), `--outfile=${out}`, '--log-level=warning', '--loader:.css=text',
-    `--alias:three=${join(SOURCES, 'three/three.module.js')}`,
-    `--alias:three/addons/controls/OrbitControls.js=${join(SOURCES, 'three/OrbitControls.js')}`,
-  ];
-  npm('npx', ...words);
+/** Fetch every library; what does not have the pinned hash is not built. */
+function fetch(sources) {
+  for (const [name, { version, tarball_sha256: wanted }] of Object.entries(pins().packages)) {
+    const found = fetched(name, version, sources);
+    if (found !== wanted) throw new Error(`${name}@${version} has the sha256 ${found}, not ${wanted}: see what changed, then make vendor PIN=1`);
+  }
 }
 
-/** Make everything that is shipped, and list its hashes in versions.json below `root`. */
-function build(root) {
-  const made = {};
+/** Bundle one entry. The licence's notice stays in it. Return our own files in it. */
+function bundle({ entry, of, format, to }, sources, root) {
+  const holder = of && readFileSync(join(sources, of, 'LICENSE'), 'utf8').match(/Copyright.*/)[0].replace(/ ?[^ -~]+/g, '');
+  const notice = of && `/* ${of} ${pins().packages[of].version}, MIT License, ${holder} */`;
+  const meta = join(sources, 'meta.json');
+  const words = [
+    '--yes', ESBUILD, place(entry, sources), '--bundle', '--minify', `--format=${format}`, '--target=es2022', '--charset=ascii',
+    '--legal-comments=none', ...(notice ? [`--banner:js=${notice}`] : []), `--outfile=${join(root, to)}`, `--metafile=${meta}`,
+    '--log-level=warning', '--loader:.css=text',
+    `--alias:three=${join(sources, 'three/build/three.module.js')}`,
+    `--alias:three/addons/controls/OrbitControls.js=${join(sources, 'three/examples/jsm/controls/OrbitControls.js')}`,
+  ];
+  npm('npx', ...words);
+  const inputs = Object.keys(JSON.parse(readFileSync(meta, 'utf8')).inputs).map((one) => relative(HERE, resolve(tmpdir(), one)));
+  return inputs.filter((one) => !one.startsWith('..'));
+}
+
+/** Return where a file lies: one of npm's, or one of ours. */
+const place = (path, sources) => (path.startsWith('npm:') ? join(sources, path.slice(4)) : join(HERE, path));
+
+/** Make everything that is shipped below `root`. Return what is noted of it. */
+function build(sources, root) {
+  const [made, own] = [{}, {}];
   const note = (path) => (made[path] = sha256(readFileSync(join(root, path))));
-  for (const each of MADE) {
-    bundle(each, root);
-    note(each.to);
-  }
   for (const [from, to] of COPIED) {
     mkdirSync(dirname(join(root, to)), { recursive: true });
-    cpSync(join(HERE, from), join(root, to));
+    cpSync(place(from, sources), join(root, to));
     note(to);
+  }
+  for (const each of MADE) {
+    for (const path of bundle(each, sources, root)) own[path] = sha256(readFileSync(join(HERE, path)));
+    note(each.to);
   }
   for (const path of Object.keys(made).filter((one) => one.startsWith('phone_host/web/page/') && !one.includes('LICENSE'))) {
     const bytes = readFileSync(join(root, path));
@@ -102,15 +110,33 @@ function build(root) {
     note(path + '.br');
     note(path + '.gz');
   }
-  const noted = { ...pins(), builder: ESBUILD, made };
-  if (root === HERE) keep(noted);
-  else writeFileSync(join(root, 'versions.json'), JSON.stringify(noted, null, 2) + '\n');
+  const sorted = Object.fromEntries(Object.entries(own).filter(([path]) => !(path in made)).sort());
+  return { packages: pins().packages, builder: ESBUILD, made, own: sorted };
 }
 
-const [what, root] = process.argv.slice(2);
-if (what === 'fetch') fetch();
-else if (what === 'build') build(resolve(root ?? HERE));
-else {
-  console.error('usage: node .ci/vendor.mjs fetch | build [ROOT]');
-  process.exit(2);
+/** Build elsewhere and name each file that differs. Compressed bytes depend on the compressor's version and are not compared. */
+function check(sources) {
+  const [there, noted] = [build(sources, join(sources, 'built')), pins()];
+  const differs = ['made', 'own'].flatMap((part) => {
+    const paths = new Set([...Object.keys(there[part]), ...Object.keys(noted[part])]);
+    return [...paths].filter((path) => !/\.(br|gz)$/.test(path) && there[part][path] !== noted[part][path]);
+  });
+  if (differs.length) throw new Error(`not what the sources give: ${differs.join(', ')}: make vendor builds them again`);
+}
+
+const sources = mkdtempSync(join(tmpdir(), 'vendor-'));
+try {
+  const what = process.argv[2];
+  if (!['pin', 'build', 'check'].includes(what)) throw new Error('usage: node .ci/vendor.mjs pin | build | check');
+  if (what === 'pin') pin(sources);
+  else {
+    fetch(sources);
+    if (what === 'build') keep(build(sources, HERE));
+    else check(sources);
+  }
+} catch (error) {
+  console.error(error.message);
+  process.exitCode = 1;
+} finally {
+  rmSync(sources, { recursive: true });
 }

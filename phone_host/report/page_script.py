@@ -1,7 +1,7 @@
 """The scripts of static pages: the live page's own modules, prebuilt, so that the project has one viewer. Light.
 
 A page holds its script as text and names the text's hash in its policy. The scripts take all values from attributes and
-load nothing. `make vendor` builds them; a test compares.
+load nothing. `make vendor` builds them; a test compares their hashes.
 """
 
 import base64
