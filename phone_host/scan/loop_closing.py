@@ -184,7 +184,7 @@ class LoopCloser:
     def _piece(self, stretch: int) -> Piece:
         """Build a stretch alone, and its neighbours, from every third of their kept views."""
         piece = Piece(self._model.volume.settings, self._threads, self._gate, self._library)
-        piece.usual_off_m = self._model.usual_off_m
+        piece.usual_off_sigmas = self._model.usual_off_sigmas
         self._fuse(piece, self._stretches.around(stretch), _ALONE)
         return piece
 

@@ -46,7 +46,7 @@ class PoseGate:
         least_overlap: share of the pixels in view that must have a partner in the model.
         sure_overlap: the same where corners enough agree on the motion: a street seen at 9 degrees gives 0.25.
         least_near: share of the partners that must lie within 3 standard deviations.
-        most_off: times the usual mean distance to the model.
+        most_off: times the usual mean distance to the model, where the depths are as noisy.
         least_depths: share of the pixels that must have a depth.
         weak_inliers: corners that agree; with fewer the pose is weak.
         is_turned_by_others: whether what is seen may have turned to anywhere while it was not followed: a thing on a turntable, whose axis
@@ -78,7 +78,7 @@ class Piece:
     Attributes:
         volume: its field.
         places: that were seen in it.
-        usual_off_m: usual distance of a view from the field, m; NaN: none was compared yet.
+        usual_off_sigmas: usual distance of a view from the field, by the noise of its depths there; NaN: none was compared yet.
 
     Args:
         settings: of the field.
@@ -88,7 +88,7 @@ class Piece:
     """
 
     def __init__(self, settings: VolumeSettings, threads: int, gate: PoseGate, library: Library | Missing) -> None:
-        self.volume, self.places, self.usual_off_m = Volume(settings, threads, library), Places(), float("nan")
+        self.volume, self.places, self.usual_off_sigmas = Volume(settings, threads, library), Places(), float("nan")
         self._library = library if isinstance(library, Library) else None
         self._threads, self._gate = threads, gate
 
@@ -136,10 +136,16 @@ class Piece:
         far = np.linalg.norm(correction[3:]) > gate.most_shift_m or np.linalg.norm(correction[:3]) > gate.most_turn
         if far:
             return Weakness.TOO_FAST
-        usual_m = np.maximum(self.usual_off_m, _ROUNDING_VOXELS * self.volume.settings.voxel_m)
-        if fit.near < gate.least_near or fit.off_m > gate.most_off * usual_m:
+        if fit.near < gate.least_near or self._is_farther_off_than_usual(fit):
             return Weakness.POOR_FIT
         return Weakness.NONE
+
+    def _is_farther_off_than_usual(self, fit: Registered) -> bool:
+        """Return whether a view lies farther from the field than noise explains, as the views before have shown it; False: there was none."""
+        if np.isnan(self.usual_off_sigmas):
+            return False
+        usual_m = np.fmax(self.usual_off_sigmas * fit.noise_m, _ROUNDING_VOXELS * self.volume.settings.voxel_m)
+        return bool(fit.off_m > self._gate.most_off * usual_m)
 
     def confirmed(self, view: View, believed: SE3) -> "Lying | None":
         """Lay a view against the field where a place puts it; None: its surface does not lie there.
@@ -173,7 +179,7 @@ class Piece:
         """
         self.volume.fuse(view, pose)
         self.places.remember(view, pose)
-        if fit is not None:
+        if fit is not None and np.isfinite(fit.off_m / fit.noise_m):
             # Slow, so that one blurred view does not make the next one pass.
-            usual = self.usual_off_m
-            self.usual_off_m = fit.off_m if np.isnan(usual) else 0.9 * usual + 0.1 * fit.off_m
+            usual, sigmas = self.usual_off_sigmas, fit.off_m / fit.noise_m
+            self.usual_off_sigmas = sigmas if np.isnan(usual) else 0.9 * usual + 0.1 * sigmas

@@ -77,6 +77,7 @@ class Registered:
         overlap: share of the pixels in view that have a partner, 0..1.
         near: share of the partners within 3 standard deviations, 0..1.
         off_m: mean distance of the partners along the normals, m; NaN without any.
+        noise_m: mean standard deviation of such a distance, by the noise of the depths and the surface's own, m; NaN without any.
         told: directions that the surface told, 0..6.
         least_told: information about the direction that the surface tells least, as a share of that about the one that it tells best.
     """
@@ -85,6 +86,7 @@ class Registered:
     overlap: float
     near: float
     off_m: float
+    noise_m: float
     told: int
     least_told: float = 0.0
 
@@ -112,26 +114,42 @@ def registered(depth_m: Depth, surface: Surface, settings: RegistrationSettings,
     if surface.points_m.shape != (*depth_m.shape, 3) or surface.normals.shape != surface.points_m.shape:
         raise ValueError(f"a surface {surface.points_m.shape} for a depth {depth_m.shape}")
     motion, told, least = SE3.identity(), 0, 0.0
+    noise_m = _noise_m(depth_m, surface, settings)
     for step, searches in _ROUNDS:
         for _ in range(searches):
             trial = Trial(motion, step)
             sums = summed(depth_m, surface, settings, trial, library)
             if sums[29] * step * step < _LEAST_PARTNERS:
-                return _told(motion, sums, 0, 0.0)
+                return _told(motion, sums, 0, 0.0, noise_m)
             move, told, least = _step(sums, settings, trial)
             motion = SE3.of(move) @ motion
             if np.abs(move).max() < _STILL:
                 break
-    return _told(motion, summed(depth_m, surface, settings, Trial(motion, _JUDGED_STEP), library), told, least)
+    return _told(motion, summed(depth_m, surface, settings, Trial(motion, _JUDGED_STEP), library), told, least, noise_m)
 
 
-def _told(motion: SE3, sums: Floats, told: int, least: float) -> Registered:
+def _noise_m(depth_m: Depth, surface: Surface, settings: RegistrationSettings) -> float:
+    """Return how far depths lie from a surface along its normals by their noise alone, m; NaN: none lies near it.
+
+    The error of a depth moves its point along the ray: what a wall beside the camera shows of it is less than what a wall ahead shows.
+    """
+    step = slice(None, None, _JUDGED_STEP)
+    points, normals, depth = surface.points_m[step, step], surface.normals[step, step], depth_m[step, step]
+    near = np.abs(points[..., 2] - depth) <= settings.most_m  # false for NaN
+    points, normals = points[near].astype(np.float64), normals[near].astype(np.float64)
+    across = np.abs((points * normals).sum(axis=1)) / points[:, 2]
+    sigmas = settings.floor_m + settings.noise_per_m * points[:, 2] ** 2 * across
+    return float(np.nanmean(sigmas)) if np.isfinite(sigmas).any() else float("nan")
+
+
+def _told(motion: SE3, sums: Floats, told: int, least: float, noise_m: float) -> Registered:
     near, off_m, partners, visible = sums[27:]
     return Registered(
         start_now=motion,
         overlap=float(partners / max(visible, 1)),
         near=float(near / max(partners, 1)),
         off_m=float(off_m / partners) if partners else float("nan"),
+        noise_m=noise_m,
         told=told,
         least_told=least,
     )

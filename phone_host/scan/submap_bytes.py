@@ -17,7 +17,7 @@ from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.tracker import TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 
-_HEAD: Final = b"tandemscan submap 4\n"
+_HEAD: Final = b"tandemscan submap 5\n"
 _MAT_VALUES: Final = 6
 _RIGID: Final = 1e-4
 _FARTHEST_M: Final = 1e5
@@ -45,7 +45,7 @@ def submap_bytes(submap: Submap) -> bytes:
         "geometry": np.array([of.focal_px, of.baseline_m, of.cx_px, of.cy_px, of.doffs_px], np.float64),
         "size_px": np.array(submap.size_px),
         "pose": _rows([submap.tracker.pose]),
-        "usual_off_m": np.array(submap.tracker.usual_off_m),
+        "usual_off_sigmas": np.array(submap.tracker.usual_off_sigmas),
         "place_poses": _rows([place.world_camera for place in places]),
         "place_sizes": np.array([len(place.points_m) for place in places], np.int64),
         "place_points": np.concatenate([np.zeros((0, 3)), *(place.points_m for place in places)]),
@@ -105,7 +105,7 @@ def _read(held: Arrays) -> Submap:
         geometry=StereoGeometry(focal_px=focal_px, baseline_m=baseline_m, cx_px=cx_px, cy_px=cy_px, doffs_px=doffs_px),
         size_px=(width_px, height_px),
         blocks=field.blocks,
-        tracker=TrackerState(_poses(held["pose"])[0], float(held["usual_off_m"]), _places(held)),
+        tracker=TrackerState(_poses(held["pose"])[0], float(held["usual_off_sigmas"]), _places(held)),
         carved=field.carved,
     )
 

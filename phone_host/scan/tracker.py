@@ -93,12 +93,12 @@ class TrackerState:
 
     Attributes:
         pose: of the last view.
-        usual_off_m: usual distance of a view from the model, m; NaN: none was compared yet.
+        usual_off_sigmas: usual distance of a view from the model, by the noise of its depths there; NaN: none was compared yet.
         places: that were seen.
     """
 
     pose: SE3
-    usual_off_m: float
+    usual_off_sigmas: float
     places: tuple[Place, ...]
 
 
@@ -136,6 +136,7 @@ class Tracker:
         self._was_lost = False
         self._waiting: _Waiting | None = None
         self._is_followed = True  # whether odometry has told every motion since the last view in the model
+        self._was_sure = True  # whether odometry has told the last motion: the next one begins where that ends
         self._count = 0
         self._stamp_s = self._usual_s = float("nan")
 
@@ -167,7 +168,8 @@ class Tracker:
         self._count += 1
         small = view if self._settings.is_of_street else reduced(view)
         moved = self._odometry.step(small)
-        self._is_followed &= self._count == 1 or self._is_sure(moved)
+        self._is_followed &= self._count == 1 or (self._is_sure(moved) and self._was_sure)
+        self._was_sure = self._count == 1 or self._is_sure(moved)
         shift_px = moved.shift_px * view.grey.shape[1] / small.grey.shape[1]
         self._pieces.moved(moved, self._steps_since(view))
         view = self._as_sure_as_timed(view, shift_px)
@@ -217,7 +219,9 @@ class Tracker:
             places_before: how many of the places are known there already.
         """
         model = self._model
-        return TrackerState(self._pieces.in_world(self._pose), model.usual_off_m, model.places.since(places_before))
+        return TrackerState(
+            self._pieces.in_world(self._pose), model.usual_off_sigmas, model.places.since(places_before)
+        )
 
     def go_on(self, state: TrackerState) -> None:
         """Go on where another tracker stood. How the camera has moved since is not known: the next view is looked for like a lost one.
@@ -228,7 +232,7 @@ class Tracker:
         self._loops = None  # of what came before there are no copies to build the field again
         self._pose, self._was_lost, self._is_followed = state.pose, True, False
         self._pieces.go_on(state.pose)
-        self._model.usual_off_m = state.usual_off_m
+        self._model.usual_off_sigmas = state.usual_off_sigmas
         self._model.places.add(state.places)
 
     def _found_again(self, view: View, believed: SE3, moved: Moved) -> Tracked | None:

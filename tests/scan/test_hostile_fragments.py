@@ -23,7 +23,7 @@ from tests.scan.test_scan_submaps import POSES, WANTED, taken
 from tests.scan.test_scan_volume import NONE, SETTINGS, filled
 from tests.support.plane_films import GEOMETRY
 
-_SUBMAP, _FIELD = b"tandemscan submap 4\n", b"tandemscan field 3\n"
+_SUBMAP, _FIELD = b"tandemscan submap 5\n", b"tandemscan field 3\n"
 _MOST_MORE_BYTES = 250 << 20
 _SHAPE = (24, 32)
 _LIBRARIES = [NONE, *([native()] if isinstance(native(), Library) else [])]

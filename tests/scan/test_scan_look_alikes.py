@@ -41,7 +41,7 @@ def model_with(*poses: SE3) -> Pieces:
     pieces = Pieces(SETTINGS, 1, PoseGate(), native())
     for pose in poses:
         pieces.fuse(corner(pose), pose, None)
-    pieces.model.usual_off_m = 0.004
+    pieces.model.usual_off_sigmas = 0.6
     return pieces
 
 
@@ -98,7 +98,7 @@ def fragments() -> tuple[Pieces, list[Piece]]:
         known.append(pieces.active)
         for at in range(1, 4):
             pieces.fuse_apart(10 * number + at, corner(along(0.02 * at), number), along(0.02 * at), Weakness.NONE, None)
-        pieces.active.usual_off_m = 0.004
+        pieces.active.usual_off_sigmas = 0.6
     return pieces, known
 
 
@@ -174,7 +174,7 @@ def test_a_tracker_knows_any_number_of_places() -> None:
     )
     tracker = Tracker(SETTINGS)
     tracker.volume.put(before.volume.changed_blocks(every=True))
-    tracker.go_on(replace(state, usual_off_m=0.004, places=(*others, *state.places)))
+    tracker.go_on(replace(state, usual_off_sigmas=0.6, places=(*others, *state.places)))
     far = SE3.of(np.array([0.02, 0.1, 1.0, -0.1, 0.02, 0.05]))
     told = tracker.track(corner(far))
     assert told.is_fused

@@ -52,7 +52,7 @@ class Walk:
 
     def __init__(self, share: float, loops: LoopSettings | None, papers: tuple[int, ...] = PAPERS) -> None:
         self.model = Piece(SETTINGS, 1, PoseGate(), native())
-        self.model.usual_off_m = 0.005
+        self.model.usual_off_sigmas = 0.7
         self.closer = None if loops is None else LoopCloser(loops, self.model, 1, PoseGate(), native())
         self._share, self._papers = share, papers
         self.poses: list[SE3] = []

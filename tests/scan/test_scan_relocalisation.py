@@ -41,7 +41,7 @@ def piece_with(*corners: SE3) -> Piece:
     piece = Piece(SETTINGS, 1, PoseGate(), native())
     for pose in corners:
         piece.fuse(corner(), pose, None)
-    piece.usual_off_m = 0.004
+    piece.usual_off_sigmas = 0.6
     return piece
 
 
@@ -81,7 +81,7 @@ def test_a_scan_that_goes_on_later_is_where_it_was_only_if_no_other_place_looks_
     """Nobody knows what happened since: with one corner it goes on there, by surface or by place; with a second one, however far away, by neither."""
     pieces = Pieces(SETTINGS, 1, PoseGate(), native())
     pieces.fuse(corner(), HERE, None)
-    pieces.model.usual_off_m = 0.004
+    pieces.model.usual_off_sigmas = 0.6
     pieces.go_on(HERE)
     fit = pieces.model.laid(corner(), HERE)
     assert pieces.is_here(corner(), HERE, fit)
@@ -145,7 +145,7 @@ def test_after_a_long_loss_two_independent_views_must_agree(second: SE3) -> None
     pieces.fuse(corner(), along(4.0), None)
     pieces.fuse(corner(along(0.2)), along(4.2), None)
     pieces.fuse(plane_view(HERE, texture(9), CORNER), HERE, None)
-    pieces.model.usual_off_m = 0.004
+    pieces.model.usual_off_sigmas = 0.6
     pieces.moved(replace(LOST, before_now=along(0.1), is_known=True, inliers=100), 1.0)
     pieces.moved(LOST, 30.0)
     pieces.begin(3, corner(), HERE, Weakness.TOO_FAST)

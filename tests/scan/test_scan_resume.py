@@ -90,7 +90,7 @@ def test_a_damaged_submap_is_one_line(walk: Path, tmp_path: Path) -> None:
     """A file that was cut is named, with what to do; exit code 4."""
     out = tmp_path / "out"
     out.mkdir()
-    (out / "submap-0000.bin").write_bytes(b"tandemscan submap 4\nx")
+    (out / "submap-0000.bin").write_bytes(b"tandemscan submap 5\nx")
     done = subprocess.run(
         command(walk, tmp_path / "other", "--resume", str(out)), capture_output=True, text=True, check=False
     )
