@@ -31,7 +31,7 @@ class Joining:
 
     Attributes:
         views: its views, which are part of the model now; none: it stays apart.
-        is_refused: whether the piece's own surface does not fit the model where it would lie.
+        is_refused: whether the piece's own surface does not fit the model where it would lie, or fits, but does not confirm it.
     """
 
     views: tuple[Joined, ...] = ()

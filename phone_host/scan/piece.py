@@ -136,16 +136,18 @@ class Piece:
         far = np.linalg.norm(correction[3:]) > gate.most_shift_m or np.linalg.norm(correction[:3]) > gate.most_turn
         if far:
             return Weakness.TOO_FAST
-        if fit.near < gate.least_near or self._is_farther_off_than_usual(fit):
+        if fit.near < gate.least_near or self.times_usual(fit) > gate.most_off:
             return Weakness.POOR_FIT
         return Weakness.NONE
 
-    def _is_farther_off_than_usual(self, fit: Registered) -> bool:
-        """Return whether a view lies farther from the field than noise explains, as the views before have shown it; False: there was none."""
-        if np.isnan(self.usual_off_sigmas):
-            return False
+    def times_usual(self, fit: Registered) -> float:
+        """Return how many times farther a view lies from the field than the views before did, each by the noise of its own depths; 0: none was compared yet.
+
+        Args:
+            fit: how its depth lies against the field.
+        """
         usual_m = np.fmax(self.usual_off_sigmas * fit.noise_m, _ROUNDING_VOXELS * self.volume.settings.voxel_m)
-        return bool(fit.off_m > self._gate.most_off * usual_m)
+        return 0.0 if np.isnan(self.usual_off_sigmas) else float(fit.off_m / usual_m)
 
     def confirmed(self, view: View, believed: SE3) -> "Lying | None":
         """Lay a view against the field where a place puts it; None: its surface does not lie there.

@@ -4,7 +4,7 @@ A camera that is lost begins a piece. A view that belongs to one and shows a pla
 with the model are put where all loops agree best (`graph`), and taken into its field; they move as a whole and are never warped.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -18,7 +18,15 @@ from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import STANDING, Piece, PoseGate
 from phone_host.scan.registration import Registered
-from phone_host.scan.relocalisation import Evidence, PoseSupport, Sighting, are_independent, pose_support, sighted
+from phone_host.scan.relocalisation import (
+    ALL_DIRECTIONS,
+    Evidence,
+    PoseSupport,
+    Sighting,
+    are_independent,
+    pose_support,
+    sighted,
+)
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view
 from phone_host.scan.volume_settings import VolumeSettings
@@ -44,6 +52,18 @@ _MOST_SIGMAS: Final = 12.0
 
 _MOST_SIGHTINGS: Final = 32
 """Of a piece that wait for a second one which agrees."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Surface:
+    """How a piece's surface lies on the model: where that puts the piece, whether it fits, and whether it confirms that.
+
+    What a surface can be slid along takes up a part of its error. One that leaves a direction open confirms nothing unless it lies as near as views usually do.
+    """
+
+    model_piece: SE3
+    is_lying: bool
+    is_confirming: bool
 
 
 class Pieces:
@@ -295,7 +315,7 @@ class Pieces:
             view: that belongs to both.
             pose: where it was taken, in the piece's axes.
             met: the same in the model's.
-            least: earlier views of the piece that must fit the model, too.
+            least: surfaces of the piece that must confirm where it lies.
             is_strict: whether a single view of the piece that does not fit refuses; else as many must as fit, and one more.
 
         Returns:
@@ -304,10 +324,12 @@ class Pieces:
         if self._active == _MODEL:
             return Joining()
         loop = self._loop(_MODEL, met.pose @ pose.inverse())
-        others, refused = self._also(view, loop)
-        is_refused = refused > (0 if is_strict else len(others))
-        if is_refused or len(others) < least:
-            return Joining(is_refused=is_refused)
+        also = self._also(view, loop)
+        others = [self._loop(_MODEL, each.model_piece) for each in also if each.is_lying]
+        is_refused = len(also) - len(others) > (0 if is_strict else len(others))
+        confirming = sum(each.is_confirming for each in also)
+        if is_refused or confirming < least:
+            return Joining(is_refused=is_refused or confirming < len(others))
         loops = [loop, *self._loops, *others]
         believed = {_MODEL: SE3.identity()} | {at: of.world_piece for at, of in self._apart.items()}
         graph = without_outliers(chained(believed, loops, _MODEL), loops, _MODEL, _MOST_SIGMAS)
@@ -321,12 +343,12 @@ class Pieces:
         self._active = _MODEL
         return Joining(tuple(sorted(joined, key=lambda each: each.number)))
 
-    def _also(self, view: View, loop: Loop) -> tuple[list[Loop], int]:
-        """Lay the piece's own surface, as its views saw it, against the model; return the loops of the views that fit, and how many lie there and do not."""
+    def _also(self, view: View, loop: Loop) -> list[_Surface]:
+        """Lay the piece's own surface, as its views saw it, against the model; return how those lie that show the same."""
         of = self._apart[self._active]
         while view.grey.shape[1] > _SMALL_PX:
             view = half_view(view)
-        loops, refused = [], 0
+        surfaces = []
         for seen in of.views[:: max(len(of.views) // _ALSO, 1)]:
             camera = Camera(view.geometry, view.grey.shape, seen.pose)
             shown = replace(view, depth_m=np.ascontiguousarray(of.piece.volume.cast(camera).points_m[..., 2]))
@@ -334,13 +356,12 @@ class Pieces:
                 continue
             start = loop.here_there @ seen.pose
             fit = self.model.laid(shown, start)
-            if fit.overlap < self._gate.least_overlap:
-                continue
-            if self.model.doubt(STANDING, fit) is Weakness.NONE:
-                loops.append(self._loop(_MODEL, start @ fit.start_now @ seen.pose.inverse()))
-            else:
-                refused += 1
-        return loops, refused
+            if fit.overlap >= self._gate.least_overlap:
+                is_lying = self.model.doubt(STANDING, fit) is Weakness.NONE
+                is_tight = fit.told == ALL_DIRECTIONS or self.model.times_usual(fit) <= 1
+                model_piece = start @ fit.start_now @ seen.pose.inverse()
+                surfaces.append(_Surface(model_piece, is_lying, is_lying and is_tight))
+        return surfaces
 
     def _loop(self, here: int, here_active: SE3) -> Loop:
         return Loop(here=here, there=self._active, here_there=here_active, turn=_LOOP_TURN, shift_m=_LOOP_SHIFT_M)

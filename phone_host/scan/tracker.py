@@ -133,6 +133,7 @@ class Tracker:
         self._settings = settings
         self._odometry = Odometry(odometry_for(settings))
         self._pose = SE3.identity() if start is None else start  # in the axes of the piece that is tracked
+        self._step = SE3.identity()  # takes points of the last view to the one before
         self._was_lost = False
         self._waiting: _Waiting | None = None
         self._is_followed = True  # whether odometry has told every motion since the last view in the model
@@ -165,6 +166,13 @@ class Tracker:
         Returns:
             Where it was taken, and how sure that is.
         """
+        piece, before = self._pieces.active, self._pose
+        tracked = self._track(view)
+        if self._pieces.active is piece:
+            self._step = (before.inverse() @ self._pose).exact()
+        return tracked
+
+    def _track(self, view: View) -> Tracked:
         self._count += 1
         small = view if self._settings.is_of_street else reduced(view)
         moved = self._odometry.step(small)
@@ -173,7 +181,7 @@ class Tracker:
         shift_px = moved.shift_px * view.grey.shape[1] / small.grey.shape[1]
         self._pieces.moved(moved, self._steps_since(view))
         view = self._as_sure_as_timed(view, shift_px)
-        believed = (self._pose @ moved.before_now).exact()
+        believed = (self._pose @ self._motion_since(moved)).exact()
         if not np.isfinite(view.depth_m).mean() >= self._gate.least_depths:
             return self._lost(believed, moved, Weakness.NO_DEPTH, None)
         if self.volume.blocks.count == 0:
@@ -191,6 +199,10 @@ class Tracker:
                 return self._fused(view, pose, moved, weakness, fit)
             return self._apart(view, pose, moved, weakness, fit)
         return self._found_again(view, believed, moved) or self._begun(view, believed, moved, doubt, fit)
+
+    def _motion_since(self, moved: Moved) -> SE3:
+        """Return the motion since the last view, as far as it is known: a thing on a turntable goes on turning, elsewhere nothing is known where odometry is lost."""
+        return self._step if self._gate.is_turned_by_others and not moved.is_known else moved.before_now
 
     def settled(self) -> tuple[Placed, ...]:
         """Move the model to where its loops agree best, before it is looked at; return where all views in it were taken then, none: nothing moved."""

@@ -276,8 +276,7 @@ class TurntableScan(Scan):
         told = self.tracker.track(thing)
         self._joined(told.joined)
         state, weakness = unless_flat(told.state, told.weakness)
-        if told.is_fused or told.moved.is_known:
-            self._keep(_Station(number, cropped, own, told.world_camera, told.is_fused))
+        self._keep(_Station(number, cropped, own, told.world_camera, told.is_fused))
         name, stamp_s, density = told_of
         return ScannedPair(
             name=name,

@@ -12,7 +12,7 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.kept_depths import KeptDepths
 from phone_host.scan.loop_closing import LoopSettings
-from phone_host.scan.map_fragment import Joining
+from phone_host.scan.map_fragment import Found, Joining
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Pieces
@@ -23,7 +23,7 @@ from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, native
-from tests.support.plane_films import CORNER, distance, plane_view, texture
+from tests.support.plane_films import CORNER, WALL, distance, plane_view, texture
 from tests.support.turning_things import processed_of
 
 pytestmark = pytest.mark.skipif(not isinstance(native(), Library), reason="numpy alone takes minutes")
@@ -250,6 +250,23 @@ def test_only_surfaces_confirm_a_piece() -> None:
     joined = pieces.join(doubled(papered(0)), pose, met, least=1).views
     assert [view.number for view in joined] == [2, 3]
     assert near(joined[0].world_camera, SEEN[2])
+
+
+@pytest.mark.parametrize(("times", "is_joined"), [(0.8, True), (1.5, False)])
+def test_a_surface_that_leaves_directions_open_confirms_only_what_it_lies_on(times: float, *, is_joined: bool) -> None:
+    """A wall can be slid along itself, which takes up a part of any error: where a surface must confirm a piece it has to lie as near as views usually do, not twice as far off."""
+    pieces = Pieces(SETTINGS, 1, PoseGate(), native())
+    flat = plane_view(SEEN[0], PICTURE, WALL)
+    waves_m = 0.01 * np.sin(np.arange(flat.depth_m.shape[1], dtype=np.float32) / 12)
+    wall = replace(flat, depth_m=flat.depth_m + waves_m)
+    pieces.fuse(flat, SEEN[0], None)
+    pieces.moved(UNKNOWN, 1.0)
+    pieces.begin(1, wall, SEEN[0], Weakness.TOO_FAST)
+    fit = pieces.model.laid(wall, SEEN[0])
+    assert fit.told < 6
+    pieces.model.usual_off_sigmas = fit.off_m / fit.noise_m / times
+    joining = pieces.join(wall, SEEN[0], Found(pieces.model, SEEN[0], fit), least=1, is_strict=True)
+    assert (len(joining.views), joining.is_refused) == ((1, False) if is_joined else (0, True))
 
 
 def doubled(view: View) -> View:
