@@ -184,8 +184,7 @@ class Odometry:
         self._poses.append((newest, self._keyframe_poses[newest].inverse() @ self._pose))
 
     def _keyframe(self, view: View, observer: Observer) -> None:
-        """Begin new points, and fit the window."""
-        self._begin_points(view, observer)
+        """Fit the window, and begin new points from where that puts the view: the fit leaves out what one keyframe alone sees."""
         held = self._held
         self._keyframe_poses.append(self._pose)
         newest = Keyframe(
@@ -200,6 +199,8 @@ class Odometry:
             first = len(self._keyframe_poses) - len(self._window)
             self._keyframe_poses[first:] = [each.camera_world.inverse() for each in self._window]
             self._pose = self._keyframe_poses[-1]
+        self._begin_points(view, replace(observer, offset_px=self._offset_px))
+        self._window[-1] = replace(self._window[-1], ids=self._held.ids, observed_px=self._held.observed_px)
         self._note()
 
     def _begin_points(self, view: View, observer: Observer) -> None:
