@@ -8,6 +8,7 @@ from common.versions import REPORT_FORMAT
 from phone_host.report.scan_report import ScanReport, scan_verdict
 from phone_host.report.stereo_report import FailedPair
 from phone_host.scan.scanned import PoseSource, ScannedPair
+from phone_host.scan.surface_error import ErrorScope
 
 
 def scan_json(report: ScanReport) -> dict[str, Any]:
@@ -37,6 +38,7 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
             "extent_m": [round(length, 6) for length in model.size.extent_m],
             "noise_m": _number(model.noise_m),
             "noise_p95_m": _number(model.noise_p95_m),
+            "drift_included": model.error_scope is ErrorScope.DRIFT if math.isfinite(model.noise_m) else None,
             "unseen_share": _number(model.unseen_share),
             "voxel_m": settings.voxel_m if settings else None,
             "far_m": round(settings.far_m, 6) if settings else None,

@@ -18,7 +18,6 @@ from phone_host.report.report_page import Figure, figures_row, heading
 from phone_host.report.scan_lines import area_text, mat_line
 from phone_host.report.scan_report import (
     MODEL,
-    SURFACE_ERROR_SCOPE,
     TRAJECTORY,
     ModelFigures,
     ScanReport,
@@ -98,7 +97,7 @@ def _known(model: ModelFigures) -> tuple[Figure, ...]:
             label="expected surface error",
             value=f"\u00b1{two_digits(model.noise_m * 1e3)}",
             unit="mm",
-            note=f"median; 95 % of the points: \u00b1{two_digits(model.noise_p95_m * 1e3)} mm ({SURFACE_ERROR_SCOPE})",
+            note=f"median; 95 % of the points: \u00b1{two_digits(model.noise_p95_m * 1e3)} mm ({model.error_scope.value})",
         ),
     )
 

@@ -20,6 +20,7 @@ from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
 from phone_host.scan.mat import Mat
 from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
 from phone_host.scan.scanned import ScannedPair
+from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
 
@@ -28,9 +29,6 @@ _LEAST_SHARE: Final = 0.5
 """Of the pairs in the model; with fewer it is not what was walked around."""
 
 _USUAL_SHARE: Final = 0.9
-
-SURFACE_ERROR_SCOPE: Final = "drift not included"
-"""What the stated error of the surface covers: the noise of the pairs, not the error of the way between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +58,9 @@ class ModelFigures:
         points: of its surface.
         triangles: of its surface.
         size: area, border and extent.
-        noise_m: median standard deviation of its points, if the views err independently, m; NaN without points.
+        noise_m: median standard deviation of its points, m; NaN without points.
         noise_p95_m: of which 19 in 20 are better.
+        error_scope: what these two cover.
         unseen_share: share of a closed surface that nobody saw, 0..1; NaN: it is open there.
         memory_bytes: of the field.
         left_out: blocks for which there was no memory.
@@ -72,6 +71,7 @@ class ModelFigures:
     size: MeshSize = NO_SIZE
     noise_m: float = math.nan
     noise_p95_m: float = math.nan
+    error_scope: ErrorScope = ErrorScope.NOISE
     unseen_share: float = math.nan
     memory_bytes: int = 0
     left_out: int = 0
@@ -190,20 +190,22 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
     if fused < max(2, _LEAST_SHARE * count):
         return Headline.BAD, f"Only {told}."
     sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
-    noise_m = report.model.noise_m
-    known = f". {surface_error_sentence(noise_m)}" if math.isfinite(noise_m) else ""
-    verdict = Headline.GOOD if min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
+    model, is_stated = report.model, math.isfinite(report.model.noise_m)
+    known = f". {surface_error_sentence(model.noise_m, model.error_scope)}" if is_stated else ""
+    is_honest = not is_stated or model.error_scope is ErrorScope.DRIFT
+    verdict = Headline.GOOD if is_honest and min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
     closed = "" if math.isnan(unseen) else f". {share_text(unseen)} was never in view and is filled in"
     return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}{known}{closed}."
 
 
-def surface_error_sentence(error_m: float) -> str:
-    """State the expected error of a model's surface, without a full stop: the only place that says what it includes.
+def surface_error_sentence(error_m: float, scope: ErrorScope) -> str:
+    """State the expected error of a model's surface, without a full stop.
 
     Args:
         error_m: median standard deviation of the surface's points, m.
+        scope: what it covers.
     """
-    return f"Expected surface error: \u00b1{two_digits(error_m * 1e3)} mm ({SURFACE_ERROR_SCOPE})"
+    return f"Expected surface error: \u00b1{two_digits(error_m * 1e3)} mm ({scope.value})"
 
 
 def share_text(share: float) -> str:

@@ -25,6 +25,7 @@ from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.stretches import Placed
+from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -349,6 +350,11 @@ class Scan:
             self._carving.go_on(carved)
         written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
+
+    @property
+    def error_scope(self) -> ErrorScope:
+        """What the standard deviations of the model's points cover: a mat tells each pose by itself, so nothing adds up on the way."""
+        return ErrorScope.DRIFT if isinstance(self.tracker, MatTracker) else ErrorScope.NOISE
 
     def crop(self, box: Box | None) -> None:
         """Keep only what lies in a box, and close it: when the model is made, for the field holds it all.

@@ -190,7 +190,7 @@ def test_two_cameras_give_the_model_of_the_files(walk: Path, tmp_path: Path) -> 
     for name in ("model.ply", "trajectory.txt"):
         assert (tmp_path / "live" / name).read_bytes() == (tmp_path / "files" / name).read_bytes()
     report = json.loads((tmp_path / "live" / "report.json").read_text())
-    assert (report["in_model"], report["verdict"]) == (5, "good")
+    assert (report["in_model"], report["verdict"], report["model"]["drift_included"]) == (5, "warning", False)
 
 
 def test_the_example_scans_the_same(walk: Path, tmp_path: Path) -> None:

@@ -22,14 +22,21 @@ from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import MeshSize
 from phone_host.scan.scanned import ScannedPair
+from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
 from tests.support.html import Page
 
 T, W, L = Tracking.TRACKING, Tracking.WEAK, Tracking.LOST
 MODEL = ModelFigures(
-    points=300, triangles=500, size=MeshSize(0.0321, 1.5, (0.2, 0.3, 0.1)), noise_m=0.0012, noise_p95_m=0.004
+    points=300,
+    triangles=500,
+    size=MeshSize(0.0321, 1.5, (0.2, 0.3, 0.1)),
+    noise_m=0.0012,
+    noise_p95_m=0.004,
+    error_scope=ErrorScope.DRIFT,
 )
+WITHOUT_DRIFT = replace(MODEL, error_scope=ErrorScope.NOISE)
 BROKEN = FailedPair(name="9", left="l/9.png", right="r/9.png", problem="l/9.png is cut off", remedy="copy it again")
 MESH = Mesh(
     np.array([[0, 0, 1], [0.5, 0, 1], [0, 0.25, 2]], np.float32),
@@ -72,7 +79,9 @@ LOST = report(*(pair(number, L, Weakness.TOO_FAST) if number in {2, 3} else pair
 @pytest.mark.parametrize(
     ("told", "verdict", "words"),
     [
-        (GOOD, Headline.GOOD, "All 5 pairs are in the model. Expected surface error: ±1.2 mm (drift not included)."),
+        (GOOD, Headline.GOOD, "All 5 pairs are in the model. Expected surface error: ±1.2 mm (drift included)."),
+        (replace(GOOD, model=WITHOUT_DRIFT), Headline.WARNING,
+         "All 5 pairs are in the model. Expected surface error: ±1.2 mm (drift not included)."),
         (LOST, Headline.WARNING, "3 of 5 pairs are in the model. Expected surface error"),
         (report(pair(0), *(pair(n, W, Weakness.FLAT) for n in range(1, 5))), Headline.WARNING, "All 5 pairs"),
         (report(pair(0), *(pair(n, L) for n in range(1, 5))), Headline.BAD, "Only 1 of 5 pairs are in the model."),
@@ -81,7 +90,7 @@ LOST = report(*(pair(number, L, Weakness.TOO_FAST) if number in {2, 3} else pair
          "No part of the surface was in view: 5 of 5 pairs could be aligned."),
         (replace(GOOD, model=replace(MODEL, noise_m=math.nan)), Headline.GOOD, "All 5 pairs are in the model."),
         (replace(GOOD, model=replace(MODEL, unseen_share=0.25)), Headline.GOOD,
-         "All 5 pairs are in the model. Expected surface error: ±1.2 mm (drift not included). 25 % was never in view and is filled in."),
+         "All 5 pairs are in the model. Expected surface error: ±1.2 mm (drift included). 25 % was never in view and is filled in."),
         (replace(GOOD, remarks=(Remark("left and right are exchanged", "x", is_blocking=True),)), Headline.BAD,
          "The model cannot be right: left and right are exchanged."),
         (replace(GOOD, interrupted_of=9), Headline.WARNING, "Interrupted after 5 of 9 pairs. All 5 pairs"),
@@ -94,6 +103,21 @@ def test_a_scan_is_judged(told: ScanReport, verdict: Headline, words: str) -> No
     assert found is verdict
     assert sentence.startswith(words)
     assert told.is_sound is (verdict is not Headline.BAD)
+
+
+@pytest.mark.parametrize(
+    ("scope", "headline", "is_included"), [(ErrorScope.DRIFT, "good", True), (ErrorScope.NOISE, "warning", False)]
+)
+def test_an_error_without_drift_is_a_warning_everywhere(scope: ErrorScope, headline: str, *, is_included: bool) -> None:
+    """Terminal, page and report.json say what the stated error covers; where drift is not, the page is amber and no tick stands on it."""
+    told = replace(GOOD, model=replace(MODEL, error_scope=scope))
+    assert f"({scope.value})" in scan_lines(told, "cup")[0]
+    values = scan_json(told)
+    assert (values["verdict"], values["model"]["drift_included"]) == (headline, is_included)
+    page = Page(scan_page(told, ShownModel(MESH, np.array([0.001, 0.002, np.nan], np.float32), 0.004)))
+    assert page.words.count(f"({scope.value})") == 2
+    assert ("\u2713" in page.words) is is_included
+    assert any("warning" in str(attributes.get("class")) for _, attributes in page.elements) is not is_included
 
 
 def test_a_pair_that_failed_makes_a_scan_unsound() -> None:
