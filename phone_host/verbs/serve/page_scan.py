@@ -10,12 +10,12 @@ from typing import Final
 
 from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
-from common.words import counted
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.live.scan import LiveScan
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.output.axes import Axes
-from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
+from phone_host.report.report_page import Headline
+from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict
 from phone_host.report.stereo_report import ALWAYS
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
@@ -68,7 +68,8 @@ class PageScan:
         except OSError as error:
             raise unwritable(self.out, error) from error
         self.live.kept.done()
-        return self._scanned(_words(report), is_sound=report.is_sound, snapshot=over.snapshot)
+        verdict, words = _verdict(report)
+        return self._scanned(words, verdict, over.snapshot)
 
     def save(self) -> Scanned | None:
         """See ReadyScan."""
@@ -77,13 +78,14 @@ class PageScan:
         with suppress(Exception):  # tell what ended the scan, not what followed
             finished = self._finished()
             write_scan(self.out, finished)
-            words = f"ended early: {_words(finished.report)}"
-            return self._scanned(words, is_sound=False, snapshot=self.host.snapshot())
+            verdict, words = _verdict(finished.report)
+            at_best = Headline.WARNING if verdict is Headline.GOOD else verdict
+            return self._scanned(f"ended early: {words}", at_best, self.host.snapshot())
         return None
 
-    def _scanned(self, words: str, *, is_sound: bool, snapshot: RunSnapshot) -> Scanned:
-        level, files = "good" if is_sound else "warning", (MODEL, TRAJECTORY, *ALWAYS)
-        return Scanned(words=words, level=level, folder=self.out, files=files, snapshot=snapshot)
+    def _scanned(self, words: str, verdict: Headline, snapshot: RunSnapshot) -> Scanned:
+        files = (MODEL, TRAJECTORY, *ALWAYS)
+        return Scanned(words=words, level=verdict.value, folder=self.out, files=files, snapshot=snapshot)
 
     def _finished(self) -> FinishedScan:
         return self.live.finished(self.host.snapshot(), self.matcher, self.axes)
@@ -161,9 +163,11 @@ def asked_box(values: Choices) -> Box | None:
     return box_of(text) if text else None
 
 
-def _words(report: ScanReport) -> str:
+def _verdict(report: ScanReport) -> tuple[Headline, str]:
+    """Return the verdict of the report, and its sentence with the model's size."""
+    verdict, sentence = scan_verdict(report)
     wide, high, deep = (1000 * side for side in report.model.size.extent_m)
-    return f"{report.fused} of {counted(len(report.scanned), 'pair')} are in the model: {wide:.0f} x {high:.0f} x {deep:.0f} mm"
+    return verdict, f"{sentence} Size: {wide:.0f} x {high:.0f} x {deep:.0f} mm" if report.model.triangles else sentence
 
 
 def _new_folder(folder: Path) -> Path:
