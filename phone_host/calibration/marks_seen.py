@@ -51,13 +51,14 @@ class SeenMarks:
         return f"marks of the family {family_name(self.family)}"
 
 
-def find_marks(images: Sequence[Image | None]) -> SeenMarks | None:
+def find_marks(images: Sequence[Image | None], families: Sequence[MarkFamily] = tuple(MarkFamily)) -> SeenMarks | None:
     """Find the marks that most images show; None: there are none.
 
     Args:
         images: (H, W) uint8 grey; None: could not be read.
+        families: that are looked for.
     """
-    seen = {family: tuple(_marks(grey, family) for grey in images if grey is not None) for family in MarkFamily}
+    seen = {family: tuple(_marks(grey, family) for grey in images if grey is not None) for family in families}
     counts = {family: sum(map(len, middles)) for family, middles in seen.items()}
     best = max(counts, key=counts.__getitem__)
     return SeenMarks(best, seen[best]) if counts[best] else None
@@ -96,6 +97,16 @@ def require_marks(seen: SeenMarks | None, board: Board) -> Board:
         f"these boards have {seen.words}{size}, --board says {board_name(board)}",
         f"give --board {':'.join([right, *sides, *family])}, with its sides as you measure them",
     )
+
+
+def squares_of(seen: SeenMarks, expected: tuple[int, int] | None) -> tuple[int, int] | None:
+    """Return squares in a row and in a column of the ChArUco sheet that shows these marks, as far as they are seen; None: they lie as on no sheet.
+
+    Args:
+        seen: the marks.
+        expected: a size that is right unless the marks contradict it; None: there is none.
+    """
+    return _size(seen, expected, is_legacy=False)
 
 
 def _is_legacy(board: Board) -> bool:

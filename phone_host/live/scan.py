@@ -23,10 +23,12 @@ from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import own_axes, report_of
 from phone_host.run.sinks import FunctionSink
 from phone_host.run.turn_remarks import field_of_turn, turn_remarks
+from phone_host.run.unused_mat import UnusedMat
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
+from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING
 from phone_host.scan.volume_settings import LEAST_WEIGHT
 from phone_host.scan.ways import scan_for
 
@@ -69,6 +71,7 @@ class LiveScan:
         is_timeless: bool,
     ) -> None:
         self.scan, self.axes, self._is_timeless = scan_for(wanted), own_axes(wanted), is_timeless
+        self._mat = UnusedMat(wanted)
         self.kept = KeptSubmaps(kept_in, self.scan, resumed)
         self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
@@ -128,7 +131,10 @@ class LiveScan:
         count = f"{counted(self._counts[1], 'pair')} in the model"
         if self._has_ended:
             return f"{count}: all pairs have come, the model is being made"
-        return f"{count}: {last.weakness.advice}" if last.weakness.advice else f"{count}: go on"
+        unused, weakness = self._mat.remark, last.weakness
+        if unused is not None and (not weakness.advice or weakness in (*OF_TURNING, *OF_TABLE)):
+            return f"{count}: {unused.text}"
+        return f"{count}: {weakness.advice}" if weakness.advice else f"{count}: go on"
 
     def end(self) -> None:
         """Note that no more pairs come: the run has ended."""
@@ -157,7 +163,8 @@ class LiveScan:
             with self._watching:
                 self.patches.become(model.mesh, self.scan.settings.voxel_m)
         remarks.extend(turn_remarks(self.scan))
-        report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
+        pairs, unused = self.scan.pairs, self._mat.remark
+        report = report_of(self.scan, model, pairs, remarks, matcher=matcher, axes=axes, unused_mat=unused)
         return FinishedScan(report, model, field=field_of_turn(self.scan))
 
     def _take(self, result: Result) -> None:
@@ -172,6 +179,7 @@ class LiveScan:
         if earlier and not self._is_replayed:  # numbers and times go on where they ended
             number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
         skew_s = 0.0 if self._is_timeless else result.pair.time_skew_ns / _NS
+        self._mat.look(result.processed)
         self._last = self.scan.take(str(number), stamp_s, result.processed, skew_s)
         # Not one more: with a pair, others that were lost may have become part of the model.
         self._counts = self._counts[0] + 1, self.scan.fused

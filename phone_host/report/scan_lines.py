@@ -6,7 +6,7 @@ from typing import Final
 from common.imagesize.head import size_text
 from common.words import counted, distance_text, two_digits
 from phone_host.report.mat_figures import MatFigures
-from phone_host.report.scan_report import ScanReport, scan_verdict, stretches
+from phone_host.report.scan_report import ScanReport, scan_verdict
 
 _MOST_LINES: Final = 8
 
@@ -30,7 +30,7 @@ def scan_lines(report: ScanReport, out: str) -> list[str]:
             lines.append(f"a pair's depths lie {distance_text(report.off_m)} off the model (mean; median of the pairs)")
     if report.on_mat is not None:
         lines.append(mat_line(report.on_mat))
-    told = [f"note: {stretch.sentence}" for stretch in stretches(report.scanned)]
+    told = [f"note: {stretch.sentence}" for stretch in report.stretches]
     lines += told[:_MOST_LINES]
     if len(told) > _MOST_LINES:
         lines.append(

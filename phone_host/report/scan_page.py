@@ -23,7 +23,6 @@ from phone_host.report.scan_report import (
     ScanReport,
     scan_verdict,
     share_text,
-    stretches,
 )
 from phone_host.scan.scanned import ScannedPair
 from phone_host.svg.plot_course import Course, over_views
@@ -53,7 +52,7 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
     verdict, sentence = scan_verdict(report)
     view = model_view(shown, MODEL)
     remarks = [
-        *(stretch.sentence for stretch in stretches(report.scanned)),
+        *(stretch.sentence for stretch in report.stretches),
         *(f"{pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed),
         *(remark.text for remark in report.remarks),
     ]

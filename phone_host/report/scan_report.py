@@ -21,7 +21,7 @@ from phone_host.scan.mat import Mat
 from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.surface_error import ErrorScope
-from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
 
 MODEL, TRAJECTORY = "model.ply", "trajectory.txt"
@@ -93,6 +93,7 @@ class ScanReport:
         interrupted_of: how many pairs were to be taken when it was interrupted; 0: it was not.
         keeps_field: whether field.bin is written, too.
         mat: on which the object lies; None: there is none.
+        unused_mat: what is said, among the remarks, of a printed mat that is in view and not used; None: there is none.
     """
 
     pairs: tuple[ScannedPair | FailedPair, ...]
@@ -106,6 +107,7 @@ class ScanReport:
     interrupted_of: int = 0
     keeps_field: bool = False
     mat: Mat | None = None
+    unused_mat: Remark | None = None
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -138,6 +140,12 @@ class ScanReport:
         """What the mat told; None: there is none, or no pair shows it."""
         told = [pair.mat for pair in self.scanned if pair.mat is not None]
         return None if self.mat is None or not told else mat_figures(self.mat, told)
+
+    @property
+    def stretches(self) -> tuple["Stretch", ...]:
+        """Pairs in a row that are weak or lost; without those whose advice the unused mat replaces."""
+        replaced = () if self.unused_mat is None else (*OF_TURNING, *OF_TABLE)
+        return tuple(each for each in stretches(self.scanned) if each.pairs[0].weakness not in replaced)
 
     @property
     def path_m(self) -> float:
@@ -192,8 +200,8 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
     sure = sum(pair.state in {Tracking.TRACKING, Tracking.RELOCALISED} for pair in report.scanned)
     model, is_stated = report.model, math.isfinite(report.model.noise_m)
     known = f". {surface_error_sentence(model.noise_m, model.error_scope)}" if is_stated else ""
-    is_honest = not is_stated or model.error_scope is ErrorScope.DRIFT
-    verdict = Headline.GOOD if is_honest and min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
+    is_doubtful = report.unused_mat is not None or (is_stated and model.error_scope is ErrorScope.NOISE)
+    verdict = Headline.GOOD if not is_doubtful and min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
     closed = "" if math.isnan(unseen) else f". {share_text(unseen)} was never in view and is filled in"
     return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}{known}{closed}."
 

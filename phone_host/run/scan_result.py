@@ -47,6 +47,7 @@ def report_of(
     *,
     matcher: str,
     axes: Axes,
+    unused_mat: Remark | None = None,
 ) -> ScanReport:
     """Make the report of a scan.
 
@@ -57,6 +58,7 @@ def report_of(
         remarks: what the user must know.
         matcher: its name.
         axes: of model.ply.
+        unused_mat: what must be said of a printed mat that is in view and not used; None: there is none.
     """
     certainty = scan.tracker.certainty if isinstance(scan.tracker, Tracker) else None
     report = ScanReport(
@@ -67,9 +69,16 @@ def report_of(
         rectified_px=scan.size_px,
         matcher=matcher,
         axes=axes,
-        remarks=(*remarks, *memory_remarks(scan), *way_remarks(certainty), *_box_remarks(scan, model)),
+        remarks=(
+            *([] if unused_mat is None else [unused_mat]),
+            *remarks,
+            *memory_remarks(scan),
+            *way_remarks(certainty),
+            *_box_remarks(scan, model),
+        ),
         keeps_field=keeps_field(scan),
         mat=scan.wanted.mat,
+        unused_mat=unused_mat,
     )
     on_mat = report.on_mat
     return report if on_mat is None else replace(report, remarks=(*report.remarks, *on_mat.remarks))
@@ -108,6 +117,8 @@ def require_something(report: ScanReport) -> None:
             f"the mat {report.mat.name} is not seen in any of {counted(len(report.scanned), 'pair')}",
             "show more of it, sharp and without glare; if another one lies there, name it, as in --mat 8x6:28mm:20mm:5x5",
         )
+    if report.settings is None and report.unused_mat is not None:
+        raise DataError(report.unused_mat.problem, report.unused_mat.remedy)
     if report.settings is None:
         _require_table(report)
         require_turning(report)
@@ -175,7 +186,7 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
         size=size_of(model.mesh),
         noise_m=noise_m,
         noise_p95_m=noise_p95_m,
-        error_scope=scan.error_scope,
+        error_scope=model.error_scope,
         unseen_share=model.unseen_share if model.is_closed else math.nan,
         memory_bytes=0 if volume is None else volume.memory_bytes,
         left_out=0 if volume is None else volume.left_out,
