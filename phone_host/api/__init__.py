@@ -26,6 +26,7 @@ from phone_host.geometry.triangulate import Intersections, triangulate
 from phone_host.measure.delays import DELAYS
 from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.model import Disparity, Image, RectifiedPair, Result, StereoGeometry
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.meshes.printable import Printer, Problem
 from phone_host.output.ply import write_ply
 from phone_host.output.rig_files.imported import Imported, import_rig
@@ -72,6 +73,7 @@ __all__ = [
     "ScannedPair",
     "Scanner",
     "StereoGeometry",
+    "UnseenSurface",
     "Wishes",
     "check_model",
     "export_model",

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.output.ply import PointCloud, write_surface
 from phone_host.run.scan_files import FinishedScan
@@ -31,16 +32,17 @@ def save_scan(folder: str | Path, scan: Scan, *, matcher: str = "unknown") -> No
     write_files(Path(folder), FinishedScan(report, model, field=field_of_turn(scan)))
 
 
-def write_model(path: str | Path, model: ScanModel) -> None:
+def write_model(path: str | Path, model: ScanModel, unseen: UnseenSurface = UnseenSurface.FILL) -> None:
     """Write the surface of a scan as PLY: metres, in the axes of the rectified left camera at the first pair that has depth, or of the mat or table.
 
     Args:
         path: the file; it appears whole or not at all.
         model: from `Scan.model()`.
+        unseen: what becomes of the part of a closed surface that no view measured.
 
     Raises:
         OSError: it cannot be written.
     """
-    mesh = model.mesh
-    seen = model.seen if model.is_closed else None
+    written = model.with_unseen(unseen)
+    mesh, seen = written.mesh, written.seen if written.is_closed else None
     write_surface(Path(path), PointCloud(mesh.points_m, mesh.colours), mesh.triangles, seen=seen)

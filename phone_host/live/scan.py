@@ -161,7 +161,8 @@ class LiveScan:
         model = self.scan.model()
         if self.scan.settings is not None:
             with self._watching:
-                self.patches.become(model.mesh, self.scan.settings.voxel_m)
+                shown = model.with_unseen(self.scan.wanted.unseen)
+                self.patches.become(shown.mesh, self.scan.settings.voxel_m, shown.seen)
         remarks.extend(turn_remarks(self.scan))
         pairs, unused = self.scan.pairs, self._mat.remark
         report = report_of(self.scan, model, pairs, remarks, matcher=matcher, axes=axes, unused_mat=unused)

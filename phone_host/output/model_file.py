@@ -9,6 +9,7 @@ from typing import Final
 from common.errors import DataError
 from common.files import read_whole
 from common.places import Kind, kind_of
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.formats import read_mesh
 from phone_host.output.meshes.solid import Solid
@@ -31,6 +32,7 @@ class Model:
         solid: the mesh.
         axes: in which its points are; None: nobody says.
         voxel_m: fineness of its scan, m; NaN: of no scan.
+        unseen: what the scan made of unseen surface; None: nobody says.
     """
 
     path: Path
@@ -38,6 +40,7 @@ class Model:
     solid: Solid
     axes: Axes | None
     voxel_m: float
+    unseen: UnseenSurface | None = None
 
 
 def mesh_file(path: Path) -> Path:
@@ -79,7 +82,8 @@ def read_model(path: Path, unit_m: float) -> Model:
     axes = next((axes for axes in Axes if axes.text == report.get("axes")), mesh.axes)
     voxel = report.get("voxel_m")
     voxel_m = float(voxel) if isinstance(voxel, int | float) and 0 < voxel < 1 else math.nan
-    return Model(path=file, stem=stem, solid=mesh.solid, axes=axes, voxel_m=voxel_m)
+    unseen = next((each for each in UnseenSurface if each.value == report.get("unseen")), None)
+    return Model(path=file, stem=stem, solid=mesh.solid, axes=axes, voxel_m=voxel_m, unseen=unseen)
 
 
 def _report(path: Path) -> dict[str, object]:

@@ -34,12 +34,14 @@ class ShownModel:
         noise_m: (V,) standard deviation of its points, m.
         voxel_m: of the field that it was made of, m.
         upright: its axes, if z is up in them; None: they are a camera's.
+        seen: (V,) whether some view measured its points; the others are hatched. None: all are seen.
     """
 
     mesh: Mesh
     noise_m: NDArray[np.float32]
     voxel_m: float
     upright: Axes | None = None
+    seen: NDArray[np.bool_] | None = None
 
 
 def model_view(shown: ShownModel, file: str) -> str:
@@ -56,6 +58,7 @@ def model_view(shown: ShownModel, file: str) -> str:
     if not total:
         return ""
     mesh, stands_for = thinned(shown.mesh, MOST_TRIANGLES, shown.voxel_m)
+    seen = np.ones(len(stands_for), np.bool_) if shown.seen is None else shown.seen[stands_for]
     noise_m = np.nan_to_num(shown.noise_m[stands_for], nan=np.inf)
     known_m = shown.noise_m[np.isfinite(shown.noise_m)]  # none, where each point was seen once
     best, worst = np.percentile(known_m, (2, 98)).tolist() if len(known_m) else (math.nan, math.nan)
@@ -76,6 +79,7 @@ def model_view(shown: ShownModel, file: str) -> str:
         "triangles": text_of(mesh.triangles.astype(np.uint32)),
         "colours": text_of(mesh.colours),
         "noise": text_of(np.rint(levels).astype(np.uint8)),
+        "seen": text_of(seen.astype(np.uint8)),
     }
     held = "".join(f' data-{name}="{text}"' for name, text in data.items())
     return (
@@ -112,7 +116,11 @@ def _words(shown: int, total: int, model: ShownModel) -> str:
         if model.upright
         else "the left camera's at the first pair: X right, Y down, Z forward"
     )
+    hatched = (
+        "" if model.seen is None or model.seen.all() else " Hatched surface was never in view: its shape is a guess."
+    )
     return (
         f"{number.replace(',', THIN)}; the axes are {axes}. Drag turns, two fingers"
         " or the wheel (after a click) zoom, shift and drag move, a double click goes back. Dark is the surface seen from behind."
+        f"{hatched}"
     )

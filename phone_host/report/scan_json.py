@@ -40,6 +40,7 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
             "noise_p95_m": _number(model.noise_p95_m),
             "drift_included": model.error_scope is ErrorScope.DRIFT if math.isfinite(model.noise_m) else None,
             "unseen_share": _number(model.unseen_share),
+            "unseen": report.unseen.value,
             "voxel_m": settings.voxel_m if settings else None,
             "far_m": round(settings.far_m, 6) if settings else None,
             "memory_bytes": model.memory_bytes,

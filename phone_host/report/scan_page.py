@@ -9,6 +9,7 @@ import numpy as np
 
 from common.imagesize.head import size_text
 from common.words import counted, distance_text, two_digits
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.model_view import ShownModel, model_view
 from phone_host.report.page_frame import document, section, table, two_widths
@@ -23,6 +24,7 @@ from phone_host.report.scan_report import (
     ScanReport,
     scan_verdict,
     share_text,
+    unseen_words,
 )
 from phone_host.scan.scanned import ScannedPair
 from phone_host.svg.plot_course import Course, over_views
@@ -112,7 +114,7 @@ def _figures(report: ScanReport) -> tuple[Figure, ...]:
         *_known(model),
         *_off(report.off_m),
         Figure(label="surface", value=area, unit=unit, note=f"{width} x {height} x {depth} mm"),
-        _border(model),
+        _border(model, report.unseen),
         Figure(
             label="voxels",
             value=f"{settings.voxel_m * 1e3:.3g}",
@@ -159,13 +161,11 @@ def _on_mat(report: ScanReport) -> str:
     )
 
 
-def _border(model: ModelFigures) -> Figure:
+def _border(model: ModelFigures, unseen: UnseenSurface) -> Figure:
     """Tell what nobody saw: how much of a closed surface, or where an open one ends."""
     if math.isfinite(model.unseen_share):
         share, unit = share_text(model.unseen_share).split(" ")
-        return Figure(
-            label="never in view", value=share, unit=unit, note="of the surface: filled in, and pink in the model"
-        )
+        return Figure(label="never in view", value=share, unit=unit, note=f"of the surface; {unseen_words(unseen)}")
     border, unit = distance_text(model.size.border_m).split(" ")
     note = "length of the edges where the surface ends; 0 is closed"
     return Figure(label="open border", value=border, unit=unit, note=note)

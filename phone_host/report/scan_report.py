@@ -7,12 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Final
+from typing import Final, assert_never
 
 import numpy as np
 
 from common.words import counted, two_digits
 from phone_host.model import StereoGeometry
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.mat_figures import MatFigures, mat_figures
 from phone_host.report.report_page import Headline
@@ -61,7 +62,7 @@ class ModelFigures:
         noise_m: median standard deviation of its points, m; NaN without points.
         noise_p95_m: of which 19 in 20 are better.
         error_scope: what these two cover.
-        unseen_share: share of a closed surface that nobody saw, 0..1; NaN: it is open there.
+        unseen_share: share of the closed surface that no view measured, 0..1, whether or not it is cut; NaN: nothing was closed.
         memory_bytes: of the field.
         left_out: blocks for which there was no memory.
     """
@@ -94,6 +95,7 @@ class ScanReport:
         keeps_field: whether field.bin is written, too.
         mat: on which the object lies; None: there is none.
         unused_mat: what is said, among the remarks, of a printed mat that is in view and not used; None: there is none.
+        unseen: what the files hold of the surface that no view measured.
     """
 
     pairs: tuple[ScannedPair | FailedPair, ...]
@@ -108,6 +110,7 @@ class ScanReport:
     keeps_field: bool = False
     mat: Mat | None = None
     unused_mat: Remark | None = None
+    unseen: UnseenSurface = UnseenSurface.FILL
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -186,14 +189,14 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
     fused, count = report.fused, len(report.pairs)
     if blocking:
         return Headline.BAD, f"The model cannot be right: {blocking}."
-    if not report.model.triangles:
-        return Headline.BAD, f"There is no surface: {fused} of {counted(count, 'pair')} could be aligned."
     unseen = report.model.unseen_share
     if unseen >= 1:
         return (
             Headline.BAD,
             f"No part of the surface was in view: {fused} of {counted(count, 'pair')} could be aligned.",
         )
+    if not report.model.triangles:
+        return Headline.BAD, f"There is no surface: {fused} of {counted(count, 'pair')} could be aligned."
     told = f"{fused} of {counted(count, 'pair')} are in the model"
     if fused < max(2, _LEAST_SHARE * count):
         return Headline.BAD, f"Only {told}."
@@ -202,7 +205,7 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
     known = f". {surface_error_sentence(model.noise_m, model.error_scope)}" if is_stated else ""
     is_doubtful = report.unused_mat is not None or (is_stated and model.error_scope is ErrorScope.NOISE)
     verdict = Headline.GOOD if not is_doubtful and min(fused, sure + 1) >= _USUAL_SHARE * count else Headline.WARNING
-    closed = "" if math.isnan(unseen) else f". {share_text(unseen)} was never in view and is filled in"
+    closed = "" if math.isnan(unseen) else f". {unseen_sentence(unseen, report.unseen)}"
     return verdict, f"{f'All {count} pairs are in the model' if fused == count else told}{known}{closed}."
 
 
@@ -214,6 +217,32 @@ def surface_error_sentence(error_m: float, scope: ErrorScope) -> str:
         scope: what it covers.
     """
     return f"Expected surface error: \u00b1{two_digits(error_m * 1e3)} mm ({scope.value})"
+
+
+def unseen_sentence(share: float, choice: UnseenSurface) -> str:
+    """Say how much of the surface no view measured, and what the files hold of it, without a full stop.
+
+    Args:
+        share: 0..1.
+        choice: what the files hold.
+    """
+    return f"{share_text(share)} was never in view and {unseen_words(choice)}"
+
+
+def unseen_words(choice: UnseenSurface) -> str:
+    """Say what the files hold of the surface that no view measured, to follow `was never in view and`.
+
+    Args:
+        choice: what the files hold.
+    """
+    match choice:
+        case UnseenSurface.FILL:
+            return "is filled in"
+        case UnseenSurface.PINK:
+            return "is filled in, in pink"
+        case UnseenSurface.CUT:
+            return "is cut, so the surface is open"
+    assert_never(choice)
 
 
 def share_text(share: float) -> str:

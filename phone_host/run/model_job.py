@@ -3,16 +3,19 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, closing
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, assert_never
 
-from common.errors import SettingsError, TandemError
+from common.errors import DataError, SettingsError, TandemError
+from phone_host.geometry.unseen_surface import filled_from_border, painted_pink, seen_triangles, unseen_share
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.atomic import replacing
 from phone_host.output.data_folder import data_folder
 from phone_host.output.meshes.decimated import NoLibraryError, decimated
 from phone_host.output.meshes.formats import FORMATS, mesh_bytes
 from phone_host.output.meshes.printable import Printer, Problem, problems
-from phone_host.output.meshes.solid import Solid
+from phone_host.output.meshes.solid import Solid, used_points
 from phone_host.output.model_file import Model, read_model
 from phone_host.output.upright import upright_model
 from phone_host.printers.bed import Bed
@@ -24,10 +27,13 @@ from phone_host.printers.printer_uri import FileUri, read_uri
 from phone_host.printers.printing import Place, RunningPrint, watched
 from phone_host.printers.progress import Ended, Progress
 from phone_host.printers.slicing import SlicingWanted
+from phone_host.report.scan_report import unseen_sentence
 from phone_host.settings import printer_keys
 
 _SHARE_OF_VOXEL: Final = 0.1
 """How far the surface may move when triangles are left out; with twice that it intersects itself in places (decision 0070)."""
+
+_NO_FLAGS: Final = "--unseen changes nothing: the model does not say which part of its surface was in view"
 
 _UNITS_M: Final = {"m": 1.0, "mm": 0.001}
 
@@ -57,6 +63,63 @@ def fewer_triangles(solid: Solid, tolerance_m: float) -> tuple[Solid, list[str]]
             "every triangle is written, because fewer would cross, or enclose nothing: give a smaller --tolerance"
         ]
     return fewer.solid, []
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UnseenResult:
+    """A mesh after the choice for the surface that no view measured.
+
+    Attributes:
+        solid: the mesh to write.
+        choice: what became of that surface; None: the model does not say where it is.
+        share: of the model's area, 0..1; NaN: as above.
+        notes: what is to be said of it.
+    """
+
+    solid: Solid
+    choice: UnseenSurface | None = None
+    share: float = math.nan
+    notes: tuple[str, ...] = ()
+
+
+def with_unseen(model: Model, choice: UnseenSurface | None) -> UnseenResult:
+    """Fill, paint or cut the surface that no view measured.
+
+    Args:
+        model: that was read.
+        choice: what becomes of that surface; None: as the scan was told, else it is filled in.
+
+    Raises:
+        DataError: it is to be cut, and nothing else is there.
+    """
+    solid = model.solid
+    if not len(solid.seen):
+        is_told = choice is not None and choice is not model.unseen
+        return UnseenResult(solid, notes=(_NO_FLAGS,) if is_told else ())
+    choice = choice or model.unseen or UnseenSurface.FILL
+    share = unseen_share(solid.points_m, solid.triangles, solid.seen)
+    notes = (unseen_sentence(share, choice),) if share > 0 else ()
+    return UnseenResult(_treated(model, choice), choice, share, notes)
+
+
+def _treated(model: Model, choice: UnseenSurface) -> Solid:
+    """Return the mesh of a model that says where it was seen, with its unseen part filled, painted or cut."""
+    solid = model.solid
+    match choice:
+        case UnseenSurface.FILL | UnseenSurface.PINK if not solid.has_colours:
+            return solid
+        case UnseenSurface.FILL:
+            return replace(solid, colours=filled_from_border(solid.colours, solid.triangles, solid.seen))
+        case UnseenSurface.PINK:
+            return replace(solid, colours=painted_pink(solid.colours, solid.seen))
+        case UnseenSurface.CUT:
+            rest = solid.triangles[seen_triangles(solid.triangles, solid.seen)]
+            if not len(rest):
+                raise DataError(f"no part of {model.path} was in view", "leave out --unseen cut, or scan again")
+            used, triangles = used_points(rest, len(solid.points_m))
+            colours = solid.colours[used] if solid.has_colours else solid.colours
+            return Solid(solid.points_m[used], triangles, colours, solid.seen[used])
+    assert_never(choice)
 
 
 def check_model(
@@ -101,6 +164,7 @@ def export_model(
     *,
     unit: str | None = None,
     tolerance_mm: float | None = None,
+    unseen: UnseenSurface | None = None,
 ) -> list[Path]:
     """Save a model for other programs, as `phone-host export` does. Files of the same names are replaced.
 
@@ -110,19 +174,21 @@ def export_model(
         out: folder for the files; it exists.
         unit: of a mesh file, m or mm; None: as the file says, else m.
         tolerance_mm: triangles are left out where the surface stays as near as this, mm; None: a tenth of the scan's voxel.
+        unseen: what becomes of the surface that no view measured; None: as the scan was told, else it is filled in.
 
     Returns:
         The files, in the order of the formats.
 
     Raises:
         SettingsError: there is no such format, or the model itself would be replaced.
-        DataError: the model cannot be read, or is none.
+        DataError: the model cannot be read, or is none, or none of it is left.
         OSError: a file cannot be written.
     """
     if unknown := set(to) - set(FORMATS):
         raise SettingsError(f"{min(unknown)!r} is no format", f"give some of {', '.join(FORMATS)}")
     read = read_model(Path(model), _UNITS_M.get(unit or "", math.nan))
-    solid, _ = fewer_triangles(read.solid, usual_tolerance_m(read) if tolerance_mm is None else tolerance_mm / 1000)
+    whole = with_unseen(read, unseen).solid
+    solid, _ = fewer_triangles(whole, usual_tolerance_m(read) if tolerance_mm is None else tolerance_mm / 1000)
     paths = {Path(out) / f"{read.stem}.{kind}": kind for kind in to}
     spare_model(read, paths)
     with ExitStack() as files:  # each takes its place when all are written

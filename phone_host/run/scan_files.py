@@ -32,7 +32,7 @@ class FinishedScan:
 
     Attributes:
         report: of it.
-        model: its surface.
+        model: its whole surface; the files hold it as `report.unseen` says.
         commands: what else to do next, for the page.
         field: its field as bytes, for another pass; empty: it takes none.
         command: the verb that made it.
@@ -61,10 +61,11 @@ def write_scan(out: Path, scan: FinishedScan, partial: Callable[[Path], None] | 
         UnavailableError: a file there was not written by this program.
         OSError: as the operating system reports it.
     """
-    report, mesh = scan.report, scan.model.mesh
+    report, model = scan.report, scan.model.with_unseen(scan.report.unseen)
+    mesh = model.mesh
     files = MODEL, TRAJECTORY, *ALWAYS, *([FIELD] if scan.field else [])
     with replacing_results(out, NAMES, files, first=MODEL, command=scan.command, partial=partial) as place:
-        seen = scan.model.seen if scan.model.is_closed else None
+        seen = model.seen if model.is_closed else None
         write_surface(place / MODEL, PointCloud(mesh.points_m, mesh.colours), mesh.triangles, report.axes, seen)
         write_text(place / TRAJECTORY, trajectory_of(report))
         write_text(
@@ -74,7 +75,8 @@ def write_scan(out: Path, scan: FinishedScan, partial: Callable[[Path], None] | 
         if scan.field:
             write_bytes(place / FIELD, scan.field)
         voxel_m = report.settings.voxel_m if report.settings else 1.0
-        shown = ShownModel(mesh, scan.model.noise_m, voxel_m, upright=report.axes if report.axes.is_upright else None)
+        upright = report.axes if report.axes.is_upright else None
+        shown = ShownModel(mesh, model.noise_m, voxel_m, upright=upright, seen=model.seen)
         write_text(place / "index.html", scan_page(report, shown, (*next_commands(report, out), *scan.commands)))
 
 

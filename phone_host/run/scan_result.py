@@ -79,6 +79,7 @@ def report_of(
         keeps_field=keeps_field(scan),
         mat=scan.wanted.mat,
         unused_mat=unused_mat,
+        unseen=scan.wanted.unseen,
     )
     on_mat = report.on_mat
     return report if on_mat is None else replace(report, remarks=(*report.remarks, *on_mat.remarks))
@@ -171,12 +172,13 @@ def require_turning(report: ScanReport) -> None:
 
 
 def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
-    """Return a model in numbers.
+    """Return a model in numbers, as the files hold it.
 
     Args:
         scan: that made it.
-        model: its surface.
+        model: its whole surface.
     """
+    unseen_share, model = model.unseen_share if model.is_closed else math.nan, model.with_unseen(scan.wanted.unseen)
     known = model.noise_m[np.isfinite(model.noise_m)]
     noise_m, noise_p95_m = (float(np.percentile(known, share)) if len(known) else math.nan for share in (50, 95))
     volume = scan.volume
@@ -187,7 +189,7 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
         noise_m=noise_m,
         noise_p95_m=noise_p95_m,
         error_scope=model.error_scope,
-        unseen_share=model.unseen_share if model.is_closed else math.nan,
+        unseen_share=unseen_share,
         memory_bytes=0 if volume is None else volume.memory_bytes,
         left_out=0 if volume is None else volume.left_out,
     )

@@ -37,10 +37,12 @@ class Floor:
     Attributes:
         z_m: its height, m.
         skip_m: height above it, m, in which its own surface and that of the thing cannot be told apart; what stands there goes on down to it.
+        is_printed: whether it is a printed mat.
     """
 
     z_m: float = 0.0
     skip_m: float = 0.0
+    is_printed: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

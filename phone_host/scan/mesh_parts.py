@@ -43,7 +43,8 @@ def size_of(mesh: Mesh) -> MeshSize:
     if not len(mesh.triangles):
         return NO_SIZE
     points = mesh.points_m.astype(np.float64)
-    area = areas_m2(mesh).sum()
+    a, b, c = np.moveaxis(points[mesh.triangles], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
     edges = np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
     keys, counts = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_counts=True)
     open_ = keys[counts == 1]
@@ -52,24 +53,23 @@ def size_of(mesh: Mesh) -> MeshSize:
     return MeshSize(float(area), float(border), (x, y, z))
 
 
-def areas_m2(mesh: Mesh) -> NDArray[np.float64]:
-    """Return the area of each triangle, (T,) m^2."""
-    a, b, c = np.moveaxis(mesh.points_m.astype(np.float64)[mesh.triangles], 1, 0)
-    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, np.float64)
-
-
 def only(mesh: Mesh, wanted: Flags) -> Mesh:
     """Return the triangles (T,) that are wanted, and the points they need."""
+    return part_of(mesh, wanted)[0]
+
+
+def part_of(mesh: Mesh, wanted: Flags) -> tuple[Mesh, NDArray[np.int64]]:
+    """Return the triangles (T,) that are wanted with the points they need, and the numbers that these points had."""
     used, corners = np.unique(mesh.triangles[wanted], return_inverse=True)
     triangles = corners.reshape(-1, 3).astype(np.int32)
-    return Mesh(mesh.points_m[used], mesh.colours[used], triangles)
+    return Mesh(mesh.points_m[used], mesh.colours[used], triangles), used.astype(np.int64)
 
 
 def without_crumbs(mesh: Mesh) -> Mesh:
     """Leave out pieces that have less than a hundredth of the largest one's triangles."""
     if not len(mesh.triangles):
         return mesh
-    piece = _pieces(mesh)[mesh.triangles[:, 0]]
+    piece = pieces_of(mesh)[mesh.triangles[:, 0]]
     sizes = np.bincount(piece)
     return only(mesh, sizes[piece] >= _CRUMB_SHARE * sizes.max())
 
@@ -82,13 +82,13 @@ def without_loose_bodies(mesh: Mesh) -> Mesh:
     """
     if not len(mesh.triangles):
         return mesh
-    piece = _pieces(mesh)[mesh.triangles[:, 0]]
+    piece = pieces_of(mesh)[mesh.triangles[:, 0]]
     corners = mesh.points_m.astype(np.float64)[mesh.triangles]
     contents = np.bincount(piece, (np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]).sum(axis=1) / 6)
     return only(mesh, contents[piece] >= _LOOSE_SHARE * contents.max())
 
 
-def _pieces(mesh: Mesh) -> NDArray[np.int64]:
+def pieces_of(mesh: Mesh) -> NDArray[np.int64]:
     """Return for each point (V,) the lowest point that it hangs together with."""
     lowest = np.arange(len(mesh.points_m))
     while True:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from phone_host.scan.blocks import SIDE
 from phone_host.scan.cube_cases import CORNERS
 from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import only, thinned
+from phone_host.scan.mesh_parts import part_of, thinned
 from phone_host.scan.volume import Volume
 
 SIDE_BLOCKS: Final = 8
@@ -32,12 +32,14 @@ class Patch:
         place: of the cube, in cubes along x, y, z.
         side_m: of the cube; points lie at most a voxel beyond it.
         mesh: the surface in it; without triangles where there is none any more.
+        seen: (V,) whether some view measured its points; of a surface that grows all are.
     """
 
     number: int
     place: tuple[int, int, int]
     side_m: float
     mesh: Mesh
+    seen: NDArray[np.bool_]
 
 
 class Patches:
@@ -76,20 +78,22 @@ class Patches:
         for place in wanted:
             self._make(volume, place, np.flatnonzero((cubes == place).all(axis=1)))
 
-    def become(self, mesh: Mesh, voxel_m: float) -> None:
+    def become(self, mesh: Mesh, voxel_m: float, seen: NDArray[np.bool_] | None = None) -> None:
         """Show another surface in place of the volume's: the finished one. The volume is not renewed afterwards.
 
         Args:
             mesh: the surface.
             voxel_m: of the field that it was made of, m.
+            seen: (V,) whether some view measured its points; None: all are seen.
         """
         side_m = SIDE * SIDE_BLOCKS * voxel_m
         cubes = np.floor(mesh.points_m[mesh.triangles].mean(axis=1) / side_m).astype(np.int32)
         places, cube_of = np.unique(cubes, axis=0, return_inverse=True)
-        parts = {tuple(place): only(mesh, cube_of == number) for number, place in enumerate(places.tolist())}
-        gone = dict.fromkeys(set(self._made) - set(parts), Mesh.empty())
-        for place, part in (gone | parts).items():
-            self._put(place, side_m, part, voxel_m)
+        parts = {tuple(place): part_of(mesh, cube_of == number) for number, place in enumerate(places.tolist())}
+        for place in set(self._made) - set(parts):
+            self._put(place, side_m, Mesh.empty(), voxel_m)
+        for place, (part, used) in parts.items():
+            self._put(place, side_m, part, voxel_m, None if seen is None else seen[used])
 
     def since(self, number: int, most_points: int) -> tuple[Patch, ...]:
         """Return the patches that are newer than one, oldest first.
@@ -108,11 +112,19 @@ class Patches:
         side_m = SIDE * SIDE_BLOCKS * voxel_m
         self._put((x, y, z), side_m, mesh_of(volume.blocks, voxel_m, self._least_weight, numbers), voxel_m)
 
-    def _put(self, place: tuple[int, int, int], side_m: float, mesh: Mesh, voxel_m: float) -> None:
-        most = len(mesh.triangles)
+    def _put(
+        self,
+        place: tuple[int, int, int],
+        side_m: float,
+        mesh: Mesh,
+        voxel_m: float,
+        seen: NDArray[np.bool_] | None = None,
+    ) -> None:
+        most, seen = len(mesh.triangles), np.ones(len(mesh.points_m), np.bool_) if seen is None else seen
         while len(mesh.points_m) > self._most_points:
             most //= 2
-            mesh, _ = thinned(mesh, most, voxel_m)
+            mesh, stand_for = thinned(mesh, most, voxel_m)
+            seen = seen[stand_for]
         if len(mesh.triangles) or place in self._made:
             self._number += 1
-            self._made[place] = Patch(self._number, place, side_m, mesh)
+            self._made[place] = Patch(self._number, place, side_m, mesh, seen)

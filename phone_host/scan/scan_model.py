@@ -1,24 +1,24 @@
 """The surface that comes out of a scan: open where nobody looked, or closed where a box says what the thing is. Pure."""
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.geometry.unseen_surface import filled_from_border, painted_pink, seen_triangles, unseen_share
+from phone_host.model.unseen import UnseenSurface
 from phone_host.scan.blocks import SIDE, Blocks
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.closing import Floor, closed
 from phone_host.scan.ground import Ground
 from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import areas_m2, only, without_crumbs, without_loose_bodies
+from phone_host.scan.mesh_parts import only, part_of, without_crumbs, without_loose_bodies
+from phone_host.scan.sheet_ink import ink_points, specks
 from phone_host.scan.surface_noise import surface_noise_m
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT
-
-UNSEEN_RGB: Final = (214, 74, 214)
-"""Colour of a surface that nobody saw: few things are pink all over."""
 
 _ON_A_VOXEL: Final = 0.005
 """A point lies on an edge between two voxels, at least a hundredth of it from either."""
@@ -31,7 +31,7 @@ class ScanModel:
     Attributes:
         mesh: its triangles.
         noise_m: (V,) float32 standard deviation of its points, m, if the views err independently; NaN where nobody saw it.
-        seen: (V,) whether some view saw the surface there; where none did, a closed surface has a colour of its own.
+        seen: (V,) whether some view saw the surface there; where none did, the colour comes from the border of what was seen.
         is_closed: whether what nobody saw was closed.
     """
 
@@ -43,13 +43,31 @@ class ScanModel:
     @property
     def unseen_share(self) -> float:
         """Share of the area that nobody saw, 0..1; NaN without a surface."""
-        areas, corners = areas_m2(self.mesh), self.seen[self.mesh.triangles]
-        return float(((~corners).mean(axis=1) * areas).sum() / areas.sum()) if areas.sum() > 0 else float("nan")
+        return unseen_share(self.mesh.points_m, self.mesh.triangles, self.seen)
 
     @property
     def seen_mesh(self) -> Mesh:
         """The triangles of which a view saw all corners: what can be compared with the truth."""
-        return only(self.mesh, np.logical_and.reduce(self.seen[self.mesh.triangles], axis=1))
+        return only(self.mesh, seen_triangles(self.mesh.triangles, self.seen))
+
+    def with_unseen(self, choice: UnseenSurface) -> "ScanModel":
+        """Return the model as files hold it.
+
+        Args:
+            choice: what becomes of the surface that nobody saw. Without it the model is open, and nothing tells any more how much it was.
+        """
+        mesh = self.mesh
+        match choice:
+            case UnseenSurface.FILL:
+                return self
+            case UnseenSurface.PINK:
+                return replace(self, mesh=replace(mesh, colours=painted_pink(mesh.colours, self.seen)))
+            case UnseenSurface.CUT:
+                if not self.is_closed:
+                    return self
+                rest, used = part_of(mesh, seen_triangles(mesh.triangles, self.seen))
+                return ScanModel(rest, self.noise_m[used], self.seen[used])
+        assert_never(choice)
 
     @staticmethod
     def empty() -> "ScanModel":
@@ -80,18 +98,22 @@ def closed_model(volume: Volume, carving: Carving, box: Box, floor: Floor | Grou
     voxel_m = volume.settings.voxel_m
     field = closed(volume.blocks, volume.settings, carving, box, floor)
     mesh = without_loose_bodies(mesh_of(field, voxel_m))
-    seen = _seen(mesh.points_m, field, voxel_m)
-    colours = np.where(seen[:, np.newaxis], mesh.colours, np.array(UNSEEN_RGB, np.uint8))
+    weights = _weights(mesh.points_m, field, voxel_m)
+    seen = weights >= LEAST_WEIGHT
+    if isinstance(floor, Floor) and floor.is_printed:
+        seen &= ~ink_points(mesh, weights, volume.blocks)
+    seen &= ~specks(mesh, seen)
+    colours = filled_from_border(mesh.colours, mesh.triangles, seen)
     noise_m = np.where(seen, surface_noise_m(mesh.points_m, volume.blocks, volume.settings), np.float32(np.nan))
     return ScanModel(Mesh(mesh.points_m, colours, mesh.triangles), noise_m.astype(np.float32), seen, is_closed=True)
 
 
-def _seen(points_m: NDArray[np.float32], field: Blocks, voxel_m: float) -> NDArray[np.bool_]:
-    """Return whether a surface was seen at both ends of the edge that each point lies on, (V,)."""
-    places, seen = points_m.astype(np.float64) / voxel_m, np.ones(len(points_m), np.bool_)
+def _weights(points_m: NDArray[np.float32], field: Blocks, voxel_m: float) -> NDArray[np.uint16]:
+    """Return the lower weight of both ends of the edge that each point lies on, (V,)."""
+    places, least = points_m.astype(np.float64) / voxel_m, np.full(len(points_m), np.iinfo(np.uint16).max, np.uint16)
     for aside in (-_ON_A_VOXEL, _ON_A_VOXEL):
         voxels = (np.floor(places + aside) if aside > 0 else np.ceil(places + aside)).astype(np.int32)
         numbers = field.find(voxels >> 3)
         at = (voxels & (SIDE - 1)) @ np.array([1, SIDE, SIDE**2])
-        seen &= (numbers >= 0) & (field.weights[np.maximum(numbers, 0), at] >= LEAST_WEIGHT)
-    return seen
+        least = np.minimum(least, np.where(numbers >= 0, field.weights[np.maximum(numbers, 0), at], np.uint16(0)))
+    return least

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from common.errors import SettingsError
+from phone_host.model.unseen import UnseenSurface
 from phone_host.scan.box import Box
 from phone_host.scan.closing import Floor
 from phone_host.scan.field_bytes import KeptField
@@ -25,6 +26,7 @@ class ScanWanted:
         turntable: whether the cameras stand still and an object turns before them.
         on_table: whether a thing is scanned that stands on a table, without a mat.
         onto: the field of an earlier pass, to which this one is added; None: this one is alone.
+        unseen: what files hold of the part of a closed surface that no view measured.
         loops: how loops are closed where nothing but the camera's way tells where it is; None: they are not.
     """
 
@@ -36,6 +38,7 @@ class ScanWanted:
     turntable: bool = False
     on_table: bool = False
     onto: KeptField | None = None
+    unseen: UnseenSurface = UnseenSurface.FILL
     loops: LoopSettings | None = field(default_factory=LoopSettings)
 
     def __post_init__(self) -> None:
@@ -59,4 +62,6 @@ class ScanWanted:
     @property
     def floor(self) -> Floor | None:
         """The plane on which the thing stands: the mat, or the table; None: it is not known."""
-        return None if self.mat is None and not self.on_table else Floor(skip_m=ABOVE_M)
+        return (
+            None if self.mat is None and not self.on_table else Floor(skip_m=ABOVE_M, is_printed=self.mat is not None)
+        )

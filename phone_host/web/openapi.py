@@ -27,7 +27,7 @@ _REFUSED: Final = (401, 403, 421, 429)
 _DO: Final = (
     "`record` begins a recording (MCAP) beside the run that goes on, in a new file of the folder `recordings`; `end_recording` ends it."
     " How it goes stands in the state: `live.recording`. `snapshot` saves the newest pair. `set` takes options of `phone-host run` as"
-    " values, `enrol` link and code, `calibrate` board and square, `scan` voxel, box, mat, object and turntable, which may be missing, `crop` box, `check_model` bed,"
+    " values, `enrol` link and code, `calibrate` board and square, `scan` voxel, box, mat, object, turntable and unseen, which may be missing, `crop` box, `check_model` bed,"
     " `save_model` format, `prepare_print` printer and bed, `print` confirm: what `printing.asks` says; the others take none."
 )
 

@@ -97,7 +97,7 @@ class ScanState:
         fused: of these in the model.
         folder: where its files lie; empty: they are not written yet.
         files: their names.
-        options: of `scan` by name, with which it was started: voxel, box, mat, turntable, object; every viewer shows these.
+        options: of `scan` by name, with which it was started: voxel, box, mat, turntable, object, unseen; every viewer shows these.
     """
 
     words: str
@@ -172,6 +172,10 @@ class SurfacePatch(Protocol):
     @property
     def mesh(self) -> SurfaceMesh:
         """The surface in it; fewer than 65 536 points."""
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(V,) whether some view measured each of its points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,8 +267,8 @@ class Command:
     Attributes:
         do: what.
         values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
-            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel`, `box`, `mat` (a sheet, or usual), `object` (yes) and `turntable` (yes), which may be
-            missing; for CROP, while a scan goes on, `box`; for CHECK_MODEL `bed`; for SAVE_MODEL `format`; for
+            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel`, `box`, `mat` (a sheet, or usual), `object` (yes), `turntable` (yes)
+            and `unseen` (fill, pink or cut), which may be missing; for CROP, while a scan goes on, `box`; for CHECK_MODEL `bed`; for SAVE_MODEL `format`; for
             PREPARE_PRINT `printer` and `bed`; for PRINT `confirm`, the state's `printing.asks`. Empty for the others.
     """
 

@@ -2,7 +2,8 @@
 
 uint32, little endian: length of the header; the header, UTF-8, with blanks so that what follows begins at a multiple of 4; then for each
 patch, in the header's order: points (uint16 x 3: steps from its lowest corner), triangles (uint16 x 3), colours (uint8 x 3), each filled up
-to a multiple of 4. A patch without triangles takes away what was in its place. docs/page.md describes the header.
+to a multiple of 4. A patch without triangles takes away what was in its place. At the end, for each patch with unseen points, a flag (uint8)
+for each of its points: 1 where a view measured it; filled up likewise. docs/page.md describes the header.
 """
 
 import struct
@@ -35,7 +36,9 @@ def surface_bytes(surface: Surface, since: int) -> bytes:
     }
     text = json_text(header).encode()
     text += b" " * (-len(text) % 4)
-    return b"".join([struct.pack("<I", len(text)), text, *(part for each in patches for part in _parts(each))])
+    parts = [part for each in patches for part in _parts(each)]
+    flags = [_filled(each.seen.astype(np.uint8).tobytes()) for each in patches if not each.seen.all()]
+    return b"".join([struct.pack("<I", len(text)), text, *parts, *flags])
 
 
 def _entry(patch: SurfacePatch) -> dict[str, object]:
@@ -45,6 +48,7 @@ def _entry(patch: SurfacePatch) -> dict[str, object]:
         "step": _step_m(patch),
         "points": len(patch.mesh.points_m),
         "triangles": len(patch.mesh.triangles),
+        "unseen": int((~patch.seen).sum()),
     }
 
 

@@ -12,11 +12,15 @@ import pytest
 
 from common import now
 from common.errors import DataError, SettingsError
-from phone_host.api import save_scan
+from phone_host.api import UnseenSurface, save_scan
 from phone_host.cli import main
 from phone_host.geometry.se3 import SE3, vectors_of
+from phone_host.geometry.unseen_surface import PINK_RGB
 from phone_host.model import Image, Processed
 from phone_host.output.axes import Axes
+from phone_host.output.meshes.formats import read_mesh
+from phone_host.output.meshes.printable import Flaw, Printer, problems
+from phone_host.output.meshes.solid import Solid
 from phone_host.output.rig_yaml import write_rig
 from phone_host.report.mat_figures import mat_figures
 from phone_host.scan.box import Box
@@ -36,6 +40,7 @@ from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_rig
+from tests.support.html import Page
 from tests.support.mat_rigs import rig_of
 from tests.support.mats import BALL_M, MAT, MatPainter, looking_at, of_right
 
@@ -168,6 +173,53 @@ def test_the_python_api_saves_it_in_the_mats_axes(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="is not seen in any of 1 pair"):
         save_scan(tmp_path / "none", unseen)
     assert not (tmp_path / "none").exists()
+
+
+def coloured(path: Path) -> Solid:
+    """A model file."""
+    return read_mesh(path.read_bytes(), path.name).solid
+
+
+def test_unseen_surface_is_grey_pink_or_cut_in_the_files_of_a_scan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A grey ball's file is grey by default, pink where nobody saw it if asked, or open; terminal, report.json and page tell the share each time."""
+    said = {
+        UnseenSurface.FILL: "was never in view and is filled in",
+        UnseenSurface.PINK: "was never in view and is filled in, in pink",
+        UnseenSurface.CUT: "was never in view and is cut, so the surface is open",
+    }
+    shares = set()
+    for choice, words in said.items():
+        save_scan(tmp_path / choice.value, scanned([0, 60, 180, 240], replace(WANTED, unseen=choice))[0])
+        told = json.loads((tmp_path / choice.value / "report.json").read_text())
+        assert told["model"]["unseen"] == choice.value
+        shares.add(told["model"]["unseen_share"])
+        assert told["headline"].endswith(f"{words}.")
+        assert f"{words}." in Page((tmp_path / choice.value / "index.html").read_text()).words
+    assert len(shares) == 1
+    fill, pink, cut = (coloured(tmp_path / choice.value / "model.ply") for choice in said)
+    assert np.ptp(fill.colours.mean(axis=0)) < 3
+    assert np.abs(fill.colours.mean(axis=0) - fill.colours[fill.seen].mean(axis=0)).max() < 20
+    assert (pink.colours[~pink.seen] == PINK_RGB).all()
+    assert np.array_equal(pink.colours[pink.seen], fill.colours[fill.seen])
+    assert len(cut.seen) == 0
+    assert Flaw.OPEN in {
+        each.flaw for each in problems(cut.points_mm.astype(np.float64), cut.triangles, Printer(), lambda _: None)
+    }
+    folder = str(tmp_path / "pink")
+    for option, colour in (([], PINK_RGB), (["--unseen", "fill"], None)):
+        assert main(["export", folder, "--to", "ply", "--tolerance", "0", "--out", str(tmp_path), *option]) == 0
+        exported = coloured(tmp_path / "pink.ply")
+        wanted = pink.colours if colour else fill.colours
+        assert np.abs(np.sort(exported.colours, axis=0).astype(int) - np.sort(wanted, axis=0)).max() == 0
+        assert "was never in view and is filled in" in capsys.readouterr().out
+    assert main(["export", folder, "--to", "ply", "--unseen", "cut", "--out", str(tmp_path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["triangles"] == len(cut.triangles)
+    assert (told["unseen"], told["unseen_share"]) == ("cut", pytest.approx(shares.pop(), abs=1e-4))
+    assert main(["export", str(tmp_path / "cut"), "--to", "ply", "--unseen", "pink", "--out", str(tmp_path)]) == 0
+    assert "--unseen changes nothing" in capsys.readouterr().out
 
 
 def test_a_pair_without_the_mat_is_lost_with_a_reason_or_followed_by_what_stands_on_it() -> None:

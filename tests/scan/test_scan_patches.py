@@ -111,13 +111,15 @@ def test_a_patch_never_has_more_points_than_are_allowed() -> None:
 
 
 def test_the_bytes_give_the_surface_back() -> None:
-    """Points come back within half a step, triangles and colours as they are, each part at a multiple of 4; nothing new repeats the number."""
+    """Points come back within half a step, triangles, colours and flags as they are, each part at a multiple of 4; nothing new repeats the number."""
     random = np.random.default_rng(3)
     points = (np.array([-2, 0, 5]) * 0.64 + random.uniform(0, 0.65, (7, 3))).astype(np.float32)
     mesh = Mesh(
         points, random.integers(0, 256, (7, 3), np.uint8), np.array([[0, 1, 2], [4, 5, 6], [6, 2, 0]], np.int32)
     )
-    data = surface_bytes(Surface(4, (Patch(9, (-2, 0, 5), 0.64, mesh), Patch(11, (1, 1, 1), 0.64, Mesh.empty()))), 8)
+    seen = np.array([1, 1, 0, 1, 0, 1, 1], np.bool_)
+    nothing = Patch(11, (1, 1, 1), 0.64, Mesh.empty(), np.zeros(0, np.bool_))
+    data = surface_bytes(Surface(4, (Patch(9, (-2, 0, 5), 0.64, mesh, seen), nothing)), 8)
     length = struct.unpack_from("<I", data)[0]
     assert length % 4 == 0
     head = json.loads(data[4 : 4 + length])
@@ -129,7 +131,8 @@ def test_the_bytes_give_the_surface_back() -> None:
     assert np.abs(np.array(first["low"]) + first["step"] * steps - points).max() <= first["step"]
     assert np.array_equal(np.frombuffer(data, "<u2", 9, at + 44).reshape(3, 3), mesh.triangles)
     assert np.array_equal(np.frombuffer(data, np.uint8, 21, at + 44 + 20).reshape(7, 3), mesh.colours)
-    assert len(data) == at + 44 + 20 + 24
+    assert [each["unseen"] for each in head["patches"]] == [2, 0]
+    assert list(data[at + 44 + 20 + 24 :]) == [*seen.tolist(), 0]
     again = surface_bytes(Surface(4, ()), 11)
     assert json.loads(again[4:])["newest"] == 11
 
@@ -154,7 +157,7 @@ def test_the_finished_surface_takes_the_place_of_what_grew() -> None:
     newest = max(each.number for each in patches.since(0, MANY))
     whole = mesh_of(volume.blocks, SETTINGS.voxel_m)
     left = only(whole, whole.points_m[whole.triangles].mean(axis=1)[:, 0] < 0)
-    patches.become(left, SETTINGS.voxel_m)
+    patches.become(left, SETTINGS.voxel_m, left.points_m[:, 1] < 0)
     found = patches.since(newest, MANY)
     assert {each.place for each in found} == before
     assert sum(len(each.mesh.triangles) for each in found) == len(left.triangles) > 500
@@ -163,4 +166,5 @@ def test_the_finished_surface_takes_the_place_of_what_grew() -> None:
         if len(each.mesh.triangles):
             low = np.array(each.place) * each.side_m
             assert (each.mesh.points_m >= low - each.side_m / 10).all()
+            assert np.array_equal(each.seen, each.mesh.points_m[:, 1] < 0)
             assert (each.mesh.points_m <= low + 1.1 * each.side_m).all()

@@ -18,7 +18,6 @@ from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.scan.box import Box
-from phone_host.scan.scan_model import UNSEEN_RGB
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.table import Table, find_table
@@ -168,7 +167,7 @@ def test_a_figure_on_a_table_becomes_a_closed_model_that_stands_on_it(scan_of_it
     assert points[:, 2].min() == pytest.approx(0.0, abs=0.0002)
     low, high = small_scene().solid.bounds_m
     assert points[:, 2].max() == pytest.approx(high[2] - low[2], abs=0.006)
-    seen = ~(np.asarray(mesh.colours) == UNSEEN_RGB).all(axis=1)
+    seen = mesh.seen
     off_m = np.abs(small_scene().solid.signed_distance(to_figure.apply(points)))
     assert seen.mean() > 0.15
     assert off_m[seen].mean() < 0.001

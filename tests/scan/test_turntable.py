@@ -20,7 +20,6 @@ from phone_host.scan.field_bytes import KeptField, field_bytes, field_of
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.observation import Observer
-from phone_host.scan.scan_model import UNSEEN_RGB
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_match import Match
 from phone_host.scan.table_cut import points_of, table_height_m
@@ -283,7 +282,7 @@ def test_the_python_api_adds_a_pass_to_what_it_has_saved(jerky: tuple[list[View]
     assert {path.name for path in (tmp_path / "second").iterdir()} >= set(report["files"])
     assert any("lie on the earlier one" in warning for warning in report["warnings"])
     mesh = read_ply_mesh((tmp_path / "second" / "model.ply").read_bytes(), "model.ply", 1.0)
-    seen = mesh.points_m[(np.asarray(mesh.colours) != UNSEEN_RGB).any(axis=1)].astype(np.float64)
+    seen = mesh.points_m[mesh.seen].astype(np.float64)
     assert np.abs(off_thing_m(seen)).mean() < 0.002
 
 

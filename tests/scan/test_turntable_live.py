@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
-from phone_host.scan.scan_model import UNSEEN_RGB
 from tests.support.programs import board, host, until
 from tests.support.turning_things import Size, photographed, turned_scene
 
@@ -47,5 +46,5 @@ def test_ctrl_c_keeps_a_turn_that_was_scanned_live(tmp_path: Path) -> None:
     assert "field.bin" in report["files"]
     assert any("the object has turned by" in warning for warning in report["warnings"])
     mesh = read_ply_mesh((out / "model.ply").read_bytes(), "model.ply", 1.0)
-    seen = mesh.points_m[(np.asarray(mesh.colours) != UNSEEN_RGB).any(axis=1)].astype(np.float64)
+    seen = mesh.points_m[mesh.seen].astype(np.float64)
     assert len(seen) > 1000

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from phone_host.output.model_file import read_model
-from phone_host.scan.scan_model import UNSEEN_RGB
 from phone_host.scene.object_scene import Setting, object_scene
 from tests.support.programs import PATIENCE_S, host, until
 
@@ -38,8 +37,7 @@ def test_the_model_is_the_thing_and_its_errors_are_told(scanned: tuple[Path, dic
     assert truth["p95_mm"] <= 1.5
     assert truth["coverage"] >= 0.9
     model = read_model(out / "model.ply", math.nan).solid
-    seen = (model.colours != UNSEEN_RGB).any(axis=1)
-    points = model.points_m[seen][::20].astype(np.float64)
+    points = model.points_m[model.seen][::20].astype(np.float64)
     off_mm = np.abs(object_scene("speckled", Setting()).solid.signed_distance(points)) * 1000
     assert off_mm.mean() == pytest.approx(truth["mean_mm"], abs=0.1)
     assert str(out / "index.html") in told

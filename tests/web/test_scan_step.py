@@ -57,7 +57,14 @@ def test_the_surface_grows_until_it_is_saved(
     page.click("#scan-go")
     page.wait_for_function("() => document.getElementById('scan-go').textContent === 'Stop'")
     assert program.commands[-1].do is Do.SCAN
-    assert program.commands[-1].values == {"voxel": "5mm", "box": "", "mat": "", "turntable": "", "object": ""}
+    assert program.commands[-1].values == {
+        "voxel": "5mm",
+        "box": "",
+        "mat": "",
+        "turntable": "",
+        "object": "",
+        "unseen": "",
+    }
     assert page.text_content("#scan-none") == "No surface yet"
     words = "2 pairs in the model: moved too fast: move more slowly, back to where it was"
     growing.show(60)
@@ -251,7 +258,7 @@ def test_what_is_scanned_is_chosen(
         page.fill("#scan-mat", sheet)
     page.click("#scan-go")
     page.wait_for_function("() => document.getElementById('scan-go').textContent === 'Stop'")
-    assert program.commands[-1].values == {"voxel": "", "box": "", **wanted}
+    assert program.commands[-1].values == {"voxel": "", "box": "", **wanted, "unseen": ""}
 
 
 def test_what_stands_on_a_mat_stands_upright(program: Played, opened: Opener) -> None:

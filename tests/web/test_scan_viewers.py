@@ -12,6 +12,7 @@ MODES = [
     ({"mat": "8x6:30mm:22mm:4x4"}, "mat", "--mat 8x6:30mm:22mm:4x4"),
     ({"turntable": "yes", "voxel": "2mm"}, "turntable", "--voxel 2mm --turntable"),
     ({"object": "yes", "box": "300x300x200@0,0,600"}, "object", "--box 300x300x200@0,0,600 --object"),
+    ({"mat": "usual", "unseen": "cut"}, "mat", "--mat --unseen cut"),
 ]
 CAMERAS = {"link": "tcp://192.168.7.2:5555", "camera": "v4l2:/dev/video0"}
 
@@ -23,13 +24,15 @@ def test_every_viewer_shows_the_options_and_the_command_of_the_running_scan(
     """A viewer that did not start the scan shows its kind, detail, mat and box, cannot change what is fixed, and the card shows `scan` with these options."""
     options, kind, words = mode
     program.patches, program.activity, program.settings = Patches(1), Activity.SCANNING, CAMERAS
-    order = ("voxel", "box", "mat", "turntable", "object")
+    order = ("voxel", "box", "mat", "turntable", "object", "unseen")
     program.scan = ScanState(words="go on", level="good", options={name: options.get(name, "") for name in order})
     page = opened("scan")
     page.wait_for_function("kind => document.getElementById('scan-kind').value === kind", arg=kind)
     assert page.is_disabled("#scan-kind")
     assert page.is_disabled("#scan-voxel")
     assert page.input_value("#scan-voxel") == options.get("voxel", "")
+    assert page.is_disabled("#scan-unseen")
+    assert page.input_value("#scan-unseen") == options.get("unseen", "")
     assert page.input_value("#scan-box") == options.get("box", "")
     assert page.is_visible("#scan-mat") is (kind == "mat")
     page.wait_for_function("words => document.getElementById('command').textContent.endsWith(' ' + words)", arg=words)

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from common.byte_order_mark import without_mark
 from common.errors import DataError
 from phone_host.output.meshes.ply_records import Column, Numbers, ShortError, Table, is_text, read_records
-from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, polygon_triangles, sound_solid
+from phone_host.output.meshes.solid import (
+    NO_COLOURS,
+    NO_FLAGS,
+    Solid,
+    colours_of_points,
+    polygon_triangles,
+    sound_solid,
+)
 from phone_host.output.meshes.text import require_short
 
 _CORNER_LISTS: Final = ("vertex_indices", "vertex_index")
@@ -63,7 +70,7 @@ def _begun_well(solid: Solid) -> Solid:
 
 
 def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
-    """Read a PLY file with faces: polygons or strips of triangles, colours of points or of faces.
+    """Read a PLY file with faces: polygons or strips of triangles, colours of points or of faces, and which points a scan has seen.
 
     Args:
         content: of the file; it may come from anybody.
@@ -96,7 +103,7 @@ def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
     if len(triangles) and not len(colours) and len(painted := _colours(faces)):
         painted = np.repeat(painted, 3 * np.maximum(counts - 2, 0), axis=0)
         colours = colours_of_points(triangles.ravel(), painted, len(places))
-    return sound_solid(name, places * unit_m, triangles, colours)
+    return sound_solid(name, places * unit_m, triangles, colours, _seen(vertices))
 
 
 def _polygons(faces: Table) -> tuple[Numbers, Numbers]:
@@ -126,6 +133,12 @@ def _strip_triangles(strips: Column | None) -> Numbers:
     is_odd = (number - begun)[: len(triangles)] % 2 == 0
     triangles[is_odd] = triangles[is_odd][:, [1, 0, 2]]
     return triangles[(triangles >= 0).all(axis=1)]
+
+
+def _seen(vertices: Table) -> NDArray[np.bool_]:
+    """Return (V,): the property `seen` of a scan's model; (0,) where there is none."""
+    column = vertices.get("seen")
+    return NO_FLAGS if column is None or column.counts is not None else np.asarray(column.values) != 0
 
 
 def _colours(table: Table) -> NDArray[np.uint8]:

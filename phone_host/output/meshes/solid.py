@@ -3,7 +3,7 @@
 Inside, points are metres; files for printers hold millimetres. Triangles go anticlockwise as seen from outside.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.output.meshes.polygons import MAX_CONCAVE, TooManyCornersError, triangulate
+
+NO_FLAGS: Final[NDArray[np.bool_]] = np.zeros(0, np.bool_)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,11 +23,13 @@ class Solid:
         points_m: (V, 3) float32, m, all finite.
         triangles: (T, 3) int32 numbers of points, 0..V-1.
         colours: (V, 3) uint8, red green blue; (0, 3) where the points have none.
+        seen: (V,) whether some view of a scan measured each point; (0,) where nothing says so.
     """
 
     points_m: NDArray[np.float32]
     triangles: NDArray[np.int32]
     colours: NDArray[np.uint8]
+    seen: NDArray[np.bool_] = field(default_factory=lambda: NO_FLAGS)
 
     @property
     def has_colours(self) -> bool:
@@ -63,6 +67,7 @@ def sound_solid(
     points_m: NDArray[np.float64],
     triangles: NDArray[np.integer[Any]],
     colours: NDArray[np.uint8] = NO_COLOURS,
+    seen: NDArray[np.bool_] = NO_FLAGS,
 ) -> Solid:
     """Make a mesh of what a file says, if that can be one.
 
@@ -71,6 +76,7 @@ def sound_solid(
         points_m: (V, 3), m.
         triangles: (T, 3) numbers of points.
         colours: (V, 3) or (0, 3).
+        seen: (V,) or (0,).
 
     Returns:
         The mesh, without triangles of which two corners are one point, and without points that no triangle uses: those may be NaN.
@@ -82,30 +88,18 @@ def sound_solid(
         raise DataError(f"{name} holds no triangle", "give a mesh, not points alone")
     require_corners(name, triangles, len(points_m))
     whole = np.ascontiguousarray(triangles, np.int32)
-    points_m, whole, colours = drop_unused(points_m, whole, colours)
+    used, whole = used_points(whole, len(points_m))
+    points_m, colours, seen = (
+        points_m[used],
+        colours[used] if len(colours) else colours,
+        seen[used] if len(seen) else seen,
+    )
     if not (points_m.min() > -_MAX_M and points_m.max() < _MAX_M):  # neither holds of NaN
         raise DataError(
             f"{name} has a corner that is no place (NaN, infinite or beyond 100 km)",
             "mend it in a mesh editor, or scan again",
         )
-    return Solid(points_m.astype(np.float32), require_triangles(name, whole), colours)
-
-
-def drop_unused(
-    points: NDArray[Any], triangles: NDArray[Any], colours: NDArray[np.uint8]
-) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.uint8]]:
-    """Leave out points that no triangle uses.
-
-    Args:
-        points: (V, 3).
-        triangles: (T, 3) numbers of points, 0..V-1.
-        colours: (V, 3) or (0, 3).
-
-    Returns:
-        The points that are left, the triangles with their new numbers, and the colours.
-    """
-    used, numbered = used_points(triangles, len(points))
-    return points[used], numbered, colours[used] if len(colours) else colours
+    return Solid(points_m.astype(np.float32), require_triangles(name, whole), colours, seen)
 
 
 def used_points(triangles: NDArray[Any], count: int) -> tuple[NDArray[np.integer[Any]] | slice, NDArray[np.int32]]:

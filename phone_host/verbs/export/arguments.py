@@ -9,6 +9,7 @@ EXAMPLES = """  phone-host export scan --to stl --out print                    #
   phone-host export scan --to stl,3mf,glb --out print
   phone-host export part.obj --unit mm --to 3mf --out print      # a mesh of another program, in millimetres
   phone-host export scan --to stl --tolerance 0                  # every triangle
+  phone-host export scan --to glb --unseen cut                   # only what was in view
 """
 
 
@@ -23,6 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         metavar="MM",
         help="leave out triangles where the surface stays as near as this; 0: none (default: a tenth of the scan's voxel; none for a mesh file)",
+    )
+    parser.add_argument(
+        "--unseen",
+        choices=("fill", "pink", "cut"),
+        help="surface that no view of the scan measured: fill it in with colours from its border, fill it in pink, or cut it, which leaves the"
+        " surface open (default: as the scan was told, else fill)",
     )
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="DIR", help="folder for the files (default: the current folder)"

@@ -8,12 +8,13 @@ from typing import Any, Final
 from common.errors import SettingsError
 from common.program.terminal import say
 from common.words import counted
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
-from phone_host.run.model_job import fewer_triangles, spare_model, usual_tolerance_m
+from phone_host.run.model_job import fewer_triangles, spare_model, usual_tolerance_m, with_unseen
 from phone_host.verbs.output_folders import require_alone, require_folder, written_together
 from phone_host.verbs.units import length_mm
 
@@ -30,7 +31,9 @@ def run(options: argparse.Namespace) -> int:
     tolerance_m = _tolerance_m(options.tolerance, model)
     files = {f"{model.stem}.{kind}": kind for kind in kinds}
     spare_model(model, (options.out / name for name in files))
-    solid, notes = fewer_triangles(model.solid, tolerance_m)
+    whole = with_unseen(model, None if options.unseen is None else UnseenSurface(options.unseen))
+    solid, notes = fewer_triangles(whole.solid, tolerance_m)
+    notes = [*whole.notes, *notes]
     require_alone(options.out)
     sizes = {}
     with written_together(options.out, *files) as place:
@@ -39,7 +42,11 @@ def run(options: argparse.Namespace) -> int:
             write_bytes(place / name, content)
             sizes[name] = len(content)
     if options.json:
-        print(json_text(_told(options.out, solid, model, sizes, notes)))
+        of_unseen = {
+            "unseen": None if whole.choice is None else whole.choice.value,
+            "unseen_share": None if math.isnan(whole.share) else round(whole.share, 6),
+        }
+        print(json_text(_told(options.out, solid, model, sizes, notes) | of_unseen))
     else:
         say(_lines(options.out, solid, model, sizes, notes))
     return 0

@@ -86,7 +86,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --mat, --object, --voxel, --box and --memory: how the model is made."""
+    """Declare --mat, --object, --voxel, --box, --unseen and --memory: how the model is made."""
     parser.add_argument(
         "--mat",
         nargs="?",
@@ -110,6 +110,13 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         "--box",
         metavar="WxHxD@X,Y,Z",
         help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat or table",
+    )
+    parser.add_argument(
+        "--unseen",
+        choices=("fill", "pink", "cut"),
+        default="fill",
+        help="with --box, --mat, --object or --turntable: surface that no view measured is filled in with colours from its border, filled in pink, or"
+        " cut, which leaves the surface open (default fill)",
     )
     parser.add_argument(
         "--memory",

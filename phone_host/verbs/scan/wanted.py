@@ -1,4 +1,4 @@
-"""Reads how a model is to be made: --mat, --object, --voxel, --box and --memory."""
+"""Reads how a model is to be made: --mat, --object, --voxel, --box, --unseen and --memory."""
 
 import argparse
 import math
@@ -11,6 +11,7 @@ from common.errors import SettingsError, UnavailableError
 from common.program.quantities import decimal_number
 from common.program.terminal import say
 from common.words import counted
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.run.kept_field import read_field
 from phone_host.run.kept_submaps import read_submaps, require_no_submaps
@@ -62,6 +63,7 @@ def scan_wanted(options: argparse.Namespace) -> ScanWanted:
         turntable=options.turntable,
         on_table=options.object,
         onto=onto,
+        unseen=UnseenSurface(options.unseen),
     )
 
 

@@ -30,7 +30,7 @@ from phone_host.verbs.scan.arguments import add_model_arguments, add_turntable_a
 from phone_host.verbs.scan.live import live_scan
 from phone_host.verbs.scan.wanted import axes_of, box_of, scan_wanted
 
-OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object")
+OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object", "unseen")
 """Options of `scan` that the page may give."""
 
 
@@ -147,6 +147,8 @@ def asked_scan(values: Choices) -> ScanWanted:
     options = parser.parse_args([])
     options.voxel, options.box, options.mat = (given[name] or None for name in ("voxel", "box", "mat"))
     options.turntable, options.object = bool(given["turntable"]), bool(given["object"])
+    if given["unseen"]:
+        options.unseen = given["unseen"]
     return scan_wanted(options)
 
 

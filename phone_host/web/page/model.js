@@ -12,6 +12,7 @@ import { opaque, Viewer } from './viewer.js';
  * @property {Uint32Array | Uint16Array} triangles - three numbers of points each, anticlockwise from outside
  * @property {Uint8Array} colours - red green blue each
  * @property {Uint8Array} noise - each: 0 exact .. 255 least exact
+ * @property {Uint8Array} seen - each: 1 where a view measured it; 0 is hatched
  */
 
 /** @typedef {'colour' | 'shape' | 'noise'} Paint */
@@ -37,17 +38,20 @@ const VERTEX = `
 precision highp float;
 in vec3 colour;
 in float noise;
+in float seen;
 out vec3 tint;
 out vec3 at;
 out vec3 place;
 out float share;
+out float known;
 void main() {
-  vec4 seen = modelViewMatrix * vec4(position, 1.0);
+  vec4 eye = modelViewMatrix * vec4(position, 1.0);
   place = (modelMatrix * vec4(position, 1.0)).xyz;
-  gl_Position = projectionMatrix * seen;
-  at = seen.xyz;
+  gl_Position = projectionMatrix * eye;
+  at = eye.xyz;
   tint = colour;
   share = noise;
+  known = seen;
 }`;
 
 const FRAGMENT = `
@@ -56,19 +60,26 @@ uniform sampler2D ramp;
 uniform int paint;
 uniform vec3 low;
 uniform vec3 high;
+uniform float hatchPx;
 in vec3 tint;
 in vec3 at;
 in vec3 place;
 in float share;
+in float known;
 out vec4 shown;
 void main() {
   vec3 normal = normalize(cross(dFdx(at), dFdy(at)));
   float facing = abs(dot(normal, normalize(at)));
   float light = paint == 0 ? 0.72 + 0.28 * facing : 0.25 + 0.75 * facing;
   vec3 own = paint == 0 ? tint : paint == 1 ? vec3(0.78) : texture(ramp, vec2(1.0 - share, 0.5)).rgb;
+  bool isHatched = known < 0.5 && fract((gl_FragCoord.x + gl_FragCoord.y) / hatchPx) < 0.3;
+  if (isHatched) own = mix(own, vec3(dot(own, vec3(0.3, 0.6, 0.1)) < 0.45 ? 1.0 : 0.0), 0.6);
   bool isOutside = any(lessThan(place, low)) || any(greaterThan(place, high));
   shown = vec4(own * light * (gl_FrontFacing ? 1.0 : 0.45) * (isOutside ? 0.3 : 1.0), 1.0);
 }`;
+
+/** From one line of the hatch to the next, along a row or a column of pixels, in CSS pixels. */
+const HATCH_PX = 8;
 
 /** What is higher above the mat than its paper and the noise of its depths stands on it, m; and so many points make a thing. */
 const STANDS_M = 0.005;
@@ -97,7 +108,8 @@ export class Model extends Viewer {
     ramp.magFilter = ramp.minFilter = three.LinearFilter;
     ramp.needsUpdate = true;
     const ends = { low: { value: new three.Vector3(...NOWHERE.low) }, high: { value: new three.Vector3(...NOWHERE.high) } };
-    const uniforms = { paint: { value: 0 }, ramp: { value: ramp }, ...ends };
+    const hatchPx = { value: HATCH_PX * window.devicePixelRatio };
+    const uniforms = { paint: { value: 0 }, ramp: { value: ramp }, hatchPx, ...ends };
     const shaders = { vertexShader: VERTEX, fragmentShader: FRAGMENT, glslVersion: three.GLSL3, uniforms, side: three.DoubleSide };
     this.material = new three.ShaderMaterial(shaders);
     /** @type {Map<string, three.Mesh>} parts of the surface, by their names */
@@ -138,6 +150,7 @@ export class Model extends Viewer {
     geometry.setAttribute('position', new three.BufferAttribute(surface.points, 3));
     geometry.setAttribute('colour', new three.BufferAttribute(surface.colours, 3, true));
     geometry.setAttribute('noise', new three.BufferAttribute(surface.noise, 1, true));
+    geometry.setAttribute('seen', new three.BufferAttribute(surface.seen, 1));
     const mesh = new three.Mesh(geometry, this.material);
     mesh.frustumCulled = false;
     const [x, y, z] = this.ofCamera(surface.low);
@@ -178,6 +191,11 @@ export class Model extends Viewer {
     uniforms.low.value.set(ends[0][0], -ends[1][1], -ends[2][1]);
     uniforms.high.value.set(ends[0][1], -ends[1][0], -ends[2][0]);
     this.draw();
+  }
+
+  /** Whether some of it is hatched. @returns {boolean} */
+  hasUnseen() {
+    return [...this.surfaces.values()].some(({ seen }) => seen.includes(0));
   }
 
   /** @returns {boolean} */

@@ -57,20 +57,28 @@ export class ScanPanel {
     const value = (/** @type {string} */ id) => field(id).value.trim();
     const kind = value('scan-kind');
     const mat = kind === 'mat' ? value('scan-mat') || 'usual' : '';
-    return { voxel: value('scan-voxel'), box: value('scan-box'), mat, turntable: kind === 'turntable' ? 'yes' : '', object: kind === 'object' ? 'yes' : '' };
+    return {
+      voxel: value('scan-voxel'),
+      box: value('scan-box'),
+      mat,
+      turntable: kind === 'turntable' ? 'yes' : '',
+      object: kind === 'object' ? 'yes' : '',
+      unseen: value('scan-unseen'),
+    };
   }
 
   /** Show the options of the newest scan, whichever viewer chose them; they may be changed for the next one. @param {Record<string, string>} options */
   follow(options) {
     const isOn = this.isScanning();
-    for (const id of ['scan-kind', 'scan-mat', 'scan-voxel']) if (field(id).disabled !== isOn) field(id).disabled = isOn;
+    for (const id of ['scan-kind', 'scan-mat', 'scan-voxel', 'scan-unseen']) if (field(id).disabled !== isOn) field(id).disabled = isOn;
     const told = JSON.stringify(options);
     if (told === this.followed) return;
     this.followed = told;
-    const { voxel = '', box = '', mat = '', turntable = '', object = '' } = options;
+    const { voxel = '', box = '', mat = '', turntable = '', object = '', unseen = '' } = options;
     field('scan-kind').value = mat ? 'mat' : turntable ? 'turntable' : object ? 'object' : '';
     field('scan-mat').value = mat === 'usual' ? '' : mat;
     field('scan-voxel').value = voxel;
+    field('scan-unseen').value = unseen;
     this.kind();
     if (box === this.field.value.trim() || document.activeElement === this.field) return;
     this.field.value = box;
@@ -170,6 +178,7 @@ export class ScanPanel {
     if (!this.state()?.scan) return;
     const has = await this.surface.ask();
     show(byId('scan-none'), this.model.isEmpty());
+    if (has) show(byId('scan-hatch'), this.model.hasUnseen());
     data(byId('scan-model'), 'parts', String(this.model.parts.size));
     if (has && !this.isHeld) this.model.view('turned');
   }

@@ -89,7 +89,7 @@ async function turnCloud(root, pictures, m) {
 /** @param {HTMLElement} root - a .modelview */
 function turnModel(root) {
   const [canvas, over] = /** @type {HTMLCanvasElement[]} */ ([...root.querySelectorAll('canvas')]);
-  const { mesh, points, triangles, colours, noise } = /** @type {Record<string, string>} */ (root.dataset);
+  const { mesh, points, triangles, colours, noise, seen } = /** @type {Record<string, string>} */ (root.dataset);
   try {
     const model = new Model(canvas, over);
     const shown = JSON.parse(mesh);
@@ -100,6 +100,7 @@ function turnModel(root) {
       triangles: new Uint32Array(bytes(triangles).buffer),
       colours: bytes(colours),
       noise: bytes(noise),
+      seen: bytes(seen),
     });
     connectViews(root, model);
     for (const choice of /** @type {NodeListOf<HTMLInputElement>} */ (root.querySelectorAll('input[data-paint]')))

@@ -1,12 +1,13 @@
 // The surface of a scan as it grows: asks for what is new, once a second while somebody looks, and takes the answer apart.
 
 /** @typedef {import('./model.js').Surface} Surface */
-/** @typedef {{place: number[], low: [number, number, number], step: number, points: number, triangles: number}} Entry */
+/** @typedef {{place: number[], low: [number, number, number], step: number, points: number, triangles: number, unseen: number}} Entry */
 /** @typedef {{begun: number, newest: number, axes: import('./model.js').Axes, patches: Entry[]}} Head */
 
 /**
  * Take an answer apart.
- * @param {ArrayBuffer} buffer - header length (uint32, little endian), header (JSON), then points, triangles and colours of each patch
+ * @param {ArrayBuffer} buffer - header length (uint32, little endian), header (JSON), then points, triangles and colours of each patch, then
+ *   for each patch with unseen points whether its points are seen
  * @returns {{head: Head, patches: [string, Surface][]}}
  * @throws {RangeError} if it is shorter than its header says
  */
@@ -24,8 +25,12 @@ export function patchesOf(buffer) {
     const points = next(Uint16Array, 3 * entry.points, 2);
     const triangles = next(Uint16Array, 3 * entry.triangles, 2);
     const colours = next(Uint8Array, 3 * entry.points, 1);
-    const surface = { low: entry.low, step: entry.step, points, triangles, colours, noise: new Uint8Array(entry.points) };
+    const seen = new Uint8Array(entry.points).fill(1);
+    const surface = { low: entry.low, step: entry.step, points, triangles, colours, noise: new Uint8Array(entry.points), seen };
     return /** @type {[string, Surface]} */ ([entry.place.join(' '), surface]);
+  });
+  head.patches.forEach((entry, number) => {
+    if (entry.unseen) patches[number][1].seen = next(Uint8Array, entry.points, 1);
   });
   return { head, patches };
 }

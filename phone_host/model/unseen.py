@@ -1,0 +1,17 @@
+"""What becomes of the part of a closed surface that no view measured."""
+
+from enum import Enum
+
+
+class UnseenSurface(Enum):
+    """The values of `--unseen`.
+
+    Attributes:
+        FILL: it is there, with colours from the border of the surface that was measured.
+        PINK: it is there, in pink.
+        CUT: it is not there; the surface is open.
+    """
+
+    FILL = "fill"
+    PINK = "pink"
+    CUT = "cut"
