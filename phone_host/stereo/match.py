@@ -15,13 +15,16 @@ user types. The entry point is a callable that takes the number of disparities (
 """
 
 from dataclasses import dataclass, field
-from typing import assert_never
+from typing import Final, assert_never
 
-from common.errors import SettingsError
+import numpy as np
+
+from common.errors import DataError, SettingsError, TandemError
 from common.program.extensions import make_registered
+from common.words import counted
+from phone_host.model import Disparity, RectifiedPair
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match_block import BlockMatcher
-from phone_host.stereo.match_checked import CheckedMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.match_tandem import TandemMatcher
@@ -29,6 +32,8 @@ from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, R
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.native.library import native, required
 from phone_host.stereo.network_name import NetworkMatcher
+
+_MEND: Final = "mend or uninstall the package that registers it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,3 +104,43 @@ def make_matcher(name: str, disparities: int) -> Matcher:
         SettingsError: no matcher has that name, or disparities is below 1.
     """
     return create_matcher(MatchSettings(matcher_named(name), disparities))
+
+
+class CheckedMatcher:
+    """A matcher of another package, whose results are checked against the rules: a mistake in it is one line and never a wrong cloud.
+
+    Args:
+        matcher: computes the disparities.
+        name: what the user calls it.
+        disparities: N; every value must be in [0, N).
+    """
+
+    def __init__(self, matcher: Matcher, name: str, disparities: int) -> None:
+        self._matcher, self._name, self._disparities = matcher, name, disparities
+
+    def match(self, pair: RectifiedPair) -> Disparity:
+        """Match one pair.
+
+        Returns:
+            (H, W) float32, px, in [0, N); NaN = none. An infinite value counts as none.
+
+        Raises:
+            DataError: the matcher failed, or its result breaks the rules.
+        """
+        try:
+            found = np.asarray(self._matcher.match(pair), np.float32)
+        except TandemError:
+            raise
+        except Exception as error:
+            raise DataError(f"matcher {self._name} failed ({type(error).__name__}: {error})", _MEND) from error
+        shape = pair.left.shape[:2]
+        if found.shape != shape:
+            raise DataError(f"matcher {self._name} gave a map of shape {found.shape} for images of {shape}", _MEND)
+        found = np.where(np.isfinite(found), found, np.float32(np.nan))
+        outside = int(np.count_nonzero((found < 0) | (found >= self._disparities)))
+        if outside:
+            raise DataError(
+                f"matcher {self._name} gave {counted(outside, 'disparity', 'disparities')} outside 0 to {self._disparities - 1}",
+                _MEND,
+            )
+        return found

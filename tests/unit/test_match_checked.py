@@ -7,7 +7,7 @@ import pytest
 
 from common.errors import DataError
 from phone_host.model import Disparity, RectifiedPair
-from phone_host.stereo.match_checked import CheckedMatcher
+from phone_host.stereo.match import CheckedMatcher
 
 _IMAGE = np.zeros((4, 6), np.uint8)
 _PAIR = RectifiedPair(_IMAGE, _IMAGE)
