@@ -15,12 +15,12 @@ RATE_HZ = 400
 ZERO_NS = 1_700_000_000 * 10**9
 
 
-def hand(chance: np.random.Generator, seconds: float, quantities: int = 3) -> Floats:
-    """Return positions, (M, quantities), RATE_HZ times a second: their rates have a spread of 1, and little above 2 Hz."""
+def hand(chance: np.random.Generator, seconds: float) -> Floats:
+    """Return positions, (M, 2), RATE_HZ times a second: their rates have a spread of 1, and little above 2 Hz."""
     count = int(seconds * RATE_HZ)
     hertz = np.fft.rfftfreq(count, 1 / RATE_HZ)
     rates = []
-    for _ in range(quantities):
+    for _ in range(2):
         spectrum = np.fft.rfft(chance.standard_normal(count)) / (1 + hertz**2) * (hertz > 0.1)
         rate = np.fft.irfft(spectrum, count)
         rates.append(rate / rate.std())
@@ -28,7 +28,7 @@ def hand(chance: np.random.Generator, seconds: float, quantities: int = 3) -> Fl
 
 
 def at(positions: Floats, moments_s: Floats) -> Floats:
-    """Return positions at any moments, (N, quantities)."""
+    """Return positions at any moments, (N, 2)."""
     ticks = np.arange(len(positions)) / RATE_HZ
     return np.column_stack([np.interp(moments_s, ticks, one) for one in positions.T])
 
