@@ -257,7 +257,7 @@ def test_a_surface_that_leaves_directions_open_confirms_only_what_it_lies_on(tim
     """A wall can be slid along itself, which takes up a part of any error: where a surface must confirm a piece it has to lie as near as views usually do, not twice as far off."""
     pieces = Pieces(SETTINGS, 1, PoseGate(), native())
     flat = plane_view(SEEN[0], PICTURE, WALL)
-    waves_m = np.float32(0.01) * np.sin(np.arange(flat.depth_m.shape[1], dtype=np.float32) / 12)
+    waves_m = 0.01 * np.sin(np.arange(flat.depth_m.shape[1], dtype=np.float32) / 12)
     wall = replace(flat, depth_m=(flat.depth_m + waves_m).astype(np.float32))
     pieces.fuse(flat, SEEN[0], None)
     pieces.moved(UNKNOWN, 1.0)
