@@ -62,7 +62,7 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
         FileLink(MODEL, f"the surface with its colours, metres; {_axes_words(report.axes)}"),
         FileLink(
             TRAJECTORY,
-            "where the camera was, a line a pair whose pose is known: s, m, quaternion x y z w (TUM's format)",
+            "camera poses, one line for each pair whose pose is known: s, m, quaternion x y z w (TUM's format)",
         ),
         FileLink("report.json", "all figures, with those of every pair"),
     )
@@ -165,7 +165,7 @@ def _border(model: ModelFigures, unseen: UnseenSurface) -> Figure:
     """Tell what nobody saw: how much of a closed surface, or where an open one ends."""
     if math.isfinite(model.unseen_share):
         share, unit = share_text(model.unseen_share).split(" ")
-        return Figure(label="never in view", value=share, unit=unit, note=f"of the surface; {unseen_words(unseen)}")
+        return Figure(label="never in view", value=share, unit=unit, note=f"of the surface; it {unseen_words(unseen)}")
     border, unit = distance_text(model.size.border_m).split(" ")
     note = "length of the edges where the surface ends; 0 is closed"
     return Figure(label="open border", value=border, unit=unit, note=note)

@@ -196,6 +196,37 @@ def drawn(page: Browser) -> list[float]:
     return [float(value) for value in page.ask(DRAWN)]
 
 
+def test_unseen_surface_of_a_scan_is_hatched(shown: tuple[Browser, str], tmp_path: Path) -> None:
+    """Of a red square the right half was never in view: dark or bright lines cross it there, and none on the left; the caption says what they mean."""
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 41))
+    points = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 2.0)]).astype(np.float32)
+    corner = np.arange(41 * 41).reshape(41, 41)[:-1, :-1].ravel()
+    quads = np.column_stack([corner, corner + 41, corner + 1, corner + 1, corner + 41, corner + 42]).reshape(-1, 3)
+    mesh = Mesh(points, np.tile(np.array([[200, 20, 20]], np.uint8), (len(points), 1)), quads.astype(np.int32))
+    model = ShownModel(mesh, np.full(len(points), 0.001, np.float32), 0.01, seen=points[:, 0] < 0)
+    path = tmp_path / "index.html"
+    path.write_text(document("Scan", model_view(model, "model.ply"), Script.DEPTH))
+    page, _ = shown
+    page.complaints.clear()
+    page.open(path.as_uri())
+    page.wait("document.querySelector('.turn canvas').dataset.drawn")
+    page.ask("document.querySelector('button[data-to=front]').click()")
+    page.wait(f"Math.abs({DRAWN}[1] - Math.PI / 2) < 0.02")
+    page.wait("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+    left, top, width, height = box(page, ".turn canvas")
+    page.picture(tmp_path / "seen.png")
+    picture = cv2.imread(str(tmp_path / "seen.png"))
+    assert picture is not None
+    row, middle = round(top + page.ask("scrollY") + height / 2), round(left + width / 2)
+    spread = [
+        picture[row - 9 : row + 9, middle + step - 12 : middle + step + 12, 1].astype(float).std() for step in (-40, 40)
+    ]
+    assert spread[0] < 3
+    assert spread[1] > 15
+    assert "Hatched surface was never in view" in page.ask("document.querySelector('figcaption').textContent")
+    assert page.complaints == []
+
+
 def test_a_scan_turns_and_shows_how_exactly_it_is_known(shown: tuple[Browser, str], tmp_path: Path) -> None:
     """The model is drawn in its colours, red; `shape alone` is grey; a button turns it; its policy refuses nothing."""
     points = np.array([[-0.5, -0.5, 2], [0.5, -0.5, 2], [-0.5, 0.5, 2], [0.5, 0.5, 2]], np.float32)

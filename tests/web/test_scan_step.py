@@ -66,7 +66,7 @@ def test_the_surface_grows_until_it_is_saved(
         "unseen": "",
     }
     assert page.text_content("#scan-none") == "No surface yet"
-    words = "2 pairs in the model: moved too fast: move more slowly, back to where it was"
+    words = "2 pairs in the model: moved too fast: go back to where it was, and move more slowly"
     growing.show(60)
     program.patches = growing.patches
     program.change(scan=ScanState(words=words, level="bad", pairs=5, fused=2))
@@ -129,18 +129,18 @@ _HORNED = """async () => {
   for (let at = 0; at < 5; at++) points.push(15, 15, 106);
   const model = new Model(canvas, over);
   const [low, step] = [[0, 0, 0], 0.001];
-  const colours = new Uint8Array(points.length), noise = new Uint8Array(points.length / 3);
+  const colours = new Uint8Array(points.length), noise = new Uint8Array(points.length / 3), seen = noise.map(() => 1);
   model.stands('mat');
-  model.show({ low, step, points: new Uint16Array(points), triangles: new Uint16Array([0, 1, 2]), colours, noise });
+  model.show({ low, step, points: new Uint16Array(points), triangles: new Uint16Array([0, 1, 2]), colours, noise, seen });
   while (!canvas.dataset.drawn) await new Promise(requestAnimationFrame);
   const mesh = model.parts.get('');
   mesh.updateWorldMatrix(true, false);
-  const seen = points.flatMap((_, at) => {
+  const shown = points.flatMap((_, at) => {
     if (at % 3) return [];
     const place = mesh.localToWorld(mesh.position.clone().set(...points.slice(at, at + 3))).project(model.camera);
     return [Math.abs(place.x), Math.abs(place.y)];
   });
-  return Math.max(...seen);
+  return Math.max(...shown);
 }"""
 """Shows a column of 100 mm with a horn of 6 mm that has one point in 600; returns how far its points lie from the middle, 1: at the edge."""
 
@@ -152,9 +152,9 @@ _ON_MAT = """async () => {
   for (let at = 0; at < 2500; at++) points.push((at * 7) % 201, (at * 13) % 161, 10);
   for (let at = 0; at < 500; at++) points.push(80 + 40 * (at % 2), 60 + 40 * ((at >> 1) % 2), 10 + ((at * 7) % 101));
   const model = new Model(canvas, over);
-  const [colours, noise] = [new Uint8Array(points.length), new Uint8Array(points.length / 3)];
+  const [colours, noise, seen] = [points.length, points.length / 3, points.length / 3].map((count) => new Uint8Array(count).fill(1));
   model.stands('mat');
-  model.show({ low: [0, 0, -0.01], step: 0.001, points: new Uint16Array(points), triangles: new Uint16Array([0, 1, 2]), colours, noise });
+  model.show({ low: [0, 0, -0.01], step: 0.001, points: new Uint16Array(points), triangles: new Uint16Array([0, 1, 2]), colours, noise, seen });
   return model.middle();
 }"""
 """Shows a mat of 200 x 160 mm with a column of 40 x 40 x 100 mm on it, whose foot begins at 80, 60 mm; returns the first box."""
@@ -262,7 +262,7 @@ def test_what_is_scanned_is_chosen(
 
 
 def test_what_stands_on_a_mat_stands_upright(program: Played, opened: Opener) -> None:
-    """A red post on a blue plate, z up: on the screen the post stands above the middle of the plate."""
+    """A red post on a blue plate, z up: on the screen the post stands above the middle of the plate; the left of the plate, which nobody saw, is hatched."""
     z, turn = np.meshgrid(np.linspace(0, 0.1, 60), np.linspace(0, 2 * np.pi, 60))
     post = np.stack([0.01 * np.cos(turn), 0.01 * np.sin(turn), z], axis=-1).reshape(-1, 3)
     x, y = np.meshgrid(np.linspace(-0.08, 0.08, 60), np.linspace(-0.08, 0.08, 60))
@@ -272,7 +272,7 @@ def test_what_stands_on_a_mat_stands_upright(program: Played, opened: Opener) ->
     colours = np.repeat(np.array([(255, 0, 0), (0, 0, 255)], np.uint8), 3600, axis=0)
     mesh = Mesh(np.concatenate([post, plate]).astype(np.float32), colours, np.concatenate([quads, quads + 3600]))
     program.patches = Patches(1)
-    program.patches.become(mesh, 0.01)
+    program.patches.become(mesh, 0.01, mesh.points_m[:, 0] > -0.04)
     program.axes = "mat"
     program.scan, program.activity = ScanState(words="go on", level="good"), Activity.SCANNING
     page = opened("scan")
@@ -287,3 +287,7 @@ def test_what_stands_on_a_mat_stands_upright(program: Played, opened: Opener) ->
     assert len(rows_of_post) > 20
     assert rows_of_post.min() < rows_of_plate.min() - 10
     assert rows_of_post.max() < rows_of_plate.max()
+    assert page.text_content("#scan-hatch:not([hidden])") == "Hatched surface was never in view: its shape is a guess."
+    hatched = ((blue > red + 30) & (red > 70) & (green > 70))[rows_of_plate.min() : rows_of_plate.max()]
+    half = hatched.shape[1] // 2
+    assert hatched[:, 80:half].sum() > 100 + 10 * hatched[:, half:-80].sum()
