@@ -130,7 +130,7 @@ class LiveScan:
             return "no pair has come" if self._has_ended else "waiting for the first pair"
         count = f"{counted(self._counts[1], 'pair')} in the model"
         if self._has_ended:
-            return f"{count}: all pairs have come, the model is being made"
+            return f"{count}: all pairs have arrived, the model is being made"
         unused, weakness = self._mat.remark, last.weakness
         if unused is not None and (not weakness.advice or weakness in (*OF_TURNING, *OF_TABLE)):
             return f"{count}: {unused.text}"
@@ -156,7 +156,7 @@ class LiveScan:
         missed = sum(account.dropped for account in snapshot.sinks if account.name == _SINK)
         if missed:
             words = f"{counted(missed, 'pair')} came while others were taken into the model, and passed"
-            remarks.append(Remark(words, "a greater --voxel is faster", is_note=True))
+            remarks.append(Remark(words, "a larger --voxel is faster", is_note=True))
         remarks.extend(self.kept.remarks)
         model = self.scan.model()
         if self.scan.settings is not None:

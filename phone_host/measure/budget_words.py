@@ -12,8 +12,8 @@ _MS: Final = 1e6
 
 _WHY: Final = {
     BudgetReason.TOO_SLOW: "pairs took too long",
-    BudgetReason.ROOM: "there was room",
-    BudgetReason.AS_FAST: "a better way takes no longer",
+    BudgetReason.ROOM: "there was time to spare",
+    BudgetReason.AS_FAST: "a better matching method takes no longer",
     BudgetReason.OTHER_SIZE: "images came in another size",
 }
 

@@ -148,7 +148,7 @@ def history_lines(history: Sequence[Episode], pairs: int, save_every: int) -> li
     more = len(past(history)) - _MOST_TOLD
     return [
         *lines,
-        *([f"{counted(more, 'more doubt')} stood for a while: see trust.history in report.json"] if more > 0 else []),
+        *([f"{counted(more, 'more doubt')} lasted for a while: see trust.history in report.json"] if more > 0 else []),
     ]
 
 

@@ -83,7 +83,7 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
         found.append(
             Concern(
                 Doubt.LATE_IMAGES,
-                f"what moves lies beside its row by {drift.late_px:.1f} px: the {'left' if drift.late_ns > 0 else 'right'} images show it"
+                f"moving objects are off their row by {drift.late_px:.1f} px: the {'left' if drift.late_ns > 0 else 'right'} images show it"
                 f" {abs(drift.late_ns) / 1e6:.0f} +- {2 * drift.late_sigma_ns / 1e6:.0f} ms later than their stamps say",
                 _TIME,
             )
@@ -122,16 +122,16 @@ def drift_lines(drift: Drift | None) -> list[str]:
     often = times(len(away))
     return [
         _drift_line(drift),
-        f"a camera or the board was away {often}, last for {away[-1].away_s:.1f} s: drift was measured afresh",
+        f"a camera or the board was away {often}, last for {away[-1].away_s:.1f} s: drift measurement started again",
     ]
 
 
 def _drift_line(drift: Drift) -> str:
     if drift.state is DriftState.UNKNOWN:
-        used = "nothing was corrected" if drift.overlay == AS_CALIBRATED else "the correction of before is kept"
+        used = "nothing was corrected" if drift.overlay == AS_CALIBRATED else "the earlier correction is kept"
         return f"drift: not measured: too few features, or too badly spread; {used}"
     if drift.state is DriftState.STEADY:
-        return f"drift: none; the rig stands as it was calibrated, rows are known to {drift.rows_sigma_px:.2f} px"
+        return f"drift: none; the rig matches its calibration, the row error is known to {drift.rows_sigma_px:.2f} px"
     told = {
         DriftState.CORRECTED: "corrected",
         DriftState.DEPARTED: "not corrected",
@@ -151,12 +151,12 @@ def stills_words(drift: Drift) -> str:
     """
     if drift.state is DriftState.UNKNOWN:
         return "drift: not measured: too few features, or too badly spread"
-    rows = f"rows are known to {drift.rows_sigma_px:.2f} px"
+    rows = f"the row error is known to {drift.rows_sigma_px:.2f} px"
     told = f"{turn_words(drift.departure)}; vertical error {drift.rows_px:.2f} px, {drift.left_px:.2f} px left; {rows}"
     parts = [
         f"the right camera against its calibration: {told}"
         if drift.departure != AS_CALIBRATED
-        else f"none; the rig stands as it was calibrated, {rows}"
+        else f"none; the rig matches its calibration, {rows}"
     ]
     knocks = [f"{change.at_s:.0f}" for change in drift.changes if change.kind is ChangeKind.KNOCKED]
     if moving := _moving(drift, 1.0):

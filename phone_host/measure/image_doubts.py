@@ -99,8 +99,8 @@ _OTHER_SCENE: Final = Concern(
 
 _CROPPED: Final = Concern(
     Doubt.CROPPED_RIG,
-    "an image is smaller than in the calibration and has another shape: it was taken for the middle of that one",
-    "use a size of the calibration's shape; or calibrate at this size, if the camera may cut elsewhere or squeeze",
+    "an image is smaller than in the calibration and has another aspect ratio: it is treated as the centre of that one",
+    "use a size with the calibration's aspect ratio; or calibrate at this size, if the camera may crop elsewhere or stretch",
 )
 
 
@@ -169,7 +169,7 @@ def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Co
             Concern(
                 Doubt.LOW_CONSISTENCY,
                 f"only {figures.consistency:.0%} of the depth is confirmed from right to left",
-                "light the scene well, and give it texture; plain and repeated surfaces deceive the matcher",
+                "light the scene well, and give it texture; plain and repeated surfaces mislead the matcher",
             )
         )
     return tuple(found)

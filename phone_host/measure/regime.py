@@ -116,7 +116,9 @@ def judge(figures: RunFigures) -> Judgement:
 
 def _judge(figures: RunFigures) -> Judgement:
     if figures.pairs < _FEW or not math.isfinite(figures.interval_ns) or not figures.processing_ns > 0:
-        return Judgement(Regime.UNKNOWN, f"too few pairs ({figures.pairs}) to tell whether the processor starves")
+        return Judgement(
+            Regime.UNKNOWN, f"too few pairs ({figures.pairs}) to say whether the processor waits for frames"
+        )
     if figures.busy >= _BUSY:
         return _backlog(figures)
     waits = f"the processor is idle for {100 * (1 - figures.busy):.0f} % of the time"

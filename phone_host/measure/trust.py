@@ -258,7 +258,7 @@ def unbelieved_concerns(unbelieved: Unbelieved) -> tuple[Concern, ...]:
         found.append(
             Concern(
                 Doubt.DISBELIEVED,
-                f"{sum(unbelieved.disbelieved.values())} of {counted(unbelieved.received, 'frame')} could not be true and {'was' if sum(unbelieved.disbelieved.values()) == 1 else 'were'} dropped ({reasons})",
+                f"{sum(unbelieved.disbelieved.values())} of {counted(unbelieved.received, 'frame')} had impossible values and {'was' if sum(unbelieved.disbelieved.values()) == 1 else 'were'} dropped ({reasons})",
                 _STOOD_STILL if is_of_clock else _LIES,
                 spares_depth=is_of_clock,
             )

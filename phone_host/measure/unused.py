@@ -64,7 +64,7 @@ def _on_the_way(run: RunSnapshot) -> Iterator[Unused]:
     yield Unused("packets of something else", "", run.link.garbage)
     yield Unused("frames that came before the clock was known", "", run.link.no_clock)
     for reason, count in disbelieved(run).items():
-        yield Unused("frames that could not be true", reason, count)
+        yield Unused("frames with impossible values", reason, count)
 
 
 def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:

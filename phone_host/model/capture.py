@@ -21,7 +21,7 @@ class Warping(Enum):
 class Unseen(Enum):
     """Why some frames do not tell whether they were warped.
 
-    STILL: the picture moved too little. PLAIN: too few details. FLAT: a wall or a poster, whose film fits many cameras. LIVELY: too much in the picture moves by itself. VAGUE: neither clearly rigid nor clearly
+    STILL: the picture moved too little. PLAIN: too few details. FLAT: a wall or a poster, whose film fits many cameras. LIVELY: too much in the picture moves on its own. VAGUE: neither clearly rigid nor clearly
     warped.
     """
 

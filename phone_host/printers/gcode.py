@@ -191,7 +191,7 @@ def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINE
         if not path.is_somewhere:
             raise DataError(f"{name}: line {line.number} moves to no place", "give the file that a slicer wrote")
     if not count:
-        raise DataError(f"{name} has no line that a printer would do", "give the file that a slicer wrote")
+        raise DataError(f"{name} has no line that a printer would execute", "give the file that a slicer wrote")
     has_model = path.model.moves > 0
     whole = path.model if has_model else path.printer  # nothing but start code is what is printed
     return GcodeFacts(

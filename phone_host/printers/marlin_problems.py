@@ -28,9 +28,7 @@ SILENT: Final = Problem(
 _CABLE: Final = "see whether its cable is sound and its baud rate right, and whether its heaters are off"
 
 
-UNREPORTED: Final = (
-    "the printer has answered the lines that switch heaters off, and does not report their goals: see that it cools"
-)
+UNREPORTED: Final = "the printer has answered the lines that switch heaters off, and does not report their target temperatures: check that it cools"
 
 
 def ended_there(words: str, *, is_cold: bool) -> Problem:
@@ -50,7 +48,7 @@ def still_heating(heaters: str) -> Problem:
         heaters: that are on, with their goals.
     """
     return Problem(
-        f"the printer has answered the lines that switch its heaters off, and heats all the same ({heaters})",
+        f"the printer has confirmed that its heaters are off, but still heats ({heaters})",
         "go and look; switch it off at its plug",
     )
 

@@ -272,7 +272,7 @@ def _exchange(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[
 def _require_cold(sender: MarlinSender) -> None:
     if not sender.cooling.is_confirmed:
         raise PrinterGoneError(
-            "the printer does not answer any more: the lines that switch its heaters off were written, and nobody knows whether it has read them",
+            "the printer does not answer any more: the lines that switch its heaters off were written, but it may not have read them",
             "go and look; switch it off if its display does not say that they are cold",
         )
 

@@ -43,7 +43,7 @@ class Answer:
             read = None
         if not isinstance(read, dict):
             raise UnavailableError(
-                f"{self.server} gives an answer that is none of its kind",
+                f"{self.server} gives an unexpected kind of answer",
                 "check the address, and which server is there",
             )
         return Value(read)

@@ -91,7 +91,7 @@ class ServerDoor:
             if wishes.is_left:
                 return _Watch(self._server, job, wishes, tell, self._patience).until_over()
             raise ServerLostError(
-                f"{error.problem} while it gets the file: nobody knows whether it prints", "look at its own page"
+                f"{error.problem} while it gets the file: it may or may not print", "look at its own page"
             ) from None
         ended = _Watch(self._server, job, wishes, tell, self._patience).until_over()
         return replace(ended, notes=(*ended.notes, *passed_note(job.facts.host_commands, self._server.title)))

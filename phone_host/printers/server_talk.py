@@ -33,7 +33,7 @@ _STORED_S: Final = 120.0
 _MOST_BYTES: Final = 1 << 20
 _MOVED: Final = frozenset({301, 302, 303, 307, 308})
 _FAILURES: Final[tuple[tuple[type[Exception], str, str], ...]] = (
-    (ssl.SSLCertVerificationError, "has a certificate that this machine does not trust", "add its authority to this machine"),
+    (ssl.SSLCertVerificationError, "has a certificate that this machine does not trust", "install its certificate authority on this machine"),
     (ssl.SSLError, "does not speak https", "leave ?tls=1 out"),
     (TimeoutError, "does not answer", "see whether it is on, and whether both are in one network"),
     (ConnectionRefusedError, "refuses the connection", "see whether it is running, and at which port"),
@@ -146,7 +146,9 @@ class ServerTalk:
                 raise UnavailableError(f"{self.server} has moved to {there[:200]}", "give the new address")
             body = response.read(_MOST_BYTES + 1)
             if len(body) > _MOST_BYTES:
-                raise UnavailableError(f"{self.server} answers without an end", "check which server is there")
+                raise UnavailableError(
+                    f"{self.server} gives an answer that does not end", "check which server is there"
+                )
             challenges = response.headers.get_all("WWW-Authenticate") or []
             digest = next((each for each in challenges if each.strip().lower().startswith("digest")), "")
             return Answer(self.server, response.status, body, digest)

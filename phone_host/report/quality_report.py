@@ -117,7 +117,7 @@ class QualityReport:
 
 
 def flaw(quality: PlaneQuality) -> Remark | None:
-    """Say why what is seen is no plane, and what helps; None if it is one."""
+    """Say why the region shows no plane, and what helps; None if it is one."""
     match quality.seen:
         case Seen.PLANE:
             return None
@@ -129,25 +129,25 @@ def flaw(quality: PlaneQuality) -> Remark | None:
             )
         case Seen.OFF_PLANE:
             return Remark(
-                f"what is seen is no plane: {quality.off_plane:.0%} of the disparities lie far off the best one",
+                f"the region shows no plane: {quality.off_plane:.0%} of the disparities lie far off the best one",
                 "aim at one flat textured wall with nothing before it, or choose a flat part with --roi X,Y,W,H",
                 is_blocking=True,
             )
         case Seen.ENDLESS:
             return Remark(
-                "the plane that is seen reaches infinity inside the region",
+                "the plane in view reaches infinity inside the region",
                 "aim at a wall, not along a floor or a table, or choose a nearer part with --roi X,Y,W,H",
                 is_blocking=True,
             )
         case Seen.BENT:
             return Remark(
-                f"what is seen is no plane: neighbouring disparities lie off it together, by {quality.bend_px:.2f} px RMS",
+                f"the region shows no plane: neighbouring disparities lie off it together, by {quality.bend_px:.2f} px RMS",
                 "aim at one flat wall or board with nothing before it; if it is flat, the calibration's lens model is wrong: calibrate again",
                 is_blocking=True,
             )
         case Seen.SCATTERED:
             return Remark(
-                f"what is seen is no plane: disparities scatter by {quality.subpixel_rms_px:.1f} px around the best one",
+                f"the region shows no plane: disparities scatter by {quality.subpixel_rms_px:.1f} px around the best one",
                 "aim at a textured wall, light it well, and check that the calibration fits these cameras",
                 is_blocking=True,
             )

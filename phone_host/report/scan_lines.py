@@ -50,7 +50,7 @@ def mat_line(mat: MatFigures) -> str:
     left, right = (f"{count:.0f}" for count in mat.seen)
     square = f"{mat.measured_m * 1e3:.2f} \u00b1 {mat.measured_sigma_m * 1e3:.2f} mm"
     return (
-        f"the mat is seen in {counted(mat.pairs, 'pair')}, {left} and {right} of its {mat.corners} corners (median); places are known to"
+        f"the mat is seen in {counted(mat.pairs, 'pair')}, {left} and {right} of its {mat.corners} corners (median); poses are known to"
         f" \u00b1 {two_digits(mat.sigma_m * 1e3)} mm; its squares measure {square}"
     )
 

@@ -99,8 +99,8 @@ def require_something(report: ScanReport) -> None:
     """
     if not report.pairs:
         raise DataError(
-            "not one pair came, so there is no model",
-            "try phone-host run: it tells which frames find no partner, and why",
+            "no pair arrived, so there is no model",
+            "try phone-host run: it shows which frames find no partner, and why",
         )
     if report.failed and not report.scanned:
         raise report.failed[0].none_of(len(report.pairs))
@@ -144,7 +144,7 @@ def _require_table(report: ScanReport) -> None:
     of = f"in any of {counted(len(report.scanned), 'pair')}"
     if most is Weakness.NO_TABLE:
         raise DataError(
-            f"no table is found {of}", "show more of it around the object, from above, and give it some texture"
+            f"no table was found {of}", "show more of it around the object, from above, and give it some texture"
         )
     if most is Weakness.BARE_TABLE:
         raise DataError(
@@ -168,7 +168,9 @@ def require_turning(report: ScanReport) -> None:
             "the background of these pairs moves, too", "let the cameras stand still, or leave --turntable out"
         )
     if most is Weakness.OUTSIDE:
-        raise DataError("what turns reaches out of the picture", "move the cameras back, or the object to the middle")
+        raise DataError(
+            "the turning object reaches beyond the picture", "move the cameras back, or the object to the middle"
+        )
 
 
 def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
@@ -206,15 +208,15 @@ def memory_remarks(scan: Scan) -> Sequence[Remark]:
         begun, now = (distance_text(each) for each in (scan.begun_voxel_m, settings.voxel_m))
         remarks.append(
             Remark(
-                f"the model has reached its greatest size: its voxels became {now} wide, {begun} at first",
-                "give a greater --memory, or a nearer --far",
+                f"the model has filled its memory: its voxels became {now} wide, {begun} at first",
+                "give a larger --memory, or a smaller --far",
             )
         )
     if scan.volume is not None and scan.volume.left_out:
         remarks.append(
             Remark(
-                "the model has reached its greatest size: what was seen later is missing from it",
-                "give a greater --memory or --voxel, or a nearer --far",
+                "the model has filled its memory: what was seen later is missing from it",
+                "give a larger --memory or --voxel, or a smaller --far",
             )
         )
     return remarks

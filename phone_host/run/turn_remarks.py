@@ -28,7 +28,7 @@ def turn_remarks(scan: Scan) -> Sequence[Remark]:
         return (Remark(few, _REMEDY, is_blocking=True),)
     turn = scan.turn
     if turn is None:
-        return (Remark("the pairs agree on no axis about which the object turns", _REMEDY, is_blocking=True),)
+        return (Remark("the pairs do not agree on the axis about which the object turns", _REMEDY, is_blocking=True),)
     return (*_match_remarks(scan), *_closing_remarks(turn))
 
 

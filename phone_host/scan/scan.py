@@ -144,8 +144,8 @@ class Scan:
         else:
             if view.geometry != self.geometry and self._closed.pairs == len(self._pairs):
                 raise SettingsError(
-                    "the scan that is gone on with has another calibration, size or crop",
-                    "give the same options as then, or begin a new scan",
+                    "the resumed scan has another calibration, size or crop",
+                    "give the same options as before, or start a new scan",
                 )
             require_size(name, view, self.size_px)
             self._note_fineness(self.tracker.volume.settings.voxel_m)
@@ -315,8 +315,8 @@ class Scan:
         """
         if _begun_on_table(submaps) != self._wanted.on_table:
             raise SettingsError(
-                f"the scan that is gone on with was begun {'without' if self._wanted.on_table else 'with'} --object",
-                "give the same options as then, or begin a new scan",
+                f"the resumed scan was started {'without' if self._wanted.on_table else 'with'} --object",
+                "give the same options as before, or start a new scan",
             )
         first = submaps[0]
         self.geometry, self.size_px = first.geometry, first.size_px
@@ -335,16 +335,16 @@ class Scan:
         said = [pair.mat for pair in self._pairs if pair.mat is not None]
         if bool(said) != (wanted.mat is not None):
             raise SettingsError(
-                f"the scan that is gone on with had {'a' if said else 'no'} mat",
-                "give the same --mat as then, or begin a new scan",
+                f"the resumed scan had {'a' if said else 'no'} mat",
+                "give the same --mat as before, or start a new scan",
             )
         if isinstance(self.tracker, MatTracker):
             self.tracker.know(said[-1].scale)
         carved, self._carving = submaps[-1].carved, self._carving_of(wanted.model_box)
         if (None if carved is None else carved.cells) != (None if self._carving is None else self._carving.cells):
             raise SettingsError(
-                "the scan that is gone on with had another box",
-                "give the same --box and --mat as then, or begin a new scan",
+                "the resumed scan had another box",
+                "give the same --box and --mat as before, or start a new scan",
             )
         if carved is not None and self._carving is not None:
             self._carving.go_on(carved)

@@ -255,7 +255,7 @@ def test_a_printer_that_answers_and_stays_hot_is_told(ends: bool, tmp_path: Path
             _, errors = process.communicate(timeout=60)
         assert there.refused_to_cool >= 4
     assert process.returncode == 3
-    assert "heats all the same (nozzle 200 C, bed 60 C)" in errors
+    assert "but still heats (nozzle 200 C, bed 60 C)" in errors
     assert len(errors.splitlines()) == 1
 
 
@@ -264,4 +264,4 @@ def test_a_printer_that_reports_no_goals_is_noted(tmp_path: Path) -> None:
     with printer(Faults(reports=False), on_socket=True) as there:
         ended = _sent(tmp_path, there.uri)
     assert isinstance(ended, Ended)
-    assert "does not report their goals" in ended.notes[-1]
+    assert "does not report their target temperatures" in ended.notes[-1]

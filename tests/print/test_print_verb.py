@@ -133,7 +133,7 @@ def test_a_printer_that_stops_is_told(gcode: Path, tmp_path: Path, said: str, wo
         (["cube.gcode", "--printer", "serial:/dev/ttyNOPE", "--up", "y"], 2, "are for models"),
         (["none.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "does not exist"),
         (["noise.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "line 1 is no G-code"),
-        (["empty.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "no line that a printer would do"),
+        (["empty.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "no line that a printer would execute"),
         (["travel.gcode", "--printer", "serial:/dev/ttyNOPE", "--yes"], 4, "extrudes nothing"),
     ],
 )

@@ -132,7 +132,7 @@ def test_somebody_who_walks_by_is_told_and_stays_out_of_the_model(tmp_path: Path
     assert report.fused == len(TURNS_DEG)
     told = [pair.weakness for pair in report.scanned]
     assert told.count(Weakness.RESTLESS) >= 3
-    assert any("something moves against the rest" in line for line in scan_lines(report, "out"))
+    assert any("something in the scene moves" in line for line in scan_lines(report, "out"))
     off = off_surfaces_m(left_axes(surface_of(tmp_path / "out" / "model.ply")[0]))
     assert max(each.mean() for each in off.values()) < 0.002
     assert max(each.max() for each in off.values()) < 0.03
@@ -182,7 +182,7 @@ def test_two_cameras_give_the_model_of_the_files(walk: Path, tmp_path: Path) -> 
         with host([*words, "--pairs", "5", "--out", str(tmp_path / "live")], tmp_path) as receiver:
             assert receiver.wait() == 0
         sender.wait()
-    assert "5 pairs in the model: all pairs have come, the model is being made" in receiver.stderr
+    assert "5 pairs in the model: all pairs have arrived, the model is being made" in receiver.stderr
     told = receiver.out.read_text()
     assert "try next" in told
     assert re.search(r"phone-host export \S*live --to ", told)

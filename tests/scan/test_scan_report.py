@@ -132,8 +132,8 @@ def test_what_went_wrong_is_told_by_stretches() -> None:
     """Neighbours with one reason are one sentence; each says what helps."""
     pairs = [pair(0), pair(1, L, Weakness.TOO_FAST), pair(2, L, Weakness.TOO_FAST), pair(3, W, Weakness.FLAT)]
     lost, weak = (stretch.sentence for stretch in stretches(pairs))
-    assert lost == "pairs 1 to 2 are not in the model: moved too fast: move more slowly, back to where it was"
-    assert weak.startswith("pair 3 is in the model, but uncertain: only a plane is in view")
+    assert lost == "pairs 1 to 2 are not in the model: moved too fast: go back to where it was, and move more slowly"
+    assert weak.startswith("pair 3 is in the model, but uncertain: only a flat surface is in view")
 
 
 def test_figures_come_from_the_pairs_in_the_model() -> None:

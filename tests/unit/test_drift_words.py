@@ -57,14 +57,14 @@ def test_what_is_unknown_since_a_knock_is_said_so() -> None:
     assert concern.doubt is Doubt.RIG_MOVED
     assert "at once 12 s after the start; by how much is not known" in concern.sentence
     assert drift_lines(drift)[0].endswith("nothing was corrected")
-    assert drift_lines(replace(drift, overlay=PITCHED))[0].endswith("the correction of before is kept")
+    assert drift_lines(replace(drift, overlay=PITCHED))[0].endswith("the earlier correction is kept")
 
 
 def test_a_camera_that_was_away_is_told() -> None:
     """Once, and several times."""
     away = Change(kind=ChangeKind.RETURNED, at_s=30.0, departure=AS_CALIBRATED, away_s=1.5)
     once, twice = (drift_lines(replace(KNOWN, changes=(away,) * count))[1] for count in (1, 2))
-    assert once == "a camera or the board was away once, last for 1.5 s: drift was measured afresh"
+    assert once == "a camera or the board was away once, last for 1.5 s: drift measurement started again"
     assert "away twice" in twice
 
 
@@ -112,7 +112,7 @@ def test_the_line_says_what_is_known() -> None:
     assert drift_lines(None) == drift_lines(Drift()) == []
     assert "not measured: too few features" in drift_lines(Drift(judged=3))[0]
     assert (
-        "stands as it was calibrated, rows are known to 0.05 px"
+        "matches its calibration, the row error is known to 0.05 px"
         in drift_lines(replace(KNOWN, state=DriftState.STEADY))[0]
     )
     assert "not corrected" in drift_lines(replace(corrected(FAR), state=DriftState.DEPARTED))[0]
@@ -197,8 +197,8 @@ def test_what_is_no_overlay_is_refused(tmp_path: Path, content: bytes | None) ->
     ("drift", "words", "remedy"),
     [
         (Drift(judged=2), "too few features", ""),
-        (replace(KNOWN, state=DriftState.STEADY, rows_px=0.0), "drift: none; the rig stands as it was calibrated", ""),
-        (replace(corrected(FAR, KNOCK), left_px=1.0), "px left; rows are known to 0.05 px; it changed at once at pair 12", "bar"),
+        (replace(KNOWN, state=DriftState.STEADY, rows_px=0.0), "drift: none; the rig matches its calibration", ""),
+        (replace(corrected(FAR, KNOCK), left_px=1.0), "px left; the row error is known to 0.05 px; it changed at once at pair 12", "bar"),
         (replace(corrected(ZOOMED), left_px=2.5), "focal length +1.00 %", "autofocus"),
         (
             replace(corrected(FAR, KNOCK), trend=Trend(turn_rad_s=(4e-4, 0.0, 0.0), sigma_rad_s=(1e-6, 1e-6, 1e-6))),

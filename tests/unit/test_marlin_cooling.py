@@ -58,7 +58,7 @@ def test_a_printer_that_answers_and_heats_all_the_same_is_told(options: SenderOp
     bench = Bench(DRAWN, options)
     bench.run(lambda text: ["ok", "//action:cancel"] if "G1 X10*" in text else [HOT] if "M105" in text else ["ok"], 60)
     assert bench.sender.phase is Phase.FAILED
-    assert "heats all the same (nozzle 210 C)" in bench.sender.problem
+    assert "but still heats (nozzle 210 C)" in bench.sender.problem
     assert not bench.sender.cooling.is_confirmed
     assert bench.texts.count("M104 S0") == bench.texts.count("M107") == 2
     assert "M85 S0" not in bench.texts

@@ -15,7 +15,7 @@ from phone_host.printers.server_answer import Answer, Value
 @pytest.mark.parametrize("body", [b"", b"[1]", b'"text"', b"{", b"\xff", b"[" * 100_000])
 def test_an_answer_that_is_no_object_is_told_in_one_line(body: bytes) -> None:
     """Whatever the bytes are: the server is named, and nothing else is thrown."""
-    with pytest.raises(UnavailableError, match="the printer gives an answer"):
+    with pytest.raises(UnavailableError, match="the printer gives an unexpected kind of answer"):
         Answer("the printer", 200, body).json()
     assert Answer("the printer", 500, body).words == "answer 500"
 

@@ -56,7 +56,7 @@ def test_what_is_no_plane_has_a_remedy_in_one_line() -> None:
     assert (bulge.quality.seen, empty.quality.seen) == (Seen.BENT, Seen.TOO_FEW)
     told = report(bulge, empty)
     lines = quality_lines(told, "out")
-    assert lines[0].startswith("No pair shows a plane. The first: what is seen is no plane: ")
+    assert lines[0].startswith("No pair shows a plane. The first: the region shows no plane: ")
     assert "no plane" in lines[2]
     warnings = [line for line in lines if line.startswith("warning: ")]
     assert len(warnings) == 2
@@ -69,7 +69,7 @@ def test_what_is_no_plane_has_a_remedy_in_one_line() -> None:
     assert math.isnan(told.sigma_px)
     assert math.isnan(told.theory_m(1.0))
     assert flaw(report().planes[0].quality) is None
-    assert quality_verdict(report(bulge))[1].startswith("What is seen is no plane")
+    assert quality_verdict(report(bulge))[1].startswith("The region shows no plane")
     assert quality_verdict(report(bulge, failed=True))[0] is Headline.BAD
     for seen in Seen:
         problem = flaw(replace(bulge.quality, seen=seen))

@@ -158,8 +158,8 @@ def test_what_is_no_plane_is_exit_4_in_one_line(room: Path, tmp_path: Path, caps
     given = [str(room / "edge_l.png"), str(room / "edge_r.png"), "--distance", "0.8m", "--out", str(tmp_path / "o")]
     assert run(room, *given) == 4
     told = capsys.readouterr().out
-    assert told.startswith("What is seen is no plane: ")
-    assert re.search(r"^warning: edge_l.png: what is seen is no plane: .*: a\w+ .*wall", told, re.MULTILINE)
+    assert told.startswith("The region shows no plane: ")
+    assert re.search(r"^warning: edge_l.png: the region shows no plane: .*: a\w+ .*wall", told, re.MULTILINE)
     assert "bias +" not in told
     report = report_of(tmp_path / "o")
     assert report["verdict"] == "bad"
@@ -179,7 +179,7 @@ def test_a_pair_that_fails_among_others_is_named(
     assert run(room, *sides, "--out", str(tmp_path / "o")) == 4
     told = capsys.readouterr().out
     assert told.startswith("1 of 3 pairs show a plane")
-    assert "warning: 2.png: what is seen is no plane" in told
+    assert "warning: 2.png: the region shows no plane" in told
     assert "3.png failed: " in told
     report = report_of(tmp_path / "o")
     assert [pair.get("seen") for pair in report["pairs"]][::2] == ["plane", None]

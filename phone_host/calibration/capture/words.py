@@ -36,9 +36,7 @@ def findings_of(report: CaptureReport) -> list[Finding]:
     """
     pace = report.pace
     if not math.isfinite(pace.rate_hz):
-        return [
-            warn("rate", f"{counted(pace.frames, 'frame')} came: nothing can be told", "see whether the camera runs")
-        ]
+        return [warn("rate", f"{counted(pace.frames, 'frame')} came: too few to judge", "check that the camera works")]
     return [
         _rate(pace),
         _stamps(pace),
@@ -60,7 +58,7 @@ def _rate(pace: Pace) -> Finding:
     is_dark = pace.brightness < _DARK or pace.exposure_ms > _RATE * 1e3 / pace.asked_hz
     if is_dark or pace.usual_hz < _HALF * pace.asked_hz:
         return warn(
-            "rate", text, "more light, or hold the exposure: automatic exposure slows a camera down in the dark"
+            "rate", text, "give more light, or lock the exposure: automatic exposure slows a camera down in the dark"
         )
     return warn("rate", text, "ask for a smaller image, or for this rate")
 
@@ -74,23 +72,25 @@ def _stamps(pace: Pace) -> Finding:
         return warn("stamps", f"{counted(pace.backwards, 'stamp')} not later than the one before; {text}", remedy)
     if pace.jitter_ms > _JITTER * period_ms:
         return warn(
-            "stamps", text, "stamps that scatter so are times of arrival: use a camera path that stamps the exposure"
+            "stamps",
+            text,
+            "stamps that vary so much are arrival times: use a camera interface that stamps the exposure",
         )
     return ok("stamps", text)
 
 
 def _exposure(pace: Pace) -> Finding:
     if not math.isfinite(pace.exposure_ms):
-        return ok("exposure", f"the camera does not say; mean brightness {pace.brightness:.0f} of 255")
+        return ok("exposure", f"not reported by the camera; mean brightness {pace.brightness:.0f} of 255")
     text = f"{pace.exposure_ms:.1f} ms, at most {pace.longest_exposure_ms:.1f} ms; mean brightness {pace.brightness:.0f} of 255"
     if pace.exposure_ms > _LONG * 1e3 / pace.usual_hz:
-        return warn("exposure", text, "more light, and hold a shorter exposure: what moves is blurred")
+        return warn("exposure", text, "give more light, and lock a shorter exposure: moving objects are blurred")
     return ok("exposure", text)
 
 
 def _shutter(rigidity: Rigidity) -> Finding:
     if not math.isfinite(rigidity.readout_ms):
-        return ok("shutter", "cannot be told from these images")
+        return ok("shutter", "cannot be determined from these images")
     text = f"rows are read within {rigidity.readout_ms:.1f} +- {max(rigidity.readout_sigma_ms, 0.1):.1f} ms"
     return ok(
         "shutter",
@@ -115,13 +115,13 @@ _SCENE: Final = "film a shelf or a desk with things on it, near and far"
 _REASONS: Final = {
     Unseen.STILL: (
         "the picture moved too little",
-        "turn the camera by some degrees, to and fro, up and down, for 20 seconds",
+        "turn the camera by some degrees, left and right, up and down, for 20 seconds",
     ),
     Unseen.PLAIN: ("too few details in the picture", _SCENE),
     Unseen.FLAT: ("the scene is flat", _SCENE),
-    Unseen.LIVELY: ("too much in the picture moves by itself", "film something that stands still"),
+    Unseen.LIVELY: ("too much in the picture moves on its own", "film a scene in which nothing moves"),
     Unseen.VAGUE: (
-        "the stretches of film contradict each other",
+        "the segments of the film contradict each other",
         "film something with more details, in more light",
     ),
 }
@@ -137,9 +137,9 @@ def warp_finding(rigidity: Rigidity) -> Finding:
             lens = "" if rigidity.knows_lens else _UNCALIBRATED
             return ok("stabilisation", f"none seen: the images move as one rigid camera's{lens}")
         case Warping.STABILISED:
-            text = f"the images are warped or cropped: no rigid camera with this lens made {of}"
+            text = f"the images are warped or cropped: no rigid camera with this lens can have made {of}"
             if math.isfinite(rigidity.readout_ms):
-                text = "all rows show one moment: software makes up for the rolling shutter, as stabilisation does"
+                text = "all rows show one moment: software corrects the rolling shutter, as stabilisation does"
             return warn(
                 "stabilisation",
                 text,
@@ -155,8 +155,8 @@ def warp_finding(rigidity: Rigidity) -> Finding:
 
 _STAGES: Final = {
     Stage.STILL: "hold the camera still",
-    Stage.MOVE: "turn it a little, to and fro, up and down, before a scene that stands still",
-    Stage.WATCH: "put it down, and let it film: its rate is watched",
+    Stage.MOVE: "turn it a little, left and right, up and down, in front of a still scene",
+    Stage.WATCH: "put it down and let it film: its frame rate is measured",
     Stage.DONE: "done",
 }
 

@@ -10,10 +10,10 @@ class Words(Enum):
     """What a person is told; beside these: what a wanted view lacks, and `taken`."""
 
     SHOW_BOTH = "show the whole board to both cameras"
-    SHOW_LEFT = "the left camera sees too little of the board: to the left, or farther away"
-    SHOW_RIGHT = "the right camera sees too little of the board: to the right, or farther away"
+    SHOW_LEFT = "the left camera sees too little of the board: move it to the left, or farther away"
+    SHOW_RIGHT = "the right camera sees too little of the board: move it to the right, or farther away"
     PART = "show more of the board"
-    SAME = "both cameras show the same picture: name two cameras"
+    SAME = "both cameras show the same picture: choose two different cameras"
     HELP = "no board found: more light, no glare, the whole board with its white margin; or name its inner corners"
     STILL = "hold still"
     BLURRED = "too blurred: hold still, more light"

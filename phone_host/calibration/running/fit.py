@@ -1,7 +1,7 @@
 """Fits the right camera's turn and focal length to the rows of many features, and tells how well they are known. Pure.
 
 - Robust: Tukey's weights; a wrong match or a thing that moved between the two exposures counts nothing.
-- Late images: what moves lies beside its row by its speed times the time between the exposures. That time is estimated as
+- Late images: moving objects are off their row by their speed times the time between the exposures. That time is estimated as
   well, so that it is not taken for a turn; and whatever moves counts for less, by what its stamp and its speed may be off,
   which all features of one thing share.
 - Honest: a lens model is never perfect, and what it leaves differs from place to place but not from pair to pair. So all

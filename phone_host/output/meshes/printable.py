@@ -241,7 +241,7 @@ def _walls(
     share_of_area = float(areas[thin].sum() / areas.sum()) if areas.sum() else 0.0
     if share_of_area < _LEAST_THIN:
         return []
-    words = f"{share_of_area:.1%} of the surface has less than {least_mm:g} mm behind it"
+    words = f"{share_of_area:.1%} of the surface is thinner than {least_mm:g} mm"
     return [_problem(Flaw.THIN, words, "scale it up, or print with a finer nozzle (--wall)", thin, blocks=False)]
 
 
