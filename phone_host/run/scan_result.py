@@ -190,7 +190,7 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
         size=size_of(model.mesh),
         noise_m=noise_m,
         noise_p95_m=noise_p95_m,
-        error_scope=scan.error_scope,
+        error_scope=model.error_scope,
         unseen_share=unseen_share,
         memory_bytes=0 if volume is None else volume.memory_bytes,
         left_out=0 if volume is None else volume.left_out,

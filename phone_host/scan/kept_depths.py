@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.carving import Carving
+from phone_host.scan.surface_error import FusedDepths, Texture, texture_of
 from phone_host.scan.view import View, halved
 
 _WIDTH_PX: Final = 160
 """A pixel is some 3 mm of a thing on a table: a cell or two."""
 
 _MOST: Final = 512
-"""20 MB. When there are as many, every second one goes, and from then on every second view is kept."""
+"""40 MB. When there are as many, every second one goes, and from then on every second view is kept."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +27,7 @@ class _Kept:
     geometry: StereoGeometry
     noise_px: float
     world_camera: SE3
+    texture: Texture
 
     @property
     def view(self) -> View:
@@ -94,6 +96,12 @@ class KeptDepths:
             replace(each, world_camera=world_cameras.get(each.number, each.world_camera)) for each in self._kept
         ]
 
+    @property
+    def fused(self) -> list[FusedDepths]:
+        """The depths of the views in the model, in the order in which they were taken."""
+        ordered = sorted(self._kept, key=lambda each: each.number)
+        return [FusedDepths(each.view, each.world_camera, each.texture) for each in ordered]
+
     def _is_next(self) -> bool:
         self._seen += 1
         return not (self._seen - 1) % self._every
@@ -118,4 +126,6 @@ def _small(number: int, view: View, world_camera: SE3) -> _Kept:
     while depth.shape[1] > _WIDTH_PX:
         (depth, geometry), noise_px = halved(depth, geometry), noise_px / 2
     with np.errstate(over="ignore"):
-        return _Kept(number, depth.astype(np.float16), geometry, noise_px, world_camera)
+        return _Kept(
+            number, depth.astype(np.float16), geometry, noise_px, world_camera, texture_of(view.grey, depth.shape)
+        )

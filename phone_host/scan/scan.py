@@ -25,7 +25,7 @@ from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.stretches import Placed
-from phone_host.scan.surface_error import ErrorScope
+from phone_host.scan.surface_error import FusedDepths, PoseErrors
 from phone_host.scan.taken_view import require_size, view_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -351,11 +351,6 @@ class Scan:
         written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
         self._closed = _Closed(len(self._pairs), self.fused, places, written)
 
-    @property
-    def error_scope(self) -> ErrorScope:
-        """What the standard deviations of the model's points cover: a mat tells each pose by itself, so nothing adds up on the way."""
-        return ErrorScope.DRIFT if isinstance(self.tracker, MatTracker) else ErrorScope.NOISE
-
     def crop(self, box: Box | None) -> None:
         """Keep only what lies in a box, and close it: when the model is made, for the field holds it all.
 
@@ -366,6 +361,22 @@ class Scan:
 
     def model(self) -> ScanModel:
         """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""
+        model, volume = self._surface(), self.volume
+        if volume is None:
+            return model
+        return model.judged(volume, self._fused_views(), self._pose_errors)
+
+    @property
+    def _pose_errors(self) -> PoseErrors:
+        """How the errors of the poses are related."""
+        return PoseErrors.INDEPENDENT if isinstance(self.tracker, MatTracker) else PoseErrors.DRIFT
+
+    def _fused_views(self) -> Sequence[FusedDepths]:
+        """Return the depths of views that are in the model, in order."""
+        return self._depths.fused
+
+    def _surface(self) -> ScanModel:
+        """Return the surface so far, with the noise of its points."""
         volume, wanted = self.volume, self._wanted
         if volume is None:
             return ScanModel.empty()

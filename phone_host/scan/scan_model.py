@@ -1,5 +1,6 @@
 """The surface that comes out of a scan: open where nobody looked, or closed where a box says what the thing is. Pure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
@@ -16,6 +17,7 @@ from phone_host.scan.ground import Ground
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import only, part_of, without_crumbs, without_loose_bodies
 from phone_host.scan.sheet_ink import ink_points, specks
+from phone_host.scan.surface_error import ErrorScope, FusedDepths, PoseErrors, surface_error
 from phone_host.scan.surface_noise import surface_noise_m
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT
@@ -30,15 +32,17 @@ class ScanModel:
 
     Attributes:
         mesh: its triangles.
-        noise_m: (V,) float32 standard deviation of its points, m, if the views err independently; NaN where nobody saw it.
+        noise_m: (V,) float32 standard deviation of its points, m; NaN where nobody saw it.
         seen: (V,) whether some view saw the surface there; where none did, the colour comes from the border of what was seen.
         is_closed: whether what nobody saw was closed.
+        error_scope: what the standard deviations cover.
     """
 
     mesh: Mesh
     noise_m: NDArray[np.float32]
     seen: NDArray[np.bool_]
     is_closed: bool = False
+    error_scope: ErrorScope = ErrorScope.NOISE
 
     @property
     def unseen_share(self) -> float:
@@ -66,8 +70,13 @@ class ScanModel:
                 if not self.is_closed:
                     return self
                 rest, used = part_of(mesh, seen_triangles(mesh.triangles, self.seen))
-                return ScanModel(rest, self.noise_m[used], self.seen[used])
+                return replace(self, mesh=rest, noise_m=self.noise_m[used], seen=self.seen[used], is_closed=False)
         assert_never(choice)
+
+    def judged(self, volume: Volume, views: Sequence[FusedDepths], pose_errors: PoseErrors) -> "ScanModel":
+        """Return the model with the standard deviations that the views' agreement asks for: see `surface_error`."""
+        error = surface_error(volume, views, self.mesh.points_m, self.noise_m, pose_errors)
+        return replace(self, noise_m=self.noise_m * np.float32(error.factor), error_scope=error.scope)
 
     @staticmethod
     def empty() -> "ScanModel":

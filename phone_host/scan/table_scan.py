@@ -77,11 +77,11 @@ class TableScan(Scan):
             self._cells, self._room = carved.cells, _room_of(carved.cells)
         super().go_on(submaps)
 
-    def model(self) -> ScanModel:
+    def _surface(self) -> ScanModel:
         """Return the closed surface of the thing, or of what is in the box that was asked for."""
         volume, wanted = self.volume, self._wanted
         if volume is None or wanted.box is not None or self._room is None or self._cells is None:
-            return super().model()
+            return super()._surface()
         above_m = max(ABOVE_M, _LEAST_VOXELS * volume.settings.voxel_m)
         box = thing_box(volume.blocks, volume.settings, self._room, above_m)
         if box is None:

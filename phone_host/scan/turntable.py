@@ -30,6 +30,7 @@ from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
+from phone_host.scan.surface_error import FusedDepths, PoseErrors
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, ground_of, points_of, table_height_m
 from phone_host.scan.taken_view import require_size, view_of
@@ -218,15 +219,26 @@ class TurntableScan(Scan):
         """
         return next((each for each in self.pairs if each.name == pair.name), pair)
 
-    def model(self) -> ScanModel:
+    def _surface(self) -> ScanModel:
         """Return the surface so far, made from all views together once there are enough of them."""
         if self._finished is None or self._finished.taken != len(self._pairs):
             self._finished = self._end()
         volume, box = self.volume, self._wanted.box or self._box_around()
         if volume is None or box is None:
-            return super().model()
+            return super()._surface()
         self._carving = self._carved_by_all(Cells.of(box, volume.settings.voxel_m), self._finished)
         return closed_model(volume, self._carving, box, self._finished.model_ground)
+
+    @property
+    def _pose_errors(self) -> PoseErrors:
+        """The errors of poses on one circle, once it is fitted."""
+        return super()._pose_errors if self.turn is None else PoseErrors.CIRCLE
+
+    def _fused_views(self) -> Sequence[FusedDepths]:
+        """Return the depths of the views that are kept and in the model, without the background."""
+        pairs = self.pairs
+        kept = [(each.thing, pairs[each.pair]) for each in self._stations]
+        return [FusedDepths.of(thing, pair.world_camera) for thing, pair in kept if pair.is_fused]
 
     def _box_around(self) -> Box | None:
         """Return a box around the thing; None: it is not known how it has turned."""

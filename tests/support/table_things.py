@@ -133,12 +133,21 @@ class Slope:
 
 def computed(folder: Path, number: int) -> Processed:
     """Compute a pair that `write_pictures` wrote."""
-    core = StereoCore(
+    left, right = (cv2.imread(str(folder / side / f"{number:02}.png")) for side in ("left", "right"))
+    assert left is not None
+    assert right is not None
+    return _core().compute(np.asarray(left, np.uint8), np.asarray(right, np.uint8), now.monotonic_ns)
+
+
+def computed_view(number: int) -> Processed:
+    """Compute what is seen of the figure at a view."""
+    view = small_scene().view(number)
+    return _core().compute(view.left, view.right, now.monotonic_ns)
+
+
+def _core() -> StereoCore:
+    return StereoCore(
         MatchSettings(matcher=MatcherName.TANDEM, disparities=96),
         Rectifier(small_scene().rig),
         wanted=DepthWanted(search_from_m=0.25),
     )
-    left, right = (cv2.imread(str(folder / side / f"{number:02}.png")) for side in ("left", "right"))
-    assert left is not None
-    assert right is not None
-    return core.compute(np.asarray(left, np.uint8), np.asarray(right, np.uint8), now.monotonic_ns)

@@ -1,0 +1,59 @@
+"""Things on which the stated error of a scan is measured: those of the object benchmark, a plaster bunny and a bottle."""
+
+from types import MappingProxyType
+from typing import Final
+
+from phone_host.scene.object_scene import ObjectScene, Setting, mat_body, object_rig
+from phone_host.scene.objects import OBJECTS
+from phone_host.scene.scene_model import Body, Frustum, Sphere, Texture
+from phone_host.scene.solid import Solid
+
+_PLASTER: Final = Texture(
+    seed=71, light_bgr=(0.55, 0.56, 0.58), dark_bgr=(0.38, 0.38, 0.40), contrast=0.35, shortest_m=0.0015, longest_m=0.03
+)
+_GLASS: Final = Texture(
+    seed=81, light_bgr=(0.30, 0.55, 0.35), dark_bgr=(0.18, 0.40, 0.22), contrast=0.4, shortest_m=0.003, longest_m=0.05
+)
+_LABEL: Final = Texture(
+    seed=82, light_bgr=(0.85, 0.85, 0.85), dark_bgr=(0.3, 0.2, 0.5), contrast=0.8, shortest_m=0.002, longest_m=0.03
+)
+
+
+def _bunny() -> Solid:
+    """Round all over, with two thin ears, hardly any texture."""
+    return Solid(
+        (
+            Body("body", Sphere(0.036), (0.0, 0.0, 0.033), _PLASTER),
+            Body("head", Sphere(0.024), (0.026, 0.0, 0.072), _PLASTER),
+            Body("right ear", Frustum(0.008, 0.005, 0.04), (0.02, 0.012, 0.108), _PLASTER),
+            Body("left ear", Frustum(0.008, 0.005, 0.04), (0.02, -0.012, 0.108), _PLASTER),
+            Body("tail", Sphere(0.012), (-0.038, 0.0, 0.02), _PLASTER),
+        )
+    )
+
+
+def _bottle() -> Solid:
+    """The same from all sides but for its label."""
+    return Solid(
+        (
+            Body("low", Frustum(0.033, 0.033, 0.03), (0.0, 0.0, 0.015), _GLASS),
+            Body("label", Frustum(0.0331, 0.0331, 0.04), (0.0, 0.0, 0.05), _LABEL),
+            Body("high", Frustum(0.033, 0.013, 0.04), (0.0, 0.0, 0.09), _GLASS),
+            Body("neck", Frustum(0.013, 0.013, 0.03), (0.0, 0.0, 0.125), _GLASS),
+        )
+    )
+
+
+ERROR_OBJECTS: Final = MappingProxyType({**OBJECTS, "bunny": _bunny, "bottle": _bottle})
+
+
+def error_scene(name: str, setting: Setting) -> ObjectScene:
+    """Return one of them on a table.
+
+    Args:
+        name: of `ERROR_OBJECTS`.
+        setting: how it is seen.
+    """
+    return ObjectScene(
+        ERROR_OBJECTS[name](), object_rig(setting.size), setting, mat_body() if setting.has_mat else None
+    )

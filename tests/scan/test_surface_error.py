@@ -1,0 +1,106 @@
+"""The stated error of a surface: 95 % of the points lie within two standard deviations, and these are at most twice as wide as they must be."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from phone_host.geometry.se3 import SE3
+from phone_host.model import Processed
+from phone_host.scan.scan import Scan
+from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.surface_error import ErrorScope
+from phone_host.scan.ways import scan_for
+from tests.scan.test_scan_mat import WANTED as ON_MAT
+from tests.scan.test_scan_mat import walked
+from tests.support.mats import BALL_M
+from tests.support.surface_coverage import coverage
+from tests.support.table_things import computed_view, small_scene, true_camera
+from tests.support.turning_things import Size, matched_view, off_thing_m, photographed, processed_of, turned_scene
+
+Floats = NDArray[np.float64]
+
+VIEWS = range(0, 28, 2)
+"""From 14 places over 208 degrees."""
+
+AROUND_M = 0.12
+"""Nothing else stands on the table so near to the figure."""
+
+
+@pytest.fixture(scope="module")
+def around() -> list[Processed]:
+    """A figure on a table."""
+    return [computed_view(number) for number in VIEWS]
+
+
+def scan_of(pairs: list[Processed], wanted: ScanWanted) -> Scan:
+    """All pairs in one scan."""
+    scan = scan_for(wanted)
+    for number, pair in enumerate(pairs):
+        scan.take(str(number), float(number), pair)
+    return scan
+
+
+def figure_m(points: Floats) -> Floats:
+    """How far points lie from the figure."""
+    return np.abs(small_scene().solid.signed_distance(points))
+
+
+def scene_m(points: Floats) -> Floats:
+    """And from the table beneath it, too."""
+    return np.minimum(figure_m(points), np.abs(points[:, 2]))
+
+
+@pytest.mark.parametrize(("on_table", "distance"), [(True, figure_m), (False, scene_m)], ids=["table", "free"])
+def test_a_way_around_an_object(
+    around: list[Processed], distance: Callable[[Floats], Floats], *, on_table: bool
+) -> None:
+    """On a table and in a free scan, drift included; the model lies as well as a rigid motion can lay it."""
+    scan = scan_of(around, ScanWanted(voxel_m=0.002, on_table=on_table))
+    model = scan.model()
+    start = true_camera(VIEWS[0]) @ scan.pairs[0].world_camera.inverse()
+    found = coverage(model, distance, start, AROUND_M)
+    assert scan.fused == len(VIEWS)
+    assert model.error_scope is ErrorScope.DRIFT
+    assert found.share >= 0.95
+    assert found.width <= 2
+
+
+def ball_m(points: Floats) -> Floats:
+    """How far points lie from the ball on the mat; below its lower half the mat hides where it ends."""
+    off = np.linalg.norm(points - [0, 0, BALL_M], axis=1) - BALL_M
+    return np.where(points[:, 2] > BALL_M / 2, off, 0)
+
+
+def test_an_object_on_a_mat() -> None:
+    """In the axes of the mat as it lies: nothing is aligned. Six views alone show too little, and it says so."""
+    pairs = [walked(degrees) for degrees in range(0, 360, 30)]
+    model = scan_of(pairs, ON_MAT).model()
+    found = coverage(model, ball_m, None)
+    assert model.error_scope is ErrorScope.DRIFT
+    assert found.share >= 0.95
+    assert found.width <= 2
+    assert scan_of(pairs[::2], ON_MAT).model().error_scope is ErrorScope.NOISE
+
+
+def test_an_object_that_turns() -> None:
+    """On a turntable without a mat, a whole turn in steps of 15 degrees."""
+    size = Size(320, 240, 420.0, 0.06)
+    scenes = [turned_scene(math.radians(15 * number)) for number in range(26)]
+    views = [matched_view(photographed(scene, size, number), size, 96) for number, scene in enumerate(scenes)]
+    scan = scan_of([processed_of(view) for view in views], ScanWanted(voxel_m=0.002, turntable=True))
+    model = scan.model()
+    found = coverage(model, off_thing_m, SE3.identity())
+    assert scan.fused == len(views)
+    assert model.error_scope is ErrorScope.DRIFT
+    assert found.share >= 0.95
+    assert found.width <= 2
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_too_few_places_do_not_show_drift(around: list[Processed], count: int) -> None:
+    """With no pair, one, and three within 32 degrees the error is that of the noise, and the model says so."""
+    model = scan_of(around[:count], ScanWanted(voxel_m=0.002)).model()
+    assert model.error_scope is ErrorScope.NOISE
