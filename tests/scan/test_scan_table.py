@@ -249,5 +249,5 @@ def test_a_scan_goes_on_where_it_was_and_not_as_another_one(pictures: Path) -> N
     later.go_on([kept])
     assert later.model().mesh.points_m.tobytes() == scan.model().mesh.points_m.tobytes()
     assert later.take("4", 4.0, computed(pictures, 4)).is_fused
-    with pytest.raises(SettingsError, match="was begun with --object"):
+    with pytest.raises(SettingsError, match="was started with --object"):
         scan_for(replace(wanted, on_table=False)).go_on([kept])
