@@ -7,6 +7,7 @@ import pytest
 from common.errors import SettingsError
 from phone_host import api
 from phone_host.cli import main
+from phone_host.model.unseen import UnseenSurface
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.table_scan import TableScan
@@ -20,6 +21,10 @@ def test_the_page_wants_what_the_command_wants() -> None:
     """Nothing, a mat, or a turntable with a box: each is read by the command's own options."""
     assert (asked_scan({}).mat, asked_scan({}).turntable, asked_scan({}).onto) == (None, False, None)
     assert asked_scan({"mat": USUAL_MAT, "box": " "}).mat == parse_mat(USUAL_MAT)
+    assert asked_scan({}).unseen is UnseenSurface.FILL
+    assert asked_scan({"unseen": "cut"}).unseen is UnseenSurface.CUT
+    with pytest.raises(SettingsError, match="unseen is 'gone'"):
+        asked_scan({"unseen": "gone"})
     turned = asked_scan({"turntable": "1", "voxel": "2mm", "box": "400x300x400@0,100,900"})
     assert (turned.turntable, turned.voxel_m, turned.box is not None) == (True, 0.002, True)
     with pytest.raises(SettingsError, match="--turntable beside --mat"):

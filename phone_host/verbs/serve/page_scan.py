@@ -13,6 +13,7 @@ from common.places import make_folder
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.live.scan import LiveScan
 from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.report_page import Headline
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict
@@ -147,8 +148,9 @@ def asked_scan(values: Choices) -> ScanWanted:
     options = parser.parse_args([])
     options.voxel, options.box, options.mat = (given[name] or None for name in ("voxel", "box", "mat"))
     options.turntable, options.object = bool(given["turntable"]), bool(given["object"])
-    if given["unseen"]:
-        options.unseen = given["unseen"]
+    options.unseen = given["unseen"] or options.unseen
+    if options.unseen not in {each.value for each in UnseenSurface}:
+        raise SettingsError(f"unseen is {options.unseen!r}", "give fill, pink or cut")
     return scan_wanted(options)
 
 
