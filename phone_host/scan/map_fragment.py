@@ -46,6 +46,11 @@ class Found:
     pose: SE3
     fit: Registered
 
+    @property
+    def weakness(self) -> Weakness:
+        """FLAT if the view could slide along the surface, else NONE."""
+        return Weakness.NONE if self.fit.is_determined else Weakness.FLAT
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FragmentView:

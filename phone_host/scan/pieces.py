@@ -18,15 +18,7 @@ from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import STANDING, Piece, PoseGate
 from phone_host.scan.registration import Registered
-from phone_host.scan.relocalisation import (
-    ALL_DIRECTIONS,
-    Evidence,
-    PoseSupport,
-    Sighting,
-    are_independent,
-    pose_support,
-    sighted,
-)
+from phone_host.scan.relocalisation import Evidence, PoseSupport, Sighting, are_independent, pose_support, sighted
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view
 from phone_host.scan.volume_settings import VolumeSettings
@@ -358,7 +350,7 @@ class Pieces:
             fit = self.model.laid(shown, start)
             if fit.overlap >= self._gate.least_overlap:
                 is_lying = self.model.doubt(STANDING, fit) is Weakness.NONE
-                is_tight = fit.told == ALL_DIRECTIONS or self.model.times_usual(fit) <= 1
+                is_tight = fit.is_determined or self.model.times_usual(fit) <= 1
                 model_piece = start @ fit.start_now @ seen.pose.inverse()
                 surfaces.append(_Surface(model_piece, is_lying, is_lying and is_tight))
         return surfaces

@@ -3,7 +3,6 @@
 What is reflected comes on top of a surface's own light, and lies elsewhere for each camera: it is bright, and the matcher is not sure of it.
 """
 
-from dataclasses import replace
 from typing import Final
 
 import cv2
@@ -34,4 +33,4 @@ def without_reflections(view: View, wanted: Depth) -> View:
     is_bright = darkest > np.percentile(darkest[is_thing], _BRIGHT_PERCENT)
     around = cv2.dilate(is_bright.astype(np.uint8), np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
     is_out = is_thing & around & (view.confidence < _SURE)
-    return replace(view, depth_m=np.where(is_out, np.float32(np.nan), view.depth_m))
+    return view.masked(~is_out)

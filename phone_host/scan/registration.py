@@ -68,6 +68,10 @@ class RegistrationSettings:
     threads: int = 1
 
 
+ALL_DIRECTIONS: Final = 6
+"""Three ways to shift and three to turn."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Registered:
     """A depth image that was laid against a surface.
@@ -89,6 +93,11 @@ class Registered:
     noise_m: float
     told: int
     least_told: float = 0.0
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether the surface told all six directions: the depths cannot slide along it."""
+        return self.told == ALL_DIRECTIONS
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,9 +22,8 @@ from phone_host.geometry.se3 import SE3
 from phone_host.scan.motion_belief import Belief, MotionBound
 from phone_host.scan.piece import Lying, Piece
 from phone_host.scan.places import Recognised, are_one_pose, is_bare
+from phone_host.scan.registration import ALL_DIRECTIONS
 from phone_host.scan.view import View
-
-ALL_DIRECTIONS: Final = 6
 
 _LEAST_OVERLAP: Final = 0.45
 """Of a loop: at 0.39, a room's view was 35 mm and 2 degrees worse off than tracking had it; from 0.44 on loops were better."""
@@ -110,7 +109,7 @@ def _judged(piece: Piece, view: View, belief: Belief, lying: Lying, inliers: int
     """Judge a place at which the camera can be."""
     if not belief.is_broken:
         return Evidence.BELIEVED
-    if lying.fit.told < ALL_DIRECTIONS and inliers < _SURE_INLIERS:
+    if not lying.fit.is_determined and inliers < _SURE_INLIERS:
         return Evidence.AMBIGUOUS
     if _has_rival(piece, view, belief, lying.pose):
         return Evidence.AMBIGUOUS

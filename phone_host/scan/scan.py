@@ -23,7 +23,7 @@ from phone_host.scan.mat_tracker import MatTracker, begun_on_mat
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.scanned import ScannedPair, Submap
+from phone_host.scan.scanned import ScannedPair, Submap, begun_on_table
 from phone_host.scan.stretches import Placed
 from phone_host.scan.surface_error import FusedDepths, PoseErrors
 from phone_host.scan.taken_view import require_size, view_of
@@ -313,7 +313,7 @@ class Scan:
         Raises:
             SettingsError: that had another box, or a mat where this one has none.
         """
-        if _begun_on_table(submaps) != self._wanted.on_table:
+        if begun_on_table(submaps) != self._wanted.on_table:
             raise SettingsError(
                 f"the resumed scan was started {'without' if self._wanted.on_table else 'with'} --object",
                 "give the same options as before, or start a new scan",
@@ -397,9 +397,3 @@ class Scan:
         return (
             None if box is None or settings is None else Carving(Cells.of(box, settings.voxel_m), self._wanted.threads)
         )
-
-
-def _begun_on_table(submaps: Sequence[Submap]) -> bool:
-    """Return whether submaps are of a thing on a table: then the first pair is not taken in the origin, though no mat told where it was."""
-    first = next((pair for submap in submaps for pair in submap.pairs if pair.is_fused), None)
-    return first is not None and first.mat is None and bool(np.linalg.norm(first.world_camera.t_m) > 0)

@@ -1,6 +1,7 @@
 """What a scan tells: what became of a pair, and what it has learnt since its last submap. Pure."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -91,3 +92,9 @@ class Submap:
     blocks: BlockValues
     tracker: TrackerState
     carved: Carved | None = None
+
+
+def begun_on_table(submaps: Sequence[Submap]) -> bool:
+    """Return whether submaps are of a thing on a table: then the first pair is not taken in the origin, though no mat told where it was."""
+    first = next((pair for submap in submaps for pair in submap.pairs if pair.is_fused), None)
+    return first is not None and first.mat is None and bool(first.world_camera.t_m.any())

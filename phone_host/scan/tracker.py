@@ -36,7 +36,6 @@ _SURE_SHARE, _SUREST_PX, _LEAST_SURE_PX = 0.1, 0.25, 1.0
 """How far off a view's pixels are after odometry: a share of the way of the corners, px, between the two. On real rooms and streets 1 px, 3 mm at 2 m. A camera at
 rest is surer: with 1 px, fifty times the same twelve views wander by 1.9 mm, with 0.25 px by 0.9 mm."""
 
-_DIRECTIONS: Final = 6
 _SKEWED_PX: Final = 0.5
 """By how much the picture may move between the moments of its left and its right image: less is within a matcher's noise."""
 
@@ -261,7 +260,7 @@ class Tracker:
             return self._back(view, found, moved, joining.views)
         self._pieces.go_on_in(found.piece)
         self._is_followed = False  # where that piece is may not be known
-        return self._apart(view, found.pose, moved, _flatness(found), found.fit)
+        return self._apart(view, found.pose, moved, found.weakness, found.fit)
 
     def _apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         """Go on in a piece that is not part of the model yet; join it where the view shows a place of the model."""
@@ -271,7 +270,7 @@ class Tracker:
             return self._still_apart(view, pose, moved, weakness, fit)
         is_agreed = self._is_agreed(met, moved)
         joining = Joining()
-        if met.fit.told == _DIRECTIONS:
+        if met.fit.is_determined:
             joining = self._pieces.join(view, pose, met)
         elif is_agreed:  # depths that leave a direction open do not tell alone where the piece is
             joining = self._pieces.join(view, pose, met, least=_CONFIRMED, is_strict=True)
@@ -297,11 +296,11 @@ class Tracker:
         if before is not None and self._is_agreed(found, moved) and before.number not in {one.number for one in joined}:
             self._pieces.leave(before.number)
             self._pieces.fuse(before.view, before.found.pose, before.found.fit)
-            weakness = _flatness(before.found)
+            weakness = before.found.weakness
             joined = (*joined, Joined(before.number, before.found.pose, Tracking.RELOCALISED, weakness))
         self._pieces.go_on_in(found.piece)
         self._was_lost = True
-        return self._fused(view, found.pose, moved, _flatness(found), found.fit, joined=joined)
+        return self._fused(view, found.pose, moved, found.weakness, found.fit, joined=joined)
 
     def _still_apart(self, view: View, pose: SE3, moved: Moved, weakness: Weakness, fit: Registered) -> Tracked:
         self._pieces.fuse_apart(self._count, view, pose, weakness, fit)
@@ -350,7 +349,7 @@ class Tracker:
         """Return what is wrong with a pose that is believed."""
         if moved.inliers < self._gate.weak_inliers:
             return Weakness.FEW_CORNERS
-        return Weakness.FLAT if fit.told < _DIRECTIONS else Weakness.NONE
+        return Weakness.NONE if fit.is_determined else Weakness.FLAT
 
     def _lost(self, pose: SE3, moved: Moved, why: Weakness, fit: Registered | None) -> Tracked:
         """Go on; the model stays as it is."""
@@ -399,7 +398,3 @@ class Tracker:
     def _keep(self, view: View) -> None:
         if self._loops is not None:
             self._loops.keep(self._count, view, self._settings.most_bytes - self._pieces.held_bytes)
-
-
-def _flatness(found: Found) -> Weakness:
-    return Weakness.NONE if found.fit.told == _DIRECTIONS else Weakness.FLAT

@@ -80,7 +80,7 @@ class _Station:
     @property
     def thing(self) -> View:
         """The view without the depths of the background."""
-        return _masked(self.view, self.mask)
+        return self.view.masked(self.mask)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -275,9 +275,9 @@ class TurntableScan(Scan):
     ) -> ScannedPair:
         """Track a view of the thing; keep it if it is fused and shows it from a new side."""
         rows, columns = self._window_of(view)
-        cropped = _cropped(view, rows, columns)
+        cropped = view.cropped(rows, columns)
         own = np.ascontiguousarray(mask[rows, columns])
-        thing = _masked(cropped, own)
+        thing = cropped.masked(own)
         if self.tracker is None:
             self.tracker = Tracker(
                 fineness_for(thing, self._wanted.voxel_m, self._wanted.most_bytes),
@@ -350,7 +350,7 @@ class TurntableScan(Scan):
             [each.view.grey for each in self._stations], [each.view.depth_m for each in self._stations]
         )
         things = [
-            _masked(each.view, each.mask & ~background.is_seen(each.view.grey, each.view.depth_m))
+            each.view.masked(each.mask & ~background.is_seen(each.view.grey, each.view.depth_m))
             for each in self._stations
         ]
         given = [
@@ -389,17 +389,6 @@ def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPa
     )
 
 
-def _cropped(view: View, rows: slice, columns: slice) -> View:
-    geometry = view.geometry
-    return replace(
-        view,
-        grey=view.grey[rows, columns].copy(),
-        colours=view.colours[rows, columns].copy(),
-        depth_m=view.depth_m[rows, columns].copy(),
-        geometry=replace(geometry, cx_px=geometry.cx_px - columns.start, cy_px=geometry.cy_px - rows.start),
-    )
-
-
 def _seen_through(view: View, background: Background | None) -> View:
     """Return a view with infinite depths where it shows the background: nothing of the thing is there, however near the table is."""
     if background is None:
@@ -407,7 +396,3 @@ def _seen_through(view: View, background: Background | None) -> View:
     still = background.is_seen(view.grey, view.depth_m).astype(np.uint8)
     sure = cv2.erode(still, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
     return replace(view, depth_m=np.where(sure, np.float32(np.inf), view.depth_m))
-
-
-def _masked(view: View, mask: NDArray[np.bool_]) -> View:
-    return replace(view, depth_m=np.where(mask, view.depth_m, np.float32(np.nan)))

@@ -61,6 +61,21 @@ class View:
         disparity = geometry.focal_px * geometry.baseline_m / depth - geometry.doffs_px
         return np.column_stack([pixels.astype(np.float64), disparity])
 
+    def masked(self, mask: NDArray[np.bool_]) -> "View":
+        """Return the view without the depths where the mask, (H, W), is false."""
+        return replace(self, depth_m=np.where(mask, self.depth_m, np.float32(np.nan)))
+
+    def cropped(self, rows: slice, columns: slice) -> "View":
+        """Return a part of the view, packed, with the geometry of its pixels."""
+        geometry = self.geometry
+        return replace(
+            self,
+            grey=self.grey[rows, columns].copy(),
+            colours=self.colours[rows, columns].copy(),
+            depth_m=self.depth_m[rows, columns].copy(),
+            geometry=replace(geometry, cx_px=geometry.cx_px - columns.start, cy_px=geometry.cy_px - rows.start),
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
