@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from common.program.invocation import command_line
+from phone_host.model.unseen import UnseenSurface
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_report import ScanReport
 
@@ -16,11 +17,16 @@ def next_commands(report: ScanReport, out: Path) -> tuple[NextCommand, ...]:
     """
     if not report.model.triangles:
         return ()
-    return (
+    export = (
         NextCommand(
             "Export the model, for other programs and slicers",
             command_line("phone-host", "export", out, "--to", "stl,3mf,glb", "--out", out / "export"),
         ),
+    )
+    if report.unseen is UnseenSurface.CUT and report.model.unseen_share > 0:  # it is open, and cannot be printed
+        return export
+    return (
+        *export,
         NextCommand("Check whether it can be printed", command_line("phone-host", "printcheck", out)),
         NextCommand("Find a 3D printer, and print it", command_line("phone-host", "print", "--find")),
     )

@@ -33,7 +33,7 @@ def require_no_submaps(folder: Path) -> None:
     if paths := _paths(folder):
         raise SettingsError(
             f"{folder} holds a scan that was ended before its end ({paths[-1].name})",
-            f"go on with it with --resume {folder}, or begin anew with --restart",
+            f"go on with it with --resume {folder}, or start again with --restart",
         )
 
 

@@ -350,7 +350,7 @@ class Pieces:
             fit = self.model.laid(shown, start)
             if fit.overlap >= self._gate.least_overlap:
                 is_lying = self.model.doubt(STANDING, fit) is Weakness.NONE
-                is_tight = fit.is_determined or self.model.times_usual(fit) <= 1
+                is_tight = fit.is_determined or 0 < self.model.times_usual(fit) <= 1
                 model_piece = start @ fit.start_now @ seen.pose.inverse()
                 surfaces.append(_Surface(model_piece, is_lying, is_lying and is_tight))
         return surfaces

@@ -6,6 +6,7 @@ The world's axes are those of the rectified left camera at the first pair that h
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -79,7 +80,7 @@ class Scan:
         self.geometry: StereoGeometry | None = None
         self.size_px = (0, 0)
         self._pairs: list[ScannedPair] = []
-        self._closed = _Closed()
+        self._closed, self._is_resumed = _Closed(), False
         self._untracked = 0  # pairs before the first that this tracker took
         self._later: dict[str, ScannedPair] = {}  # pairs of which something else has become, by name
         self._missing = Weakness.NO_MAT  # why the last pair that has depth did not begin the model
@@ -231,13 +232,8 @@ class Scan:
         """Begin with a view that has depth; None: mat or table are not seen in it."""
         wanted = self._wanted
         if wanted.mat is not None and wanted.model_box is not None:
-            begun = begun_on_mat(
-                view,
-                wanted.mat,
-                wanted.model_box,
-                lambda inside: fineness_for(inside, wanted.voxel_m, wanted.most_bytes),
-                wanted.threads,
-            )
+            fineness = partial(fineness_for, voxel_m=wanted.voxel_m, most_bytes=wanted.most_bytes)
+            begun = begun_on_mat(view, wanted.mat, wanted.model_box, fineness, wanted.threads)
             if isinstance(begun, Weakness):
                 self._missing = begun
                 return None
@@ -349,7 +345,7 @@ class Scan:
         if carved is not None and self._carving is not None:
             self._carving.go_on(carved)
         written, self._untracked = sum(len(each.blocks.places) for each in submaps), len(self._pairs)
-        self._closed = _Closed(len(self._pairs), self.fused, places, written)
+        self._closed, self._is_resumed = _Closed(len(self._pairs), self.fused, places, written), True
 
     def crop(self, box: Box | None) -> None:
         """Keep only what lies in a box, and close it: when the model is made, for the field holds it all.
@@ -362,9 +358,14 @@ class Scan:
     def model(self) -> ScanModel:
         """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""
         model, volume = self._surface(), self.volume
-        if volume is None:
+        if volume is None or self._lacks_views:
             return model
         return model.judged(volume, self._fused_views(), self._pose_errors)
+
+    @property
+    def _lacks_views(self) -> bool:
+        """Whether views of the model are missing, those before a resumption, so that the others cannot show its drift."""
+        return self._is_resumed and not isinstance(self.tracker, MatTracker)
 
     @property
     def _pose_errors(self) -> PoseErrors:

@@ -42,9 +42,8 @@ _LEAST_COVERED: Final = 0.5
 """Share of the points on pieces that two segments or more have seen."""
 
 _DRIFT: Final = 1.8
-"""Error of the mean of all segments as a multiple of what their spread tells: neighbours err together, too. With it and `_BIAS`, 95 % of the points of rendered
-objects lie within two standard deviations, on a mat, a table, a turntable and in free scans, and the deviations are 1.1 to 1.6 times as wide as they
-must be (decision 0132)."""
+"""Error of the mean of all segments as a multiple of what their spread tells: neighbours err together, too. With it and `_BIAS`, 95 % of the points of
+the rendered sequences in the tests, one of each kind, lie within two standard deviations, which are at most twice as wide as they must be; decision 0132 tells of others."""
 
 _BIAS: Final = 0.17
 """Error that all views share, as a share of a depth's noise: 0.085 px of a disparity by the matcher, which no spread shows."""
@@ -63,7 +62,7 @@ _MAX_VOXELS: Final = 6.0
 _MIN_PIXELS: Final = 4
 _WIDTH_PX: Final = 160
 _MAX_VIEWS: Final = 128
-"""Every second one is left out, or more, until there are no more: so the figure takes less than a second."""
+"""Every second one is left out, or more, until there are no more.""" ""
 
 _FAR: Final = 1 << 16
 """Pieces to either side of the origin: half a kilometre with voxels of 1 mm."""

@@ -5,6 +5,7 @@ background; those inside of the thing are not, even if it is plain there.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import cv2
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from phone_host.model import Image
 from phone_host.scan.turning_mask import enclosed
-from phone_host.scan.view import Depth
+from phone_host.scan.view import Depth, View
 
 Flags = NDArray[np.bool_]
 
@@ -28,6 +29,9 @@ _LEAST_SHARE: Final = 0.25
 
 _DEPTH_SHARE: Final = 0.015
 """Of the depth, by which two views of the same background differ at most."""
+
+_RIM_PX: Final = 5
+"""Across which the background beside the thing may be the thing."""
 
 
 class Background:
@@ -66,6 +70,12 @@ class Background:
         nearer = depth_m < self.depth_m * np.float32(1 - _DEPTH_SHARE)  # False without a depth
         still = cv2.medianBlur((alike & ~nearer).astype(np.uint8), 5) > 0
         return ~enclosed(~still)
+
+    def opened(self, view: View) -> View:
+        """Return a view with infinite depths where it shows the background: nothing of the thing is there, however near the table is."""
+        still = self.is_seen(view.grey, view.depth_m).astype(np.uint8)
+        sure = cv2.erode(still, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
+        return replace(view, depth_m=np.where(sure, np.float32(np.inf), view.depth_m))
 
 
 def _blurred(grey: Image) -> NDArray[np.float32]:

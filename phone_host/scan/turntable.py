@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,9 +52,6 @@ _MOST_BYTES: Final = 200_000_000
 _TRUNCATION_SHARE: Final = 2 / 3
 """Of the truncation with which the thing is tracked: in the end the poses are exact. A rendered thing then lies 0.44 mm off on average in place of 0.48, and
 is 1.0 % too large in place of 2.5; with half, 0.45 mm, and where it was seen 1.8 % too small in place of 1.0."""
-
-_RIM_PX: Final = 5
-"""Across which the background beside the thing may be the thing."""
 
 _MARGIN_VOXELS: Final = 4.0
 """Around the thing, as around one on a table."""
@@ -234,10 +230,16 @@ class TurntableScan(Scan):
         """The errors of poses on one circle, once it is fitted."""
         return super()._pose_errors if self.turn is None else PoseErrors.CIRCLE
 
+    @property
+    def _lacks_views(self) -> bool:
+        """Whether an earlier pass, whose views are not here, is part of the model."""
+        return self.match is not None and self.match.match is Match.FOUND
+
     def _fused_views(self) -> Sequence[FusedDepths]:
         """Return the depths of the views that are kept and in the model, without the background."""
-        pairs = self.pairs
-        kept = [(each.thing, pairs[each.pair]) for each in self._stations]
+        pairs, turn = self.pairs, self.turn
+        used = [True] * len(self._stations) if turn is None else turn.used
+        kept = [(each.thing, pairs[each.pair]) for each, is_used in zip(self._stations, used, strict=True) if is_used]
         return [FusedDepths.of(thing, pair.world_camera) for thing, pair in kept if pair.is_fused]
 
     def _box_around(self) -> Box | None:
@@ -256,9 +258,11 @@ class TurntableScan(Scan):
     def _carved_by_all(self, cells: Cells, finished: _Finished) -> Carving:
         """Let the views carve, from where they are known to lie in the end, and those of an earlier pass."""
         carving, pairs, onto = Carving(cells, self._wanted.threads), self.pairs, self._wanted.onto
+        background = finished.background
         for station in self._stations:
             if pairs[station.pair].is_fused:
-                carving.see(_seen_through(station.view, finished.background), pairs[station.pair].world_camera)
+                view = station.view if background is None else background.opened(station.view)
+                carving.see(view, pairs[station.pair].world_camera)
         if finished.model_ground is not None:
             carving.take_empty(finished.model_ground.below(cells))
         if (
@@ -387,12 +391,3 @@ def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPa
     return ScannedPair(
         name=name, stamp_s=stamp_s, world_camera=SE3.identity(), state=Tracking.LOST, weakness=why, density=density
     )
-
-
-def _seen_through(view: View, background: Background | None) -> View:
-    """Return a view with infinite depths where it shows the background: nothing of the thing is there, however near the table is."""
-    if background is None:
-        return view
-    still = background.is_seen(view.grey, view.depth_m).astype(np.uint8)
-    sure = cv2.erode(still, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
-    return replace(view, depth_m=np.where(sure, np.float32(np.inf), view.depth_m))

@@ -108,7 +108,7 @@ def test_the_same_command_does_not_drop_a_killed_scan(walk: Path, tmp_path: Path
     again = subprocess.run(command(walk, out), capture_output=True, text=True, check=False, timeout=WAIT_S)
     assert again.returncode == 2
     (line,) = again.stderr.strip().splitlines()
-    assert f"go on with it with --resume {out}, or begin anew with --restart" in line
+    assert f"go on with it with --resume {out}, or start again with --restart" in line
     assert {path.name: path.read_bytes() for path in out.glob("submap-*.bin")} == kept
     anew = subprocess.run(command(walk, out, "--restart"), capture_output=True, text=True, check=False, timeout=WAIT_S)
     assert anew.returncode == 0, anew.stderr

@@ -104,3 +104,15 @@ def test_too_few_places_do_not_show_drift(around: list[Processed], count: int) -
     """With no pair, one, and three within 32 degrees the error is that of the noise, and the model says so."""
     model = scan_of(around[:count], ScanWanted(voxel_m=0.002)).model()
     assert model.error_scope is ErrorScope.NOISE
+
+
+def test_a_resumed_scan_does_not_state_its_drift(around: list[Processed]) -> None:
+    """The views before the resumption are gone, so those after it cannot show how far both lie apart."""
+    wanted = ScanWanted(voxel_m=0.002)
+    begun = scan_of(around[:2], wanted)
+    resumed = scan_for(wanted)
+    resumed.go_on([begun.close_submap(whole=True)])
+    for number, pair in enumerate(around[2:], 2):
+        resumed.take(str(number), float(number), pair)
+    assert resumed.fused == len(VIEWS)
+    assert resumed.model().error_scope is ErrorScope.NOISE

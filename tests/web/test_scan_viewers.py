@@ -32,7 +32,7 @@ def test_every_viewer_shows_the_options_and_the_command_of_the_running_scan(
     assert page.is_disabled("#scan-voxel")
     assert page.input_value("#scan-voxel") == options.get("voxel", "")
     assert page.is_disabled("#scan-unseen")
-    assert page.input_value("#scan-unseen") == options.get("unseen", "")
+    assert page.input_value("#scan-unseen") == options.get("unseen", "fill")
     assert page.input_value("#scan-box") == options.get("box", "")
     assert page.is_visible("#scan-mat") is (kind == "mat")
     page.wait_for_function("words => document.getElementById('command').textContent.endsWith(' ' + words)", arg=words)

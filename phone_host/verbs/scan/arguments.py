@@ -154,5 +154,5 @@ def _add_resume_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--restart",
         action="store_true",
-        help="begin anew where --out holds what a scan that was killed has written; without it that is refused",
+        help="start again where --out holds what a scan that was killed has written; without it that is refused",
     )

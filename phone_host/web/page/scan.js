@@ -63,7 +63,7 @@ export class ScanPanel {
       mat,
       turntable: kind === 'turntable' ? 'yes' : '',
       object: kind === 'object' ? 'yes' : '',
-      unseen: value('scan-unseen'),
+      unseen: value('scan-unseen') === 'fill' ? '' : value('scan-unseen'),
     };
   }
 
@@ -78,7 +78,7 @@ export class ScanPanel {
     field('scan-kind').value = mat ? 'mat' : turntable ? 'turntable' : object ? 'object' : '';
     field('scan-mat').value = mat === 'usual' ? '' : mat;
     field('scan-voxel').value = voxel;
-    field('scan-unseen').value = unseen;
+    field('scan-unseen').value = unseen || 'fill';
     this.kind();
     if (box === this.field.value.trim() || document.activeElement === this.field) return;
     this.field.value = box;
