@@ -129,12 +129,14 @@ def registered(depth_m: Depth, surface: Surface, settings: RegistrationSettings,
             trial = Trial(motion, step)
             sums = summed(depth_m, surface, settings, trial, library)
             if sums[29] * step * step < _LEAST_PARTNERS:
-                return _told(motion, sums, 0, 0.0, noise_m)
+                return _registered_at(motion, sums, 0, 0.0, noise_m)
             move, told, least = _step(sums, settings, trial)
             motion = SE3.of(move) @ motion
             if np.abs(move).max() < _STILL:
                 break
-    return _told(motion, summed(depth_m, surface, settings, Trial(motion, _JUDGED_STEP), library), told, least, noise_m)
+    return _registered_at(
+        motion, summed(depth_m, surface, settings, Trial(motion, _JUDGED_STEP), library), told, least, noise_m
+    )
 
 
 def _noise_m(depth_m: Depth, surface: Surface, settings: RegistrationSettings) -> float:
@@ -151,7 +153,7 @@ def _noise_m(depth_m: Depth, surface: Surface, settings: RegistrationSettings) -
     return float(np.nanmean(sigmas)) if np.isfinite(sigmas).any() else float("nan")
 
 
-def _told(motion: SE3, sums: Floats, told: int, least: float, noise_m: float) -> Registered:
+def _registered_at(motion: SE3, sums: Floats, told: int, least: float, noise_m: float) -> Registered:
     near, off_m, partners, visible = sums[27:]
     return Registered(
         start_now=motion,

@@ -14,6 +14,7 @@ TABLES = {
         "test_recordings",
         "test_bags",
         "test_image_folders",
+        "test_picture_folders",
         "test_image_sizes",
         "test_damaged_recordings",
         "test_damaged_bags",

@@ -103,7 +103,7 @@ def read_ply_mesh(content: bytes, name: str, unit_m: float) -> Solid:
     if len(triangles) and not len(colours) and len(painted := _colours(faces)):
         painted = np.repeat(painted, 3 * np.maximum(counts - 2, 0), axis=0)
         colours = colours_of_points(triangles.ravel(), painted, len(places))
-    return sound_solid(name, places * unit_m, triangles, colours, _seen(vertices))
+    return sound_solid(name, places * unit_m, triangles, colours, _seen_flags(vertices))
 
 
 def _polygons(faces: Table) -> tuple[Numbers, Numbers]:
@@ -135,7 +135,7 @@ def _strip_triangles(strips: Column | None) -> Numbers:
     return triangles[(triangles >= 0).all(axis=1)]
 
 
-def _seen(vertices: Table) -> NDArray[np.bool_]:
+def _seen_flags(vertices: Table) -> NDArray[np.bool_]:
     """Return (V,): the property `seen` of a scan's model; (0,) where there is none."""
     column = vertices.get("seen")
     return NO_FLAGS if column is None or column.counts is not None else np.asarray(column.values) != 0
