@@ -41,11 +41,14 @@ class OctoPrint:
         self.title = self._talk.server
 
     def state(self) -> ServerState:
-        """See PrintServer."""
+        """See PrintServer.
+
+        The printer is asked before the job: of a print that ends between the two, the share is the final one.
+        """
+        printer_answer = self._ask("GET", "/api/printer?exclude=sd")
         job_answer = self._ask("GET", "/api/job")
         require_good(job_answer, "to tell what it prints")
         job = job_answer.json()
-        printer_answer = self._ask("GET", "/api/printer?exclude=sd")
         said = job["state"].text
         share = min(max(or_zero(job["progress"]["completion"].number) / 100, 0.0), 1.0)
         left_s = job["progress"]["printTimeLeft"].number

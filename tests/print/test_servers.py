@@ -64,6 +64,14 @@ def test_a_file_is_handed_over_whole_and_watched(kind: ServerKind, job: Job) -> 
 
 
 @KINDS
+def test_a_print_that_ends_between_two_questions_is_done(kind: ServerKind, job: Job) -> None:
+    """A server that is asked twice for its state says first that it prints, and then that it does not: nobody has ended it."""
+    with print_server(kind, ServerFaults(ends_between=True)) as there:
+        ended = printed(there, job)
+    assert (ended.phase, ended.share) == (Phase.DONE, 1.0)
+
+
+@KINDS
 def test_cancelling_leaves_the_heaters_off(kind: ServerKind, job: Job) -> None:
     """The print is ended, and the server was asked whether the heaters are off."""
     wishes = Wishes()

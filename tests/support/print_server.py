@@ -33,6 +33,7 @@ class ServerFaults:
         rate: share of a print that is done in a second.
         fails_at: share at which the printer reports an error.
         ends_at: share at which somebody ends the print at the printer.
+        ends_between: whether the print is done as soon as, half way, the first of the questions after its state has been answered.
         refuses: status with which a file is refused; 0: it is not.
         starts: whether a file that was handed over is begun.
         cools: whether the heaters can be switched off.
@@ -51,6 +52,7 @@ class ServerFaults:
     rate: float = 2.0
     fails_at: float = 9.0
     ends_at: float = 9.0
+    ends_between: bool = False
     refuses: int = 0
     starts: bool = True
     cools: bool = True
@@ -87,6 +89,7 @@ class PrintServerStandIn:
         self.condition = faults.condition
         self.share = 0.0
         self.answers = 0
+        self.first_question = ""
         self._at_s = time.monotonic()
         self.lock, self.is_over = threading.Lock(), threading.Event()
         stand_in = self
@@ -127,6 +130,13 @@ class PrintServerStandIn:
             elif self.share >= 1:
                 self.condition, self.goal, self.bed = "done", 0.0, 0.0
         self._at_s = now_s
+
+    def answered(self, path: str) -> None:
+        """Let the print end now, if it shall end between two questions."""
+        self.first_question = self.first_question or path
+        if self.faults.ends_between and path == self.first_question and self.share >= 0.5:
+            self.share = 1.0
+            self.go()
 
     def cool(self, *, nozzle: bool = True, bed: bool = True) -> None:
         """Switch the heaters off, if that can be done."""
@@ -173,6 +183,7 @@ class _Handler(BaseHTTPRequestHandler):
             if self.command != "GET":
                 there.asked.append(f"{self.command} {path}")
             status, said = self._refusal(path) or _ANSWERS[there.kind](there, self, path, body)
+            there.answered(path)
         while self.command in there.faults.holds and not there.is_over.wait(0.02):
             pass
         self._say(status, said)
