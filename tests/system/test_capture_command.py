@@ -48,7 +48,7 @@ def doctor(film: Path, *arguments: str) -> tuple[dict[str, Any], str]:
     camera = f"replay:{film}/film?fps={_FPS}&loop=1&pace=clock"
     command = [sys.executable, "-P", "-m", "phone_host.cli", "doctor", "--json", "--camera", camera, *arguments]
     own = {**os.environ, "XDG_DATA_HOME": str(film / "data")}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120, env=own)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, env=own)
     assert "Traceback" not in done.stderr
     return json.loads(done.stdout) if done.stdout else {}, done.stderr
 
@@ -71,14 +71,20 @@ def test_a_film_is_checked_and_kept_beside_the_rig(film: Path) -> None:
 def test_a_film_is_checked_before_the_calibration_and_kept_among_the_users_data(film: Path, tmp_path: Path) -> None:
     """Without a calibration the next doctor knows of the check, too; with one that has none beside it, another is asked for."""
     found, _ = doctor(film, "--capture", "10")
-    assert found["capture"] == json.loads((film / "data" / "tandemscan" / "capture.json").read_text(encoding="utf-8"))
+    kept = film / "data" / "tandemscan" / "capture.json"
+    assert found["capture"] == json.loads(kept.read_text(encoding="utf-8"))
     assert found["capture"]["rigidity"]["knows_lens"] is False
+    (judged,) = (each for each in found["checks"] if each["what"] == "stabilisation")
     again, _ = doctor(film)
-    assert [each["verdict"] for each in again["checks"] if each["what"] == "capture"] == ["ok"]
+    (known,) = (each for each in again["checks"] if each["what"] == "capture")
+    assert (known["verdict"], known["finding"]) == (judged["verdict"], f"checked: {judged['finding']}")
+    # Without the lens, some stretches of this film look warped: whether enough are among those that were filmed is chance.
+    found["capture"]["rigidity"] |= {"warping": "good", "unseen": None}
+    kept.write_text(json.dumps(found["capture"]), encoding="utf-8")
     rig = shutil.copy(film / "rig.yaml", tmp_path)
     late, _ = doctor(film, "--calibration", str(rig))
-    (kept,) = (each for each in late["checks"] if each["what"] == "capture")
-    assert (kept["verdict"], kept["remedy"]) == ("warn", CHECK_AGAIN)
+    (known,) = (each for each in late["checks"] if each["what"] == "capture")
+    assert (known["verdict"], known["remedy"]) == ("warn", CHECK_AGAIN)
 
 
 def test_a_check_needs_a_camera_with_a_clock(film: Path, tmp_path: Path) -> None:
