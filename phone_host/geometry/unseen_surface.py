@@ -3,10 +3,12 @@
 A surface is points, triangles and a flag for each point: whether a view measured it.
 """
 
-from typing import Final
+from typing import Final, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
+
+from phone_host.model.unseen import UnseenSurface
 
 Flags = NDArray[np.bool_]
 Colours = NDArray[np.uint8]
@@ -37,6 +39,31 @@ def unseen_share(points_m: NDArray[np.float32], triangles: Triangles, seen: Flag
     return float((unseen * areas).sum() / areas.sum()) if areas.sum() > 0 else float("nan")
 
 
+def apply_unseen(colours: Colours, triangles: Triangles, seen: Flags, choice: UnseenSurface) -> tuple[Colours, Flags]:
+    """Fill, paint or cut the surface that no view measured.
+
+    Args:
+        colours: (V, 3), red green blue; (0, 3) where the points have none.
+        triangles: (T, 3) numbers of points.
+        seen: (V,) whether a view measured each point.
+        choice: what becomes of that surface.
+
+    Returns:
+        The colours of all points, shaped as before, and which triangles remain, (T,).
+    """
+    whole = np.ones(len(triangles), np.bool_)
+    match choice:
+        case UnseenSurface.CUT:
+            return colours, seen_triangles(triangles, seen)
+        case UnseenSurface.FILL | UnseenSurface.PINK if not len(colours):
+            return colours, whole
+        case UnseenSurface.FILL:
+            return filled_from_border(colours, triangles, seen), whole
+        case UnseenSurface.PINK:
+            return np.where(seen[:, np.newaxis], colours, np.array(PINK_RGB, np.uint8)), whole
+    assert_never(choice)
+
+
 def seen_triangles(triangles: Triangles, seen: Flags) -> Flags:
     """Return which triangles remain when unseen surface is cut, (T,): those of which a view measured all corners.
 
@@ -45,16 +72,6 @@ def seen_triangles(triangles: Triangles, seen: Flags) -> Flags:
         seen: (V,) whether a view measured each point.
     """
     return np.asarray(seen[triangles].all(axis=1), np.bool_)
-
-
-def painted_pink(colours: Colours, seen: Flags) -> Colours:
-    """Return the colours with unseen points in pink, (V, 3).
-
-    Args:
-        colours: (V, 3), red green blue.
-        seen: (V,) whether a view measured each point.
-    """
-    return np.where(seen[:, np.newaxis], colours, np.array(PINK_RGB, np.uint8))
 
 
 def filled_from_border(colours: Colours, triangles: Triangles, seen: Flags) -> Colours:

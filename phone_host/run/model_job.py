@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, assert_never
+from typing import Final
 
 from common.errors import DataError, SettingsError, TandemError
-from phone_host.geometry.unseen_surface import filled_from_border, painted_pink, seen_triangles, unseen_share
+from phone_host.geometry.unseen_surface import apply_unseen, unseen_share
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.atomic import replacing
 from phone_host.output.data_folder import data_folder
@@ -105,21 +105,13 @@ def with_unseen(model: Model, choice: UnseenSurface | None) -> UnseenResult:
 def _treated(model: Model, choice: UnseenSurface) -> Solid:
     """Return the mesh of a model that says where it was seen, with its unseen part filled, painted or cut."""
     solid = model.solid
-    match choice:
-        case UnseenSurface.FILL | UnseenSurface.PINK if not solid.has_colours:
-            return solid
-        case UnseenSurface.FILL:
-            return replace(solid, colours=filled_from_border(solid.colours, solid.triangles, solid.seen))
-        case UnseenSurface.PINK:
-            return replace(solid, colours=painted_pink(solid.colours, solid.seen))
-        case UnseenSurface.CUT:
-            rest = solid.triangles[seen_triangles(solid.triangles, solid.seen)]
-            if not len(rest):
-                raise DataError(f"no part of {model.path} was in view", "leave out --unseen cut, or scan again")
-            used, triangles = used_points(rest, len(solid.points_m))
-            colours = solid.colours[used] if solid.has_colours else solid.colours
-            return Solid(solid.points_m[used], triangles, colours, solid.seen[used])
-    assert_never(choice)
+    colours, remains = apply_unseen(solid.colours, solid.triangles, solid.seen, choice)
+    if remains.all():
+        return replace(solid, colours=colours)
+    if not remains.any():
+        raise DataError(f"no part of {model.path} was in view", "leave out --unseen cut, or scan again")
+    used, triangles = used_points(solid.triangles[remains], len(solid.points_m))
+    return Solid(solid.points_m[used], triangles, colours[used] if solid.has_colours else colours, solid.seen[used])
 
 
 def check_model(

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, assert_never
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.geometry.unseen_surface import filled_from_border, painted_pink, seen_triangles, unseen_share
+from phone_host.geometry.unseen_surface import apply_unseen, filled_from_border, seen_triangles, unseen_share
 from phone_host.model.unseen import UnseenSurface
 from phone_host.scan.blocks import SIDE, Blocks
 from phone_host.scan.box import Box
@@ -60,18 +60,15 @@ class ScanModel:
         Args:
             choice: what becomes of the surface that nobody saw. Without it the model is open, and nothing tells any more how much it was.
         """
+        if (
+            choice is UnseenSurface.FILL or not self.is_closed
+        ):  # `closed_model` fills it; an open surface has no such part
+            return self
         mesh = self.mesh
-        match choice:
-            case UnseenSurface.FILL:
-                return self
-            case UnseenSurface.PINK:
-                return replace(self, mesh=replace(mesh, colours=painted_pink(mesh.colours, self.seen)))
-            case UnseenSurface.CUT:
-                if not self.is_closed:
-                    return self
-                rest, used = part_of(mesh, seen_triangles(mesh.triangles, self.seen))
-                return replace(self, mesh=rest, noise_m=self.noise_m[used], seen=self.seen[used], is_closed=False)
-        assert_never(choice)
+        colours, remains = apply_unseen(mesh.colours, mesh.triangles, self.seen, choice)
+        rest, used = part_of(replace(mesh, colours=colours), remains)
+        is_closed = choice is not UnseenSurface.CUT
+        return replace(self, mesh=rest, noise_m=self.noise_m[used], seen=self.seen[used], is_closed=is_closed)
 
     def judged(self, volume: Volume, views: Sequence[FusedDepths], pose_errors: PoseErrors) -> "ScanModel":
         """Return the model with the standard deviations that the views' agreement asks for: see `surface_error`."""

@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.unseen_surface import (
     PINK_RGB,
+    apply_unseen,
     filled_from_border,
-    painted_pink,
-    seen_triangles,
     unseen_share,
 )
+from phone_host.model.unseen import UnseenSurface
 
 SIDE = 21
 
@@ -62,9 +62,22 @@ def test_share_pink_and_cut_go_by_the_flags() -> None:
     assert unseen_share(points, triangles, seen) == pytest.approx(0.5, abs=0.03)
     assert np.isnan(unseen_share(points[:0], triangles[:0], seen[:0]))
     colours = np.full((len(points), 3), 99, np.uint8)
-    pink = painted_pink(colours, seen)
+    pink, remains = apply_unseen(colours, triangles, seen, UnseenSurface.PINK)
+    assert remains.all()
     assert (pink[~seen] == PINK_RGB).all()
     assert (pink[seen] == 99).all()
-    rest = triangles[seen_triangles(triangles, seen)]
+    same, remains = apply_unseen(colours, triangles, seen, UnseenSurface.CUT)
+    assert np.array_equal(same, colours)
+    rest = triangles[remains]
     assert len(rest) == len(triangles) // 2
     assert points[rest, 1].min() == SIDE // 2
+
+
+@pytest.mark.parametrize("choice", [UnseenSurface.FILL, UnseenSurface.PINK])
+def test_points_without_colours_stay_without(choice: UnseenSurface) -> None:
+    """A surface without colours gets none, and loses no triangle, where its unseen part is filled in."""
+    points, triangles = grid()
+    none = np.zeros((0, 3), np.uint8)
+    colours, remains = apply_unseen(none, triangles, points[:, 1] >= SIDE // 2, choice)
+    assert colours is none
+    assert remains.all()
