@@ -11,7 +11,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.carving import Carving
 from phone_host.scan.surface_error import FusedDepths, Texture, texture_of
-from phone_host.scan.view import View, halved
+from phone_host.scan.view import View, narrowed
 
 _WIDTH_PX: Final = 160
 """A pixel is some 3 mm of a thing on a table: a cell or two."""
@@ -122,10 +122,7 @@ class KeptDepths:
 
 
 def _small(number: int, view: View, world_camera: SE3) -> _Kept:
-    depth, geometry, noise_px = view.depth_m, view.geometry, view.noise_px
-    while depth.shape[1] > _WIDTH_PX:
-        (depth, geometry), noise_px = halved(depth, geometry), noise_px / 2
+    depth, geometry, step = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
     with np.errstate(over="ignore"):
-        return _Kept(
-            number, depth.astype(np.float16), geometry, noise_px, world_camera, texture_of(view.grey, depth.shape)
-        )
+        small = depth.astype(np.float16)
+    return _Kept(number, small, geometry, view.noise_px / step, world_camera, texture_of(view.grey, depth.shape))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import StereoGeometry
-from phone_host.scan.view import View, halved
+from phone_host.scan.view import View, narrowed
 
 _WIDTH_PX: Final = 320
 """A voxel is some 2.5 px of the matched image for each metre of the distance (`fineness`): half of VGA leaves one depth for each voxel 0.8 m away."""
@@ -122,12 +122,12 @@ class KeptViews:
 
 
 def _small(view: View) -> _Kept:
-    depth, geometry, noise_px, patch_px, step = view.depth_m, view.geometry, view.noise_px, view.patch_px, 1
-    while depth.shape[1] > _WIDTH_PX:
-        (depth, geometry), noise_px, patch_px, step = halved(depth, geometry), noise_px / 2, patch_px / 2, 2 * step
+    depth, geometry, step = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
     _, colours = cv2.imencode(
         ".jpg", np.ascontiguousarray(view.colours[::step, ::step]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
     )
     with np.errstate(over="ignore"):
         deflated = zlib.compress(depth.astype(np.float16).tobytes(), _LEVEL)
-    return _Kept(deflated, depth.shape, np.asarray(colours, np.uint8), geometry, noise_px, patch_px)
+    return _Kept(
+        deflated, depth.shape, np.asarray(colours, np.uint8), geometry, view.noise_px / step, view.patch_px / step
+    )

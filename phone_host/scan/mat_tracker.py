@@ -25,7 +25,7 @@ from phone_host.scan.reflections import without_reflections
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
 from phone_host.scan.tracker import Tracked, TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
-from phone_host.scan.view import Camera, Depth, View, halved, reduced
+from phone_host.scan.view import Camera, Depth, View, narrowed, reduced
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
@@ -185,9 +185,7 @@ class MatTracker:
 
     def _laid(self, view: View, start: SE3) -> Registered:
         """Lay what a view shows near the model against it."""
-        depth, geometry, step = depths_inside(view, start, self._room), view.geometry, 1
-        while depth.shape[1] > _ALIGNED_PX:
-            (depth, geometry), step = halved(depth, geometry), 2 * step
+        depth, geometry, step = narrowed(depths_inside(view, start, self._room), view.geometry, _ALIGNED_PX)
         surface = self.volume.cast(Camera(geometry, depth.shape, start), depth)
         voxel_m = self.volume.settings.voxel_m
         settings = RegistrationSettings(

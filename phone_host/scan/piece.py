@@ -14,7 +14,7 @@ from phone_host.scan.odometry import Moved
 from phone_host.scan.places import Places
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
 from phone_host.scan.tracking_words import Weakness
-from phone_host.scan.view import Camera, View, halved
+from phone_host.scan.view import Camera, View, narrowed
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing
@@ -100,9 +100,7 @@ class Piece:
             believed: where the camera is, in the piece's axes.
             sure_px: standard deviation of the view's pixels there, px; infinite: nothing is known of it.
         """
-        depth, geometry, step = view.depth_m, view.geometry, 1
-        while depth.shape[1] > _ALIGNED_PX:
-            (depth, geometry), step = halved(depth, geometry), 2 * step
+        depth, geometry, step = narrowed(view.depth_m, view.geometry, _ALIGNED_PX)
         # Beyond its reach the field has no partners.
         of = self.volume.settings
         depth, voxel_m = np.where(depth <= of.far_m, depth, np.float32(np.nan)), of.voxel_m

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Image
 from phone_host.scan.blocks import SIDE
-from phone_host.scan.view import Camera, View, halved
+from phone_host.scan.view import Camera, View, narrowed
 from phone_host.scan.volume import Volume
 
 Floats = NDArray[np.float64]
@@ -90,10 +90,8 @@ class FusedDepths:
             view: with its images.
             world_camera: where it was taken.
         """
-        depth, geometry, noise_px = view.depth_m, view.geometry, view.noise_px
-        while depth.shape[1] > _WIDTH_PX:
-            (depth, geometry), noise_px = halved(depth, geometry), noise_px / 2
-        small = replace(view, depth_m=depth, geometry=geometry, noise_px=noise_px)
+        depth, geometry, step = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
+        small = replace(view, depth_m=depth, geometry=geometry, noise_px=view.noise_px / step)
         return FusedDepths(small, world_camera, texture_of(view.grey, depth.shape))
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.box import Box
 from phone_host.scan.tracking_words import Weakness
-from phone_host.scan.view import View, halved
+from phone_host.scan.view import View, narrowed
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -130,9 +130,7 @@ def find_table(view: View) -> Table | Weakness:
 
 
 def _grid_of(view: View) -> _Grid:
-    depth, geometry, noise_px = view.depth_m, view.geometry, view.noise_px
-    while depth.shape[1] > _WIDTH_PX:
-        (depth, geometry), noise_px = halved(depth, geometry), noise_px / 2
+    depth, geometry, _ = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
     rows, columns = np.indices(depth.shape, np.float64)
     slopes = np.stack(
         [
@@ -148,7 +146,7 @@ def _grid_of(view: View) -> _Grid:
     return _Grid(
         slopes=slopes,
         inverse=inverse,
-        sigma=noise_px / (geometry.focal_px * geometry.baseline_m),
+        sigma=view.noise_per_m,
         points_m=slopes / inverse[..., np.newaxis],
     )
 

@@ -112,6 +112,23 @@ def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeome
     return depth_m[::2, ::2].copy(), half
 
 
+def narrowed(depth_m: Depth, geometry: StereoGeometry, max_width_px: int) -> tuple[Depth, StereoGeometry, int]:
+    """Halve depths until they are no wider than a limit.
+
+    Args:
+        depth_m: (H, W) float32, m.
+        geometry: of the pair.
+        max_width_px: the limit, > 0.
+
+    Returns:
+        The depths, the geometry of their pixels, and by how much a pixel became wider: 1, 2, 4 ...
+    """
+    step = 1
+    while depth_m.shape[1] > max_width_px:
+        (depth_m, geometry), step = halved(depth_m, geometry), 2 * step
+    return depth_m, geometry, step
+
+
 def reduced(view: View) -> View:
     """Return a view of half the size, its grey averaged over 2 x 2 pixels; one that is small already as it is."""
     if view.grey.shape[1] < _LEAST_WIDTH_PX:

@@ -10,7 +10,7 @@ from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
 from phone_host.scan.cube_cases import cube_cases
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.registration import RegistrationSettings, Trial, registered, summed
-from phone_host.scan.view import Camera, View, halved
+from phone_host.scan.view import Camera, View, halved, narrowed
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import MOST_WEIGHT, VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
@@ -291,3 +291,15 @@ def _differ(case: int, edge: int) -> bool:
     axis, at = divmod(edge, 4)
     low = [n for n in range(8) if not n >> axis & 1][at]
     return bool((case >> low ^ case >> (low | 1 << axis)) & 1)
+
+
+@pytest.mark.parametrize(("width_px", "step"), [(97, 1), (48, 4)])
+def test_narrowed_depths_lie_where_they_lay(width_px: int, step: int) -> None:
+    """Depths 97 px wide are halved until they are narrow enough; what remains is every n-th pixel, and its ray is that of the pixel it was."""
+    depth = np.arange(97 * 61, dtype=np.float32).reshape(61, 97)
+    small, geometry, wider = narrowed(depth, GEOMETRY, width_px)
+    assert wider == step
+    assert np.array_equal(small, depth[::step, ::step])
+    for pixel in (0, small.shape[1] - 1):
+        ray = (pixel - geometry.cx_px) / geometry.focal_px
+        assert ray == pytest.approx((step * pixel - GEOMETRY.cx_px) / GEOMETRY.focal_px)
