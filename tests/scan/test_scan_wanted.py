@@ -1,5 +1,7 @@
 """What is wanted of a scan: the page's words mean what the command's options mean, and what does not go together is refused in one line."""
 
+import argparse
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,8 @@ from phone_host.scan.table_scan import TableScan
 from phone_host.scan.turntable import TurntableScan
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.verbs.export.arguments import add_arguments
+from phone_host.verbs.scan.arguments import add_model_arguments
 from phone_host.verbs.serve.page_scan import asked_scan
 
 
@@ -29,6 +33,14 @@ def test_the_page_wants_what_the_command_wants() -> None:
     assert (turned.turntable, turned.voxel_m, turned.box is not None) == (True, 0.002, True)
     with pytest.raises(SettingsError, match="--turntable beside --mat"):
         asked_scan({"turntable": "1", "mat": USUAL_MAT})
+
+
+@pytest.mark.parametrize("add", [add_model_arguments, add_arguments], ids=["scan", "export"])
+def test_unseen_takes_each_choice_and_no_other(add: Callable[[argparse.ArgumentParser], None]) -> None:
+    """Scan and export offer the values of the choice, in its order."""
+    parser = argparse.ArgumentParser()
+    add(parser)
+    assert f"--unseen {{{','.join(each.value for each in UnseenSurface)}}}" in parser.format_help()
 
 
 def test_the_python_api_takes_one_way_and_begins_it() -> None:

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from phone_host.verbs.unseen_argument import add_unseen_argument
+
 SUMMARY = "write a scan or mesh as STL, OBJ, 3DS, PLY, 3MF or GLB for other programs and printers"
 
 EXAMPLES = """  phone-host export scan --to stl --out print                    # scan: the folder that phone-host scan wrote
@@ -25,12 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help="leave out triangles where the surface stays as near as this; 0: none (default: a tenth of the scan's voxel; none for a mesh file)",
     )
-    parser.add_argument(
-        "--unseen",
-        choices=("fill", "pink", "cut"),
-        help="surface that no view of the scan measured: fill it in with colours from its border, fill it in pink, or cut it, which leaves the"
-        " surface open (default: as the scan was told, else fill)",
-    )
+    add_unseen_argument(parser, default=None, otherwise="default: as the scan was told, else fill")
     parser.add_argument(
         "--out", type=Path, default=Path(), metavar="DIR", help="folder for the files (default: the current folder)"
     )

@@ -12,6 +12,7 @@ from phone_host.verbs.stereo_arguments import (
     add_limit_arguments,
     add_overlay_argument,
 )
+from phone_host.verbs.unseen_argument import add_unseen_argument
 
 SUMMARY = "put pairs from several places together to one model with colours"
 
@@ -111,13 +112,8 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="WxHxD@X,Y,Z",
         help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat or table",
     )
-    parser.add_argument(
-        "--unseen",
-        choices=("fill", "pink", "cut"),
-        default="fill",
-        help="with --box, --mat, --object or --turntable: surface that no view measured is filled in with colours from its border, filled in pink, or"
-        " cut, which leaves the surface open (default fill)",
-    )
+    when = "with --box, --mat, --object or --turntable: "
+    add_unseen_argument(parser, when, default="fill", otherwise="default fill")
     parser.add_argument(
         "--memory",
         type=reading(file_size, "--memory"),
