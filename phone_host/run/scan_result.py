@@ -9,6 +9,7 @@ import numpy as np
 
 from common.errors import DataError
 from common.words import counted, distance_text
+from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
@@ -75,6 +76,7 @@ def report_of(
             *memory_remarks(scan),
             *way_remarks(certainty),
             *_box_remarks(scan, model),
+            *_unseen_remarks(scan.wanted, model),
         ),
         keeps_field=keeps_field(scan),
         mat=scan.wanted.mat,
@@ -89,6 +91,15 @@ def _box_remarks(scan: Scan, model: ScanModel) -> tuple[Remark, ...]:
     """Say that the box that was asked for may be elsewhere, where there is no surface, or none of it was seen: it was closed out of nothing."""
     is_empty = scan.wanted.box is not None and not model.seen.any()
     return (_EMPTY_BOX,) if is_empty else ()
+
+
+def _unseen_remarks(wanted: ScanWanted, model: ScanModel) -> tuple[Remark, ...]:
+    """Say that a choice for unseen surface changes nothing, because the surface is open; why a turn's is, its own remarks say."""
+    is_open = not model.is_closed and not wanted.turntable and len(model.mesh.triangles) > 0
+    if not is_open or wanted.unseen is UnseenSurface.FILL:
+        return ()
+    problem = f"--unseen {wanted.unseen.value} changes nothing, because the surface is not closed"
+    return (Remark(problem, "give --box, --mat, --object or --turntable", is_note=True),)
 
 
 def require_something(report: ScanReport) -> None:

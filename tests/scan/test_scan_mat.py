@@ -222,6 +222,26 @@ def test_unseen_surface_is_grey_pink_or_cut_in_the_files_of_a_scan(
     assert "--unseen changes nothing" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("wanted", "count"),
+    [
+        (ScanWanted(voxel_m=0.004, unseen=UnseenSurface.CUT), 1),
+        (ScanWanted(voxel_m=0.004, unseen=UnseenSurface.PINK), 1),
+        (ScanWanted(voxel_m=0.004), 0),
+        (replace(WANTED, voxel_m=0.004, unseen=UnseenSurface.CUT), 0),
+    ],
+)
+def test_a_choice_for_unseen_surface_that_changes_nothing_is_a_note(
+    wanted: ScanWanted, count: int, tmp_path: Path
+) -> None:
+    """A surface that stays open has no unseen part: where pink or cut was asked for, one note says so and what closes it; elsewhere there is none."""
+    save_scan(tmp_path / "out", scanned([0, 10], wanted)[0])
+    words = f"--unseen {wanted.unseen.value} changes nothing, because the surface is not closed: give --box, --mat, --object or --turntable"
+    said = json.loads((tmp_path / "out" / "report.json").read_text())["warnings"]
+    assert sum("--unseen" in each for each in said) == said.count(words) == count
+    assert Page((tmp_path / "out" / "index.html").read_text()).words.count(words) == count
+
+
 def test_a_pair_without_the_mat_is_lost_with_a_reason_or_followed_by_what_stands_on_it() -> None:
     """Before the mat was seen nothing is fused. Later the ball alone tells where it is when it hardly moved, not when it was turned half around."""
     scan = Scan(WANTED)
