@@ -1,7 +1,9 @@
 """The scan's step for several viewers and small screens: the running scan's options, its command, what is in view, and how Stop looks."""
 
+import numpy as np
 import pytest
 
+from phone_host.scan.mesh import Mesh
 from phone_host.scan.patches import Patches
 from phone_host.web.source import Activity, ScanState
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
@@ -103,3 +105,19 @@ def test_stop_looks_the_same_on_every_step(program: Played, opened: Opener, size
             button,
         )
     assert looks["scan"] == looks["run"] == looks["calibration"]
+
+
+def test_the_sentence_about_hatching_goes_with_the_surface(program: Played, opened: Opener) -> None:
+    """It stands under surface that was never in view; when the next scan begins, the viewer is empty and the sentence gone, also while the answer with the first patches is lost on its way."""
+    points = np.array([[0, 0, 0.5], [0.1, 0, 0.5], [0, 0.1, 0.5]], np.float32)
+    mesh = Mesh(points, np.full((3, 3), 90, np.uint8), np.array([[0, 1, 2]], np.int32))
+    program.patches = Patches(1)
+    program.patches.become(mesh, 0.01, np.zeros(3, np.bool_))
+    program.scan = ScanState(words="done", level="good")
+    page = opened("scan")
+    page.wait_for_selector("#scan-hatch:not([hidden])")
+    page.route("**/api/surface?since=0", lambda route: route.abort())
+    program.patches = Patches(1)
+    program.change(begun=program.begun + 1, activity=Activity.SCANNING)
+    page.wait_for_selector("#scan-none:not([hidden])")
+    page.wait_for_selector("#scan-hatch", state="hidden")

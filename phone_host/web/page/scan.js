@@ -178,7 +178,7 @@ export class ScanPanel {
     if (!this.state()?.scan) return;
     const has = await this.surface.ask();
     show(byId('scan-none'), this.model.isEmpty());
-    if (has) show(byId('scan-hatch'), this.model.hasUnseen());
+    show(byId('scan-hatch'), this.model.hasUnseen());
     data(byId('scan-model'), 'parts', String(this.model.parts.size));
     if (has && !this.isHeld) this.model.view('turned');
   }
