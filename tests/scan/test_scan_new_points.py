@@ -12,7 +12,7 @@ from tests.bench.ring_corridor import GEOMETRY, Ring, RingScene
 from tests.support.plane_films import distance
 
 FIRST, LAST = 20, 25
-"""At the view before the last one, close to a wall, 19 corners are left, and a keyframe begins."""
+"""At the view before the last one, close to a wall, some 20 corners are left (19 measured), and a keyframe begins."""
 
 
 def test_a_motion_from_a_poorly_known_keyframe_is_exact() -> None:
@@ -28,6 +28,6 @@ def test_a_motion_from_a_poorly_known_keyframe_is_exact() -> None:
         view = View(grey=left, colours=colours, depth_m=depth_m.astype(np.float32), geometry=GEOMETRY, noise_px=0.5)
         moves.append(odometry.step(reduced(view)))
     before, truth = (scene.poses[number] for number in (LAST - 1, LAST))
-    assert moves[-2].inliers < 40
+    assert 10 < moves[-2].inliers < 30
     assert moves[-1].inliers > 200
     assert distance(moves[-1].before_now, before.inverse() @ truth).max() < 3e-3
