@@ -20,8 +20,6 @@ from typing import Final
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
 
 from common import now
 from phone_host.geometry.se3 import SE3, vectors_of
@@ -42,6 +40,7 @@ from phone_host.stereo.rectifier import Rectifier
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.object_turntable import turntable_verdicts
+from tests.bench.row_table import print_rows
 from tests.support.mat_rigs import rig_of
 from tests.support.mats import MAT, MatPainter, looking_at, of_right
 
@@ -247,25 +246,14 @@ def main() -> int:
         print(json.dumps({"machine": str(machine()), **told, "verdicts": [asdict(each) for each in verdicts]}))
     else:
         print(f"{machine()}, OpenCV {cv2.__version__}, {options.threads} threads")
-        _print("mat poses", poses)
-        _print("surfaces", surfaces)
+        print_rows("mat poses", poses)
+        print_rows("surfaces", surfaces)
         print(*verdicts, sep="\n")
     return exit_code(verdicts)
 
 
 def _below(name: str, found: float, most: float, unit: str) -> Verdict:
     return Verdict(name, found <= most, f"{found:.3f} {unit}", f"at most {most:g} {unit}")
-
-
-def _print(title: str, rows: Sequence[PoseRow | SurfaceRow]) -> None:
-    if not rows:
-        return
-    table = Table(title=title, title_justify="left")
-    for name in asdict(rows[0]):
-        table.add_column(name.replace("_", " "), justify="right")
-    for row in rows:
-        table.add_row(*(f"{each:.3f}" if isinstance(each, float) else str(each) for each in asdict(row).values()))
-    Console(width=150).print(table)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ scaled. A free scan counts within 0.12 m of the thing, table included. Exit 4 wh
 
 import argparse
 import json
-import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -20,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
 from common import now
 from phone_host.geometry.se3 import SE3
@@ -38,6 +36,7 @@ from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
+from tests.bench.row_table import print_rows
 from tests.bench.scan_error_objects import ERROR_OBJECTS, error_scene
 from tests.support.surface_coverage import coverage
 
@@ -166,22 +165,9 @@ def main() -> int:
         print(json.dumps({"machine": str(machine()), "opencv": cv2.__version__, **values}))
     else:
         print(f"{machine()}, OpenCV {cv2.__version__}")
-        _print(rows)
+        print_rows("stated and true errors", rows)
         print(*verdicts, sep="\n")
     return exit_code(verdicts)
-
-
-def _print(rows: Sequence[Row]) -> None:
-    table = Table(title="stated and true errors", title_justify="left")
-    for name in Row.__dataclass_fields__:
-        table.add_column(name.replace("_", " "), justify="right")
-    for row in rows:
-        cells = (
-            f"{each:.3f}" if isinstance(each, float) and math.isfinite(each) else str(each)
-            for each in asdict(row).values()
-        )
-        table.add_row(*cells)
-    Console(width=130).print(table)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """The stated error of a surface: 95 % of the points lie within two standard deviations, and these are at most twice as wide as they must be."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,13 +9,14 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed
 from phone_host.scan.scan import Scan
+from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.ways import scan_for
 from tests.scan.test_scan_mat import WANTED as ON_MAT
 from tests.scan.test_scan_mat import walked
 from tests.support.mats import BALL_M
-from tests.support.surface_coverage import coverage
+from tests.support.surface_coverage import Distance, coverage
 from tests.support.table_things import computed_view, small_scene, true_camera
 from tests.support.turning_things import Size, matched_view, off_thing_m, photographed, processed_of, turned_scene
 
@@ -43,6 +43,14 @@ def scan_of(pairs: list[Processed], wanted: ScanWanted) -> Scan:
     return scan
 
 
+def assert_stated_well(model: ScanModel, distance: Distance, start: SE3 | None, reach_m: float = np.inf) -> None:
+    """Drift is included, 95 % of the points lie within two deviations, and these are not twice as wide as they must be."""
+    found = coverage(model, distance, start, reach_m)
+    assert model.error_scope is ErrorScope.DRIFT
+    assert found.share >= 0.95
+    assert found.width <= 2
+
+
 def figure_m(points: Floats) -> Floats:
     """How far points lie from the figure."""
     return np.abs(small_scene().solid.signed_distance(points))
@@ -54,18 +62,13 @@ def scene_m(points: Floats) -> Floats:
 
 
 @pytest.mark.parametrize(("on_table", "distance"), [(True, figure_m), (False, scene_m)], ids=["table", "free"])
-def test_a_way_around_an_object(
-    around: list[Processed], distance: Callable[[Floats], Floats], *, on_table: bool
-) -> None:
+def test_a_way_around_an_object(around: list[Processed], distance: Distance, *, on_table: bool) -> None:
     """On a table and in a free scan, drift included; the model lies as well as a rigid motion can lay it."""
     scan = scan_of(around, ScanWanted(voxel_m=0.002, on_table=on_table))
     model = scan.model()
     start = true_camera(VIEWS[0]) @ scan.pairs[0].world_camera.inverse()
-    found = coverage(model, distance, start, AROUND_M)
     assert scan.fused == len(VIEWS)
-    assert model.error_scope is ErrorScope.DRIFT
-    assert found.share >= 0.95
-    assert found.width <= 2
+    assert_stated_well(model, distance, start, AROUND_M)
 
 
 def ball_m(points: Floats) -> Floats:
@@ -78,10 +81,7 @@ def test_an_object_on_a_mat() -> None:
     """In the axes of the mat as it lies: nothing is aligned. Six views alone show too little, and it says so."""
     pairs = [walked(degrees) for degrees in range(0, 360, 30)]
     model = scan_of(pairs, ON_MAT).model()
-    found = coverage(model, ball_m, None)
-    assert model.error_scope is ErrorScope.DRIFT
-    assert found.share >= 0.95
-    assert found.width <= 2
+    assert_stated_well(model, ball_m, None)
     assert scan_of(pairs[::2], ON_MAT).model().error_scope is ErrorScope.NOISE
 
 
@@ -92,11 +92,8 @@ def test_an_object_that_turns() -> None:
     views = [matched_view(photographed(scene, size, number), size, 96) for number, scene in enumerate(scenes)]
     scan = scan_of([processed_of(view) for view in views], ScanWanted(voxel_m=0.002, turntable=True))
     model = scan.model()
-    found = coverage(model, off_thing_m, SE3.identity())
     assert scan.fused == len(views)
-    assert model.error_scope is ErrorScope.DRIFT
-    assert found.share >= 0.95
-    assert found.width <= 2
+    assert_stated_well(model, off_thing_m, SE3.identity())
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])
