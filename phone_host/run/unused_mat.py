@@ -4,7 +4,6 @@ from phone_host.model import Processed
 from phone_host.report.stereo_report import Remark
 from phone_host.scan.mat_in_view import MatDetector
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.stereo.images import to_grey
 
 
 class UnusedMat:
@@ -33,7 +32,7 @@ class UnusedMat:
             What must be said; None: nothing, or nothing new.
         """
         detector = self._detector
-        if detector is None or not detector.take(to_grey(processed.pair.left)) or detector.result is None:
+        if detector is None or not detector.take(processed.pair.left) or detector.result is None:
             return None
         remedy = f"use {detector.result.option}{self._in_place} to scan the object on it, or take the mat away"
         self.remark = Remark("a printed mat is in view, but the scan does not use it", remedy)

@@ -8,6 +8,7 @@ from phone_host.calibration.marked import Charuco, MarkFamily
 from phone_host.calibration.marks_seen import find_marks, squares_of
 from phone_host.model import Image
 from phone_host.scan.mat import USUAL_MAT, parse_mat
+from phone_host.stereo.images import to_grey
 
 _FIRST_PAIRS: Final = 5
 """These are searched, and then pairs 8, 16, 32 ...: so a long scan costs hardly more than a short one."""
@@ -52,11 +53,11 @@ class MatDetector:
         """The mat that was found; None: none was."""
         return self._result
 
-    def take(self, grey: Image) -> bool:
+    def take(self, left: Image) -> bool:
         """Look for a mat in the next pair, if it is one of those that are searched.
 
         Args:
-            grey: (H, W) uint8, its left image.
+            left: its left image, (H, W) grey or (H, W, 3) BGR, uint8.
 
         Returns:
             Whether a mat was found in this pair, and in none before.
@@ -64,7 +65,7 @@ class MatDetector:
         number, self._pairs = self._pairs, self._pairs + 1
         if self._result is not None or (number >= _FIRST_PAIRS and number & (number - 1)):
             return False
-        self._result = mat_in_view(grey)
+        self._result = mat_in_view(to_grey(left))
         return self._result is not None
 
 

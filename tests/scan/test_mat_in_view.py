@@ -60,14 +60,15 @@ def test_no_mat_is_seen_where_none_lies() -> None:
 
 
 def test_few_pairs_are_searched() -> None:
-    """The first five, then the 9th, 17th, 33rd ...; a mat that lies there is reported once."""
-    blank, mat = np.full((480, 640), 90, np.uint8), with_mat("10x8:25mm:18mm:5x5", 0)
+    """The first five, then the 9th, 17th, 33rd ..., in grey or colour; others are not even converted to grey. A mat that lies there is reported once."""
+    blank, grey = np.full((480, 640), 90, np.uint8), with_mat("10x8:25mm:18mm:5x5", 0)
+    mat, no_image = np.repeat(grey[..., np.newaxis], 3, axis=2), np.zeros((480, 640, 2), np.uint8)
     detector = MatDetector()
     assert not any(detector.take(blank) for _ in range(5))
-    assert not any(detector.take(mat) for _ in range(3))
+    assert not any(detector.take(no_image) for _ in range(3))
     assert detector.take(mat)
     assert detector.result == MatInView(10, 8, MarkFamily.ARUCO_5X5)
-    assert not any(detector.take(mat) for _ in range(9))
+    assert not any(detector.take(no_image) for _ in range(9))
 
 
 @pytest.fixture(scope="module")
