@@ -4,22 +4,23 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from common.errors import DataError
-from common.words import counted, distance_text
+from common.words import counted, distance_text, two_digits
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.run.turn_remarks import keeps_field
-from phone_host.run.way_remarks import way_remarks
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
+from phone_host.scan.stretches import WayCertainty
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 
@@ -27,6 +28,8 @@ _EMPTY_BOX = Remark(
     "nothing of what the pairs show lies in the box",
     "move or enlarge --box, or leave it out to see where the thing lies",
 )
+_LEAST_WAY_M: Final = 5.0
+"""Around a thing or a table the pairs see each other's surface, which holds them together better than their way does."""
 
 
 def own_axes(wanted: ScanWanted) -> Axes | None:
@@ -231,3 +234,19 @@ def memory_remarks(scan: Scan) -> Sequence[Remark]:
             )
         )
     return remarks
+
+
+def way_remarks(certainty: WayCertainty | None) -> Sequence[Remark]:
+    """Say how far poses far from the beginning may be off: the noise of the surface knows nothing of that.
+
+    Args:
+        certainty: of the way; None: something else than the way tells where the camera is, or nobody knows.
+    """
+    if certainty is None or certainty.length_m < _LEAST_WAY_M:
+        return ()
+    known = f"its farthest poses are known to \u00b1 {two_digits(1e3 * certainty.sigma_m)} mm"
+    way = f"the camera's way is {distance_text(certainty.length_m)} long"
+    if certainty.loops:
+        return (Remark(f"{way} and {counted(certainty.loops, 'loop')} were closed: {known}", is_note=True),)
+    remedy = "come back to where you began, and show it for some pairs from the same side"
+    return (Remark(f"{way} and no loop was closed: {known}", remedy, is_note=True),)
