@@ -1,5 +1,10 @@
-"""Depth as a 16-bit PNG in mm, the form in which depth cameras' pictures are passed on. 0 means none."""
+"""Depth as a 16-bit PNG in mm, the form in which depth cameras' pictures are passed on. 0 means none.
 
+The text that says what the pixels mean is a tEXt chunk: PNG specification (third edition), sections 5.3 and 11.3.3.2.
+"""
+
+import struct
+import zlib
 from pathlib import Path
 from typing import Final
 
@@ -9,7 +14,6 @@ from numpy.typing import NDArray
 
 from phone_host.model import CloudImage
 from phone_host.output.atomic import write_bytes
-from phone_host.output.png_text import with_text
 from phone_host.output.strips import strips
 
 MOST_MM: Final = 65535
@@ -19,6 +23,9 @@ _TEXT: Final = (
     "16 bit, unit millimetre, 0 = none: distance from the left camera along its optical axis (z forward), for each pixel of the"
     " rectified left image"
 )
+_BEFORE_CHUNKS: Final = 8  # the signature
+_HEADER_END: Final = _BEFORE_CHUNKS + 12 + 13
+"""IHDR, always the first chunk: 13 bytes of data; length, kind and CRC take 12."""
 
 
 def depth_mm(cloud: CloudImage) -> tuple[NDArray[np.uint16], int]:
@@ -57,5 +64,18 @@ def write_depth(path: Path, cloud: CloudImage) -> int:
     """
     depth, unfit = depth_mm(cloud)
     encoded = cv2.imencode(".png", depth, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-    write_bytes(path, with_text(encoded.tobytes(), "Description", _TEXT))
+    write_bytes(path, _with_text(encoded.tobytes(), "Description", _TEXT))
     return unfit
+
+
+def _with_text(png: bytes, keyword: str, text: str) -> bytes:
+    """Add a tEXt chunk behind the header.
+
+    Args:
+        png: a whole PNG file.
+        keyword: 1 to 79 letters of Latin-1.
+        text: Latin-1, without the character 0.
+    """
+    body = b"tEXt" + keyword.encode("latin-1") + b"\0" + text.encode("latin-1")
+    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    return png[:_HEADER_END] + chunk + png[_HEADER_END:]
