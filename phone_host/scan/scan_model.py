@@ -18,9 +18,8 @@ from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import only, part_of, without_crumbs, without_loose_bodies
 from phone_host.scan.sheet_ink import ink_points, specks
 from phone_host.scan.surface_error import ErrorScope, FusedDepths, PoseErrors, surface_error
-from phone_host.scan.surface_noise import surface_noise_m
 from phone_host.scan.volume import Volume
-from phone_host.scan.volume_settings import LEAST_WEIGHT
+from phone_host.scan.volume_settings import LEAST_WEIGHT, WEIGHT_ONE, VolumeSettings
 
 _ON_A_VOXEL: Final = 0.005
 """A point lies on an edge between two voxels, at least a hundredth of it from either."""
@@ -112,6 +111,28 @@ def closed_model(volume: Volume, carving: Carving, box: Box, floor: Floor | Grou
     colours = filled_from_border(mesh.colours, mesh.triangles, seen)
     noise_m = np.where(seen, surface_noise_m(mesh.points_m, volume.blocks, volume.settings), np.float32(np.nan))
     return ScanModel(Mesh(mesh.points_m, colours, mesh.triangles), noise_m.astype(np.float32), seen, is_closed=True)
+
+
+def surface_noise_m(points_m: NDArray[np.float32], blocks: Blocks, settings: VolumeSettings) -> NDArray[np.float32]:
+    """Return the standard deviation of the surface, if the views err independently.
+
+    A depth's weight is the inverse of its variance (`volume_settings`), so a sum of weights tells that of their mean.
+
+    Args:
+        points_m: (N, 3) points of the surface, m.
+        blocks: of the volume.
+        settings: of the volume.
+
+    Returns:
+        (N,) m; NaN where the volume holds nothing.
+    """
+    voxels = np.rint(points_m / settings.voxel_m).astype(np.int32)
+    numbers, inside = blocks.find(voxels >> 3), voxels & (SIDE - 1)
+    at = inside @ np.array([1, SIDE, SIDE**2])
+    weights = np.where(numbers >= 0, blocks.weights[np.maximum(numbers, 0), at], 0).astype(np.float64)
+    with np.errstate(divide="ignore"):
+        noise = settings.sure_m * np.sqrt(WEIGHT_ONE / weights)
+    return np.where(weights > 0, noise, np.nan).astype(np.float32)
 
 
 def _weights(points_m: NDArray[np.float32], field: Blocks, voxel_m: float) -> NDArray[np.uint16]:

@@ -19,8 +19,8 @@ from phone_host.scan.fineness import fineness_for
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import NO_SIZE, only, size_of, thinned, without_crumbs
 from phone_host.scan.scan import Scan
+from phone_host.scan.scan_model import surface_noise_m
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.surface_noise import surface_noise_m
 from phone_host.scan.taken_view import view_of
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume import Volume
