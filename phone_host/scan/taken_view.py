@@ -2,18 +2,20 @@
 
 from typing import Final
 
+import cv2
 import numpy as np
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from phone_host.model import Processed
-from phone_host.scan.depth_edges import without_edges
+from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.mat import Mat
-from phone_host.scan.view import View
+from phone_host.scan.view import Depth, View
 from phone_host.stereo.images import size_px, to_grey
 
 NOISE_PX: Final = 0.5
 """Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
+_STEP_PX: Final = 1.5
+"""A rise of the disparity from pixel to pixel: a table 0.3 m below the cameras gives 0.3 px, the outline of a cup 5 px."""
 
 
 def require_size(name: str, view: View, size: tuple[int, int]) -> None:
@@ -53,3 +55,24 @@ def view_of(processed: Processed, mat: Mat | None = None) -> View:
         epipolar=processed.pair.epipolar,
         confidence=None if mat is None else processed.confidence,
     )
+
+
+def without_edges(depth_m: Depth, geometry: StereoGeometry) -> Depth:
+    """Leave out the depths beside a step, where a matcher's window sees both sides.
+
+    Args:
+        depth_m: (H, W) float32, m, NaN = none.
+        geometry: of the rectified pair.
+
+    Returns:
+        (H, W) float32, m: the same, NaN where a neighbour's disparity is more than 1.5 px away.
+    """
+    with np.errstate(divide="ignore"):
+        disparity = np.float32(geometry.focal_px * geometry.baseline_m) / depth_m
+    known, around = np.isfinite(disparity), np.ones((3, 3), np.uint8)
+    highest = cv2.dilate(np.where(known, disparity, np.float32(-np.inf)), around)
+    lowest = cv2.erode(np.where(known, disparity, np.float32(np.inf)), around)
+    flat = known & (
+        np.maximum(highest - disparity, disparity - lowest, where=known, out=np.zeros_like(disparity)) <= _STEP_PX
+    )
+    return np.where(flat, depth_m, np.float32(np.nan))
