@@ -5,11 +5,12 @@ from enum import Enum
 from functools import partial
 from typing import Final
 
+import numpy as np
+
 from common.recording.layout import CLOUD, DEPTH
-from common.recording.ros_messages import cloud_parts, depth_parts
-from phone_host.model import Result, Side
+from common.recording.ros_messages import POINT_BYTES, cloud_parts, depth_parts
+from phone_host.model import CloudImage, Image, Result, Side
 from phone_host.output.depth_png import depth_mm
-from phone_host.recording.computed import cloud_data
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.run.sinks import OneQueueSink, SinkQueue
 
@@ -63,3 +64,22 @@ class ComputedSink(OneQueueSink):
         if Computed.CLOUD in self._wanted:
             data = cloud_data(cloud, result.processed.pair.left)
             self._recording.computed(CLOUD, partial(cloud_parts, frame_id=frame_id, data=data), ledger, at_ns)
+
+
+def cloud_data(cloud: CloudImage, colours: Image) -> bytes:
+    """Return the points of a cloud as a recording has them.
+
+    Args:
+        cloud: (H, W, 3) float32, m; NaN: none.
+        colours: (H, W) grey or (H, W, 3) BGR, uint8: of each point.
+
+    Returns:
+        x, y, z, m, and 0x00RRGGBB of each point that is there, `POINT_BYTES` each, little endian.
+    """
+    there = ~np.isnan(cloud[..., 2])
+    points = np.empty((int(np.count_nonzero(there)), POINT_BYTES // 4), "<f4")
+    points[:, :3] = cloud[there]
+    seen = colours[there].astype("<u4")
+    blue, green, red = seen.T if seen.ndim > 1 else (seen, seen, seen)
+    points[:, 3] = (red << 16 | green << 8 | blue).view("<f4")
+    return points.tobytes()
