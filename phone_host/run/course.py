@@ -4,14 +4,14 @@ from collections.abc import Callable
 from typing import Final
 
 from common import now
-from common.errors import AbsentBoardError
-from common.protocol.message import CameraDescription
+from common.camera.image_numbers import plain_camera
+from common.errors import AbsentBoardError, SettingsError
+from common.protocol.message import CameraDescription, Pacing
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.time_limit import TimeLimit
 from phone_host.run.worker import Worker
 from phone_host.stream.await_board import BoardPatience, refusal_error
-from phone_host.stream.one_kind import require_one_kind
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.refusals import BoardRefusal
 from phone_host.stream.streams import BoardStream, OwnStream
@@ -19,6 +19,10 @@ from phone_host.stream.streams import BoardStream, OwnStream
 _STEP_S: Final = 0.05
 _LAST_PARTNER_NS: Final = 1_000_000_000
 """After one stream has ended, the other gets this long to deliver the last partners."""
+_MIXED_REMEDY: Final = (
+    "for photographs, leave fps=, loop=, phase_ms= and pace=clock out on both sides; for a film or a live camera, give fps="
+    " or loop=1 on the side that shows stills"
+)
 
 
 class Course:
@@ -134,3 +138,26 @@ class Course:
     def _all_paired(self) -> bool:
         counts = self._queue.counts
         return self._receiver.ended and (counts.held_board == 0 or (self._camera.ended and counts.held_host == 0))
+
+
+def require_one_kind(own: CameraDescription, board: CameraDescription) -> None:
+    """Refuse stills on one side beside a camera with a clock on the other: nothing says which images belong together.
+
+    Args:
+        own: this machine's camera.
+        board: the board's camera.
+
+    Raises:
+        SettingsError: one of the two shows images on demand, the other by its clock.
+    """
+    if own.pacing is board.pacing:
+        return
+    names = f"the board's camera {_address(board)}", f"this machine's camera {_address(own)}"
+    stills, film = names if board.pacing is Pacing.DEMAND else names[::-1]
+    raise SettingsError(f"{stills} shows stills, {film} keeps a clock", _MIXED_REMEDY)
+
+
+def _address(camera: CameraDescription) -> str:
+    """Return what a camera's address begins with, as far as its description tells."""
+    kind, space, rest = plain_camera(camera.name).partition(" ")
+    return f"{kind}:{rest}" if kind == "replay" and space else camera.name

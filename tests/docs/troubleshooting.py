@@ -29,7 +29,7 @@ _ROOMS: Final = (
         ),
     ),
     ("Cameras", ("common/camera", "phone_host/camera", "board_agent/rate")),
-    ("Links", ("common/link", "phone_host/stream", "phone_host/children")),
+    ("Links", ("common/link", "phone_host/stream", "phone_host/run/course", "phone_host/children")),
     (
         "Finding a board, keys and enrolment",
         ("phone_host/boards", "common/keys", "board_agent/enrolment", "common/protocol", "common/trusted"),

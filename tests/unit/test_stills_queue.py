@@ -10,8 +10,8 @@ from common.camera.image_numbers import ImageNumbers, ShowsFiles, with_numbers
 from common.errors import SettingsError
 from common.protocol.message import CameraDescription, Pacing
 from common.stamp import HOST_CLOCK
+from phone_host.run.course import require_one_kind
 from phone_host.stream.demand_clock import DemandClock
-from phone_host.stream.one_kind import require_one_kind
 from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.sync.fifo import FifoSettings, Overflow
