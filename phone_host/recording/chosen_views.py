@@ -4,7 +4,7 @@ A picture is named by the second at which it was taken, counted from the first p
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -23,13 +23,19 @@ from phone_host.measure.camera_match import state_of
 from phone_host.model import Image, Side
 from phone_host.output.cameras_json import CAMERAS_NAME, cameras_text
 from phone_host.recording.both_sides import encoded, topics_of
-from phone_host.recording.stillest import NS, stillest
 from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.stereo.images import to_grey
 from phone_host.stereo.raw_images import decode_frame
 
 _SMALL_PX: Final = (160, 120)
 """Enough to see that something moves, and little enough that noise is not seen."""
+
+NS: Final = 1_000_000_000
+_LEAST_NS: Final = NS
+"""A person who shows a board holds each pose for about two seconds."""
+
+MOST: Final = 100
+"""More views add nothing to a calibration, and cost a minute."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +131,31 @@ def _chosen(
         before = small
         advance((place + 1) / len(pairs))
     return [whole[place] for place in stillest([left.stamps_ns[pairs[place][0]] for place in whole], changes)]
+
+
+def stillest(stamps_ns: Sequence[int], changes: Sequence[float]) -> list[int]:
+    """Return the places of one moment for each second: the one at which least moved.
+
+    A camera's rows are not exposed at once, and two cameras not at one moment: what moves then is bent, or stands in two places.
+
+    Args:
+        stamps_ns: of the moments, ascending.
+        changes: how much each image differs from the one before; NaN: it cannot be told. As many as moments.
+
+    Returns:
+        Ascending; at most `MOST`: of a longer film one for each hundredth of it.
+    """
+    if not stamps_ns:
+        return []
+    begin_ns = stamps_ns[0]
+    every_ns = max(_LEAST_NS, -(-(stamps_ns[-1] - begin_ns + 1) // MOST))
+    best: dict[int, tuple[float, int]] = {}
+    for place, at_ns in enumerate(stamps_ns):
+        around = [change for change in changes[place : place + 2] if not math.isnan(change)]
+        found = max(around, default=math.inf), place
+        slot = (at_ns - begin_ns) // every_ns
+        best[slot] = min(found, best.get(slot, found))
+    return [place for _, place in best.values()]
 
 
 def _cameras(recorded: Recorded, left: CameraDescription, right: CameraDescription) -> str:
