@@ -2,11 +2,15 @@
 
 import argparse
 import math
+import select
 import sys
 import termios
-from contextlib import ExitStack, closing, suppress
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
 from typing import Final
 
+from common.android import is_android
 from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import HUNG_UP
@@ -14,6 +18,7 @@ from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.json_text import json_text
+from phone_host.printers.announced_printers import SERVICES, FoundPrinter, printers_of
 from phone_host.printers.door import Job, Wishes
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, is_gcode
@@ -22,9 +27,7 @@ from phone_host.printers.printing import RunningPrint, begun, printed
 from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import Slicer, SlicingWanted
 from phone_host.run.model_job import PreparedPrint, prepare_print
-from phone_host.run.progress_bar import share_bar, step_bar
-from phone_host.verbs.print.finding import find
-from phone_host.verbs.print.keypad import keypad
+from phone_host.run.progress_bar import busy_bar, share_bar, step_bar
 from phone_host.verbs.printer_bed import bed_of
 
 _STEP_S: Final = 0.1
@@ -33,7 +36,7 @@ _STEP_S: Final = 0.1
 def run(options: argparse.Namespace) -> int:
     """Slice a model, check the G-code, ask, send it, and say how it ended."""
     if options.find:
-        return find(options)
+        return _find(options)
     if options.what is None or not options.printer:
         raise SettingsError("print needs a model or G-code, and --printer", "phone-host print --find lists printers")
     uri = read_uri(options.printer)
@@ -54,6 +57,37 @@ def run(options: argparse.Namespace) -> int:
         signals = StopSignals()
         code = _told(_sent(prepared, signals), options, uri, prepared.job)
         return HUNG_UP if signals.hung_up and code == INTERRUPTED else code
+
+
+def _find(options: argparse.Namespace) -> int:
+    """List the printers.
+
+    Raises:
+        UnavailableError: this machine cannot listen for them.
+    """
+    with busy_bar("listening for printers"):
+        found = _announced()
+    if options.json:
+        told = [{"printer": each.uri, "name": each.name} for each in found]
+        print(json_text({"command": "print", "printers": told}))
+        return 0
+    if not found:
+        say("no printer announces itself in this network: give its address with --printer")
+        return 0
+    width = max(len(each.uri) for each in found)
+    say(
+        [f"{counted(len(found), 'printer')} found", *(f"  --printer {each.uri:{width}}  {each.name}" for each in found)]
+    )
+    return 0
+
+
+def _announced() -> list[FoundPrinter]:
+    try:
+        from phone_host.boards.announced import listen  # noqa: PLC0415 - zeroconf is optional
+    except ImportError:
+        why = "Android keeps mDNS from Termux" if is_android() else "the package zeroconf is missing"
+        raise UnavailableError(f"printers cannot be looked for: {why}", "give the address with --printer") from None
+    return printers_of(listen(SERVICES))
 
 
 def _sent(prepared: PreparedPrint, signals: StopSignals) -> Ended:
@@ -80,7 +114,7 @@ def _show(running: RunningPrint, name: str) -> None:
         OSError: the terminal is gone.
         termios.error: likewise.
     """
-    with keypad() as pressed, share_bar(f"{name}: waiting for the printer") as bar:
+    with _keypad() as pressed, share_bar(f"{name}: waiting for the printer") as bar:
         while not running.join(_STEP_S):
             match pressed():
                 case "p":
@@ -89,6 +123,29 @@ def _show(running: RunningPrint, name: str) -> None:
                     running.cancel()
             bar(running.progress.share)
             bar.say(_words(name, running.progress))
+
+
+@contextmanager
+def _keypad() -> Iterator[Callable[[], str]]:
+    """While the block runs, keys need no Enter; Ctrl-C stays what it is.
+
+    Yields:
+        A function that returns the key that was pressed; empty: none.
+    """
+    if not sys.stdin.isatty():
+        yield lambda: ""
+        return
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)
+    try:
+        yield _pressed
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _pressed() -> str:
+    ready, _, _ = select.select([sys.stdin], [], [], 0)
+    return sys.stdin.read(1).lower() if ready else ""
 
 
 def _words(name: str, progress: Progress) -> str:
