@@ -25,7 +25,7 @@ from common.camera.factory import open_camera
 from common.camera.options import EXAMPLE
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
-from common.program.commandline import INTERRUPTED
+from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.settings import log_level, with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import fitted
@@ -37,7 +37,6 @@ from common.stamp import board_clock
 from common.versions import all_versions
 from common.words import counted
 
-_BAD_DATA: Final = 4
 _LEAST_BYTES: Final = 1_000_000
 _LEAST_RING_BYTES: Final = PARTS * 2_000_000
 """A part that holds less is mostly what stands at the begin of each."""
@@ -219,7 +218,7 @@ def _tell(outcome: Outcome, health: CameraHealth, bound: _Bound, *, as_json: boo
         print(fitted(_words(outcome, bound)))
     if is_interrupted:
         return INTERRUPTED
-    return _BAD_DATA if outcome.end in {End.FAILED, End.SLEPT} or written.dropped or not written.frames else 0
+    return CHECK_FAILED if outcome.end in {End.FAILED, End.SLEPT} or written.dropped or not written.frames else 0
 
 
 def _words(outcome: Outcome, bound: _Bound) -> str:

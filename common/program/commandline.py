@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 INTERRUPTED: Final = interrupts.INTERRUPTED
+CHECK_FAILED: Final = 4
+"""Exit code: the data are bad, or a check failed."""
 
 _UNAVAILABLE: Final = 3
-_BAD_DATA: Final = 4
 
 # Errors on writing to stdout when the disk, a quota, a device or the terminal behind it fails.
 _WRITE_FAILURES: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
@@ -266,7 +267,7 @@ def _ran(
         if options.debug or not is_out_of_memory(error):
             raise
         _say(f"{parser.prog}: error: memory ran out{words_of(error)}: {remedy_of(vars(options))}")
-        return _BAD_DATA
+        return CHECK_FAILED
 
 
 def _say(line: str) -> None:

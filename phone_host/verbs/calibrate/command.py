@@ -3,7 +3,7 @@
 import argparse
 
 from common.errors import DataError
-from common.program.commandline import INTERRUPTED
+from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.terminal import say
 from phone_host.calibration.verdict import Verdict
 from phone_host.output.json_text import json_text
@@ -14,8 +14,6 @@ from phone_host.verbs.calibrate.importing import import_calibration
 from phone_host.verbs.calibrate.report_json import report_values
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_alone
-
-_CHECK_FAILED = 4
 
 
 def run(options: argparse.Namespace) -> int:
@@ -46,5 +44,5 @@ def run(options: argparse.Namespace) -> int:
 def exit_code(verdict: Verdict, *, is_interrupted: bool) -> int:
     """Return with what the command ends: a check that failed counts more than a signal."""
     if verdict is Verdict.REJECT:
-        return _CHECK_FAILED
+        return CHECK_FAILED
     return INTERRUPTED if is_interrupted else 0

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
-from common.program.commandline import INTERRUPTED
+from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.invocation import command_line, program_name
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
@@ -35,7 +35,6 @@ from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
 from phone_host.stereo.rectify import rectify_rig
 
-_CHECK_FAILED = 4
 _SECONDS = 12.0
 _OUT = Path("out/demo")
 
@@ -97,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
     say(_closing(out, film, errors), sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
-    return 0 if errors.pairs and not errors.wrong_pairs and complete else _CHECK_FAILED
+    return 0 if errors.pairs and not errors.wrong_pairs and complete else CHECK_FAILED
 
 
 def _claim(out: Path) -> None:

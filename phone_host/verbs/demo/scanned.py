@@ -13,7 +13,7 @@ from rich.console import Console
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.program import logs
-from common.program.commandline import INTERRUPTED
+from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.invocation import command_line
 from common.program.signals import StopSignals
 from common.program.terminal import say
@@ -43,7 +43,6 @@ from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.rectify import rectify_rig
 
-_CHECK_FAILED: Final = 4
 _OUT: Final = Path("out/demo-scan")
 _OBJECT: Final = "speckled"
 _VIEWS: Final = 36
@@ -96,7 +95,7 @@ def run_scan_demo(options: argparse.Namespace) -> int:
     say(_closing(out, printed), sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
-    return 0 if scan.report.is_sound and errors.mean_mm <= _WORST_MM else _CHECK_FAILED
+    return 0 if scan.report.is_sound and errors.mean_mm <= _WORST_MM else CHECK_FAILED
 
 
 def _scanned(

@@ -12,6 +12,7 @@ import numpy as np
 
 from common.errors import SettingsError
 from common.places import Kind, kind_of
+from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_text
@@ -28,7 +29,6 @@ from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.stereo_numbers import point_px
 from phone_host.verbs.stereo_options import build_core, overlay_of
 
-_CHECK_FAILED: Final = 4
 _NOISE: Final = "noise of both images"
 _RIG: Final = "the rig's calibration (covariance)"
 _ZERO: Final = "the rig's zero (zero_sigma)"
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
         print(json_text(_report(options, points, found)))
     else:
         say(_lines(options, points, found))
-    return _CHECK_FAILED if any(isinstance(each, MissedPoint) for each in found.points) else 0
+    return CHECK_FAILED if any(isinstance(each, MissedPoint) for each in found.points) else 0
 
 
 def _require_image(path: str) -> None:

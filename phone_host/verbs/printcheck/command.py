@@ -2,13 +2,13 @@
 
 import argparse
 from pathlib import Path
-from typing import Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, UnavailableError
+from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
@@ -25,8 +25,6 @@ from phone_host.run.progress_bar import step_bar
 from phone_host.verbs.output_folders import require_alone, require_folder, written_together
 from phone_host.verbs.printer_bed import bed_of
 from phone_host.verbs.units import length_mm
-
-_CHECK_FAILED: Final = 4
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
         print(json_text(_told(model, found, left, mended, paths)))
     else:
         say(_lines(found, left, mended, paths))
-    return _CHECK_FAILED if any(problem.blocks for problem in left) else 0
+    return CHECK_FAILED if any(problem.blocks for problem in left) else 0
 
 
 def _stl(mended: Fixed) -> bytes:

@@ -2,9 +2,9 @@
 
 import argparse
 import sys
-from typing import Final
 
 from common.errors import SettingsError
+from common.program.commandline import CHECK_FAILED
 from common.program.terminal import columns, say
 from common.words import counted
 from phone_host.calibration.target import Board, parse_board
@@ -23,8 +23,6 @@ from phone_host.verbs.result_places import require_place
 from phone_host.verbs.stereo_numbers import crop_of
 from phone_host.verbs.stereo_options import metric_core, require_metres
 from phone_host.verbs.units import limit_mm, square_mm
-
-_CHECK_FAILED: Final = 4
 
 
 def run(options: argparse.Namespace) -> int:
@@ -61,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         print(json_text(quality_json(report)))
     else:
         say(quality_lines(report, str(options.out), columns()))
-    return 0 if report.is_sound else _CHECK_FAILED
+    return 0 if report.is_sound else CHECK_FAILED
 
 
 def _board(options: argparse.Namespace) -> Board | None:

@@ -15,7 +15,7 @@ from common.camera.base import Camera
 from common.errors import SettingsError, TandemError
 from common.link.base import Link
 from common.program import logs
-from common.program.commandline import INTERRUPTED
+from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.settings import log_level, with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import fitted
@@ -35,8 +35,6 @@ from phone_host.recording.unpaired import UnpairedFrames
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.verbs.output_folders import require_alone
-
-_BAD_DATA = 4
 
 
 def run(options: argparse.Namespace) -> int:
@@ -112,4 +110,4 @@ def _tell(account: RecordingAccount, *, as_json: bool, is_interrupted: bool) -> 
         print(fitted(account.words))
     if is_interrupted:
         return INTERRUPTED
-    return 0 if account.is_whole and account.frames else _BAD_DATA
+    return 0 if account.is_whole and account.frames else CHECK_FAILED

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from common.errors import SettingsError
 from common.program import logs
-from common.program.commandline import INTERRUPTED
+from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.interrupts import leave
 from common.program.settings import Resolved, log_level
 from common.program.signals import StopSignals
@@ -25,8 +25,6 @@ from phone_host.verbs.run.prepared import Ended, PreparedRun, checked, open_run
 
 if TYPE_CHECKING:
     from phone_host.serve.beside import BesideRun
-
-_CHECK_FAILED = 4
 
 
 def run(options: argparse.Namespace) -> int:
@@ -105,7 +103,7 @@ def _finish(
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
     is_wrong = not is_stopped and (depth_is_wrong(snapshot) or snapshot.spoiled_counts.nothing_whole)
-    return _CHECK_FAILED if too_few or is_wrong or not written.is_complete else 0
+    return CHECK_FAILED if too_few or is_wrong or not written.is_complete else 0
 
 
 def _tell(line: str) -> None:

@@ -2,9 +2,9 @@
 
 import argparse
 import sys
-from typing import Final
 
 from common.errors import SettingsError
+from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
 from phone_host.output.json_text import json_text
 from phone_host.report.scan_json import scan_json
@@ -25,8 +25,6 @@ from phone_host.verbs.result_places import require_place
 from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
 from phone_host.verbs.stereo_options import metric_core, require_metres
 
-_CHECK_FAILED: Final = 4
-
 
 def run(options: argparse.Namespace) -> int:
     """Scan pictures, or what two cameras give, and print what came of it."""
@@ -42,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         print(json_text(scan_json(report)))
     else:
         say([*scan_lines(report, str(options.out)), *next_lines(report, options.out)])
-    return code or (0 if report.is_sound else _CHECK_FAILED)
+    return code or (0 if report.is_sound else CHECK_FAILED)
 
 
 def _scan_pictures(options: argparse.Namespace) -> ScanReport:

@@ -8,7 +8,7 @@ from pathlib import Path
 from common.errors import SettingsError
 from common.orientation import UPRIGHT
 from common.program import logs
-from common.program.commandline import INTERRUPTED
+from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import say
@@ -88,7 +88,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
         raise unwritable(options.out, error) from error
     live.kept.done()
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
-    return last.report, INTERRUPTED if signals.interrupted else 4 if too_few else 0
+    return last.report, INTERRUPTED if signals.interrupted else CHECK_FAILED if too_few else 0
 
 
 def live_scan(opened: Opened, wanted: ScanWanted, out: Path, resumed: tuple[Submap, ...] = ()) -> LiveScan:

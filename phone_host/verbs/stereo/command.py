@@ -5,9 +5,10 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from common.errors import SettingsError
+from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
 from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.json_text import json_text
@@ -27,8 +28,6 @@ from phone_host.verbs.output_folders import unwritable
 from phone_host.verbs.result_places import require_place
 from phone_host.verbs.stereo.next_commands import Typed, next_commands
 from phone_host.verbs.stereo_options import build_core, output_options, overlay_of
-
-_CHECK_FAILED: Final = 4
 
 
 def run(options: argparse.Namespace) -> int:
@@ -66,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
         _tell(options, pair_json(only), pair_lines(only, str(options.out)))
     else:
         _tell(options, set_json(report), set_lines(report, str(options.out)))
-    return 0 if report.is_sound else _CHECK_FAILED
+    return 0 if report.is_sound else CHECK_FAILED
 
 
 def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[str]) -> None:
