@@ -16,6 +16,7 @@ from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
 from phone_host.report.cut_words import searched_from_m
 from phone_host.report.stereo_trust import PairTrust
+from phone_host.stereo.view_files import ViewFiles
 
 ALWAYS: Final = ("report.json", "index.html")
 """Files that lie in every folder of results."""
@@ -278,28 +279,28 @@ def distinct_names(paths: Sequence[str]) -> dict[str, str]:
     return {path: path for path in paths}
 
 
-def alone_remarks(left: Sequence[str], right: Sequence[str], *, is_told: bool, pairs: int) -> tuple[Remark, ...]:
-    """Say which images have no partner, and if pairs were guessed.
+def files_remarks(files: ViewFiles, matcher_note: str = "") -> tuple[Remark, ...]:
+    """Say which images have no partner, if pairs were guessed, and how the matcher was chosen.
 
     Args:
-        left: left images without a partner.
-        right: right images without a partner.
-        is_told: whether the names say which files are pairs.
-        pairs: how many pairs there are.
+        files: of both sides.
+        matcher_note: what is to be said of the choice of the matcher; empty: nothing.
     """
     remarks = []
-    for side, alone in (("left", left), ("right", right)):
-        if alone:
+    for side, paths in (("left", files.left_alone), ("right", files.right_alone)):
+        if paths:
+            alone = list(distinct_names([*map(str, paths)]).values())
             named = ", ".join(alone[:_MOST_NAMES]) + (", …" if len(alone) > _MOST_NAMES else "")
             remarks.append(
                 Remark(f"{counted(len(alone), f'{side} image has', f'{side} images have')} no partner: {named}")
             )
-    if not is_told and (pairs > 1 or left or right):
-        unequal = " though the counts differ" if left or right else ""
+    are_unequal = bool(files.left_alone or files.right_alone)
+    if not files.by_number and not files.by_name and (len(files.pairs) > 1 or are_unequal):
+        unequal = " though the counts differ" if are_unequal else ""
         remarks.append(
             Remark(
                 f"the images were paired in the order of their names{unequal}, because the names share neither numbers nor words",
                 "check that each pair shows one moment, or give the two images of a moment the same number",
             )
         )
-    return tuple(remarks)
+    return (*remarks, Remark(matcher_note, is_note=True)) if matcher_note else tuple(remarks)

@@ -29,7 +29,7 @@ from phone_host.output.result_files import replacing_results
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import MeasuredPair, QualityReport
-from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size, alone_remarks, distinct_names
+from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size, files_remarks
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted, tell_of_partial
@@ -137,15 +137,12 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
 
 def _report(job: QualityJob, pairs: list[MeasuredPair | FailedPair]) -> QualityReport:
     files = job.files
-    left, right = (list(distinct_names([*map(str, alone)]).values()) for alone in (files.left_alone, files.right_alone))
-    is_told = files.by_number or files.by_name
-    note = [Remark(job.matcher_note, is_note=True)] if job.matcher_note else []
     return QualityReport(
         pairs=tuple(pairs),
         matcher=job.matcher,
         left_alone=tuple(map(str, files.left_alone)),
         right_alone=tuple(map(str, files.right_alone)),
-        remarks=(*alone_remarks(left, right, is_told=is_told, pairs=len(files.pairs)), *note),
+        remarks=files_remarks(files, job.matcher_note),
     )
 
 

@@ -18,7 +18,7 @@ from phone_host.model import Processed
 from phone_host.output.axes import Axes
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_report import ScanReport
-from phone_host.report.stereo_report import FailedPair, Remark, Size, alone_remarks, distinct_names
+from phone_host.report.stereo_report import FailedPair, Remark, Size, files_remarks
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted, tell_if_heard, tell_of_partial
@@ -192,16 +192,9 @@ class _Work:
     def finished(self) -> FinishedScan:
         """Make the surface and the report of the pairs so far."""
         model = self.scan.model()
-        files = self._job.files
-        left, right = (
-            list(distinct_names([*map(str, alone)]).values()) for alone in (files.left_alone, files.right_alone)
-        )
-        is_told = files.by_number or files.by_name
-        note = [Remark(self._job.matcher_note, is_note=True)] if self._job.matcher_note else []
         remarks = (
             *self._doubts.values(),
-            *alone_remarks(left, right, is_told=is_told, pairs=len(files.pairs)),
-            *note,
+            *files_remarks(self._job.files, self._job.matcher_note),
             *self.kept.remarks,
             *turn_remarks(self.scan),
         )

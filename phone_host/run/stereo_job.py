@@ -28,11 +28,9 @@ from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
-    Remark,
     SetReport,
     Size,
-    alone_remarks,
-    distinct_names,
+    files_remarks,
 )
 from phone_host.run.cores import Cores
 from phone_host.run.freed_memory import keep_freed_memory
@@ -152,22 +150,9 @@ def _set(job: StereoJob, pairs: tuple[PairReport | FailedPair, ...], drift: Drif
         by_name=job.files.by_name,
         left_alone=left,
         right_alone=right,
-        remarks=() if len(pairs) == 1 else (*_of_the_job(job), *drift_remarks(drift)),
+        remarks=() if len(pairs) == 1 else (*files_remarks(job.files, job.matcher_note), *drift_remarks(drift)),
         drift=drift,
     )
-
-
-def _of_the_job(job: StereoJob) -> tuple[Remark, ...]:
-    """Return what is told once: of images without a partner, and of the matcher."""
-    return (*_alone(job), *([Remark(job.matcher_note, is_note=True)] if job.matcher_note else []))
-
-
-def _alone(job: StereoJob) -> tuple[Remark, ...]:
-    left, right = (
-        list(distinct_names([*map(str, alone)]).values()) for alone in (job.files.left_alone, job.files.right_alone)
-    )
-    is_told = job.files.by_number or job.files.by_name
-    return alone_remarks(left, right, is_told=is_told, pairs=len(job.files.pairs))
 
 
 class _StopWatch:
@@ -268,7 +253,7 @@ class _Work:
             remarks = [
                 *turned_remarks(*opened),
                 *pair_remarks(processed, trust, core.wanted.search_from_m),
-                *(() if folder else _of_the_job(self._job)),
+                *(() if folder else files_remarks(self._job.files, self._job.matcher_note)),
             ]
             report = PairReport(
                 name=folder,

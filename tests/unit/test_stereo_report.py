@@ -1,6 +1,7 @@
 """What `stereo` tells about pairs: limits, cuts, images without partner."""
 
 from dataclasses import replace
+from pathlib import Path
 from textwrap import wrap
 
 import pytest
@@ -19,10 +20,11 @@ from phone_host.report.stereo_report import (
     PairReport,
     Remark,
     SetReport,
-    alone_remarks,
+    files_remarks,
 )
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.report.stereo_verdict import set_verdict
+from phone_host.stereo.view_files import ViewFiles
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
 _GOOD = PairTrust(ImageFigures(), (), Answer(Grade.GOOD, "Depth looks right."))
@@ -186,14 +188,21 @@ def test_a_result_is_sound_if_nothing_failed_nothing_blocks_and_there_is_depth(
     assert report.is_sound is sound
 
 
+def _files(pairs: int, left_alone: list[str], right_alone: list[str], *, by_number: bool) -> ViewFiles:
+    """Files of both sides: so many pairs, and these without a partner."""
+    paired = tuple((str(n), Path(f"l{n}.png"), Path(f"r{n}.png")) for n in range(pairs))
+    return ViewFiles(paired, tuple(map(Path, left_alone)), tuple(map(Path, right_alone)), by_number=by_number)
+
+
 def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_told() -> None:
     """Nothing is left out silently; a long list is cut short."""
-    [one] = alone_remarks([], ["r9.png"], is_told=True, pairs=4)
+    [one] = files_remarks(_files(4, [], ["r9.png"], by_number=True))
     assert one.text == "1 right image has no partner: r9.png"
-    many, order = alone_remarks([f"{n}.png" for n in range(7)], [], is_told=False, pairs=4)
+    many, order = files_remarks(_files(4, [f"{n}.png" for n in range(7)], [], by_number=False))
     assert many.problem == "7 left images have no partner: 0.png, 1.png, 2.png, 3.png, 4.png, …"
     assert "order of their names though the counts differ" in order.problem
-    assert alone_remarks([], [], is_told=False, pairs=1) == ()
+    assert files_remarks(_files(1, [], [], by_number=False)) == ()
+    assert files_remarks(_files(1, [], [], by_number=False), "sgbm") == (Remark("sgbm", is_note=True),)
 
 
 def test_the_verdict_of_several_pairs_counts_them() -> None:
