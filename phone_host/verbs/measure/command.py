@@ -21,13 +21,12 @@ from phone_host.run.point_job import ELSEWHERE, Measured, measure_points, point_
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.seen_pair import FoundPoint, MissedPoint, Outcome
 from phone_host.settings import most_pixels
-from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.measured_point import Within, distance_between
 from phone_host.stereo.rig_errors import Known
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.stereo_numbers import point_px
-from phone_host.verbs.stereo_options import build_core, overlay_of
+from phone_host.verbs.stereo_options import metric_core
 
 _NOISE: Final = "noise of both images"
 _RIG: Final = "the rig's calibration (covariance)"
@@ -51,10 +50,11 @@ def run(options: argparse.Namespace) -> int:
     for path in (options.left, options.right):
         _require_image(path)
     points = tuple(point_px(text, "--points", "X,Y in px, for example 312,240") for text in options.points)
+    matcher = options.matcher or default_matcher().value
     job = PairJob(
         left=Path(options.left),
         right=Path(options.right),
-        make_core=lambda size_px: _core(options, size_px),
+        make_core=lambda size_px: metric_core(options, matcher, size_px, Path(options.left)),
         most_pixels=most_pixels(None, options.max_megapixels),
         mounted=orientations(options),
     )
@@ -79,14 +79,6 @@ def _require_image(path: str) -> None:
                 f"{path} is a folder, and distances are measured in one pair of images",
                 "name one left and one right image",
             )
-
-
-def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:
-    matcher = options.matcher or default_matcher().value
-    core, _ = build_core(options, options.calibration, matcher, size_px, Path(options.left))
-    assert core is not None, "a calibration always makes one"
-    core.correct(overlay_of(options, core))
-    return core
 
 
 def _parts(options: argparse.Namespace, found: Measured) -> tuple[list[str], list[str]]:

@@ -14,11 +14,10 @@ from phone_host.output.meshes.solid import Solid
 from phone_host.run.one_pair import PairJob, compute_pair
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
-from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_alone, require_folder, written_together
-from phone_host.verbs.stereo_options import build_core, overlay_of
+from phone_host.verbs.stereo_options import metric_core
 from phone_host.verbs.units import bounded_mm
 
 _NAMES: Final = ("relief.stl", "relief.3mf")
@@ -37,10 +36,11 @@ def run(options: argparse.Namespace) -> int:
     base_m = bounded_mm(options.base, "--base", "2mm", _THICK_MM) / 1000
     sizes = Sizes(width_m=width_m, height_m=height_m, base_m=base_m)
     require_folder(options.out)
+    matcher = options.matcher or default_matcher().value
     job = PairJob(
         left=Path(options.left),
         right=Path(options.right),
-        make_core=lambda size_px: _core(options, size_px),
+        make_core=lambda size_px: metric_core(options, matcher, size_px, Path(options.left)),
         most_pixels=most_pixels(None, options.max_megapixels),
         mounted=orientations(options),
     )
@@ -73,14 +73,6 @@ def run(options: argparse.Namespace) -> int:
     else:
         say([*_lines(relief, solid), f"written to {' and '.join(files)}", *(f"doubt: {doubt}" for doubt in doubts)])
     return 0
-
-
-def _core(options: argparse.Namespace, size_px: tuple[int, int]) -> StereoCore:
-    matcher = options.matcher or default_matcher().value
-    core, _ = build_core(options, options.calibration, matcher, size_px, Path(options.left))
-    assert core is not None, "a calibration always makes one"
-    core.correct(overlay_of(options, core))
-    return core
 
 
 def _fewer(solid: Solid) -> Solid:

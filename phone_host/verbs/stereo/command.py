@@ -77,8 +77,7 @@ def _tell(options: argparse.Namespace, report: dict[str, Any], lines: Sequence[s
 
 def _core(options: argparse.Namespace, matcher: str, size_px: Size, image: Path) -> StereoCore:
     core, _ = build_core(options, options.calibration or "", matcher, size_px, image)
-    if core is None:  # cannot happen: one of the two options was checked above
-        raise SettingsError("no stereo core", "give --calibration or --rectified")
+    assert core is not None, "--calibration and --rectified both make one"
     core.correct(overlay_of(options, core))
     return core
 
