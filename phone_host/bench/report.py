@@ -17,6 +17,7 @@ from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
 from phone_host.measure.delay_fit import DelayFit
 from phone_host.measure.delays import DELAYS, STAGES, Spread
+from phone_host.output.json_text import json_number
 from phone_host.sync.fifo import FifoSettings
 
 PERCENTILES: Final = ("p50", "p95", "p99", "max")
@@ -144,7 +145,7 @@ def _run(result: CaseResult, fifo: FifoSettings) -> dict[str, object]:
         "height_px": case.size.height_px,
         "jpeg_quality_percent": None if case.quality_percent == BOARD_SETS else case.quality_percent,
         "camera_rate_hz": case.rate_hz,
-        "pair_rate_hz": _number(result.pairs_per_second),
+        "pair_rate_hz": json_number(result.pairs_per_second),
         "measured_s": result.measured_s,
         "measured_pairs": len(result.ledgers),
         "mean_frame_bytes": round(sum(ledger.bytes for ledger in result.ledgers) / max(1, len(result.ledgers))),
@@ -152,9 +153,9 @@ def _run(result: CaseResult, fifo: FifoSettings) -> dict[str, object]:
         "delays": {name: _spread(statistics.spread(name)) for name in DELAYS},
         "stages": {name: _spread(statistics.spread(name)) for name in STAGES},
         "time_skew": _spread(statistics.spread("time_skew")),
-        "clock_uncertainty": {f"{key}_us": _number(value / 1e3) for key, value in percentiles(uncertainty).items()},
-        "clock_uncertainty_at_end_us": _number(result.uncertainty_ns / 1e3),
-        "clock_bound_at_end_us": _number(result.bound_ns / 1e3),
+        "clock_uncertainty": {f"{key}_us": json_number(value / 1e3) for key, value in percentiles(uncertainty).items()},
+        "clock_uncertainty_at_end_us": json_number(result.uncertainty_ns / 1e3),
+        "clock_bound_at_end_us": json_number(result.bound_ns / 1e3),
         "regime": {"regime": regime.regime.value, "sentence": regime.sentence, "remedies": list(regime.remedies)},
         "whole_run": _counts(result),
         "line": None if result.relay is None else asdict(result.relay),
@@ -185,7 +186,7 @@ def _counts(result: CaseResult) -> dict[str, object]:
 
 
 def _spread(spread: Spread) -> dict[str, float | None]:
-    return {f"{key}_ms": _number(value / 1e6) for key, value in percentiles(spread).items()}
+    return {f"{key}_ms": json_number(value / 1e6) for key, value in percentiles(spread).items()}
 
 
 def percentiles(spread: Spread) -> dict[str, float]:
@@ -197,10 +198,6 @@ def percentiles(spread: Spread) -> dict[str, float]:
         "max": spread.max_ns,
         "mean": spread.mean_ns,
     }
-
-
-def _number(value: float) -> float | None:
-    return None if value != value else round(value, 6)  # noqa: PLR0124 - NaN is the only value unlike itself; JSON has none
 
 
 def _interface(one: InterfaceFit) -> dict[str, object]:
@@ -220,17 +217,17 @@ def _interface(one: InterfaceFit) -> dict[str, object]:
         "rate_high_bytes_per_s": fit.most_bytes_per_s,
     }
     # JSON has no number for an infinite rate; the slope beside it says what was found.
-    numbers = {key: None if value == float("inf") else _number(value) for key, value in (finite | rates).items()}
+    numbers = {key: json_number(value) for key, value in (finite | rates).items()}
     return {"link": str(one.interface), "fitted_frames": fit.points, **numbers}
 
 
 def _errors(errors: Errors) -> dict[str, object]:
     return {
         "predicted_runs": errors.runs,
-        "pair_rate_median_percent": _number(100.0 * errors.rate),
-        "pair_rate_worst_percent": _number(100.0 * errors.worst_rate),
-        "end_to_end_p50_median_percent": _number(100.0 * errors.end_to_end),
-        "end_to_end_p50_worst_percent": _number(100.0 * errors.worst_end_to_end),
+        "pair_rate_median_percent": json_number(100.0 * errors.rate),
+        "pair_rate_worst_percent": json_number(100.0 * errors.worst_rate),
+        "end_to_end_p50_median_percent": json_number(100.0 * errors.end_to_end),
+        "end_to_end_p50_worst_percent": json_number(100.0 * errors.worst_end_to_end),
     }
 
 
@@ -253,11 +250,11 @@ def _said(predicted: Figures | Unknown) -> dict[str, object]:
 
 def _figures(figures: Figures) -> dict[str, object]:
     return {
-        "pair_rate_hz": _number(figures.pairs_per_s),
-        "lost_percent": _number(100.0 * figures.lost_share),
-        "propagation_p50_ms": _number(figures.propagation_p50_ns / 1e6),
-        "queuing_p95_ms": _number(figures.queuing_p95_ns / 1e6),
-        "starvation_p50_ms": _number(figures.starvation_p50_ns / 1e6),
-        "end_to_end_p50_ms": _number(figures.end_to_end_p50_ns / 1e6),
-        "end_to_end_p95_ms": _number(figures.end_to_end_p95_ns / 1e6),
+        "pair_rate_hz": json_number(figures.pairs_per_s),
+        "lost_percent": json_number(100.0 * figures.lost_share),
+        "propagation_p50_ms": json_number(figures.propagation_p50_ns / 1e6),
+        "queuing_p95_ms": json_number(figures.queuing_p95_ns / 1e6),
+        "starvation_p50_ms": json_number(figures.starvation_p50_ns / 1e6),
+        "end_to_end_p50_ms": json_number(figures.end_to_end_p50_ns / 1e6),
+        "end_to_end_p95_ms": json_number(figures.end_to_end_p95_ns / 1e6),
     }

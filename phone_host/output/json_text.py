@@ -23,6 +23,16 @@ def json_text(value: Any, indent: int | None = None) -> str:  # noqa: ANN401 - w
     return json.dumps(_finite(value), indent=indent, allow_nan=False)
 
 
+def json_number(value: float, digits: int = 6) -> float | None:
+    """Round a number for JSON, which has neither NaN nor infinity: they become None.
+
+    Args:
+        value: any number.
+        digits: decimals that are kept.
+    """
+    return round(value, digits) if math.isfinite(value) else None
+
+
 def json_value(text: str | bytes) -> Any:  # noqa: ANN401
     """Read JSON of others.
 

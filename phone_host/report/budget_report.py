@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from phone_host.model import BudgetAccount, BudgetStep
+from phone_host.output.json_text import json_number
 from phone_host.report.report_page import Table
 
 _MS: Final = 1e6
@@ -62,9 +63,9 @@ def _step(step: BudgetStep) -> dict[str, object]:
         "width_px": step.width_px,
         "height_px": step.height_px,
         "disparities": step.disparities,
-        "nearest_m": None if math.isnan(step.nearest_m) else round(step.nearest_m, 6),
+        "nearest_m": json_number(step.nearest_m),
     }
 
 
 def _ms(value_ns: float) -> float | None:
-    return None if math.isnan(value_ns) else round(value_ns / _MS, 6)
+    return json_number(value_ns / _MS)

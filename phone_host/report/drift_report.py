@@ -4,6 +4,7 @@ import math
 
 from phone_host.measure.drift_words import is_late, turn_words
 from phone_host.model import Change, ChangeKind, Departure, Drift, Turn
+from phone_host.output.json_text import json_number
 from phone_host.report.report_page import Table
 
 _WORDS = {
@@ -25,20 +26,20 @@ def drift_values(drift: Drift | None) -> dict[str, object] | None:
     trend = drift.trend
     return {
         **_standing(drift),
-        "focal_sigma_percent": _rounded(100 * drift.focal_sigma),
+        "focal_sigma_percent": json_number(100 * drift.focal_sigma),
         "overlay": _departure(drift.overlay),
-        "zero_sigma_px": _rounded(drift.zero_sigma_px),
+        "zero_sigma_px": json_number(drift.zero_sigma_px),
         "features": drift.features,
         "pairs_used": drift.measurements,
         "pairs_judged": drift.judged,
         "trend": {
-            "seconds": _rounded(trend.seconds),
+            "seconds": json_number(trend.seconds),
             "turn_deg_per_min": _degrees(trend.turn_rad_s, 60.0),
             "turn_sigma_deg_per_min": _degrees(trend.sigma_rad_s, 60.0),
-            "vertical_error_px_per_min": _rounded(60 * trend.rows_px_s),
+            "vertical_error_px_per_min": json_number(60 * trend.rows_px_s),
         },
-        "late_left_ms": _rounded(drift.late_ns / 1e6),
-        "late_sigma_ms": _rounded(drift.late_sigma_ns / 1e6),
+        "late_left_ms": json_number(drift.late_ns / 1e6),
+        "late_sigma_ms": json_number(drift.late_sigma_ns / 1e6),
         "is_late": is_late(drift),
         "changes": [_change(change) for change in drift.changes],
     }
@@ -59,7 +60,7 @@ def stills_drift_values(drift: Drift | None) -> dict[str, object] | None:
         "trend": {
             "turn_deg_per_pair": _degrees(trend.turn_rad_s),
             "turn_sigma_deg_per_pair": _degrees(trend.sigma_rad_s),
-            "vertical_error_px_per_pair": _rounded(trend.rows_px_s),
+            "vertical_error_px_per_pair": json_number(trend.rows_px_s),
         },
         "knocked_at_pair": [round(change.at_s) for change in drift.changes if change.kind is ChangeKind.KNOCKED],
     }
@@ -71,9 +72,9 @@ def _standing(drift: Drift) -> dict[str, object]:
         "state": drift.state.value,
         "departure": _departure(drift.departure),
         "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
-        "vertical_error_px": _rounded(drift.rows_px),
-        "vertical_error_sigma_px": _rounded(drift.rows_sigma_px),
-        "vertical_error_left_px": _rounded(drift.left_px),
+        "vertical_error_px": json_number(drift.rows_px),
+        "vertical_error_sigma_px": json_number(drift.rows_sigma_px),
+        "vertical_error_left_px": json_number(drift.left_px),
     }
 
 
@@ -108,14 +109,10 @@ def _change(change: Change) -> dict[str, object]:
 def _departure(departure: Departure) -> dict[str, object]:
     return {
         "turn_deg": _degrees(departure.turn_rad),
-        "focal_percent": _rounded(100 * (departure.focal - 1)),
+        "focal_percent": json_number(100 * (departure.focal - 1)),
     }
 
 
 def _degrees(turn: Turn, times: float = 1.0) -> list[float | None]:
     """Pitch, yaw and roll: about the right camera's x, y and z axis."""
-    return [_rounded(math.degrees(angle) * times) for angle in turn]
-
-
-def _rounded(value: float) -> float | None:
-    return None if math.isnan(value) else round(value, 6)
+    return [json_number(math.degrees(angle) * times) for angle in turn]

@@ -1,6 +1,5 @@
 """Makes the report.json object of a run. Pure; times in ms, None where nothing was measured."""
 
-import math
 from dataclasses import asdict
 from typing import Final
 
@@ -18,6 +17,7 @@ from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trust import Concern
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, TimeOffset
+from phone_host.output.json_text import json_number
 from phone_host.report.budget_report import budget_values
 from phone_host.report.drift_report import drift_values
 from phone_host.report.match_words import corrected_values
@@ -40,7 +40,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "error": None if run.failure is None else asdict(run.failure),
         "pairs": run.processed,
         "pairs_asked": run.asked_pairs or None,
-        "pairs_per_second": _number(run.pairs_per_second),
+        "pairs_per_second": json_number(run.pairs_per_second),
         "paired_by": run.replayed.paired_by.value,
         **_delays(run),
         "clock": _clock(run),
@@ -64,7 +64,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "budget": budget_values(run.budget),
         "drift": drift_values(run.drift),
         "regime": _regime(judge(figures(run))),
-        "image_motion_px_per_s": _number(run.motion_px_s),
+        "image_motion_px_per_s": json_number(run.motion_px_s),
         "trust": _trust(run),
         "warnings": _warnings(run),
         "shortfall": run.shortfall or None,
@@ -220,11 +220,11 @@ def concern_values(concern: Concern) -> dict[str, object]:
 def figure_values(figures: ImageFigures) -> dict[str, float | None]:
     """Return what the images say: shares, px; None where nothing was measured."""
     return {
-        "density": _number(figures.density),
-        "consistency": _number(figures.consistency),
-        "scattered": _number(figures.scattered_share),
-        "vertical_error_px": _number(figures.vertical_px),
-        "vertical_offset_px": _number(figures.vertical_offset_px),
+        "density": json_number(figures.density),
+        "consistency": json_number(figures.consistency),
+        "scattered": json_number(figures.scattered_share),
+        "vertical_error_px": json_number(figures.vertical_px),
+        "vertical_offset_px": json_number(figures.vertical_offset_px),
     }
 
 
@@ -241,7 +241,7 @@ def spread_ms(spread: Spread) -> dict[str, float | int | None]:
         "max": spread.max_ns,
         "mean": spread.mean_ns,
     }
-    return {"count": spread.count} | {name: _number(value / _MS) for name, value in values.items()}
+    return {"count": spread.count} | {name: json_number(value / _MS) for name, value in values.items()}
 
 
 def age_bound(run: RunSnapshot) -> str:
@@ -265,18 +265,18 @@ def _phase(run: RunSnapshot) -> dict[str, object]:
     said: dict[str, object] = {"known": phase is not None}
     if phase is not None:
         said |= {
-            "time_skew_ms": _number(phase.time_skew_ns / _MS),
-            "period_ms": _number(phase.period_ns / _MS),
-            "drift_ppm": _number(phase.drift * 1e6),
-            "beat_s": None if not math.isfinite(phase.beat_s) else _number(phase.beat_s),
+            "time_skew_ms": json_number(phase.time_skew_ns / _MS),
+            "period_ms": json_number(phase.period_ns / _MS),
+            "drift_ppm": json_number(phase.drift * 1e6),
+            "beat_s": json_number(phase.beat_s),
         }
     if alignment is not None:
         said["alignment"] = {
             "state": alignment.state.value,
             "words": alignment.words,
             "corrections": alignment.corrections,
-            "before_ms": _number(alignment.before_ns / _MS),
-            "after_ms": _number(alignment.after_ns / _MS),
+            "before_ms": json_number(alignment.before_ns / _MS),
+            "after_ms": json_number(alignment.after_ns / _MS),
         }
     return said
 
@@ -364,7 +364,3 @@ def _session(run: RunSnapshot, index: int) -> dict[str, object]:
         "ended": account.ended,
         "tail": "unknown" if account.vanished else "known",
     }
-
-
-def _number(value: float) -> float | None:
-    return None if value != value else round(value, 6)  # noqa: PLR0124 - NaN is the only value unlike itself; JSON has none

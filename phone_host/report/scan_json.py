@@ -5,6 +5,7 @@ from typing import Any
 
 from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
+from phone_host.output.json_text import json_number
 from phone_host.report.scan_report import ScanReport, scan_verdict
 from phone_host.report.stereo_report import FailedPair
 from phone_host.scan.scanned import PoseSource, ScannedPair
@@ -27,7 +28,7 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
         "in_model": report.fused,
         "interrupted_of": report.interrupted_of or None,
         "path_m": round(report.path_m, 6),
-        "off_model_m": _number(report.off_m),
+        "off_model_m": json_number(report.off_m),
         "mat": _mat(report),
         "model": {
             "axes": report.axes.text,
@@ -36,10 +37,10 @@ def scan_json(report: ScanReport) -> dict[str, Any]:
             "area_m2": round(model.size.area_m2, 6),
             "border_m": round(model.size.border_m, 6),
             "extent_m": [round(length, 6) for length in model.size.extent_m],
-            "noise_m": _number(model.noise_m),
-            "noise_p95_m": _number(model.noise_p95_m),
+            "noise_m": json_number(model.noise_m),
+            "noise_p95_m": json_number(model.noise_p95_m),
             "drift_included": model.error_scope is ErrorScope.DRIFT if math.isfinite(model.noise_m) else None,
-            "unseen_share": _number(model.unseen_share),
+            "unseen_share": json_number(model.unseen_share),
             "unseen": report.unseen.value,
             "voxel_m": settings.voxel_m if settings else None,
             "far_m": round(settings.far_m, 6) if settings else None,
@@ -62,10 +63,10 @@ def _mat(report: ScanReport) -> dict[str, Any] | None:
         "corners": mat.corners,
         "seen_left": mat.seen[0],
         "seen_right": mat.seen[1],
-        "sigma_m": _number(mat.sigma_m),
+        "sigma_m": json_number(mat.sigma_m),
         "square_m": mat.square_m,
-        "measured_m": _number(mat.measured_m),
-        "measured_sigma_m": _number(mat.measured_sigma_m),
+        "measured_m": json_number(mat.measured_m),
+        "measured_sigma_m": json_number(mat.measured_sigma_m),
         "to_scale": mat.is_to_scale,
     }
 
@@ -81,21 +82,17 @@ def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
         "weakness": pair.weakness.value,
         "density": round(pair.density, 4),
         "corners": pair.corners,
-        "overlap": _number(pair.overlap),
-        "off_m": _number(pair.off_m),
+        "overlap": json_number(pair.overlap),
+        "off_m": json_number(pair.off_m),
         "mat": None
         if pair.mat is None
         else {
             "left": pair.mat.seen[0],
             "right": pair.mat.seen[1],
-            "rms_px": _number(pair.mat.rms_px),
-            "sigma_m": _number(pair.mat.sigma_m),
+            "rms_px": json_number(pair.mat.rms_px),
+            "sigma_m": json_number(pair.mat.sigma_m),
         },
         "place_m": None
         if pair.pose_source is PoseSource.NONE
         else [round(value, 6) for value in pair.world_camera.t_m.tolist()],
     }
-
-
-def _number(value: float) -> float | None:
-    return round(value, 6) if math.isfinite(value) else None

@@ -3,12 +3,12 @@
 One pair's object is the same whether it was computed alone or as one of several.
 """
 
-import math
 from dataclasses import asdict
 from typing import Any
 
 from common.imagesize.head import size_text
 from common.versions import REPORT_FORMAT
+from phone_host.output.json_text import json_number
 from phone_host.report.drift_report import stills_drift_values
 from phone_host.report.match_words import corrected_values
 from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
@@ -30,7 +30,7 @@ def pair_json(report: PairReport) -> dict[str, Any]:
         "size": size_text(report.rectified_px),
         "matcher": report.matcher,
         "disparities": search.disparities or None if search else None,
-        "searched_from_m": None if math.isnan(report.searched_from_m) else round(report.searched_from_m, 4),
+        "searched_from_m": json_number(report.searched_from_m, 4),
         "scale": round(search.scale, 4) if search else None,
         "corrected": corrected_values(report.match_report),
         "geometry": None if report.geometry is None else asdict(report.geometry),

@@ -3,7 +3,6 @@
 `live` ends with its samples, because those differ from viewer to viewer and all else is made once for all of them.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Final
@@ -16,7 +15,7 @@ from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.trouble import Trouble
 from phone_host.measure.unused import unused
 from phone_host.model import DepthAccount, Unwritten
-from phone_host.output.json_text import json_text
+from phone_host.output.json_text import json_number, json_text
 from phone_host.report.cut_words import cut_sentence
 from phone_host.report.run_json import concern_values
 from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
@@ -168,9 +167,9 @@ def _live(run: RunSnapshot, samples: Sequence[Sample], steps: Sequence[Step], no
         "trust": _trust(run, steps),
         "ended": run.ended,
         "pairs": run.processed,
-        "pairs_per_s": _number(_rate(run, samples, now_ns)),
-        "time_skew_ms": None if run.timeless else _number(skew_ns / 1e6),
-        "density": _number(run.images.now.density),
+        "pairs_per_s": json_number(_rate(run, samples, now_ns), 4),
+        "time_skew_ms": None if run.timeless else json_number(skew_ns / 1e6, 4),
+        "density": json_number(run.images.now.density, 4),
         "cropped": run.depth.cut is not None and run.depth.cut.outside > 0,
         "cut": _cut(run.depth),
         "link": _link(run),
@@ -261,7 +260,3 @@ def _clock(run: RunSnapshot) -> dict[str, object]:
         "offset_ms": run.estimate.offset_ns / 1e6,
         "uncertainty_us": run.estimate.uncertainty_ns / 1e3,
     }
-
-
-def _number(value: float) -> float | None:
-    return round(value, 4) if math.isfinite(value) else None

@@ -15,6 +15,7 @@ from phone_host.calibration.causes.mistakes import Turned
 from phone_host.calibration.fit_quality import LensTrial
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.model import Rig
+from phone_host.output.json_text import json_number
 from phone_host.verbs.calibrate.board import Known
 from phone_host.verbs.calibrate.report import CalibrationReport, Exported, ImportReport, Judged
 
@@ -105,16 +106,16 @@ def _turned(views: BoardViews) -> dict[str, Any]:
 def _judged(result: Judged) -> dict[str, Any]:
     finding = result.finding
     if finding is None:
-        return {"depth_limit_m": _rounded(result.depth_limit_m, 3), "cause": None}
+        return {"depth_limit_m": json_number(result.depth_limit_m, 3), "cause": None}
     cause: dict[str, Any] = {
         "name": finding.mistake.value,
         "sentence": result.cause_words,
         "remedy": finding.remedy,
-        "explained_px": _rounded(finding.explained_px, 4),
+        "explained_px": json_number(finding.explained_px, 4),
     }
     if finding.turned is not None:
         cause["turned"] = _turn(finding.turned)
-    return {"depth_limit_m": _rounded(result.depth_limit_m, 3), "cause": cause}
+    return {"depth_limit_m": json_number(result.depth_limit_m, 3), "cause": cause}
 
 
 def _turn(turned: Turned) -> dict[str, Any]:
@@ -140,8 +141,8 @@ def _figures(found: Calibration) -> dict[str, Any]:
         },
         "vertical_error_px": _vertical(found),
         "baseline_mm": _baseline_mm(rig),
-        "baseline_sigma_mm": _rounded(found.baseline_sigma_m * 1e3, 4),
-        "zero_sigma_px": _rounded(rig.zero_sigma_px, 4),
+        "baseline_sigma_mm": json_number(found.baseline_sigma_m * 1e3, 4),
+        "zero_sigma_px": json_number(rig.zero_sigma_px, 4),
         "focal_px": _focal_px(rig),
         "sizes": {**sizes, "rectified": None if rectified is None else f"{rectified.width_px}x{rectified.height_px}"},
         "board_side": rig.board_side.value,
@@ -152,13 +153,13 @@ def _figures(found: Calibration) -> dict[str, Any]:
         "distortion_coefficients": max(bend.terms for bend in found.bends),
         "sigmas": _sigmas(rig),
         "depth_sigmas": [
-            {"depth_mm": round(depth_m * 1e3), "depth_sigma_mm": _rounded(sigma_m * 1e3, 3)}
+            {"depth_mm": round(depth_m * 1e3), "depth_sigma_mm": json_number(sigma_m * 1e3, 3)}
             for depth_m, sigma_m in found.depths
         ],
         "squares_mm": {
             "given": round(squares.true_m * 1e3, 4),
-            "mean": _rounded(squares.mean_m * 1e3, 4),
-            "sigma": _rounded(squares.sigma_m * 1e3, 4),
+            "mean": json_number(squares.mean_m * 1e3, 4),
+            "sigma": json_number(squares.sigma_m * 1e3, 4),
         },
         "board_spread": round(found.spread, 3),
         "largest_tilt_deg": round(float(found.tilts_deg.max()), 1),
@@ -174,11 +175,11 @@ def _view(used: Used, *, is_rectified: bool) -> dict[str, Any]:
         "left_px": round(used.left_px, 4),
         "right_px": round(used.right_px, 4),
         "vertical_px": round(used.vertical_px, 4) if is_rectified else None,
-        "rays_miss_sigmas": _rounded(board.miss, 3),
-        "board_size": _rounded(board.size, 6),
-        "board_size_sigma": _rounded(board.size_sigma, 6),
-        "board_bow_mm": _rounded(bow_m * 1e3, 3),
-        "board_bow_sigma_mm": _rounded(sigma_m * 1e3, 3),
+        "rays_miss_sigmas": json_number(board.miss, 3),
+        "board_size": json_number(board.size, 6),
+        "board_size_sigma": json_number(board.size_sigma, 6),
+        "board_bow_mm": json_number(bow_m * 1e3, 3),
+        "board_bow_sigma_mm": json_number(sigma_m * 1e3, 3),
     }
 
 
@@ -186,9 +187,9 @@ def _vertical(found: Calibration) -> dict[str, Any]:
     """Return the vertical error; null where the rig cannot be rectified."""
     px = found.vertical_px if found.obstacle is None else np.full(1, np.nan)
     return {
-        "mean": _rounded(float(px.mean()), 4),
-        "p95": _rounded(float(np.percentile(px, 95)), 4),
-        "max": _rounded(float(px.max()), 4),
+        "mean": json_number(float(px.mean()), 4),
+        "p95": json_number(float(np.percentile(px, 95)), 4),
+        "max": json_number(float(px.max()), 4),
     }
 
 
@@ -228,7 +229,3 @@ def _sigmas(rig: Rig) -> dict[str, Any]:
         key: [float(f"{each:.4g}") if math.isfinite(each) else None for each in row] for key, row in pose.items()
     }
     return cameras | rounded
-
-
-def _rounded(value: float, digits: int) -> float | None:
-    return round(value, digits) if math.isfinite(value) else None

@@ -10,7 +10,7 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.atomic import write_bytes
-from phone_host.output.json_text import json_text
+from phone_host.output.json_text import json_number, json_text
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         of_unseen = {
             "unseen": None if whole.choice is None else whole.choice.value,
-            "unseen_share": None if math.isnan(whole.share) else round(whole.share, 6),
+            "unseen_share": json_number(whole.share),
         }
         print(json_text(_told(options.out, solid, model, sizes, notes) | of_unseen))
     else:

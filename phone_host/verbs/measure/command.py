@@ -15,7 +15,7 @@ from common.places import Kind, kind_of
 from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
-from phone_host.output.json_text import json_text
+from phone_host.output.json_text import json_number, json_text
 from phone_host.run.one_pair import PairJob
 from phone_host.run.point_job import ELSEWHERE, Measured, measure_points, point_text
 from phone_host.run.progress_bar import step_bar
@@ -137,7 +137,7 @@ def _path(outcomes: Sequence[Outcome]) -> list[Within | None]:
 
 def _values(length: Within) -> dict[str, float | None]:
     limits = {"value": length.value_m, "low": length.low_m, "high": length.high_m}
-    return {name: round(value * 1e3, 3) if math.isfinite(value) else None for name, value in limits.items()}
+    return {name: json_number(value * 1e3, 3) for name, value in limits.items()}
 
 
 def _lines(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> list[str]:
