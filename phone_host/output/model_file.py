@@ -18,6 +18,7 @@ _MODEL = "model.ply"
 _REPORTS: Final = ("report.json", "report-scan.json")
 """The second one is the first, moved aside by another command that has written its own beside the model."""
 
+_UNITS_M: Final = {"m": 1.0, "mm": 0.001}
 _MOST_BYTES: Final = 2 << 30
 _MOST_REPORT_BYTES: Final = 16 << 20
 
@@ -59,12 +60,12 @@ def mesh_file(path: Path) -> Path:
     return path / _MODEL
 
 
-def read_model(path: Path, unit_m: float) -> Model:
+def read_model(path: Path, unit: str | None = None) -> Model:
     """Read a model.
 
     Args:
         path: the folder of a scan, or a mesh file.
-        unit_m: unit of a mesh file, m; NaN: what the file says, as ours and each 3MF do, else the metre.
+        unit: of a mesh file, m or mm; None: what the file says, as ours and each 3MF do, else the metre.
 
     Raises:
         DataError: there is none, it is no mesh, or a spoiled one.
@@ -77,7 +78,7 @@ def read_model(path: Path, unit_m: float) -> Model:
         raise DataError(f"{file} cannot be read ({error.strerror})", "check its permissions") from None
     reports = [_report(path / name) for name in _REPORTS] if is_scan else []
     report = next((told for told in reports if told), {})
-    mesh = read_mesh(content, file.name, math.nan if is_scan else unit_m)
+    mesh = read_mesh(content, file.name, math.nan if is_scan else _UNITS_M.get(unit or "", math.nan))
     stem = (path.resolve().name or "model") if is_scan else path.stem
     axes = next((axes for axes in Axes if axes.text == report.get("axes")), mesh.axes)
     voxel = report.get("voxel_m")

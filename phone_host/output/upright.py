@@ -1,6 +1,5 @@
 """A model as a printer wants it: in millimetres, z up."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from phone_host.output.axes import Axes
 from phone_host.output.model_file import Model, read_model
 
-_UNITS_M: Final = {"m": 1.0, "mm": 0.001}
 _UP: Final = {"z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}  # fmt: skip
 """Rows of the rotation that puts this axis up."""
 
@@ -42,6 +40,6 @@ def upright_model(path: Path, unit: str | None, up: str | None) -> Upright:
     Raises:
         DataError: it is none, or cannot be read.
     """
-    model = read_model(path, _UNITS_M.get(unit or "", math.nan))
+    model = read_model(path, unit)
     turn = np.array(_UP[up or _UP_OF[model.axes]], np.float64)
     return Upright(model, model.solid.points_m.astype(np.float64) * 1000 @ turn.T)

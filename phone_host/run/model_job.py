@@ -35,8 +35,6 @@ _SHARE_OF_VOXEL: Final = 0.1
 
 _NO_FLAGS: Final = "--unseen changes nothing: the model does not say which part of its surface was in view"
 
-_UNITS_M: Final = {"m": 1.0, "mm": 0.001}
-
 
 def usual_tolerance_m(model: Model) -> float:
     """Return how far the surface may move unless somebody says it, m; 0: not at all."""
@@ -178,7 +176,7 @@ def export_model(
     """
     if unknown := set(to) - set(FORMATS):
         raise SettingsError(f"{min(unknown)!r} is no format", f"give some of {', '.join(FORMATS)}")
-    read = read_model(Path(model), _UNITS_M.get(unit or "", math.nan))
+    read = read_model(Path(model), unit)
     whole = with_unseen(read, unseen).solid
     solid, _ = fewer_triangles(whole, usual_tolerance_m(read) if tolerance_mm is None else tolerance_mm / 1000)
     paths = {Path(out) / f"{read.stem}.{kind}": kind for kind in to}

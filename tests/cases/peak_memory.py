@@ -19,7 +19,7 @@ def main(paths: list[str]) -> None:
         if child == 0:
             before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
             try:
-                read_model(Path(path), 0.001)
+                read_model(Path(path), "mm")
             except DataError as error:
                 print(error, file=sys.stderr)
             print(1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before), flush=True)

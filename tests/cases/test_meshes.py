@@ -51,7 +51,7 @@ def require(solid: Solid, answer: dict[str, Any]) -> None:
 
 def read(name: str) -> Solid:
     """Read a case; formats without a unit are in mm."""
-    return read_model(FOLDER / name, 0.001 if name.rpartition(".")[2] in NO_UNIT else float("nan")).solid
+    return read_model(FOLDER / name, "mm" if name.rpartition(".")[2] in NO_UNIT else None).solid
 
 
 @pytest.mark.parametrize("name", READ)

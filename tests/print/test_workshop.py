@@ -57,7 +57,7 @@ def test_a_model_is_checked_and_saved(tmp_path: Path) -> None:
     assert workshop.saved(folder) == ()
     assert workshop.save(folder, "stl") == "saved as cube.stl"
     assert workshop.saved(folder) == ("cube.stl",)
-    assert np.ptp(read_model(Path(folder) / "cube.stl", float("nan")).solid.points_m, axis=0) == pytest.approx(0.02)
+    assert np.ptp(read_model(Path(folder) / "cube.stl").solid.points_m, axis=0) == pytest.approx(0.02)
     with pytest.raises(SettingsError, match="no format"):
         workshop.save(folder, "dwg")
     workshop.close()

@@ -355,8 +355,8 @@ def test_our_own_files_are_read_in_their_unit(tmp_path: Path) -> None:
     for kind in READABLE:
         path = tmp_path / f"ball.{kind}"
         path.write_bytes(mesh_bytes(ball(1), kind, None))
-        assert read_model(path, math.nan).solid.size_mm[0] == pytest.approx(100, abs=0.1)
-        assert read_model(path, 1.0).solid.size_mm[0] == pytest.approx(100 if kind == "glb" else 100_000, rel=0.001)
+        assert read_model(path).solid.size_mm[0] == pytest.approx(100, abs=0.1)
+        assert read_model(path, "m").solid.size_mm[0] == pytest.approx(100 if kind == "glb" else 100_000, rel=0.001)
 
 
 @pytest.mark.parametrize("name", ["missing", "folder"])
@@ -364,7 +364,7 @@ def test_a_model_that_is_not_there_is_told(tmp_path: Path, name: str) -> None:
     """Neither a missing path nor a folder without a scan is a model."""
     (tmp_path / "folder").mkdir()
     with pytest.raises(TandemError, match=name):
-        read_model(tmp_path / name, math.nan)
+        read_model(tmp_path / name)
 
 
 def test_a_scan_says_its_fineness_when_another_report_has_taken_its_name(tmp_path: Path) -> None:
@@ -372,7 +372,7 @@ def test_a_scan_says_its_fineness_when_another_report_has_taken_its_name(tmp_pat
     (tmp_path / "model.ply").write_bytes(mesh_bytes(ball(1), "ply", None))
     (tmp_path / "report.json").write_text(json.dumps({"command": "quality", "model": "a phone"}))
     (tmp_path / "report-scan.json").write_text(json.dumps({"model": {"voxel_m": 0.002, "axes": Axes.Y_UP.text}}))
-    model = read_model(tmp_path, math.nan)
+    model = read_model(tmp_path)
     assert model.voxel_m == 0.002
     assert model.axes is Axes.Y_UP
 
@@ -383,7 +383,7 @@ def test_a_file_of_ours_says_its_axes(tmp_path: Path, kind: str, axes: Axes | No
     """Alone, without its scan's folder: what is made of it stands as the scan did, with its points where they were."""
     solid = ball(1)
     (tmp_path / f"cup.{kind}").write_bytes(mesh_bytes(solid, kind, axes))
-    found = read_model(tmp_path / f"cup.{kind}", math.nan)
+    found = read_model(tmp_path / f"cup.{kind}")
     assert found.axes is axes
     places = found.solid.points_m[found.solid.triangles]
     assert places == pytest.approx(solid.points_m[solid.triangles], abs=1e-7)
@@ -404,7 +404,7 @@ def test_a_scan_says_its_fineness_and_axes(tmp_path: Path, report: str, voxel_m:
         mesh_bytes(ball(1), "ply", None).replace(b"tandemscan; unit mm", b"unit metre         ")
     )
     (tmp_path / "report.json").write_text(report)
-    model = read_model(tmp_path, 0.5)
+    model = read_model(tmp_path, "mm")
     assert model.voxel_m == pytest.approx(voxel_m, nan_ok=True)
     assert model.axes is axes
     assert model.stem == tmp_path.name

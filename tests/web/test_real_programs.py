@@ -123,7 +123,7 @@ def test_from_nothing_to_true_depth_on_the_page_alone(browser: Any, wall: Path, 
     shown.close()
     [scan] = (tmp_path / "data" / "tandemscan" / "scans").iterdir()
     assert {path.name for path in scan.iterdir()} >= {"model.ply", "trajectory.txt", "report.json", "index.html"}
-    points_m = read_model(scan, 1.0).solid.points_mm / 1000
+    points_m = read_model(scan, "m").solid.points_mm / 1000
     assert np.median(points_m[:, 2]) == pytest.approx(DEPTH_M, rel=0.02)
     [recording] = (tmp_path / "data" / "tandemscan" / "recordings").glob("*.mcap")
     recorded = open_recorded(recording)  # the run has ended it

@@ -1,7 +1,6 @@
 """phone-host export: write a scan or a mesh for other programs and printers."""
 
 import argparse
-import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,7 +17,6 @@ from phone_host.run.model_job import fewer_triangles, spare_model, usual_toleran
 from phone_host.verbs.output_folders import require_alone, require_folder, written_together
 from phone_host.verbs.units import length_mm
 
-_UNITS_M: Final = {"m": 1.0, "mm": 0.001}
 _LARGE_MM: Final = 2000.0
 """Longer than any printer's bed: more likely millimetres taken for metres."""
 
@@ -27,7 +25,7 @@ def run(options: argparse.Namespace) -> int:
     """Read the model, leave out triangles that say nothing, write each format, say how large it is."""
     kinds = _kinds(options.to)
     require_folder(options.out)
-    model = read_model(Path(options.model), _UNITS_M.get(options.unit, math.nan))
+    model = read_model(Path(options.model), options.unit)
     tolerance_m = _tolerance_m(options.tolerance, model)
     files = {f"{model.stem}.{kind}": kind for kind in kinds}
     spare_model(model, (options.out / name for name in files))
