@@ -3,10 +3,11 @@
 import argparse
 import shlex
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from common.errors import SettingsError
 from common.places import resolved
+from common.program.commandline import ExamplesFirstParser
 from phone_host.verbs.calibrate.arguments import add_arguments
 
 _OF_LIVE: Final = frozenset({"link", "camera", "views", "sound", "snapshots", "wait", "tolerance", "keys"})
@@ -22,19 +23,6 @@ class _Given:
     dest: str
     option: str
     words: tuple[str, ...]
-
-
-class _Declared(argparse.ArgumentParser):
-    """Remembers which options are declared."""
-
-    def __init__(self) -> None:
-        self.declared: list[argparse.Action] = []
-        super().__init__(add_help=False)
-
-    def add_argument(self, *names: Any, **how: Any) -> argparse.Action:  # noqa: ANN401 - as argparse has it
-        """See argparse."""
-        self.declared.append(super().add_argument(*names, **how))
-        return self.declared[-1]
 
 
 def require_pictures(options: argparse.Namespace) -> None:
@@ -83,12 +71,12 @@ def command_again(options: argparse.Namespace, left: str, right: str) -> str:
 
 def _given(options: argparse.Namespace) -> list[_Given]:
     """Return the options that are not as they are by default, in the order of --help."""
-    parser = _Declared()
+    parser = ExamplesFirstParser(add_help=False)
     add_arguments(parser)
     found = []
-    for action in parser.declared:
+    for action in dict.fromkeys(parser.declared.values()):  # --sound and --no-sound are one
         value = getattr(options, action.dest)
-        if not action.option_strings or value == action.default:
+        if value == action.default:
             continue
         name = action.option_strings[-1 if value is False else 0]  # --no-sound
         if isinstance(value, bool):
