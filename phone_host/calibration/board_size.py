@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, TandemError
-from common.imagesize.head import MOST_PIXELS
+from common.imagesize.head import MOST_PIXELS, size_text
 from common.words import counted
 from phone_host.calibration.board_fits import ENOUGH, Fits, Inner
 from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
@@ -366,11 +366,6 @@ def require_marks_of(files: ViewFiles, board: Board, most_pixels: int = MOST_PIX
 
 def _marks_in(files: ViewFiles, most_pixels: int) -> SeenMarks | None:
     return find_marks(side_by_side(lambda path: _small(path, most_pixels), list(_sample(files))[:_MARKED]))
-
-
-def size_text(size: Inner) -> str:
-    """Write a size as `--board` takes it."""
-    return f"{size[0]}x{size[1]}"
 
 
 def _seen_in(path: Path, most_pixels: int, way: int) -> _Seen | None:

@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 
 from common.errors import DataError, SettingsError
+from common.imagesize.head import size_text
 from phone_host.calibration.board_fits import ENOUGH, Fits, Inner
 from phone_host.calibration.board_names import board_name
 from phone_host.calibration.board_size import (
     Vote,
     size_in_pictures,
     size_seen,
-    size_text,
     small_for_sizes,
     whole_size_seen,
 )

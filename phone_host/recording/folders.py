@@ -14,6 +14,7 @@ from common.appearing import new_folder
 from common.camera.imagefile import load
 from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import PixelFormat
+from common.imagesize.head import size_text
 from common.places import make_folder
 from common.recording.layout import ABOUT, About, image_topic
 from common.recording.recorded import Recorded
@@ -23,7 +24,7 @@ from common.versions import all_versions
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.preview import write_png
 from phone_host.recording.both_sides import encoded
-from phone_host.recording.image_sizes import Size, size_text, usual_size
+from phone_host.recording.image_sizes import Size, usual_size
 from phone_host.recording.import_account import ImportAccount
 from phone_host.recording.timed_images import TimedImage, TimeOptions, timed_images
 from phone_host.stereo.raw_images import decode_frame

@@ -17,8 +17,3 @@ def usual_size(sizes_px: Sequence[Size | None]) -> Size | None:
     """
     counts = Counter(size for size in sizes_px if size is not None)
     return max(counts, key=counts.__getitem__, default=None)
-
-
-def size_text(size_px: Size) -> str:
-    """Return width and height as people write them."""
-    return f"{size_px[0]}x{size_px[1]}"

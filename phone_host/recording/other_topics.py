@@ -8,6 +8,7 @@ from pathlib import Path
 
 from common.errors import DataError
 from common.frame import SpoiledImageError
+from common.imagesize.head import size_text
 from common.recording.layout import ABOUT, About, image_topic
 from common.recording.opened import open_recorded
 from common.recording.recorded import Recorded, Shown, retimed, size_px
@@ -17,7 +18,7 @@ from common.versions import all_versions
 from common.words import counted, listed
 from phone_host.recording.both_sides import topics_of
 from phone_host.recording.given_times import EPOCH_NS, at_rate
-from phone_host.recording.image_sizes import Size, size_text, usual_size
+from phone_host.recording.image_sizes import Size, usual_size
 from phone_host.recording.import_account import ImportAccount
 
 _SIDES = ("left", "right")

@@ -5,8 +5,9 @@ from enum import Enum
 from typing import Final
 
 from common.errors import DataError
+from common.imagesize.head import size_text
 from phone_host.calibration.board_names import named_board, no_square
-from phone_host.calibration.board_size import require_marks_of, require_size, size_in_files, size_text
+from phone_host.calibration.board_size import require_marks_of, require_size, size_in_files
 from phone_host.calibration.marked import Charuco
 from phone_host.calibration.target import Board
 from phone_host.run.progress_bar import busy_bar

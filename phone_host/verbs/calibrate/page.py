@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from common.errors import DataError
+from common.imagesize.head import size_text
 from phone_host.calibration.board_pairs import Rejected
-from phone_host.calibration.board_size import size_text
 from phone_host.calibration.board_views import Mounted
 from phone_host.calibration.rectified_view import fullest, rectified_view
 from phone_host.calibration.series_snapshot import Taken, series_rig, series_views

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from common.errors import DataError
+from common.imagesize.head import size_text
 from common.orientation import UPRIGHT
 from common.versions import REPORT_FORMAT
 from phone_host.calibration.board_pairs import Calibration, Used
-from phone_host.calibration.board_size import size_text
 from phone_host.calibration.board_views import BoardViews
 from phone_host.calibration.causes.mistakes import Turned
 from phone_host.calibration.fit_quality import LensTrial
