@@ -30,7 +30,7 @@ from phone_host.output.meshes.solid import Solid
 from phone_host.output.result_files import claim
 from phone_host.output.rig_yaml import write_rig
 from phone_host.output.upright import upright_model
-from phone_host.printers.bed import Bed
+from phone_host.printers.bed import USUAL_BED
 from phone_host.printers.preparing import Wanted, job_of
 from phone_host.printers.printer_uri import FileUri
 from phone_host.printers.slicing import SlicingWanted
@@ -50,7 +50,6 @@ _VIEWS: Final = 36
 
 _LEAST_VIEWS, _MOST_VIEWS = 6, 360
 _STL, _GCODE = "model.stl", "model.gcode"
-_BED: Final = Bed((220.0, 220.0, 250.0))
 
 _WORST_MM: Final = 1.5
 """A model that is farther off on average is no model: thin parts come out 1 mm off, and a scan that was lost several."""
@@ -160,7 +159,7 @@ def _printed(out: Path, console: Console) -> dict[str, Any]:
     solid = Solid(points_m, upright.model.solid.triangles, np.zeros((0, 3), np.uint8))
     write_bytes(out / _STL, mesh_bytes(solid, "stl", None))
     found: dict[str, Any] = {"stl": str(out / _STL), "gcode": None, "seconds": None, "problem": None}
-    wanted = Wanted(SlicingWanted(_BED))
+    wanted = Wanted(SlicingWanted(USUAL_BED))
     announce("slicing", console)
     try:
         with (
