@@ -1,4 +1,4 @@
-"""The commands' help as a new user sees it."""
+"""The commands' help as a new user sees it, by real processes; tests/unit/test_examples.py looks at every verb's."""
 
 import shlex
 from pathlib import Path
@@ -8,28 +8,7 @@ import pytest
 from tests.support.programs import program
 
 COMMANDS = [
-    ("board_agent.cli", []),
-    *(("board_agent.cli", [verb]) for verb in ("run", "settings", "cameras", "doctor", "keys", "pair")),
-    ("phone_host.cli", []),
-    *(
-        ("phone_host.cli", [verb])
-        for verb in (
-            "demo",
-            "run",
-            "record",
-            "sessions",
-            "calibrate",
-            "calibrate-time",
-            "stereo",
-            "measure",
-            "target",
-            "quality",
-            "doctor",
-            "pair",
-            "keys",
-            "settings",
-        )
-    ),
+    *((module, verb) for module in ("board_agent.cli", "phone_host.cli") for verb in ([], ["run"])),
     ("phone_host.bench.cli", []),
 ]
 
@@ -38,7 +17,7 @@ COMMANDS = [
     ("module", "verb"), COMMANDS, ids=lambda value: " ".join(value) if isinstance(value, list) else value
 )
 def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) -> None:
-    """--help of every command and verb ends with exit 0 and opens with examples that begin with the command's own name."""
+    """--help of a command and of a verb ends with exit 0 and opens with examples that begin with the command's own name."""
     with program(module, [*verb, "--help"], tmp_path, "help") as running:
         assert running.wait() == 0
     first, second = running.out.read_text().splitlines()[:2]
@@ -48,9 +27,6 @@ def test_help_opens_with_examples(module: str, verb: list[str], tmp_path: Path) 
     ]
     words = [word for word in shlex.split(second, comments=True) if word != "sudo" and "=" not in word]
     assert Path(words[0]).name == name  # with its folder, where the shell does not find it by its name
-    # Where a verb is still to be chosen, the help shows none of its options.
-    runs_as_it_is = bool(verb) or module == "phone_host.bench.cli"
-    assert ("--debug" in running.out.read_text()) is runs_as_it_is
 
 
 @pytest.mark.parametrize("module", ["board_agent.cli", "phone_host.cli", "phone_host.bench.cli"])

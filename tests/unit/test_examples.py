@@ -68,9 +68,13 @@ def refusal(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 @named
 def test_every_help_shows_its_own_examples(program: str, verb: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """The examples of a verb call this verb, one with each kind of need, and the parser takes every one of them."""
+    """The examples of a verb come first and call this verb, one with each kind of need, and the parser takes every one of them."""
     assert MAINS[program]([*verb, "--help"]) == 0
-    examples = suggested(capsys.readouterr().out.partition("\nusage:")[0])
+    told = capsys.readouterr().out
+    assert told.startswith("examples:\n")
+    # Where a verb is still to be chosen, the help shows none of its options.
+    assert ("--debug" in told) is (bool(verb) or program == "delay-bench")
+    examples = suggested(told.partition("\nusage:")[0])
     assert len(examples) >= 2
     for words in examples:
         assert words[: 1 + len(verb)] == [program, *verb]
