@@ -29,8 +29,9 @@ from phone_host.output.result_files import replacing_results
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import MeasuredPair, QualityReport
-from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size, files_remarks
+from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
 from phone_host.run.cores import Cores
+from phone_host.run.file_remarks import files_remarks
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted, tell_of_partial
 from phone_host.run.stereo_job import Watcher

@@ -18,8 +18,9 @@ from phone_host.model import Processed
 from phone_host.output.axes import Axes
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_report import ScanReport
-from phone_host.report.stereo_report import FailedPair, Remark, Size, files_remarks
+from phone_host.report.stereo_report import FailedPair, Remark, Size
 from phone_host.run.cores import Cores
+from phone_host.run.file_remarks import files_remarks
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted, tell_if_heard, tell_of_partial
 from phone_host.run.kept_submaps import KeptSubmaps

@@ -30,9 +30,9 @@ from phone_host.report.stereo_report import (
     PairReport,
     SetReport,
     Size,
-    files_remarks,
 )
 from phone_host.run.cores import Cores
+from phone_host.run.file_remarks import files_remarks
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted, tell_of_partial
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
