@@ -16,7 +16,8 @@ from typing import Final
 
 from tests.bench.machine import machine
 from tests.vm.air import AIR, SWITCH_ON
-from tests.vm.guest import Architecture, Guest, image_of
+from tests.vm.guest import Guest
+from tests.vm.machine import Architecture, image_of
 
 _ROOT: Final = Path(__file__).resolve().parents[2]
 _WHEELS: Final = (

@@ -28,7 +28,8 @@ from phone_host.measure.accounts import SessionAccount
 from phone_host.model import BoardFrame
 from phone_host.stream.receiver import Receiver
 from tests.support.unkept import Unkept
-from tests.vm.guest import LINK_PORT, UNIT, Architecture, Guest, image_of
+from tests.vm.guest import LINK_PORT, UNIT, Guest
+from tests.vm.machine import Architecture, image_of
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 SOURCES: Final = Path(__file__).resolve().parent / "board"

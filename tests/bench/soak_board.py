@@ -13,7 +13,8 @@ import numpy as np
 from tests.bench.board_guest import OurHost, booted_board
 from tests.bench.payloads import write_jpegs
 from tests.bench.soak_checks import Check, Resident, count, memory
-from tests.vm.guest import UNIT, Architecture
+from tests.vm.guest import UNIT
+from tests.vm.machine import Architecture
 from tests.vm.uvc import Model
 from tests.vm.webcam import Webcam
 

@@ -1,4 +1,4 @@
-"""The booted board that all tests here share. `make test-board` builds its image; without an image the tests are skipped."""
+"""The board that each file of tests gets: of its own, and as a snapshot left it. `make test-board` builds its image; without it the tests are skipped."""
 
 import shutil
 import subprocess
@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.vm.guest import Architecture, Guest, image_of
+from tests.vm.guest import Guest
+from tests.vm.machine import Architecture, Snapshot, image_of
 from tests.vm.stream import FPS, Film, Skew, webcam_skew, write_film
 from tests.vm.webcam import Webcam
 
@@ -19,28 +20,38 @@ CAMERA = f"v4l2:auto?size=320x240&fps={FPS}&readout_ms={READOUT_MS}"
 
 
 @contextmanager
-def booted(architecture: Architecture, disk: Path | None = None) -> Iterator[Guest]:
+def booted(architecture: Architecture, disk: Path | None = None, *, savable: bool = False) -> Iterator[Guest]:
     """A booted board without the package, for the length of a block; skips the test if there is no such image."""
     image = image_of(architecture)
     if not shutil.which(image.emulator):
         pytest.skip(f"{image.emulator} is missing: run make test-board")
     if not image.built:
         pytest.skip(f"no image of a board in {image.folder}: run make test-board")
+    with _folder() as folder, _running(Guest(image, folder, disk, savable=savable)) as guest:
+        yield guest
+
+
+@contextmanager
+def restored(snapshot: Snapshot) -> Iterator[Guest]:
+    """A board that goes on from a snapshot, for the length of a block."""
+    with _folder() as folder, _running(Guest(snapshot, folder)) as guest:
+        yield guest
+
+
+@contextmanager
+def _folder() -> Iterator[Path]:
     # Not pytest's folder: the path of ssh's socket must be short.
     with tempfile.TemporaryDirectory(prefix="board-") as folder:
-        guest = Guest(image, Path(folder), disk)
-        try:
-            guest.start()
-            yield guest
-        finally:
-            guest.stop()
+        yield Path(folder)
 
 
-@pytest.fixture(scope="session")
-def bare_guest() -> Iterator[Guest]:
-    """A booted board without the package."""
-    with booted(Architecture.AMD64) as guest:
+@contextmanager
+def _running(guest: Guest) -> Iterator[Guest]:
+    try:
+        guest.start()
         yield guest
+    finally:
+        guest.stop()
 
 
 @pytest.fixture(scope="session")
@@ -61,12 +72,20 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
     return write_film(tmp_path_factory.mktemp("film"))
 
 
-@pytest.fixture(scope="module")
-def guest(bare_guest: Guest, package: Path) -> Guest:
+@pytest.fixture(scope="session")
+def snapshot(package: Path) -> Iterator[Snapshot]:
     """The board with its package installed, its camera configured, and its link open to everybody."""
-    bare_guest.install(package)
-    bare_guest.configure(CAMERA)
-    return bare_guest
+    with booted(Architecture.AMD64, savable=True) as guest:
+        guest.install(package)
+        guest.configure(CAMERA)
+        yield guest.save()
+
+
+@pytest.fixture(scope="module")
+def guest(snapshot: Snapshot) -> Iterator[Guest]:
+    """The same board, for this file alone."""
+    with restored(snapshot) as board:
+        yield board
 
 
 @pytest.fixture(scope="module")

@@ -1,25 +1,26 @@
 """A booted board: Debian with its own kernel and systemd in QEMU, reached over ssh, with its link's port on this machine.
 
 Two network cards: eth0 for the test's commands and the webcam, eth1 for the board's link alone, so that a test can degrade the link and
-nothing else. The disk image is never changed; what a test writes is gone when the guest stops.
+nothing else. The disk image is never changed; what a test writes is gone when the guest stops. Emulated, a boot and an installation take a
+minute of processor time: a snapshot of a running guest, its disk and its memory, starts many guests within seconds.
 """
 
 import json
 import shlex
+import shutil
 import socket
 import subprocess
 import tarfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 from typing import Any, Final
 
 from tests.support.programs import PATIENCE_S, free_port, until
+from tests.vm.clock import ECHO, GuestClock
+from tests.vm.machine import COMMAND_LINE, MACHINES, Image, Snapshot
 
-_ROOT: Final = Path(__file__).resolve().parents[2]
 NETWORK_CARD: Final = "eth1"
 """Carries the board's link and nothing else."""
 
@@ -30,89 +31,23 @@ UNIT: Final = "board-agent"
 _BOOT_S: Final = 180.0
 """Boot takes 11 s on an idle machine; 56 s were seen on a busy one."""
 
-_COMMAND_LINE: Final = "quiet loglevel=4 panic=-1 mitigations=off nokaslr selinux=0 apparmor=0 audit=0 random.trust_cpu=on net.ifnames=0 systemd.show_status=0"
-
-
-class Architecture(Enum):
-    """The processor architecture of a board."""
-
-    AMD64 = "amd64"
-    ARMHF = "armhf"
-
-
-@dataclass(frozen=True, slots=True)
-class _Machine:
-    """How QEMU emulates a board of one architecture.
-
-    Attributes:
-        program: the emulator.
-        arguments: machine, processor, memory.
-        command_line: kernel parameters beside _COMMAND_LINE.
-    """
-
-    program: str
-    arguments: tuple[str, ...]
-    command_line: str
-
-
-_MACHINES: Final = {
-    Architecture.AMD64: _Machine(
-        "qemu-system-x86_64",
-        ("-M", "q35", "-accel", "tcg,thread=multi,tb-size=512", "-cpu", "max", "-smp", "2", "-m", "512"),
-        # The HPET counts this machine's nanoseconds. The emulated TSC would be calibrated against it at boot, wrongly on a busy machine.
-        # The kernel checks its timer by counting ticks in a loop; on a busy machine too few arrive, and it hangs ("8254 timer not connected").
-        "console=ttyS0 clocksource=hpet tsc=unstable no_timer_check",
-    ),
-    # Memory and processors of a BeagleBone Black; Python is about as fast as there (0.7 s for 10^6 rounds of `x += i`).
-    Architecture.ARMHF: _Machine(
-        "qemu-system-arm",
-        ("-M", "virt,highmem=off", "-accel", "tcg,tb-size=256", "-cpu", "cortex-a15", "-smp", "1", "-m", "512"),
-        "console=ttyAMA0",
-    ),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Image:
-    """A guest's files as build-guest leaves them.
-
-    Attributes:
-        folder: rootfs.ext4, vmlinuz, initrd.img and key.
-        architecture: of the guest.
-    """
-
-    folder: Path
-    architecture: Architecture = Architecture.AMD64
-
-    @property
-    def emulator(self) -> str:
-        """The emulator that runs it."""
-        return _MACHINES[self.architecture].program
-
-    @property
-    def built(self) -> bool:
-        """Whether all files are there."""
-        return all((self.folder / name).is_file() for name in ("rootfs.ext4", "vmlinuz", "initrd.img", "key"))
-
-
-def image_of(architecture: Architecture) -> Image:
-    """The image that .ci/board has built from the current scripts; its folder is named after them, so that a changed script never meets an old image."""
-    named = subprocess.run([_ROOT / ".ci" / "board", "folder"], capture_output=True, text=True, check=True)
-    return Image(Path(named.stdout.strip()) / architecture.value, architecture)
-
 
 class Guest:
     """A virtual board.
 
     Args:
-        image: what to boot.
+        start: an image to boot, or a snapshot to go on from.
         folder: for console, pid and ssh's socket.
         disk: an image with a file system of its own, /dev/vdb in the guest; it too is never changed.
+        savable: whether it writes to a copy of the image's disk, so that `save` has one.
     """
 
-    def __init__(self, image: Image, folder: Path, disk: Path | None = None) -> None:
-        self._image = image
-        self._disk = disk
+    def __init__(
+        self, start: Image | Snapshot, folder: Path, disk: Path | None = None, *, savable: bool = False
+    ) -> None:
+        self._image = start if isinstance(start, Image) else start.image
+        self._snapshot = start if isinstance(start, Snapshot) else None
+        self._disk, self._savable = disk, savable
         self._folder = folder
         self._ssh_port, self.link_port, self.door_port = free_port(), free_port(), free_port()
         self._process: subprocess.Popen[bytes] | None = None
@@ -137,8 +72,9 @@ class Guest:
             *("-netdev", f"user,id=link,net=10.0.3.0/24,{forwarded}"),
             *("-device", "virtio-net-pci,netdev=link,romfile="),
         ]
-        disk = f"id=disk,if=none,format=raw,file={self._image.folder / 'rootfs.ext4'},snapshot=on,cache=unsafe"
-        machine = _MACHINES[self._image.architecture]
+        disk = f"id=disk,if=none,format=raw,file={self._root_disk()},snapshot={'off' if self._savable else 'on'},cache=unsafe"
+        incoming = ["-incoming", f"exec:cat {shlex.quote(str(self._snapshot.memory))}"] if self._snapshot else []
+        machine = MACHINES[self._image.architecture]
         command = [
             *(
                 machine.program,
@@ -151,14 +87,31 @@ class Guest:
                 "none",
             ),
             *("-kernel", str(self._image.folder / "vmlinuz"), "-initrd", str(self._image.folder / "initrd.img")),
-            *("-append", f"{machine.command_line} {_COMMAND_LINE}"),
+            *("-append", f"{machine.command_line} {COMMAND_LINE}"),
             *("-serial", f"file:{self._folder / 'console'}", "-device", "virtio-rng-pci"),
             *("-qmp", f"unix:{self._folder / 'orders'},server=on,wait=off"),
             *("-drive", disk, "-device", "virtio-blk-pci,drive=disk", *_further_disk(self._disk), *network),
+            *incoming,
         ]
         with (self._folder / "qemu.log").open("wb") as log:
             self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
         self._await_boot(after="")
+
+    def _root_disk(self) -> Path:
+        """The root file system: of the snapshot, of the image, or a copy of that."""
+        if self._snapshot is not None:
+            return self._snapshot.disk
+        original = self._image.folder / "rootfs.ext4"
+        return Path(shutil.copyfile(original, self._folder / "disk")) if self._savable else original
+
+    def save(self) -> Snapshot:
+        """Write the guest's memory beside its disk, and stop it; other guests go on from there, as long as its folder is there."""
+        memory = self._folder / "memory"
+        subprocess.run([*self._ssh_command("")[:-2], "-O", "exit", "root@127.0.0.1"], check=True, capture_output=True)
+        self.tell_emulator("migrate", uri=f"exec:cat >{shlex.quote(str(memory))}")
+        until(lambda: self.tell_emulator("query-migrate").get("status") == "completed", "the memory is written")
+        self.stop()
+        return Snapshot(self._image, self._folder / "disk", memory)
 
     @property
     def emulator_pid(self) -> int:
@@ -191,16 +144,16 @@ class Guest:
         self.tell_emulator("system_wakeup")
         until(lambda: self.code("true") == 0, "the board is awake")
 
-    def tell_emulator(self, order: str) -> dict[str, Any]:
-        """Send the emulator a command without arguments, in QEMU's machine protocol; return its answer."""
+    def tell_emulator(self, order: str, **arguments: str) -> dict[str, Any]:
+        """Send the emulator a command, in QEMU's machine protocol; return its answer."""
         with socket.socket(socket.AF_UNIX) as connection:
             connection.settimeout(PATIENCE_S)
             connection.connect(str(self._folder / "orders"))
             with connection.makefile("rw") as speech:
                 speech.readline()  # its greeting
                 answer: dict[str, Any] = {}
-                for word in ("qmp_capabilities", order):
-                    speech.write(json.dumps({"execute": word}) + "\n")
+                for command in ({"execute": "qmp_capabilities"}, {"execute": order, "arguments": arguments}):
+                    speech.write(json.dumps(command) + "\n")
                     speech.flush()
                     while "return" not in (answer := json.loads(speech.readline())):
                         assert "event" in answer, answer  # it reports a sleep unasked, too
@@ -290,9 +243,9 @@ class Guest:
         """Write a text file in the guest."""
         self.sh(f"printf %s {shlex.quote(text)} > {shlex.quote(path)}")
 
-    def clock(self) -> "GuestClock":
+    def clock(self) -> GuestClock:
         """Open an echo of the guest's CLOCK_MONOTONIC."""
-        return GuestClock(self._ssh_command(f"python3 -u -c {shlex.quote(_ECHO)}"))
+        return GuestClock(self._ssh_command(f"python3 -u -c {shlex.quote(ECHO)}"))
 
     def popen(self, command: str) -> "subprocess.Popen[bytes]":
         """Start a command that keeps running; the caller ends it."""
@@ -334,47 +287,6 @@ class Guest:
         )
         flags = [word for option in options for word in ("-o", option)]
         return ["ssh", "-F", "none", "-i", str(self._key), "-p", str(self._ssh_port), *flags, "root@127.0.0.1", command]
-
-
-_ECHO: Final = "import sys, time\nfor _ in sys.stdin: print(time.monotonic_ns())"
-
-
-class GuestClock:
-    """Reads the guest's CLOCK_MONOTONIC from outside: the truth against which the product's own estimate is checked.
-
-    Args:
-        command: starts the echo.
-    """
-
-    def __init__(self, command: list[str]) -> None:
-        self._echo = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
-
-    def offset_ns(self) -> tuple[int, int]:
-        """Measure guest's clock minus this machine's.
-
-        Returns:
-            The offset and its maximum error, ns: half of the shortest of 50 round trips.
-        """
-        readings = []
-        for _ in range(50):
-            before_ns = time.monotonic_ns()
-            there_ns = self._ask()
-            after_ns = time.monotonic_ns()
-            readings.append((after_ns - before_ns, there_ns - (before_ns + after_ns) // 2))
-        round_trip_ns, offset_ns = min(readings)
-        return offset_ns, round_trip_ns // 2
-
-    def close(self) -> None:
-        """End the echo."""
-        self._echo.kill()
-        with self._echo:  # closes its pipes and waits
-            pass
-
-    def _ask(self) -> int:
-        assert self._echo.stdin is not None
-        assert self._echo.stdout is not None
-        self._echo.stdin.write(b"\n")
-        return int(self._echo.stdout.readline())
 
 
 def _is_open(port: int) -> bool:

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from tests.vm.conftest import CAMERA, READOUT_MS, booted
-from tests.vm.guest import UNIT, Architecture, Guest
+from tests.vm.guest import UNIT, Guest
+from tests.vm.machine import Architecture
 from tests.vm.stream import FPS, Film, check_journal, streaming, webcam_skew
 from tests.vm.webcam import Webcam
 

@@ -1,4 +1,4 @@
-"""RFCOMM between two of the kernel's virtual Bluetooth controllers; each test gets a fresh guest, since a test may leave the stack in disarray."""
+"""RFCOMM between two of the kernel's virtual Bluetooth controllers; each test gets a guest of its own, since a test may leave the stack in disarray."""
 
 import re
 from collections.abc import Iterator
@@ -8,14 +8,15 @@ import pytest
 
 from tests.support.programs import until
 from tests.vm.air import AIR, DAEMON, SWITCH_ON
-from tests.vm.conftest import CAMERA, READOUT_MS, booted
+from tests.vm.conftest import CAMERA, READOUT_MS, restored
 from tests.vm.contract import run_contract
 from tests.vm.extension import extension
-from tests.vm.guest import Architecture, Guest
+from tests.vm.guest import Guest
+from tests.vm.machine import Snapshot
 from tests.vm.stream import FPS, Film, Stream, check_journal, streaming, webcam_skew
 from tests.vm.webcam import Webcam
 
-pytestmark = pytest.mark.timeout(1800)  # each test boots a board of its own
+pytestmark = pytest.mark.timeout(1800)  # the first test boots the board and runs the contract suite there
 
 BOARD, HOST = "00:AA:01:00:00:00", "00:AA:01:01:00:01"
 """Addresses that btvirt assigns."""
@@ -27,19 +28,18 @@ CHANNEL = 1
 
 
 @pytest.fixture
-def radio() -> Iterator[Guest]:
-    """A fresh board with two controllers, without bluetoothd."""
-    with booted(Architecture.AMD64) as guest:
+def radio(snapshot: Snapshot) -> Iterator[Guest]:
+    """A board with two controllers, without bluetoothd."""
+    with restored(snapshot) as guest:
         guest.sh(f"{AIR}{SWITCH_ON}")
         yield guest
         assert "list_del corruption" not in guest.console
 
 
 @pytest.fixture
-def serving(radio: Guest, package: Path, film: Film) -> Iterator[tuple[Guest, Webcam]]:
+def serving(radio: Guest, film: Film) -> Iterator[tuple[Guest, Webcam]]:
     """The board's service on a channel of the first controller, with its webcam plugged in."""
     camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
-    radio.install(package)
     try:
         camera.plug(radio)
         radio.configure(CAMERA, f"rfcomm://*/{CHANNEL}?unpaired=1")
@@ -84,16 +84,15 @@ def _switch_off_and_on(guest: Guest, adapters: str, stream: Stream) -> None:
 
 
 def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
-    package: Path, film: Film, tmp_path: Path
+    snapshot: Snapshot, film: Film, tmp_path: Path
 ) -> None:
     """Two adapters are paired by bluetoothd; a host then finds board and channel by the board's name, and pairs are correct over the encrypted link; once forgotten, it is told to pair."""
-    with booted(Architecture.AMD64) as guest:
+    with restored(snapshot) as guest:
         guest.sh(AIR)
         guest.put(Path(__file__).with_name("pair.py"), "/srv")
         guest.put(Path(__file__).with_name("far_end.py"), "/srv")
         guest.sh(DAEMON)
         guest.sh(f"timeout 60 python3 -u /srv/pair.py {HOST} {BOARD}")
-        guest.install(package)
         camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000)
         try:
             camera.plug(guest)
@@ -124,7 +123,7 @@ def test_a_paired_host_finds_the_board_by_name_and_a_forgotten_one_is_refused(
         assert "list_del corruption" not in guest.console
 
 
-def test_the_record_is_published_and_published_again(package: Path) -> None:
+def test_the_record_is_published_and_published_again(snapshot: Snapshot) -> None:
     """With bluetoothd the host finds the channel by asking the board; a restarted daemon is told again; a stopped service withdraws the record."""
     ask = f"""
 import socket, sys
@@ -138,14 +137,13 @@ for own, other in (("{HOST}", "{BOARD}"), ("{BOARD}", "{HOST}")):
     asking.send(query())
     print(channel_in(asking.recv(65536)))
 """
-    with booted(Architecture.AMD64) as radio:
+    with restored(snapshot) as radio:
 
         def found() -> set[str]:
             return set(radio.sh("timeout 50 python3 -P /srv/ask.py 2>/dev/null || echo nobody").split())
 
         radio.sh(AIR)
         radio.write("/srv/ask.py", ask)
-        radio.install(package)
         radio.sh("mkdir /srv/frames && printf 'P5 2 2 255\nabcd' >/srv/frames/1.pgm")
         radio.configure("replay:/srv/frames?fps=10&loop=1", "rfcomm://*/7")
         radio.until("StatusText", "waiting for a host", "the service listens")

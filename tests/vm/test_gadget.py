@@ -33,7 +33,7 @@ OURS = f"{GADGETS}/tandemscan"
 
 
 @pytest.fixture(scope="module")
-def cabled(guest: Guest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guest]:
+def cabled(guest: Guest, tmp_path_factory: pytest.TempPathFactory) -> Guest:
     """The board with its gadget up, and the host's end of the cable under its stable names."""
     guest.sh(f"systemctl start {GADGET}")
     assert guest.show("ConditionResult", GADGET) == "no", "without a controller there is nothing to do"
@@ -48,9 +48,7 @@ def cabled(guest: Guest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[G
     guest.sh("udevadm control --reload; modprobe -a dummy_hcd cdc_acm cdc_ncm")
     guest.sh(f"systemctl start {GADGET}")
     _await_ends(guest)
-    yield guest
-    guest.sh(f"systemctl stop {GADGET}; rm /etc/udev/rules.d/70-tandemscan.rules; modprobe -r dummy_hcd")
-    guest.configure(CAMERA)
+    return guest
 
 
 @pytest.fixture

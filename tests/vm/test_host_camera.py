@@ -16,7 +16,8 @@ from packaging.requirements import Requirement
 from tests.support.programs import PATIENCE_S, until
 from tests.vm import uvc
 from tests.vm.conftest import CAMERA, READOUT_MS, ROOT, booted
-from tests.vm.guest import LINK_PORT, Architecture, Guest
+from tests.vm.guest import LINK_PORT, Guest
+from tests.vm.machine import Architecture
 from tests.vm.stream import FPS, FRAMES, Film, check_counts, check_delays, check_journal, check_pairs, webcam_skew
 from tests.vm.webcam import Webcam
 

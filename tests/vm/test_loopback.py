@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.vm.guest import UNIT, Architecture, Guest, image_of
+from tests.vm.guest import UNIT, Guest
+from tests.vm.machine import Architecture, image_of
 
 pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 
@@ -22,10 +23,9 @@ def loopback(guest: Guest) -> Iterator[Guest]:
     guest.sh(f"systemctl stop {UNIT} && modprobe videodev && insmod /srv/{module.name} && udevadm settle")
     writer = guest.popen("exec python3 /srv/loopback_writer.py /dev/video0 320 240")
     yield guest
-    guest.sh("pkill -f /srv/loopback_writer.py")
+    writer.kill()
     with writer:  # closes its pipes and waits
         pass
-    guest.sh(f"rmmod v4l2loopback && systemctl start {UNIT}")
 
 
 def test_its_first_buffer_is_no_frame_and_its_stamps_are_believed(loopback: Guest) -> None:

@@ -44,9 +44,8 @@ def webcam(guest: Guest, film: Film, halves: list[bytes]) -> Iterator[Webcam]:
     camera = Webcam(film.frames, FPS, READOUT_MS * 1_000_000, MODEL, halves)
     camera.plug(guest)
     lowered = f"-e 's|^least_fps = .*|least_fps = {SLOW_FPS}|' -e 's|^adapt = .*|adapt = [\"rate\", \"size\"]|'"
-    guest.sh(f"cp {SETTINGS} /srv/settings && sed -i {lowered} {SETTINGS} && systemctl restart {UNIT}")
+    guest.sh(f"sed -i {lowered} {SETTINGS} && systemctl restart {UNIT}")
     yield camera
-    guest.sh(f"cp /srv/settings {SETTINGS} && systemctl restart {UNIT}")
     camera.close()
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.vm.conftest import booted
-from tests.vm.guest import Architecture, Guest
+from tests.vm.guest import Guest
 from tests.vm.stream import Film, Skew, check_journal, streaming
 from tests.vm.webcam import Webcam
 
@@ -16,13 +15,6 @@ pytestmark = pytest.mark.timeout(600)  # the first test boots the board
 SLEEP_S = 1.5
 """Shorter than the silence after which a host gives up its board: then only the board itself reports the sleep. Longer than a
 second: the guest's kernel measures a sleep by a clock of whole seconds, and takes a shorter one for none."""
-
-
-@pytest.fixture(scope="module")
-def bare_guest() -> Iterator[Guest]:
-    """A board of this file's own: QEMU 7.2 wakes a guest correctly only once."""
-    with booted(Architecture.AMD64) as guest:
-        yield guest
 
 
 @pytest.fixture(autouse=True)
