@@ -346,9 +346,11 @@ def _session(run: RunSnapshot, index: int) -> dict[str, object]:
     account = run.link.sessions[index]
     before = dict(account.first.dropped)
     dropped = {reason.value: count - before.get(reason, 0) for reason, count in account.latest.dropped}
-    sent = account.latest.sent - account.first.sent
+    # Frames overtake accounts, and the board's last one may not have come: what is here was sent.
+    sent = max(account.latest.sent - account.first.sent, account.received + account.lost)
     # A frame that waited when this host came was grabbed before and sent, or dropped, since. It belongs to this account.
     grabbed = account.latest.grabbed - account.first.sent - sum(before.values())
+    grabbed = max(grabbed, sent + sum(dropped.values()))
     return {
         "session": account.session,
         "grabbed": grabbed,

@@ -88,14 +88,15 @@ def test_a_line_that_adds_nothing_gives_every_byte_both_ways(kind: str, tmp_path
 def test_the_rate_is_the_profiles(name: str, tmp_path: Path) -> None:
     """Bytes never arrive faster than the profile allows (beyond what the line holds), and somewhere in the run as fast as it allows.
 
-    The second half waits for a stretch of half a second that reaches 95 % of the rate: a busy machine may take longer, but is never faster.
+    The second half waits for a stretch of half a second that reaches 85 % of the rate: a busy machine may take longer, but is never faster; a wrong rate is wrong by
+    the share of a start bit, 20 %, or more.
     """
     profile = NAMED[name]
     stretch_bytes = int(profile.bytes_per_s / 2)
     with line(profile.carrier, profile, tmp_path) as (_, board, host):
         deadline = time.monotonic() + PATIENCE_S
         rates: list[float] = []
-        while not rates or max(rates) < 0.95 * profile.bytes_per_s:
+        while not rates or max(rates) < 0.85 * profile.bytes_per_s:
             assert time.monotonic() < deadline, f"{max(rates):.0f} bytes/s at most, {profile.bytes_per_s:.0f} asked for"
             writer = sent_all(board, bytes(stretch_bytes + profile.held_bytes))
             marks: list[tuple[float, int]] = []

@@ -282,6 +282,13 @@ def test_a_frame_that_waited_when_the_host_came_belongs_to_the_account() -> None
         assert told[0]["grabbed"] == told[0]["sent"] + sum(told[0]["dropped"].values()) + waiting
 
 
+def test_what_has_come_was_sent_even_if_the_last_account_has_not() -> None:
+    """The board's newest account counts 48 frames, 49 have come and 1 is lost: 50 were sent, and never fewer than arrived."""
+    account = SessionAccount("s", BoardCounts(), BoardCounts(51, 48, ((DropReason.REPLACED, 3),)), received=49, lost=1)
+    told: Any = build(replace(run(1), link=LinkAccount([account])))["sessions"]
+    assert (told[0]["sent"], told[0]["grabbed"], told[0]["waiting"]) == (50, 53, 0)
+
+
 def test_stills_have_no_figures_from_an_exposure() -> None:
     """Capture, end-to-end, time skew and age are null in the report, which says why, and no row or plot shows them."""
     delays = DelayStatistics()
