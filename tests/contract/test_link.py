@@ -186,9 +186,9 @@ def test_a_reader_that_does_not_read_makes_the_link_full(pair: tuple[End, End, d
         else:
             assert result is SendResult.FULL
             refusals += 1
-            # Small packets go on where large ones have filled the buffers. By themselves they would take fifty thousand sends, each of which
-            # yields its core: beside busy programs that is longer than the 30 s after which a reader that does not read is given up.
-            fill = size
+            # Small packets go on once large ones have filled all buffers on the way. By themselves they would take fifty thousand sends, each of
+            # which yields its core: beside busy programs that is longer than the 30 s after which a reader that does not read is given up.
+            fill = fill if refusals < enough / 2 else size
             for pollable in listener.link.pollables:
                 zmq.zmq_poll([(pollable, zmq.POLLIN)], 1)  # lets the transport move data
     assert len(taken) * max(size, 1) < 64 * MB
