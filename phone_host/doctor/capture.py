@@ -1,4 +1,4 @@
-"""Films with a camera and checks what it gives: the shell around `calibration.capture`."""
+"""Films with a camera and checks what it gives: the shell around `camera_check`."""
 
 import math
 import queue
@@ -14,9 +14,9 @@ from common.doctor.finding import Finding, ok, warn
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame
 from common.protocol.message import CameraDescription
-from phone_host.calibration.capture.check import CaptureCheck, Plan, Progress, Stage
-from phone_host.calibration.capture.look import Reading, look
-from phone_host.calibration.capture.words import findings_of
+from phone_host.doctor.camera_check.check import CaptureCheck, Plan, Progress, Stage
+from phone_host.doctor.camera_check.look import Reading, look
+from phone_host.doctor.camera_check.words import findings_of
 from phone_host.model import CameraModel, Image, Rig, Side
 from phone_host.model.capture import CaptureReport, CaptureSource
 from phone_host.output.atomic import write_text

@@ -1,4 +1,4 @@
-"""What a check of a camera's images found: values only. `calibration.capture` computes them."""
+"""What a check of a camera's images found: values only. `doctor.camera_check` computes them."""
 
 import math
 from dataclasses import dataclass

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from phone_host.calibration.capture.check import ENOUGH, Progress
-from phone_host.calibration.capture.words import stage_words
+from phone_host.doctor.camera_check.check import ENOUGH, Progress
+from phone_host.doctor.camera_check.words import stage_words
 from phone_host.web.source import Checked
 
 _STEPS: Final = 20

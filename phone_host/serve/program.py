@@ -7,10 +7,10 @@ from typing import Protocol
 
 from common.doctor.finding import Finding
 from common.keys import KeyFolder
-from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.view import View
 from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.scan import LiveScan

@@ -23,8 +23,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.calibration.capture.check import CaptureCheck, Plan
-from phone_host.calibration.capture.look import FRAMES, look
+from phone_host.doctor.camera_check.check import CaptureCheck, Plan
+from phone_host.doctor.camera_check.look import FRAMES, look
 from phone_host.model import CameraModel
 from phone_host.model.capture import CaptureSource, Rigidity, Warping
 from tests.bench.capture_films import Place, Stabiliser, Take, film, lens_of

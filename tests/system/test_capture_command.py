@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.calibration.capture.words import CHECK_AGAIN
+from phone_host.doctor.camera_check.words import CHECK_AGAIN
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import write_rig

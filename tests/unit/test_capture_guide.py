@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from phone_host.calibration.capture.check import Progress, Stage
+from phone_host.doctor.camera_check.check import Progress, Stage
 from phone_host.model.capture import Unseen
 from phone_host.serve.capture_guide import CaptureGuide
 from phone_host.web.source import Checked

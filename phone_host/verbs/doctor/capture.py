@@ -5,9 +5,9 @@ from pathlib import Path
 
 from common import now
 from common.stamp import HOST_CLOCK
-from phone_host.calibration.capture.check import Progress
-from phone_host.calibration.capture.words import stage_words
 from phone_host.camera.factory import open_camera
+from phone_host.doctor.camera_check.check import Progress
+from phone_host.doctor.camera_check.words import stage_words
 from phone_host.doctor.capture import CheckedCapture, check_capture
 from phone_host.doctor.host_doctor import Question
 from phone_host.run.progress_bar import ShareBar, share_bar

@@ -14,12 +14,12 @@ from common.program.extensions import registered_names
 from common.program.invocation import command_line
 from common.program.settings import log_level
 from common.stamp import HOST_CLOCK
-from phone_host.calibration.capture.check import Progress
 from phone_host.calibration.verdict import Verdict
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera, require_replayed
 from phone_host.camera.http_uri import without_password
+from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.capture.bundle import Flags, Floats, Tracks
+from phone_host.doctor.camera_check.bundle import Flags, Floats, Tracks
 from phone_host.geometry.lens import rays_through
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.capture.bundle import LIKELY, Flags, Floats, Problem, State, Tracks, moved
-from phone_host.calibration.capture.consensus import still_points
+from phone_host.doctor.camera_check.bundle import LIKELY, Flags, Floats, Problem, State, Tracks, moved
+from phone_host.doctor.camera_check.consensus import still_points
 from phone_host.geometry.schur import solved
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.capture.bundle import Flags, Floats, Tracks
+from phone_host.doctor.camera_check.bundle import Flags, Floats, Tracks
 from phone_host.model import Image
 from phone_host.stereo.match_align import with_levels_of
 

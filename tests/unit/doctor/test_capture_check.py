@@ -11,10 +11,10 @@ import pytest
 from common.camera_identity import CameraIdentity
 from common.doctor.finding import Grade
 from common.errors import DataError
-from phone_host.calibration.capture.check import ENOUGH, CaptureCheck, Plan, Stage, rigidity_of
-from phone_host.calibration.capture.look import FRAMES, Reading, Window, guessed_lens, look
-from phone_host.calibration.capture.pace import Shot, pace_of
-from phone_host.calibration.capture.words import (
+from phone_host.doctor.camera_check.check import ENOUGH, CaptureCheck, Plan, Stage, rigidity_of
+from phone_host.doctor.camera_check.look import FRAMES, Reading, Window, guessed_lens, look
+from phone_host.doctor.camera_check.pace import Shot, pace_of
+from phone_host.doctor.camera_check.words import (
     CHECK_AGAIN,
     findings_of,
     holds_for,

@@ -5,7 +5,7 @@ from typing import Final, assert_never
 
 from common.doctor.finding import Finding, ok, warn
 from common.words import counted
-from phone_host.calibration.capture.check import Progress, Stage
+from phone_host.doctor.camera_check.check import Progress, Stage
 from phone_host.model.capture import CaptureReport, CaptureSource, Pace, Rigidity, Unseen, Warping
 
 _RATE: Final = 0.9

@@ -12,8 +12,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.capture.look import FRAMES, Reading, Window, may_tell
-from phone_host.calibration.capture.pace import Shot, pace_of
+from phone_host.doctor.camera_check.look import FRAMES, Reading, Window, may_tell
+from phone_host.doctor.camera_check.pace import Shot, pace_of
 from phone_host.model import CameraModel, Image, Side
 from phone_host.model.capture import CaptureReport, CaptureSource, Rigidity, Unseen, Warping
 from phone_host.stereo.scaled_rig import scaled_camera

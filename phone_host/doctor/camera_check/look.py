@@ -7,9 +7,9 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.capture.bundle import Flags
-from phone_host.calibration.capture.rigid import Compared, compare
-from phone_host.calibration.capture.tracks import filled_cells, follow, motion_px
+from phone_host.doctor.camera_check.bundle import Flags
+from phone_host.doctor.camera_check.rigid import Compared, compare
+from phone_host.doctor.camera_check.tracks import filled_cells, follow, motion_px
 from phone_host.model import CameraModel, Image
 from phone_host.model.capture import Unseen
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from phone_host.calibration.capture.look import RIGID, WARPED, Reading, _judged
-from phone_host.calibration.capture.rigid import Compared
+from phone_host.doctor.camera_check.look import RIGID, WARPED, Reading, _judged
+from phone_host.doctor.camera_check.rigid import Compared
 from phone_host.model.capture import Unseen
 
 FRAMES, POINTS = 20, 100
