@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 
 from phone_host.calibration.bent_board import bow_shapes
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.board_pose import towards
 from phone_host.calibration.bundle import Vector
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project_linearised, rays_through
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of
 from phone_host.geometry.triangulate import triangulate

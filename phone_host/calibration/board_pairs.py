@@ -1,7 +1,6 @@
-"""The values of a calibration: pairs of board views, why a pair is not used, and the result. No behaviour."""
+"""The result of a calibration. Values only. Pure."""
 
 from dataclasses import dataclass, field
-from enum import Enum
 
 import numpy as np
 
@@ -10,55 +9,9 @@ from phone_host.calibration.bend import Bend
 from phone_host.calibration.bundle import Vector
 from phone_host.calibration.fit_quality import LensTrial, Squares
 from phone_host.calibration.next_view import NextView
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.pairs import Rejected
 from phone_host.model import Rectification, Rig
 from phone_host.model.calibration_series import BoardInSpace
-
-
-class Reason(Enum):
-    """Why a pair is not used."""
-
-    NO_PARTNER = "no partner"
-    UNREADABLE = "unreadable"
-    OTHER_SIZE = "other image size"
-    TURNED = "turned otherwise"
-    NOT_FOUND_LEFT = "board not found left"
-    NOT_FOUND_RIGHT = "board not found right"
-    NOT_FOUND_BOTH = "board not found in both"
-    CORNERS_LEFT = "corners jump left"
-    CORNERS_RIGHT = "corners jump right"
-    MOVED = "not the same moment"
-    REPEATED = "the same pictures again"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BoardPair:
-    """The corners of one pair.
-
-    Attributes:
-        name: how reports name the pair.
-        left_px: (N, 2) float64.
-        right_px: (N, 2) float64, in the same order.
-    """
-
-    name: str
-    left_px: Corners
-    right_px: Corners
-
-
-@dataclass(frozen=True, slots=True)
-class Rejected:
-    """A pair that is not used.
-
-    Attributes:
-        name: the pair.
-        reason: why.
-        detail: the reason in words, with numbers.
-    """
-
-    name: str
-    reason: Reason
-    detail: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.calibration.board_pose import fit_pose
-from phone_host.calibration.target import Board, Corners, agree, find_corners
+from phone_host.calibration.target.corners import Board, Corners, agree, find_corners
 from phone_host.model import CameraModel, DisparityPlane, Epipolar, RectifiedPair, StereoGeometry
 from phone_host.stereo.plane_fit import plane_at, plane_in_disparity
 

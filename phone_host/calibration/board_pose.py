@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from phone_host.calibration.bundle import BundleView, Vector, alone_state, fit_poses
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
 from phone_host.geometry.lens import rays_through
 from phone_host.geometry.se3 import SE3, rotations_of
 from phone_host.model import CameraModel, Lens

@@ -18,7 +18,7 @@ import numpy as np
 from common.errors import DataError
 from common.program.out_of_memory import is_out_of_memory
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import (
     BundleState,
@@ -38,7 +38,8 @@ from phone_host.calibration.fitted_rig import Bends, Fitted, summed_up
 from phone_host.calibration.lens_choice import choose_lens, grows, is_fisheye
 from phone_host.calibration.misfits import misfits
 from phone_host.calibration.relative_pose import prediction_errors_px, states_of
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.geometry.lens import PARAMETERS
 from phone_host.geometry.se3 import SE3, rotations_of
 from phone_host.model import Rig, Side

@@ -8,11 +8,11 @@ import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import Vector
 from phone_host.calibration.fisheye_start import fisheye_camera
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
+from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel, Side

@@ -6,9 +6,10 @@ from typing import Final
 import numpy as np
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.board_names import board_name, named_board
-from phone_host.calibration.board_pairs import BoardPair, Calibration
-from phone_host.calibration.target import Board
+from phone_host.calibration.board_pairs import Calibration
+from phone_host.calibration.target.board_names import board_name, named_board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.output.rig_views import RigViews
 
 _SAME_PX: Final = 1e-3

@@ -14,7 +14,7 @@ from common.errors import DataError
 from phone_host.calibration.bend import Bend
 from phone_host.calibration.board_pose import rough_pose
 from phone_host.calibration.bundle import BundleState, Vector, adjust_alone, alone_state
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel, Lens

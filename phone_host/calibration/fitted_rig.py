@@ -9,7 +9,7 @@ from common.errors import DataError
 from phone_host.calibration.bend import Bend
 from phone_host.calibration.bent_board import fit_bent
 from phone_host.calibration.board_in_space import boards_in_space
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Rejected, Used
+from phone_host.calibration.board_pairs import Calibration, Used
 from phone_host.calibration.bundle import BundleResult, BundleView, FreeParameters, Vector, adjust, rig_of, rms_px
 from phone_host.calibration.calibrate_alone import corners_of, own_errors_px
 from phone_host.calibration.fit_quality import LensTrial
@@ -17,7 +17,8 @@ from phone_host.calibration.held_out import held_out_squares
 from phone_host.calibration.misfits import rms, vertical_errors_px
 from phone_host.calibration.next_view import next_view
 from phone_host.calibration.rig_sigma import DEPTHS_M, depth_sigma_m, zero_sigma_px
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
+from phone_host.calibration.target.pairs import BoardPair, Rejected
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Side
 from phone_host.stereo.rectify import rectify_rig

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.calibration.board_in_space import ray_crossings
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.bundle import BundleState, BundleView, FreeParameters, Vector, adjust_roughly, rig_of
 from phone_host.calibration.fit_quality import Squares
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Rig
 
 _PARTS: Final = 5

@@ -29,7 +29,7 @@ from phone_host.calibration.bundle import (
 from phone_host.calibration.bundle_problem import errors_of
 from phone_host.calibration.fisheye_start import fisheye_camera
 from phone_host.calibration.fit_quality import LensTrial
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
 from phone_host.geometry.lens import farthest_angle, parameters_of, rays_through, with_parameters
 from phone_host.model import CameraModel, Lens
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from phone_host.calibration.board_in_space import misses
-from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.bundle import BundleResult, BundleState, Vector, rig_of, rms_px
 from phone_host.calibration.calibrate_alone import FAR_OFF_PX, corners_of, off_words, own_errors_px
+from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.model import Rectification, Rig, Side
 from phone_host.stereo.rectify import across_lines_px, rectify_points
 

@@ -13,31 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.bundle import Vector, project_view, rms_px
 from phone_host.calibration.calibrate_alone import LEAST_PAIRS, LoneCamera, calibrate_alone
 from phone_host.calibration.relative_pose import state_of
-from phone_host.calibration.target import Board, Corners, agree
+from phone_host.calibration.target.corners import Board, agree
+from phone_host.calibration.target.pairs import BoardPair, FileCorners
 from phone_host.model import Side
 
 _MOST_MISSING: Final = 8
 _FITS_SHARE: Final = 1 / 400
 """How well a rig from one pair predicts the right views of others, as a share of the image's width: 3 px of 1280. On a
 real rig pairs of one moment are off by 0.5 to 1.5 px, those of two moments by 20 px and more."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FileCorners:
-    """The corners found in one picture; none if the board was not found.
-
-    Attributes:
-        name: of the file.
-        corners: (N, 2), or (0, 2).
-    """
-
-    name: str
-    corners: Corners
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

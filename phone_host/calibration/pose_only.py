@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair, Calibration
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.bundle import BundleResult, Vector
 from phone_host.calibration.bundle_problem import GLOBALS, BundleView, RigProblem
 from phone_host.calibration.calibrate import fit_of_known_lenses
 from phone_host.calibration.fitted_rig import summed_up
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.rig_pixels import RIG
 from phone_host.model import CameraModel, Lens, Rig
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from phone_host.calibration.bundle import BundleState, Vector, project_view, rms_px
 from phone_host.calibration.calibrate_alone import LoneCamera
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel
 

@@ -7,12 +7,13 @@ from typing import Final
 import numpy as np
 
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Rejected
-from phone_host.calibration.board_views import BoardViews, ViewPictures
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.bundle import Vector
 from phone_host.calibration.fit_quality import LensTrial
 from phone_host.calibration.misfits import vertical_errors_px
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.board_views import BoardViews, ViewPictures
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.pairs import BoardPair, Rejected
 from phone_host.calibration.verdict import limits_of
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Rig

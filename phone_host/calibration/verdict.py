@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.words import counted
-from phone_host.calibration.board_pairs import Calibration, Reason, Rejected
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.next_view import DEPTH_M, Kind
+from phone_host.calibration.target.pairs import Reason, Rejected
 from phone_host.model import Rig, Verdict
 from phone_host.model.calibration_series import Limits
 

@@ -16,8 +16,6 @@ from common import now
 from common.camera.base import Camera
 from common.errors import SettingsError
 from common.link.base import Link
-from phone_host.calibration.board_views import Size
-from phone_host.calibration.causes.looks import look_at
 from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.guide import Guide
 from phone_host.calibration.guide.progress import Progress
@@ -25,8 +23,10 @@ from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_b
 from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import Want
 from phone_host.calibration.guide.words import Words
-from phone_host.calibration.moving_board import BoardFinder, SizeCheck, SizeFinder
-from phone_host.calibration.target import Board, Corners
+from phone_host.calibration.target.board_views import Size
+from phone_host.calibration.target.corners import Board, Corners
+from phone_host.calibration.target.moving_board import BoardFinder, SizeCheck, SizeFinder
+from phone_host.calibration.target.sharpness import look_at
 from phone_host.live.newest import Newest
 from phone_host.measure.unused import unused
 from phone_host.model import Image, Result

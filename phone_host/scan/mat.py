@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import SettingsError
-from phone_host.calibration.board_names import board_name, named_board
-from phone_host.calibration.marked import marked_corners
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.board_names import board_name, named_board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.marked import marked_corners
 from phone_host.model import Image
 
 Floats = NDArray[np.float64]

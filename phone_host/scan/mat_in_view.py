@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Final
 
-from phone_host.calibration.board_names import family_name
-from phone_host.calibration.marked import Charuco, MarkFamily
-from phone_host.calibration.marks_seen import find_marks, squares_of
+from phone_host.calibration.target.board_names import family_name
+from phone_host.calibration.target.marked import Charuco, MarkFamily
+from phone_host.calibration.target.marks_seen import find_marks, squares_of
 from phone_host.model import Image
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.stereo.images import to_grey

@@ -16,9 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.sheets.layout import marked_sheet
-from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard
-from phone_host.calibration.sheets.sheet import Paper
+from phone_host.calibration.target.sheet import Paper
+from phone_host.calibration.target.sheet_layout import Chessboard, Family, MarkedBoard, marked_sheet
 from phone_host.model import CameraModel, Image, Rig, Side
 from phone_host.scene.objects import OBJECTS
 from phone_host.scene.printed import printed_sheet

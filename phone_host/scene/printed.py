@@ -1,6 +1,6 @@
 """A printed sheet as a texture: its ink as sums over areas, so that a pixel of any size reads the exact mean. Pure.
 
-The pattern is that of `calibration.sheets`, which the printer gets, too: what is seen is what was printed.
+The pattern is that of `calibration.target.sheet_layout`, which the printer gets, too: what is seen is what was printed.
 """
 
 from typing import Final
@@ -8,7 +8,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.sheets.sheet import Ink, Sheet
+from phone_host.calibration.target.sheet import Ink, Sheet
 from phone_host.scene.scene_model import Floats, Print, Vector
 
 _TEXELS_PER_MM: Final = 7

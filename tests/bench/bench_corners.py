@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.calibration.corner_fit import fit_corners, steps_between
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corner_fit import fit_corners, steps_between
+from phone_host.calibration.target.corners import Board
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel, Image

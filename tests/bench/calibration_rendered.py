@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair, Calibration
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.target import Board, agree, find_corners
+from phone_host.calibration.target.corners import Board, agree, find_corners
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import parameters_of, project
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
 from phone_host.model import CameraModel, Image, Lens, Rig

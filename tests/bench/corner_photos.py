@@ -9,8 +9,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.board_views import look_for_boards
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.board_views import look_for_boards
+from phone_host.calibration.target.corners import Board
 from phone_host.model import Image
 from phone_host.scene.scene import Renderer, rig_poses
 from phone_host.stereo.view_files import pair_files

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from common.errors import SettingsError
-from phone_host.calibration.board_names import board_name, named_board
-from phone_host.calibration.moving_board import SizeCheck
+from phone_host.calibration.target.board_names import board_name, named_board
+from phone_host.calibration.target.moving_board import SizeCheck
 from phone_host.model import Image
 from phone_host.output.rig_yaml import read_rig
 from phone_host.verbs.calibrate.arguments import add_arguments

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.calibration.marked import MarkFamily
+from phone_host.calibration.target.marked import MarkFamily
 from phone_host.cli import main
 from phone_host.model import Image
 from phone_host.output.rig_yaml import write_rig

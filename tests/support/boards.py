@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import rays_through
 from phone_host.model import CameraModel, Image, Rig
 from tests.support.rigs import project_points

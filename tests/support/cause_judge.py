@@ -1,12 +1,13 @@
 """Names the mistake of a made series the way `phone-host calibrate` does, from corners or from images."""
 
 from common.errors import DataError
-from phone_host.calibration.board_pairs import BoardPair, Calibration
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.causes.looks import SeenLook, look_at
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
-from phone_host.calibration.target import agree, find_corners
+from phone_host.calibration.target.corners import agree, find_corners
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.calibration.target.sharpness import SeenLook, look_at
 from phone_host.model import Side
 from tests.support.cause_series import Made
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from common.orientation import Flip, Orientation
 from phone_host.calibration.arrangement import turned_corners
-from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.board_views import look_for_boards
 from phone_host.calibration.calibrate import Sizes, calibrate
 from phone_host.calibration.causes.mistakes import Mistake
-from phone_host.calibration.target import Board, agree, find_corners
+from phone_host.calibration.target.board_views import look_for_boards
+from phone_host.calibration.target.corners import Board, agree, find_corners
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Image
 from phone_host.stereo.view_files import pair_files
 from tests.support.cause_judge import finding_of

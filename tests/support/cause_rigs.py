@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
 from phone_host.model import CameraModel, Rig
 from tests.support.rigs import project_points
 

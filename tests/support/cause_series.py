@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from common.orientation import Flip, Orientation
 from phone_host.calibration.arrangement import turned_corners
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.causes.mistakes import Mistake
-from phone_host.calibration.target import Board, agree
+from phone_host.calibration.target.corners import Board, agree
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Image, Rig
 from tests.support.boards import render_pair
 from tests.support.cause_rigs import random_poses, random_rig

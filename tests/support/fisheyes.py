@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Lens

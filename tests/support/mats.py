@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.marked import Charuco, MarkFamily
-from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard, marked_rectangles
-from phone_host.calibration.sheets.sheet import Ink
+from phone_host.calibration.target.marked import Charuco, MarkFamily
+from phone_host.calibration.target.sheet import Ink
+from phone_host.calibration.target.sheet_layout import Chessboard, Family, MarkedBoard, marked_rectangles
 from phone_host.geometry.lens import rays_through
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel, Image, Rig

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.calibration.target import Board, find_corners
+from phone_host.calibration.target.corners import Board, find_corners
 from phone_host.output.ply import read_ply
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.images import read_image

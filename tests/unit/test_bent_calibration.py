@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.calibrate import calibrate
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.se3 import SE3
 from tests.support.boards import BOARD, poses
 from tests.support.rigs import project_points, unlike_rig

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from phone_host.calibration.board_in_space import boards_in_space, misses
-from phone_host.calibration.board_pairs import BoardPair
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import SE3, rotations_of
 from phone_host.model import Rig

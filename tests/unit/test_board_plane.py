@@ -6,7 +6,7 @@ import pytest
 
 from common.errors import DataError
 from phone_host.calibration.board_plane import board_plane_of, corners_bias_share, find_board_plane
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
 from phone_host.model import Epipolar, RectifiedPair, StereoGeometry
 from phone_host.stereo.plane_fit import normal_over_distance, plane_in_disparity
 from tests.support.boards import BOARD, poses, render_board

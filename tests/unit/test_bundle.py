@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.bundle import BundleState, BundleView, FreeParameters, adjust
 from phone_host.calibration.calibrate import calibrate
+from phone_host.calibration.target.pairs import BoardPair
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 

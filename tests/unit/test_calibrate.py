@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from common.errors import DataError
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import BoardPair, Calibration, Reason, Rejected
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.calibrate_alone import off_words
+from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.verdict import Assessment, Verdict, judge, size_factor, vertical_p95_px
 from phone_host.model import CameraModel, Rig
 from tests.support.boards import BOARD, exact_pairs, poses

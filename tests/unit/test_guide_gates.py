@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.coverage import COLUMNS, ROWS, Coverage, Depth, Tilt, depth_of, tilt_of
 from phone_host.calibration.guide.gates import (
     Gate,
@@ -25,7 +24,8 @@ from phone_host.calibration.guide.gates import (
 )
 from phone_host.calibration.guide.placement import Placement, placement, usual_camera
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, back, is_there, missing, spot_of
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.sharpness import BoardLook
 
 BOARD = Board(9, 6, 0.025)
 SIZES = ((640, 480), (1280, 720))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.board_names import named_board
 from phone_host.calibration.held_out import square_sides_m
+from phone_host.calibration.target.board_names import named_board
 from phone_host.model import Rig
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import fisheye_rig, unlike_rig

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.board_size import size_seen, whole_size_seen
 from phone_host.calibration.guide.placement import placement
-from phone_host.calibration.target import find_corners
+from phone_host.calibration.target.board_size import size_seen, whole_size_seen
+from phone_host.calibration.target.corners import find_corners
 from phone_host.geometry.lens import project
 from tests.support.novice.depth_truth import depth_error_m, depths_in_places
 from tests.support.novice.hands import Plan, Stroke, motion

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.sheets.patterns import DICTIONARIES
+from phone_host.calibration.target.sheet_layout import DICTIONARIES
 from phone_host.model import CameraModel, Image, Side
 from phone_host.scene.cast import cast, pixel_rays, project
 from phone_host.scene.distance import nearest_on

@@ -14,7 +14,7 @@ from common.errors import DataError, SettingsError, UnavailableError
 from common.frame import PixelFormat
 from common.orientation import Flip, Orientation
 from common.protocol.message import CameraDescription, Pacing
-from phone_host.calibration.cameras_beside import cameras_beside
+from phone_host.calibration.target.cameras_beside import cameras_beside
 from phone_host.model import Side
 from phone_host.recording.chosen_views import MOST, NS, choose_views, stillest
 from phone_host.recording.copied import copy_recording

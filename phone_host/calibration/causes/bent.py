@@ -11,7 +11,7 @@ import numpy as np
 from phone_host.calibration.bent_board import BENT_SIGMAS, common_bows_m
 from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.causes.mistakes import Finding, Mistake
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
 
 _BENT: Final = 0.004
 """Share of the board's side: 0.8 mm of 200 mm. Boards of four real rigs, whose results are good, stay at 0.003 and below."""

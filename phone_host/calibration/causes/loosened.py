@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.board_pairs import BoardPair
 from phone_host.calibration.causes.lone import LENS, Vector
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.schur import NormalEquations, eliminated, minimise
 
 TURN, MOVE, FOCUS_LEFT, FOCUS_RIGHT, ROWS_LEFT, ROWS_RIGHT = (

@@ -8,7 +8,7 @@ import numpy as np
 
 from phone_host.calibration.guide.gates import Size
 from phone_host.calibration.guide.placement import Placement
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
 
 COLUMNS, ROWS = 8, 6
 """Cells of an image: as fine as lenses bend."""

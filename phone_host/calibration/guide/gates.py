@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.causes.looks import BoardLook
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
+from phone_host.calibration.target.sharpness import BoardLook
 from phone_host.calibration.verdict import REFERENCE_PX
 
 Size = tuple[int, int]

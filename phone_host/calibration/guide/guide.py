@@ -13,7 +13,6 @@ import math
 from collections import Counter
 from typing import Final
 
-from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.coverage import Coverage, Depth
 from phone_host.calibration.guide.gates import (
     NOT_SEEN,
@@ -35,7 +34,8 @@ from phone_host.calibration.guide.unseen import is_guessed, unseen, with_corners
 from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Speech, Words, done, taken
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.sharpness import BoardLook
 from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import Rig
 

@@ -7,7 +7,7 @@ from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.guide.wants import ORDER, Want, spot_of
 from phone_host.calibration.next_view import DEPTH_M, after_one_m
 from phone_host.calibration.rig_sigma import DEPTHS_M
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
 from phone_host.calibration.verdict import Verdict
 
 LEAST_STATED: Final = 5

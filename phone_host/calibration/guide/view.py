@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.causes.looks import BoardLook
 from phone_host.calibration.guide.gates import Glance
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.calibration.target.sharpness import BoardLook
 
 
 @dataclass(frozen=True, slots=True, eq=False)

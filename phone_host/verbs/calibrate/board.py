@@ -6,10 +6,10 @@ from typing import Final
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from phone_host.calibration.board_names import named_board, no_square
-from phone_host.calibration.board_size import require_marks_of, require_size, size_in_files
-from phone_host.calibration.marked import Charuco
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.board_names import named_board, no_square
+from phone_host.calibration.target.board_size import require_marks_of, require_size, size_in_files
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.marked import Charuco
 from phone_host.run.progress_bar import busy_bar
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.units import square_mm

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import DataError
-from phone_host.calibration.board_pairs import Calibration, Rejected
-from phone_host.calibration.board_views import BoardViews
+from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.target.board_views import BoardViews
+from phone_host.calibration.target.pairs import Rejected
 from phone_host.calibration.verdict import Assessment
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import Verdict

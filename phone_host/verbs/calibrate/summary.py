@@ -9,8 +9,9 @@ from common.errors import DataError
 from common.orientation import UPRIGHT
 from common.words import counted
 from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import Calibration, Rejected
-from phone_host.calibration.board_views import BoardViews, turn_text
+from phone_host.calibration.board_pairs import Calibration
+from phone_host.calibration.target.board_views import BoardViews, turn_text
+from phone_host.calibration.target.pairs import Rejected
 from phone_host.calibration.verdict import SHARE_GOOD
 from phone_host.model import Verdict
 from phone_host.output.report_owner import REPORT

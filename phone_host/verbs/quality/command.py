@@ -7,7 +7,7 @@ from common.errors import SettingsError
 from common.program.commandline import CHECK_FAILED
 from common.program.terminal import columns, say
 from common.words import counted
-from phone_host.calibration.target import Board, parse_board
+from phone_host.calibration.target.corners import Board, parse_board
 from phone_host.output.json_text import json_text
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_lines import quality_lines

@@ -13,14 +13,19 @@ import numpy as np
 from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
 from common.program.terminal import say
-from phone_host.calibration.board_names import require_marks
-from phone_host.calibration.sheets.layout import chessboard_sheet, largest_square_mm, marked_sheet
-from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard
-from phone_host.calibration.sheets.pdf import pdf
-from phone_host.calibration.sheets.screen import ScreenBoard, screen_board
-from phone_host.calibration.sheets.sheet import Paper, Sheet
-from phone_host.calibration.sheets.svg import svg
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.board_names import require_marks
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.sheet import Paper, Sheet, pdf, svg
+from phone_host.calibration.target.sheet_layout import (
+    Chessboard,
+    Family,
+    MarkedBoard,
+    ScreenBoard,
+    chessboard_sheet,
+    largest_square_mm,
+    marked_sheet,
+    screen_board,
+)
 from phone_host.output.atomic import replacing
 from phone_host.output.json_text import json_text
 from phone_host.verbs.output_folders import require_folder, unwritable

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
 from phone_host.geometry.lens import rays_through
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel, Image

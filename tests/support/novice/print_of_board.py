@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.marked import AprilGrid, Charuco, MarkFamily
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.marked import AprilGrid, Charuco, MarkFamily
 
 AROUND: Final = 3
 """Squares around the outer corners: the margin, the cardboard and the hands."""

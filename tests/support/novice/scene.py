@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.board_names import named_board
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.board_names import named_board
+from phone_host.calibration.target.corners import Board
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Lens, Rig, Side
 from tests.bench.calibration_rendered import random_camera

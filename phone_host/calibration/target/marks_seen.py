@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 
 from common.errors import SettingsError
-from phone_host.calibration.board_names import board_name, family_name
-from phone_host.calibration.marked import AprilGrid, Charuco, Corners, MarkFamily
-from phone_host.calibration.target import Board
+from phone_host.calibration.target.board_names import board_name, family_name
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.marked import AprilGrid, Charuco, Corners, MarkFamily
 from phone_host.model import Image
 
 _BORDERS: Final = {MarkFamily.APRILTAG_36H11: (2, 1)}

@@ -8,9 +8,9 @@ import pytest
 
 from common.errors import DataError
 from common.orientation import UPRIGHT, Orientation
-from phone_host.calibration.board_pairs import Reason
-from phone_host.calibration.board_views import BoardViews, look_for_boards
-from phone_host.calibration.target import find_corners
+from phone_host.calibration.target.board_views import BoardViews, look_for_boards
+from phone_host.calibration.target.corners import find_corners
+from phone_host.calibration.target.pairs import Reason
 from phone_host.model import Image
 from phone_host.stereo.view_files import pair_files
 from tests.support.boards import BOARD, poses, render_pair

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from phone_host.calibration.target import Board, find_corners, is_outlined
-from phone_host.calibration.threads import side_by_side
+from phone_host.calibration.target.corners import Board, find_corners, is_outlined
+from phone_host.calibration.target.threads import side_by_side
 from phone_host.model import Image
 
 Inner = tuple[int, int]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.corner_fit import fit_corners, steps_between
+from phone_host.calibration.target.corner_fit import fit_corners, steps_between
 from phone_host.model import Image
 
 _SHAPE = (5, 7)

@@ -10,9 +10,9 @@ from typing import Final, assert_never
 import cv2
 import numpy as np
 
-from phone_host.calibration.causes.lone import Vector
-from phone_host.calibration.marked import AprilGrid, Charuco, is_mirrored
-from phone_host.calibration.target import Board, Corners
+from phone_host.calibration.target.corner_fit import Floats
+from phone_host.calibration.target.corners import Board, Corners
+from phone_host.calibration.target.marked import AprilGrid, Charuco, is_mirrored
 from phone_host.model import Image, Side
 
 _REACH: Final = 0.35
@@ -92,7 +92,7 @@ def look_at(grey: Image, corners: Corners, board: Board) -> BoardLook:
     return BoardLook(float(np.nanmax(widths)), float((together < _FAINT * usual).mean()), bright)
 
 
-def _reaches(grid: Vector, board: Board) -> tuple[float, float]:
+def _reaches(grid: Floats, board: Board) -> tuple[float, float]:
     """Return how far edges along the rows and along the columns are followed, in their own lengths.
 
     A tilted board is narrower one way: beside its longer edges the marks are nearer.
@@ -120,7 +120,7 @@ def _reach(board: Board) -> float:
             assert_never(board.marks)
 
 
-def _edges(grey: Image, starts: Vector, ends: Vector, reach: float) -> tuple[Vector, Vector]:
+def _edges(grey: Image, starts: Floats, ends: Floats, reach: float) -> tuple[Floats, Floats]:
     """Return width, px, and contrast of the edges between corners that lie beside each other, (M,) each."""
     along = ends - starts
     across = np.column_stack([-along[:, 1], along[:, 0]])

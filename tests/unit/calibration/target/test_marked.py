@@ -8,18 +8,18 @@ import pytest
 from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.board_names import named_board
-from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.board_size import size_seen
 from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.causes.looks import SeenLook, look_at
 from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
-from phone_host.calibration.marked import MarkFamily
-from phone_host.calibration.marks_seen import SeenMarks, find_marks, require_marks
-from phone_host.calibration.sheets.patterns import Chessboard, Family, MarkedBoard, marked_rectangles
-from phone_host.calibration.sheets.sheet import Ink
-from phone_host.calibration.target import Board, agree, find_corners
+from phone_host.calibration.target.board_names import named_board
+from phone_host.calibration.target.board_size import size_seen
+from phone_host.calibration.target.corners import Board, agree, find_corners
+from phone_host.calibration.target.marked import MarkFamily
+from phone_host.calibration.target.marks_seen import SeenMarks, find_marks, require_marks
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.calibration.target.sharpness import SeenLook, look_at
+from phone_host.calibration.target.sheet import Ink
+from phone_host.calibration.target.sheet_layout import Chessboard, Family, MarkedBoard, marked_rectangles
 from phone_host.model import Image, Side
 from tests.support.boards import exact_pairs, poses
 from tests.support.rigs import unlike_rig

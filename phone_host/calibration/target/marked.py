@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.corner_fit import fit_corners
-from phone_host.calibration.small_picture import shrunk
+from phone_host.calibration.target.corner_fit import fit_corners
+from phone_host.calibration.target.small_picture import shrunk
 from phone_host.model import Image
 
 Corners = NDArray[np.float64]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import SettingsError
-from phone_host.calibration.corner_fit import FittedCorners, fit_corners, steps_between
-from phone_host.calibration.marked import AprilGrid, Marks, find_marked, plan_of
-from phone_host.calibration.small_picture import shrunk
+from phone_host.calibration.target.corner_fit import FittedCorners, fit_corners, steps_between
+from phone_host.calibration.target.marked import AprilGrid, Marks, find_marked, plan_of
+from phone_host.calibration.target.small_picture import shrunk
 from phone_host.model import Image
 from phone_host.stereo.images import to_grey
 

@@ -5,8 +5,8 @@ import re
 from typing import Final, assert_never
 
 from common.errors import SettingsError
-from phone_host.calibration.marked import AprilGrid, Charuco, MarkFamily
-from phone_host.calibration.target import Board, parse_board
+from phone_host.calibration.target.corners import Board, parse_board
+from phone_host.calibration.target.marked import AprilGrid, Charuco, MarkFamily
 
 _FAMILIES: Final = {"4x4": MarkFamily.ARUCO_4X4, "5x5": MarkFamily.ARUCO_5X5, "6x6": MarkFamily.ARUCO_6X6}
 _LENGTH: Final = r"(\d+(?:\.\d+)?)\s*mm"

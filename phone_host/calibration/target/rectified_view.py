@@ -9,9 +9,9 @@ import numpy as np
 from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
-from phone_host.calibration.board_pairs import BoardPair
-from phone_host.calibration.small_picture import shrunk_to, small_jpeg, small_size
-from phone_host.calibration.target import Corners
+from phone_host.calibration.target.corners import Corners
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.calibration.target.small_picture import shrunk_to, small_jpeg, small_size
 from phone_host.model import CameraModel, Rectification, Rig
 from phone_host.model.calibration_series import RectifiedView
 from phone_host.stereo.images import decode_file, open_image

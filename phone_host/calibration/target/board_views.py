@@ -13,12 +13,11 @@ from common.imagesize.head import MOST_PIXELS
 from common.imagesize.head import size_text as px_text
 from common.orientation import UPRIGHT, Flip, Orientation
 from common.program.out_of_memory import noted_if_out_of_memory
-from phone_host.calibration.board_pairs import BoardPair, Reason, Rejected
-from phone_host.calibration.causes.looks import BoardLook, SeenLook, look_at
-from phone_host.calibration.out_of_step import FileCorners
-from phone_host.calibration.small_picture import PREVIEW_PX, small_jpeg
-from phone_host.calibration.target import Board, Corners, agree, find_corners
-from phone_host.calibration.threads import side_by_side
+from phone_host.calibration.target.corners import Board, Corners, agree, find_corners
+from phone_host.calibration.target.pairs import BoardPair, FileCorners, Reason, Rejected
+from phone_host.calibration.target.sharpness import BoardLook, SeenLook, look_at
+from phone_host.calibration.target.small_picture import PREVIEW_PX, small_jpeg
+from phone_host.calibration.target.threads import side_by_side
 from phone_host.model import Side
 from phone_host.stereo.images import decode_file, open_image, to_grey
 from phone_host.stereo.view_files import ViewFiles

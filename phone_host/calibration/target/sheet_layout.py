@@ -1,12 +1,108 @@
-"""Lays a board or a mat out on a sheet of paper: in its middle, with rulers that show whether the print is to scale. Pure."""
+"""Draws boards and mats: on a sheet of paper with rulers that show whether the print is to scale, or on a screen. Pure.
+
+A mat and a ChArUco board are chessboards with a coded mark in each white square (Garrido-Jurado et al. 2014; OpenCV's
+CharucoBoard, without its legacy pattern). Their corners are those of the squares: the marks only tell which is which.
+"""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Final
 
+import cv2
+import numpy as np
+
 from common.errors import SettingsError
-from phone_host.calibration.sheets.patterns import Chessboard, MarkedBoard, chessboard_rectangles, marked_rectangles
-from phone_host.calibration.sheets.sheet import Paper, Rectangle, Sheet, Words
+from phone_host.calibration.target.sheet import Ink, Paper, Rectangle, Sheet, Words
+from phone_host.model import Image
+
+
+class Family(Enum):
+    """A family of coded marks; its value is how many bits a side has."""
+
+    ARUCO_4X4 = 4
+    ARUCO_5X5 = 5
+    ARUCO_6X6 = 6
+
+
+DICTIONARIES: Final = {
+    Family.ARUCO_4X4: cv2.aruco.DICT_4X4_1000,
+    Family.ARUCO_5X5: cv2.aruco.DICT_5X5_1000,
+    Family.ARUCO_6X6: cv2.aruco.DICT_6X6_1000,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Chessboard:
+    """A chessboard: squares in a row and in a column, and their side, mm."""
+
+    columns: int
+    rows: int
+    square_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class MarkedBoard:
+    """A chessboard whose white squares hold coded marks.
+
+    Attributes:
+        squares: the chessboard.
+        mark_mm: side of a mark, its black border included.
+        family: of the marks; they are numbered from 0, row by row.
+    """
+
+    squares: Chessboard
+    mark_mm: float
+    family: Family
+
+
+def chessboard_rectangles(board: Chessboard) -> list[Rectangle]:
+    """Return the black squares; the upper left one is black."""
+    side = board.square_mm
+    return [
+        Rectangle(column * side, row * side, side, side)
+        for row in range(board.rows)
+        for column in range(board.columns)
+        if (row + column) % 2 == 0
+    ]
+
+
+def marked_rectangles(board: MarkedBoard) -> list[Rectangle]:
+    """Return the black squares, and the marks as black squares with white bits."""
+    found = chessboard_rectangles(board.squares)
+    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[board.family])
+    white = [
+        (column, row)
+        for row in range(board.squares.rows)
+        for column in range(board.squares.columns)
+        if (row + column) % 2
+    ]
+    margin = (board.squares.square_mm - board.mark_mm) / 2
+    cells = board.family.value + 2
+    for number, (column, row) in enumerate(white):
+        x, y = (each * board.squares.square_mm + margin for each in (column, row))
+        found.append(Rectangle(x, y, board.mark_mm, board.mark_mm))
+        bits = np.asarray(cv2.aruco.generateImageMarker(dictionary, number, cells, borderBits=1)) > 0
+        found += _runs(bits, x, y, board.mark_mm / cells)
+    return found
+
+
+def _runs(bits: np.ndarray, x_mm: float, y_mm: float, cell_mm: float) -> list[Rectangle]:
+    """Return white bits as rows and as columns of them: painted twice, so that no seam shows where two touch."""
+    found = []
+    for lines, is_row in ((bits, True), (bits.T, False)):
+        for index, line in enumerate(lines):
+            edges = np.flatnonzero(np.diff(np.concatenate([[False], line, [False]]).astype(int)))
+            for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+                along, across = (start * cell_mm, index * cell_mm)
+                length = (end - start) * cell_mm
+                found.append(
+                    Rectangle(x_mm + along, y_mm + across, length, cell_mm, Ink.WHITE)
+                    if is_row
+                    else Rectangle(x_mm + across, y_mm + along, cell_mm, length, Ink.WHITE)
+                )
+    return found
+
 
 _MARGIN_MM: Final = 4.8
 """Office printers leave 4.2 mm to 4.6 mm of the paper's edge blank."""
@@ -157,3 +253,46 @@ def _ruler(x_mm: float, y_mm: float) -> list[Rectangle]:
         tick = _TICK_MM if at % 50 == 0 else _TICK_MM * 0.6
         found.append(Rectangle(x_mm + left, y_mm + _TICK_MM - tick, _LINE_MM, tick))
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenBoard:
+    """A chessboard on a screen.
+
+    Attributes:
+        image: (H, W) uint8, the whole screen.
+        square_px: side of a square, px.
+        square_mm: the same, mm; NaN if the screen's diagonal is not known.
+        pitch_mm: width of a pixel, mm; NaN likewise.
+    """
+
+    image: Image
+    square_px: int
+    square_mm: float
+    pitch_mm: float
+
+
+def screen_board(columns: int, rows: int, size_px: tuple[int, int], diagonal_mm: float = math.nan) -> ScreenBoard:
+    """Draw a chessboard that fills a screen but for a margin of one square.
+
+    Args:
+        columns: squares in a row.
+        rows: squares in a column.
+        size_px: the screen's width and height, px.
+        diagonal_mm: of what the screen shows, mm; its pixels are square.
+
+    Raises:
+        SettingsError: the screen is too small for so many squares.
+    """
+    width, height = size_px
+    side = min(width // (columns + 2), height // (rows + 2))
+    if side < 8:
+        raise SettingsError(
+            f"{columns}x{rows} squares do not fit on a screen of {width}x{height} px", "give fewer squares"
+        )
+    image = np.full((height, width), 255, np.uint8)
+    left, top = (width - columns * side) // 2, (height - rows * side) // 2
+    squares = (np.indices((rows, columns)).sum(axis=0) % 2 * 255).astype(np.uint8)
+    image[top : top + rows * side, left : left + columns * side] = np.kron(squares, np.ones((side, side), np.uint8))
+    pitch_mm = diagonal_mm / math.hypot(width, height)
+    return ScreenBoard(image, side, side * pitch_mm, pitch_mm)

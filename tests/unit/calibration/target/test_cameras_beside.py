@@ -8,7 +8,7 @@ import pytest
 from common.camera_identity import CameraIdentity, RememberedCamera
 from common.errors import DataError, SettingsError
 from common.orientation import UPRIGHT, Orientation
-from phone_host.calibration.cameras_beside import cameras_beside, with_cameras
+from phone_host.calibration.target.cameras_beside import cameras_beside, with_cameras
 from phone_host.output.cameras_json import cameras_text
 from phone_host.stereo.view_files import pair_files
 from tests.support.pictures import encoded, picture

@@ -10,13 +10,18 @@ import pypdfium2
 import pytest
 
 from common.errors import SettingsError
-from phone_host.calibration.sheets.layout import chessboard_sheet, largest_square_mm, marked_sheet
-from phone_host.calibration.sheets.patterns import DICTIONARIES, Chessboard, Family, MarkedBoard
-from phone_host.calibration.sheets.pdf import pdf
-from phone_host.calibration.sheets.screen import screen_board
-from phone_host.calibration.sheets.sheet import Ink, Paper, Sheet
-from phone_host.calibration.sheets.svg import svg
-from phone_host.calibration.target import Board, find_corners
+from phone_host.calibration.target.corners import Board, find_corners
+from phone_host.calibration.target.sheet import Ink, Paper, Sheet, pdf, svg
+from phone_host.calibration.target.sheet_layout import (
+    DICTIONARIES,
+    Chessboard,
+    Family,
+    MarkedBoard,
+    chessboard_sheet,
+    largest_square_mm,
+    marked_sheet,
+    screen_board,
+)
 from phone_host.cli import main
 from phone_host.model import Image
 
