@@ -17,7 +17,7 @@ from common.errors import DataError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
 from common.program.out_of_memory import noted_if_out_of_memory
-from phone_host.calibration.board_plane import BoardPlane, find_board_plane
+from phone_host.calibration.solve.board_plane import BoardPlane, find_board_plane
 from phone_host.calibration.target.corners import Board
 from phone_host.measure.depth_error import depth_error_m
 from phone_host.measure.trust import Doubt

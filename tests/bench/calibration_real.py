@@ -16,9 +16,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.board_pairs import Calibration
-from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.held_out import square_sides_m
+from phone_host.calibration.solve.calibrate import calibrate
+from phone_host.calibration.solve.held_out import square_sides_m
+from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import Board, agree, find_corners
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Image

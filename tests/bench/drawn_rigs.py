@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.bend import Bend
-from phone_host.calibration.bundle import BundleState, BundleView, FreeParameters, adjust
-from phone_host.calibration.bundle_problem import moved
+from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.bundle import BundleState, BundleView, FreeParameters, adjust
+from phone_host.calibration.solve.bundle_problem import moved
 from phone_host.geometry.rig_pixels import standard_errors
 from phone_host.geometry.se3 import rotations_of, vectors_of
 from phone_host.model import Rig

@@ -9,12 +9,12 @@ import pytest
 from common.errors import DataError
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.arrangement import Misplaced, composed, misplaced, turned_corners
-from phone_host.calibration.board_pairs import Calibration
-from phone_host.calibration.calibrate import Sizes, calibrate
+from phone_host.calibration.solve.calibrate import Sizes, calibrate
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import judge
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.corners import Board, Corners, agree
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.calibration.verdict import judge
 from phone_host.model import Image, Side
 from phone_host.stereo.orient import upright
 from phone_host.verbs.calibrate.hints import arrangement_hint

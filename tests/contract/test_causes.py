@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.mistakes import Course, Finding, Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.causes.partners import wrong_partners
 from phone_host.calibration.causes.unturned import unturned
+from phone_host.calibration.solve.calibrate import calibrate
+from phone_host.calibration.solve.verdict import Assessment, Verdict
 from phone_host.calibration.target.corners import find_corners
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import look_at
-from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.verbs.calibrate.cause import assessed, with_cause
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.cause_judge import finding_of

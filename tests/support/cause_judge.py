@@ -1,10 +1,10 @@
 """Names the mistake of a made series the way `phone-host calibrate` does, from corners or from images."""
 
 from common.errors import DataError
-from phone_host.calibration.board_pairs import Calibration
-from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
+from phone_host.calibration.solve.calibrate import calibrate
+from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import agree, find_corners
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import SeenLook, look_at

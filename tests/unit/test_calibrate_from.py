@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.calibrate import calibrate
-from phone_host.calibration.earlier_views import board_of, pairs_of, together, views_of
-from phone_host.calibration.pose_only import solve_pose
+from phone_host.calibration.solve.calibrate import calibrate
+from phone_host.calibration.solve.earlier_views import board_of, pairs_of, together, views_of
+from phone_host.calibration.solve.pose_only import solve_pose
+from phone_host.calibration.solve.verdict import Verdict, judge
 from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.calibration.verdict import Verdict, judge
 from phone_host.geometry.se3 import rotations_of, vectors_of
 from phone_host.model import Lens, Rectification, Rig, Side, TimeOffset
 from phone_host.output.rig_views import RigViews

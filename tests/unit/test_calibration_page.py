@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.series_snapshot import series_views
+from phone_host.calibration.solve.series_snapshot import series_views
 from phone_host.model import Verdict
 from phone_host.model.calibration_series import CalibrationSeries
 from phone_host.report.calibration_page import calibration_page, verdict_words

@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.calibration.series_snapshot import series_views
+from phone_host.calibration.solve.series_snapshot import series_views
+from phone_host.calibration.solve.view_turns import view_turns
 from phone_host.calibration.target.pairs import Reason, Rejected
 from phone_host.calibration.target.rectified_view import fullest, rectified_view
 from phone_host.calibration.target.small_picture import small_jpeg, small_size
-from phone_host.calibration.view_turns import view_turns
 from phone_host.svg.plot_arrows import enlarged
 from phone_host.svg.plot_course import Course, over_views
 from phone_host.svg.plot_coverage import coverage_map, tile_views

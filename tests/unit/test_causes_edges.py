@@ -10,24 +10,23 @@ import pytest
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import Calibration
-from phone_host.calibration.board_plane import find_board_plane
-from phone_host.calibration.board_pose import rough_pose
-from phone_host.calibration.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem
 from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.lone import both_alone
 from phone_host.calibration.causes.mistakes import Course, Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
 from phone_host.calibration.causes.partners import wrong_partners
-from phone_host.calibration.fit_quality import Squares
-from phone_host.calibration.pose_only import solve_pose
+from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.board_plane import find_board_plane
+from phone_host.calibration.solve.board_pose import rough_pose
+from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem
+from phone_host.calibration.solve.pose_only import solve_pose
+from phone_host.calibration.solve.result import Calibration, Squares
+from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.board_names import named_board
 from phone_host.calibration.target.corners import Board, find_corners
 from phone_host.calibration.target.marked import MarkFamily
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import look_at
-from phone_host.calibration.verdict import Verdict
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel, Lens, RectifiedPair, Rig, StereoGeometry

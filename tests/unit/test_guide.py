@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import Calibration
-from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.guide.gates import Gate, Glance, is_alike
 from phone_host.calibration.guide.guide import Guide
 from phone_host.calibration.guide.picture import guide_svg
@@ -23,11 +20,14 @@ from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corn
 from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Want
 from phone_host.calibration.guide.words import Speech, Words
-from phone_host.calibration.next_view import Spot, after_one_m
-from phone_host.calibration.rig_sigma import depth_sigma_m
+from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.calibrate import calibrate
+from phone_host.calibration.solve.next_view import Spot, after_one_m
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.rig_sigma import depth_sigma_m
+from phone_host.calibration.solve.verdict import Assessment, Verdict
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import BoardLook
-from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import Side
 from tests.support.boards import exact_pairs, poses
 from tests.support.guided import follow

@@ -19,12 +19,12 @@ from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.snapshot import before_board
+from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.board_names import named_board
 from phone_host.calibration.target.board_size import whole_size_seen
 from phone_host.calibration.target.corners import Board, find_corners
 from phone_host.calibration.target.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target.sharpness import BoardLook
-from phone_host.calibration.verdict import Verdict
 from phone_host.camera.factory import open_camera
 from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken

@@ -13,13 +13,13 @@ import pytest
 from common.errors import DataError
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.arrangement import turned_corners
-from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import Calibration
-from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.mistakes import Course, Mistake
+from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.calibrate import calibrate
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Verdict, judge
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.calibration.verdict import Verdict, judge
 from phone_host.geometry.se3 import vectors_of
 from phone_host.model import Rig, Side
 from phone_host.output.rig_yaml import read_rig_views, write_rig

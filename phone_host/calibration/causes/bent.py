@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.bent_board import BENT_SIGMAS, common_bows_m
-from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.causes.mistakes import Finding, Mistake
+from phone_host.calibration.solve.bent_board import BENT_SIGMAS, common_bows_m
+from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import Board
 
 _BENT: Final = 0.004

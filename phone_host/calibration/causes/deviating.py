@@ -11,7 +11,6 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.calibrate import Sizes
 from phone_host.calibration.causes.lone import Vector, apart_px, both_alone
 from phone_host.calibration.causes.loosened import (
     FOCUS_LEFT,
@@ -25,9 +24,10 @@ from phone_host.calibration.causes.loosened import (
 )
 from phone_host.calibration.causes.mistakes import Course, Finding, Mistake, Turned
 from phone_host.calibration.causes.rules import Rule, Weighed, again, criterion, scatter, significance, weighed
+from phone_host.calibration.solve.calibrate import Sizes
+from phone_host.calibration.solve.verdict import REFERENCE_PX, Verdict
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.calibration.verdict import REFERENCE_PX, Verdict
 from phone_host.model import CameraModel, Side
 
 _LEAST_PAIRS: Final = 6

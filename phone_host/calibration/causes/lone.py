@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.bundle import BundleState
-from phone_host.calibration.calibrate_alone import LoneCamera, calibrate_alone, corners_of, errors_px, with_poses
-from phone_host.calibration.relative_pose import prediction_errors_px, states_of
+from phone_host.calibration.solve.bundle import BundleState
+from phone_host.calibration.solve.calibrate_alone import LoneCamera, calibrate_alone, corners_of, errors_px, with_poses
+from phone_host.calibration.solve.relative_pose import prediction_errors_px, states_of
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import parameters_of
 from phone_host.model import Side

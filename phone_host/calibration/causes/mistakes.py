@@ -5,7 +5,7 @@ from enum import Enum
 
 from phone_host.calibration.arrangement import Misplaced
 from phone_host.calibration.causes.lone import Vector
-from phone_host.calibration.verdict import Verdict
+from phone_host.calibration.solve.verdict import Verdict
 from phone_host.model import CameraModel
 
 

@@ -15,18 +15,18 @@ from common.errors import DataError
 from common.orientation import Flip, Orientation
 from common.words import counted
 from phone_host.calibration.arrangement import Misplaced, misplaced
-from phone_host.calibration.board_pairs import Calibration
-from phone_host.calibration.calibrate import Sizes
 from phone_host.calibration.causes.bent import bent
 from phone_host.calibration.causes.deviating import deviation
 from phone_host.calibration.causes.lone import both_alone
 from phone_host.calibration.causes.mistakes import Finding, Mistake
 from phone_host.calibration.causes.partners import wrong_partners
 from phone_host.calibration.causes.plain_lens import is_plain, with_plain_lenses
+from phone_host.calibration.solve.calibrate import Sizes
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import REFERENCE_PX, Verdict, size_factor
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair, Reason
 from phone_host.calibration.target.sharpness import SeenLook
-from phone_host.calibration.verdict import REFERENCE_PX, Verdict, size_factor
 from phone_host.model import Side
 
 _SPOILED_SHARE: Final = 0.2

@@ -11,8 +11,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.board_pose import fit_pose
 from phone_host.calibration.causes.lone import Vector, lone_camera
+from phone_host.calibration.solve.board_pose import fit_pose
 from phone_host.calibration.target.corners import Board, agree
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project

@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from phone_host.calibration.solve.verdict import REFERENCE_PX
 from phone_host.calibration.target.corners import Corners
 from phone_host.calibration.target.sharpness import BoardLook
-from phone_host.calibration.verdict import REFERENCE_PX
 
 Size = tuple[int, int]
 """Width and height, px."""

@@ -34,9 +34,9 @@ from phone_host.calibration.guide.unseen import is_guessed, unseen, with_corners
 from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Speech, Words, done, taken
+from phone_host.calibration.solve.verdict import Assessment, Verdict
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import BoardLook
-from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import Rig
 
 _PATIENCE_NS: Final = 8_000_000_000

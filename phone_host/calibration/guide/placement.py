@@ -7,7 +7,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.board_pose import fit_pose
+from phone_host.calibration.solve.board_pose import fit_pose
 from phone_host.calibration.target.corners import Board, Corners
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel

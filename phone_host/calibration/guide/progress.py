@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from typing import Final
 
-from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.guide.wants import ORDER, Want, spot_of
-from phone_host.calibration.next_view import DEPTH_M, after_one_m
-from phone_host.calibration.rig_sigma import DEPTHS_M
+from phone_host.calibration.solve.next_view import DEPTH_M, after_one_m
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.rig_sigma import DEPTHS_M
+from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.corners import Board
-from phone_host.calibration.verdict import Verdict
 
 LEAST_STATED: Final = 5
 """Fewer views do not show how much they contradict each other (`bundle`): what a rig of them states is too good, and is not told."""

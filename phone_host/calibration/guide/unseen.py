@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable
 
-from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.guide.placement import placement
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Placed, Want, is_seen
+from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Assessment, Verdict
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.calibration.verdict import Assessment, Verdict
 from phone_host.model import CameraModel
 
 

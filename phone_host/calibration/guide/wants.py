@@ -11,7 +11,7 @@ from typing import Final
 
 from phone_host.calibration.guide.coverage import Depth
 from phone_host.calibration.guide.placement import Placement
-from phone_host.calibration.next_view import Spot
+from phone_host.calibration.solve.next_view import Spot
 
 _TILT_DEG, _ASKED_TILT_DEG = 18.0, 30.0
 """A board counts as tilted from the first on; the second is what is imagined. Below 15 a focal length is hardly told from a

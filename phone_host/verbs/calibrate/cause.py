@@ -3,10 +3,10 @@
 from typing import Final
 
 from phone_host.calibration.arrangement import is_contradicted
-from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.causes.mistakes import Finding, Mistake
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Assessment, Verdict, judge
 from phone_host.calibration.target.pairs import Rejected
-from phone_host.calibration.verdict import Assessment, Verdict, judge
 
 _BEST_FIRST: Final = (Verdict.GOOD, Verdict.USABLE, Verdict.REJECT)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from common.errors import DataError
 from phone_host.calibration.guide.unseen import guessed_corners, with_corners
-from phone_host.calibration.series_snapshot import Taken
+from phone_host.calibration.solve.series_snapshot import Taken
 from phone_host.calibration.target.board_views import Mounted, look_for_boards
 from phone_host.calibration.target.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.target.pairs import Reason

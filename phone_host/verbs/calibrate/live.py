@@ -21,19 +21,19 @@ from common.program.terminal import say
 from common.stamp import HOST_CLOCK
 from common.words import counted
 from phone_host.boards.opened import open_named
-from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
-from phone_host.calibration.earlier_views import board_of, pairs_of
 from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.unseen import unseen_in
 from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, Want
+from phone_host.calibration.solve.earlier_views import board_of, pairs_of
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.board_views import BoardViews, Size
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import SeenLook
-from phone_host.calibration.verdict import Verdict
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera

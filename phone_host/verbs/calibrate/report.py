@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import DataError
-from phone_host.calibration.board_pairs import Calibration
 from phone_host.calibration.causes.mistakes import Finding
 from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Assessment
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.pairs import Rejected
-from phone_host.calibration.verdict import Assessment
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import Verdict
 from phone_host.output.rig_files.imported import Imported, RigKind

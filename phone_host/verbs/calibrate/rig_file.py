@@ -5,7 +5,7 @@ from typing import Final
 
 from common.errors import DataError, UnavailableError
 from common.places import Kind, kind_of
-from phone_host.calibration.earlier_views import new_ones, pairs_of
+from phone_host.calibration.solve.earlier_views import new_ones, pairs_of
 from phone_host.model import Rectification, Rig
 from phone_host.output.atomic import replacing
 from phone_host.output.rig_views import RigViews

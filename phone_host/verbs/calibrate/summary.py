@@ -8,11 +8,11 @@ import numpy as np
 from common.errors import DataError
 from common.orientation import UPRIGHT
 from common.words import counted
-from phone_host.calibration.bend import Bend
-from phone_host.calibration.board_pairs import Calibration
+from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import SHARE_GOOD
 from phone_host.calibration.target.board_views import BoardViews, turn_text
 from phone_host.calibration.target.pairs import Rejected
-from phone_host.calibration.verdict import SHARE_GOOD
 from phone_host.model import Verdict
 from phone_host.output.report_owner import REPORT
 from phone_host.stereo.view_files import ViewFiles, is_unread_photograph

@@ -14,7 +14,7 @@ from common.program.extensions import registered_names
 from common.program.invocation import command_line
 from common.program.settings import log_level
 from common.stamp import HOST_CLOCK
-from phone_host.calibration.verdict import Verdict
+from phone_host.calibration.solve.verdict import Verdict
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera, require_replayed

@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.calibrate import calibrate
 from phone_host.calibration.causes.mistakes import Mistake
 from phone_host.calibration.causes.name import BoardSeries, name_mistake
+from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.target.board_names import named_board
 from phone_host.calibration.target.board_size import size_seen
 from phone_host.calibration.target.corners import Board, agree, find_corners
