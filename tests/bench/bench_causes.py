@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from phone_host.calibration.causes.mistakes import Mistake
+from phone_host.calibration.failure_modes.mistakes import Mistake
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.cause_judge import finding_of

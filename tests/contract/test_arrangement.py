@@ -8,7 +8,7 @@ import pytest
 
 from common.errors import DataError
 from common.orientation import UPRIGHT, Flip, Orientation
-from phone_host.calibration.arrangement import Misplaced, composed, misplaced, turned_corners
+from phone_host.calibration.failure_modes.arrangement import Misplaced, composed, misplaced, turned_corners
 from phone_host.calibration.solve.calibrate import Sizes, calibrate
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.solve.verdict import judge

@@ -1,8 +1,8 @@
 """Names the mistake of a made series the way `phone-host calibrate` does, from corners or from images."""
 
 from common.errors import DataError
-from phone_host.calibration.causes.mistakes import Finding
-from phone_host.calibration.causes.name import BoardSeries, name_mistake
+from phone_host.calibration.failure_modes.mistakes import Finding
+from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import agree, find_corners

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.orientation import Flip, Orientation
-from phone_host.calibration.arrangement import turned_corners
-from phone_host.calibration.causes.mistakes import Mistake
+from phone_host.calibration.failure_modes.arrangement import turned_corners
+from phone_host.calibration.failure_modes.mistakes import Mistake
 from phone_host.calibration.solve.calibrate import Sizes, calibrate
 from phone_host.calibration.target.board_views import look_for_boards
 from phone_host.calibration.target.corners import Board, agree, find_corners

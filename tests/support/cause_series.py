@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.orientation import Flip, Orientation
-from phone_host.calibration.arrangement import turned_corners
-from phone_host.calibration.causes.mistakes import Mistake
+from phone_host.calibration.failure_modes.arrangement import turned_corners
+from phone_host.calibration.failure_modes.mistakes import Mistake
 from phone_host.calibration.target.corners import Board, agree
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Image, Rig

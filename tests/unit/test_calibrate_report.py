@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from phone_host.calibration.causes.mistakes import Course, Finding, Mistake, Turned
+from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, Turned
 from phone_host.calibration.guide.snapshot import before_board
 from phone_host.calibration.solve.verdict import Assessment, Verdict
 from phone_host.output.json_text import json_text

@@ -12,8 +12,8 @@ import pytest
 
 from common.errors import DataError
 from common.orientation import UPRIGHT, Flip, Orientation
-from phone_host.calibration.arrangement import turned_corners
-from phone_host.calibration.causes.mistakes import Course, Mistake
+from phone_host.calibration.failure_modes.arrangement import turned_corners
+from phone_host.calibration.failure_modes.mistakes import Course, Mistake
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.result import Calibration

@@ -2,7 +2,7 @@
 
 Lenses and baseline are the rig's. In each view the board's pose and a turn of the right camera about its own centre are fitted to
 both images' corners (Gauss-Newton, twelve corners give 48 equations for 9 numbers). The uncertainty is that by the corners' noise, pooled
-over the views. `causes.rules` weighs whether the turns follow a rule; these are the turns themselves, for the eye.
+over the views. `failure_modes.rules` weighs whether the turns follow a rule; these are the turns themselves, for the eye.
 """
 
 from typing import Final

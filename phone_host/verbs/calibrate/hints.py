@@ -2,8 +2,8 @@
 
 from common.errors import DataError
 from common.orientation import Flip, Orientation
-from phone_host.calibration.arrangement import Misplaced, composed
-from phone_host.calibration.out_of_step import OutOfStep
+from phone_host.calibration.failure_modes.arrangement import Misplaced, composed
+from phone_host.calibration.failure_modes.out_of_step import OutOfStep
 from phone_host.calibration.target.board_views import BoardViews, Mounted
 from phone_host.model import Side
 

@@ -11,7 +11,7 @@ from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
 from common.places import resolved
 from common.program.terminal import say
-from phone_host.calibration.causes.name import BASELINE_OFF
+from phone_host.calibration.failure_modes.name import BASELINE_OFF
 from phone_host.model import Rig, Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text

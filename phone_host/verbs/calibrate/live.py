@@ -21,8 +21,8 @@ from common.program.terminal import say
 from common.stamp import HOST_CLOCK
 from common.words import counted
 from phone_host.boards.opened import open_named
-from phone_host.calibration.causes.mistakes import Mistake
-from phone_host.calibration.causes.name import BoardSeries, name_mistake
+from phone_host.calibration.failure_modes.mistakes import Mistake
+from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.unseen import unseen_in

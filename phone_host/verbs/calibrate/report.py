@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.errors import DataError
-from phone_host.calibration.causes.mistakes import Finding
+from phone_host.calibration.failure_modes.mistakes import Finding
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.solve.verdict import Assessment

@@ -9,7 +9,7 @@ from common.errors import DataError
 from common.imagesize.head import size_text
 from common.orientation import UPRIGHT
 from common.versions import REPORT_FORMAT
-from phone_host.calibration.causes.mistakes import Turned
+from phone_host.calibration.failure_modes.mistakes import Turned
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.solve.result import Calibration, LensTrial, Used
 from phone_host.calibration.target.board_views import BoardViews

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.causes.mistakes import Mistake
-from phone_host.calibration.causes.name import BoardSeries, name_mistake
+from phone_host.calibration.failure_modes.mistakes import Mistake
+from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.target.board_names import named_board
 from phone_host.calibration.target.board_size import size_seen

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.causes.mistakes import Finding, Mistake
+from phone_host.calibration.failure_modes.mistakes import Finding, Mistake
 from phone_host.calibration.solve.bent_board import BENT_SIGMAS, common_bows_m
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import Board

@@ -7,7 +7,7 @@ board: pixel -> ray -> turned ray -> pixel. Calibrated from these corners, the r
 import cv2
 import numpy as np
 
-from phone_host.calibration.causes.mistakes import Turned
+from phone_host.calibration.failure_modes.mistakes import Turned
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project, rays_through
 

@@ -11,7 +11,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.causes.lone import Vector, lone_camera
+from phone_host.calibration.failure_modes.lone import Vector, lone_camera
 from phone_host.calibration.solve.board_pose import fit_pose
 from phone_host.calibration.target.corners import Board, agree
 from phone_host.calibration.target.pairs import BoardPair

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from phone_host.calibration.arrangement import Misplaced
-from phone_host.calibration.causes.lone import Vector
+from phone_host.calibration.failure_modes.arrangement import Misplaced
+from phone_host.calibration.failure_modes.lone import Vector
 from phone_host.calibration.solve.verdict import Verdict
 from phone_host.model import CameraModel
 

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.causes.deviating import deviation
-from phone_host.calibration.causes.lone import both_alone
-from phone_host.calibration.causes.mistakes import Course, Mistake
-from phone_host.calibration.causes.name import BoardSeries, name_mistake
-from phone_host.calibration.causes.partners import wrong_partners
+from phone_host.calibration.failure_modes.deviating import deviation
+from phone_host.calibration.failure_modes.lone import both_alone
+from phone_host.calibration.failure_modes.mistakes import Course, Mistake
+from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
+from phone_host.calibration.failure_modes.partners import wrong_partners
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_plane import find_board_plane
 from phone_host.calibration.solve.board_pose import rough_pose

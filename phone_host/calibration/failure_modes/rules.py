@@ -13,8 +13,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.causes.lone import Vector
-from phone_host.calibration.causes.loosened import (
+from phone_host.calibration.failure_modes.lone import Vector
+from phone_host.calibration.failure_modes.loosened import (
     DEVIATIONS,
     FOCUS_LEFT,
     FOCUS_RIGHT,

@@ -14,13 +14,13 @@ import numpy as np
 from common.errors import DataError
 from common.orientation import Flip, Orientation
 from common.words import counted
-from phone_host.calibration.arrangement import Misplaced, misplaced
-from phone_host.calibration.causes.bent import bent
-from phone_host.calibration.causes.deviating import deviation
-from phone_host.calibration.causes.lone import both_alone
-from phone_host.calibration.causes.mistakes import Finding, Mistake
-from phone_host.calibration.causes.partners import wrong_partners
-from phone_host.calibration.causes.plain_lens import is_plain, with_plain_lenses
+from phone_host.calibration.failure_modes.arrangement import Misplaced, misplaced
+from phone_host.calibration.failure_modes.bent import bent
+from phone_host.calibration.failure_modes.deviating import deviation
+from phone_host.calibration.failure_modes.lone import both_alone
+from phone_host.calibration.failure_modes.mistakes import Finding, Mistake
+from phone_host.calibration.failure_modes.partners import wrong_partners
+from phone_host.calibration.failure_modes.plain_lens import is_plain, with_plain_lenses
 from phone_host.calibration.solve.calibrate import Sizes
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.solve.verdict import REFERENCE_PX, Verdict, size_factor

@@ -11,8 +11,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.causes.lone import Vector, apart_px, both_alone
-from phone_host.calibration.causes.loosened import (
+from phone_host.calibration.failure_modes.lone import Vector, apart_px, both_alone
+from phone_host.calibration.failure_modes.loosened import (
     FOCUS_LEFT,
     FOCUS_RIGHT,
     MOVE,
@@ -22,8 +22,8 @@ from phone_host.calibration.causes.loosened import (
     camera_arrays,
     loosen,
 )
-from phone_host.calibration.causes.mistakes import Course, Finding, Mistake, Turned
-from phone_host.calibration.causes.rules import Rule, Weighed, again, criterion, scatter, significance, weighed
+from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, Turned
+from phone_host.calibration.failure_modes.rules import Rule, Weighed, again, criterion, scatter, significance, weighed
 from phone_host.calibration.solve.calibrate import Sizes
 from phone_host.calibration.solve.verdict import REFERENCE_PX, Verdict
 from phone_host.calibration.target.corners import Board

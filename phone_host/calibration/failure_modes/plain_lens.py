@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.causes.lone import Vector
+from phone_host.calibration.failure_modes.lone import Vector
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import parameters_of, rays_through
 from phone_host.model import CameraModel, Lens, Rig
