@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Final, assert_never
 
 from common.program.logs import event
-from phone_host.calibration.running.see import Timed, sighting_of
-from phone_host.calibration.running.watch import DriftWatch
+from phone_host.calibration.drift.see import Timed, sighting_of
+from phone_host.calibration.drift.watch import DriftWatch
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, Image, Result, Side
 from phone_host.output.overlay_yaml import overlay_text
 from phone_host.stereo.core import StereoCore

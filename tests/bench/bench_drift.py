@@ -24,8 +24,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.calibration.running.rows import values_of
-from phone_host.calibration.running.watch import START_PX, WINDOW
+from phone_host.calibration.drift.rows import values_of
+from phone_host.calibration.drift.watch import START_PX, WINDOW
 from phone_host.measure.drift_words import drift_concerns
 from phone_host.model import AS_CALIBRATED, Departure, Drift
 from phone_host.stereo.core import StereoCore

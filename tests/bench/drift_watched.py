@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phone_host.calibration.running.fit import fit_rows
-from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, values_of
-from phone_host.calibration.running.see import Timed, sighting_of
-from phone_host.calibration.running.watch import WINDOW, DriftWatch
+from phone_host.calibration.drift.fit import fit_rows
+from phone_host.calibration.drift.rows import PARAMETERS, RowModel, Sighting, values_of
+from phone_host.calibration.drift.see import Timed, sighting_of
+from phone_host.calibration.drift.watch import WINDOW, DriftWatch
 from phone_host.model import Change, Departure, Drift
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import look_at, maps_of

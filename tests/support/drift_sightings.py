@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from phone_host.calibration.running.rows import RowModel, Sighting
+from phone_host.calibration.drift.rows import RowModel, Sighting
 from phone_host.geometry.lens import project
 from phone_host.model import AS_CALIBRATED, CameraModel, Departure, Rig, Side
 from phone_host.scene.scene import rotation

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from common import now
-from phone_host.calibration.running.see import Timed
+from phone_host.calibration.drift.see import Timed
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Processed, Result, Side
 from phone_host.run.drift_keeper import DriftKeeper, Moment, _say
 from phone_host.scene.scene import demo_scene, render, rig_poses

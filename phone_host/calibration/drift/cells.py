@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.running.rows import RowModel, Vector
+from phone_host.calibration.drift.rows import RowModel, Vector
 from phone_host.stereo.evidence_points import Points
 
 CELLS: Final = (6, 4)

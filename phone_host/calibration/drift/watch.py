@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.running.fit import Fit, fit_rows, is_better, proven
-from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, Vector, departure_of, values_of
-from phone_host.calibration.running.trend import Trends
+from phone_host.calibration.drift.fit import Fit, fit_rows, is_better, proven
+from phone_host.calibration.drift.rows import PARAMETERS, RowModel, Sighting, Vector, departure_of, values_of
+from phone_host.calibration.drift.trend import Trends
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState
 
 WINDOW: Final = 6

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.running.rows import RowModel, Sighting
-from phone_host.calibration.running.trend import Trends
-from phone_host.calibration.running.watch import DriftWatch
+from phone_host.calibration.drift.rows import RowModel, Sighting
+from phone_host.calibration.drift.trend import Trends
+from phone_host.calibration.drift.watch import DriftWatch
 from phone_host.measure.drift_words import drift_concerns
 from phone_host.measure.trust import Doubt
 from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, DriftState

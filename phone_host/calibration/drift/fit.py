@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.running.cells import Cells, cells_of, medians, typical_px
-from phone_host.calibration.running.rows import PARAMETERS, RowModel, Sighting, Vector
+from phone_host.calibration.drift.cells import Cells, cells_of, medians, typical_px
+from phone_host.calibration.drift.rows import PARAMETERS, RowModel, Sighting, Vector
 
 MODEL_PX: Final = 0.1
 """What good calibrations leave in their own images, and what differs from one part of a scene to another: euroc 0.11 to 0.13 px."""

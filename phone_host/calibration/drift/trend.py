@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.running.rows import Vector
+from phone_host.calibration.drift.rows import Vector
 from phone_host.model import Trend, Turn
 
 _LEAST_S: Final = 20.0

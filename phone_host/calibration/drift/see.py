@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from phone_host.calibration.running.rows import RowModel, Sighting
+from phone_host.calibration.drift.rows import RowModel, Sighting
 from phone_host.model import Image, Processed
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import Examined, grey, maps_of

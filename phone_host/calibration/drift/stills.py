@@ -6,11 +6,11 @@ A pair's number takes the place of its moment: a `Trend` is per pair. Nothing is
 from dataclasses import replace
 from typing import Final
 
-from phone_host.calibration.running.fit import fit_rows
-from phone_host.calibration.running.rows import PARAMETERS
-from phone_host.calibration.running.see import Timed, sighting_of
-from phone_host.calibration.running.trend import Trends
-from phone_host.calibration.running.watch import FEWEST_CELLS, FEWEST_FEATURES, DriftWatch
+from phone_host.calibration.drift.fit import fit_rows
+from phone_host.calibration.drift.rows import PARAMETERS
+from phone_host.calibration.drift.see import Timed, sighting_of
+from phone_host.calibration.drift.trend import Trends
+from phone_host.calibration.drift.watch import FEWEST_CELLS, FEWEST_FEATURES, DriftWatch
 from phone_host.model import Drift, Processed
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import Examined
