@@ -21,7 +21,7 @@ from common.orientation import UPRIGHT, Orientation, orientation_of
 from common.protocol.message import CameraDescription, FrameMessage
 from common.recording.opened import open_recorded
 from common.recording.recorded import Recorded
-from phone_host.calibration.timing.shots import Shot
+from phone_host.calibration.time_offset.shots import Shot
 from phone_host.model import BoardFrame, Side
 from phone_host.output.atomic import write_bytes
 from phone_host.output.result_files import replacing_results

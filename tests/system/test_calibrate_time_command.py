@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.calibration.timing.screen import COUNT, PatternReader
+from phone_host.calibration.time_offset.screen import COUNT, PatternReader
 from phone_host.model import UNMEASURED_NS, TimeOffset
 from phone_host.output.rig_yaml import read_rig, write_rig
 from phone_host.scene.film import Film, render_film

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.timing.shots import Measured, Method, Times, period_s, require_shots, rolling_s
+from phone_host.calibration.time_offset.shots import Measured, Method, Times, period_s, require_shots, rolling_s
 from phone_host.model import Image, TimeOffset
 
 BITS: Final = 12

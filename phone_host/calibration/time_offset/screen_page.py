@@ -2,7 +2,7 @@
 
 import json
 
-from phone_host.calibration.timing.screen import (
+from phone_host.calibration.time_offset.screen import (
     BITS,
     CELL,
     CELL_PLACES,

@@ -10,8 +10,8 @@ import pytest
 
 from common.errors import DataError
 from common.frame import PixelFormat
-from phone_host.calibration.misfit_plot import misfit_svg
-from phone_host.calibration.timing.screen import (
+from phone_host.calibration.time_offset.misfit_plot import misfit_svg
+from phone_host.calibration.time_offset.screen import (
     COUNT,
     HEIGHT,
     WIDTH,
@@ -21,8 +21,8 @@ from phone_host.calibration.timing.screen import (
     draw,
     measure_screen,
 )
-from phone_host.calibration.timing.shared_motion import measure_shared_motion
-from phone_host.calibration.timing.shots import Measured, Method, Shot, Times
+from phone_host.calibration.time_offset.shared_motion import measure_shared_motion
+from phone_host.calibration.time_offset.shots import Measured, Method, Shot, Times
 from phone_host.model import Image, Side
 from phone_host.scene.scene import (
     PHONE_LOOK,

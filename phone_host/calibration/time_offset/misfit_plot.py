@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.timing.shots import Measured
+from phone_host.calibration.time_offset.shots import Measured
 from phone_host.svg.plot_scale import Linear, number_text, span, ticks
 
 _WIDTH_PX, _HEIGHT_PX = 720, 320

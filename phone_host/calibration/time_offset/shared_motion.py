@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.frame import SpoiledImageError
-from phone_host.calibration.timing.shots import SIGMAS, Measured, Method, Shot, require_shots, rolling_s, to_seconds
+from phone_host.calibration.time_offset.shots import (
+    SIGMAS,
+    Measured,
+    Method,
+    Shot,
+    require_shots,
+    rolling_s,
+    to_seconds,
+)
 from phone_host.model import UNMEASURED_NS, Image, Side, TimeOffset
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near

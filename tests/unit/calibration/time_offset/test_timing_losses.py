@@ -9,9 +9,17 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from common.frame import PixelFormat
-from phone_host.calibration.timing.screen import COUNT, Counted, PatternReader, Reading, counted, draw, measure_screen
-from phone_host.calibration.timing.shared_motion import measure_shared_motion
-from phone_host.calibration.timing.shots import Measured, Shot, Times
+from phone_host.calibration.time_offset.screen import (
+    COUNT,
+    Counted,
+    PatternReader,
+    Reading,
+    counted,
+    draw,
+    measure_screen,
+)
+from phone_host.calibration.time_offset.shared_motion import measure_shared_motion
+from phone_host.calibration.time_offset.shots import Measured, Shot, Times
 from phone_host.model import CameraModel, Image, Rig
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.stereo.rectifier import Rectifier
