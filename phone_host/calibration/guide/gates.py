@@ -27,13 +27,13 @@ _APART_PX: Final = 0.15
 """The board may move so far between the two exposures of a pair: less than what corners of a good rig err by."""
 
 _BLURRED_PX, _MOST_BLURRED_PX = 4.0, 6.0
-"""Edges of sharp boards are 1 to 3 px wide (four real rigs). From 6 px on `causes` calls a series blurred."""
+"""Edges of sharp boards are 1 to 3 px wide (four real rigs). From 6 px on `failure_modes` calls a series blurred."""
 
 _BLURRED_FACTOR: Final = 1.6
 """A camera that is soft by nature is compared with its own sharpest view."""
 
 _WASHED: Final = 0.05
-"""More of the edges may not have lost their contrast: from 0.08 on `causes` calls a series glaring."""
+"""More of the edges may not have lost their contrast: from 0.08 on `failure_modes` calls a series glaring."""
 
 _LEAST_SEEN, _LEAST_CORNERS = 0.3, 12
 """Share and number of a board's corners, for boards of which a part is enough."""

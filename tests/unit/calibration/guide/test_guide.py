@@ -32,7 +32,7 @@ from phone_host.model import Side
 from tests.support.boards import exact_pairs, poses
 from tests.support.guided import follow
 from tests.support.rigs import unlike_rig
-from tests.unit.test_guide_gates import BOARD, NONE, SIZES, corners, tilted
+from tests.unit.calibration.guide.test_guide_gates import BOARD, NONE, SIZES, corners, tilted
 
 SECOND_NS = 1_000_000_000
 LOOK_NS = SECOND_NS // 10
