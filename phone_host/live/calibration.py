@@ -16,11 +16,10 @@ from common import now
 from common.camera.base import Camera
 from common.errors import SettingsError
 from common.link.base import Link
-from phone_host.calibration.guide.gates import Gate, Glance
+from phone_host.calibration.guide.gates import Gate, Glance, View
 from phone_host.calibration.guide.guide import Guide
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
-from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import Want
 from phone_host.calibration.guide.words import Words
 from phone_host.calibration.target.board_views import Size

@@ -11,10 +11,9 @@ from rich.text import Text
 from common import now
 from common.places import make_folder
 from common.program.terminal import say
-from phone_host.calibration.guide.picture import guide_svg
+from phone_host.calibration.guide.gates import View
+from phone_host.calibration.guide.picture import figure_lines, guide_svg, picture_lines, verdict_lines
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot
-from phone_host.calibration.guide.text_picture import figure_lines, picture_lines, verdict_lines
-from phone_host.calibration.guide.view import View
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
 from phone_host.run.redrawn import Part, Redrawn

@@ -16,7 +16,7 @@ from common.imagesize.head import MOST_PIXELS
 from common.ledger import StageTimes
 from common.orientation import UPRIGHT, Orientation
 from common.program.out_of_memory import noted_if_out_of_memory
-from phone_host.calibration.drift.stills import StillsWatch
+from phone_host.calibration.drift.see import StillsWatch
 from phone_host.model import Drift
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from common.doctor.finding import Finding
 from common.keys import KeyFolder
+from phone_host.calibration.guide.gates import View
 from phone_host.calibration.guide.snapshot import GuideSnapshot
-from phone_host.calibration.guide.view import View
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.host_doctor import Question

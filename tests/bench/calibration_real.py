@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.held_out import square_sides_m
+from phone_host.calibration.solve.fitted_rig import square_sides_m
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import Board, agree, find_corners
 from phone_host.calibration.target.pairs import BoardPair

@@ -11,10 +11,9 @@ import pytest
 
 from common.errors import DataError
 from phone_host.calibration.failure_modes.deviating import deviation
-from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake
+from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, unturned
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.failure_modes.partners import wrong_partners
-from phone_host.calibration.failure_modes.unturned import unturned
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.verdict import Assessment, Verdict
 from phone_host.calibration.target.corners import find_corners

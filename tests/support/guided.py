@@ -8,11 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.guide.gates import Gate, Glance
+from phone_host.calibration.guide.gates import Gate, Glance, View
 from phone_host.calibration.guide.guide import Guide
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended
-from phone_host.calibration.guide.view import View
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import BoardLook
 from phone_host.model import Rig

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.solve.calibrate import calibrate
+from phone_host.calibration.solve.calibrate import calibrate, solve_pose
 from phone_host.calibration.solve.earlier_views import board_of, pairs_of, together, views_of
-from phone_host.calibration.solve.pose_only import solve_pose
 from phone_host.calibration.solve.verdict import Verdict, judge
 from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.corners import Board

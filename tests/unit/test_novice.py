@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.guide.placement import placement
+from phone_host.calibration.guide.coverage import placement
 from phone_host.calibration.target.board_size import size_seen, whole_size_seen
 from phone_host.calibration.target.corners import find_corners
 from phone_host.geometry.lens import project

@@ -1,9 +1,12 @@
-"""Turns a judged pair into a sighting: its features followed, and taken back to the rig as it was calibrated. Pure."""
+"""Turns judged pairs into sightings, their features followed and taken back to the rig as it was calibrated; watches stills so. Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
-from phone_host.calibration.drift.rows import RowModel, Sighting
-from phone_host.model import Image, Processed
+from phone_host.calibration.drift.fit import fit_rows
+from phone_host.calibration.drift.rows import PARAMETERS, RowModel, Sighting
+from phone_host.calibration.drift.watch import FEWEST_CELLS, FEWEST_FEATURES, DriftWatch, Trends
+from phone_host.model import Drift, Image, Processed
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import Examined, grey, maps_of
 from phone_host.stereo.evidence_points import ThroughRig
@@ -57,3 +60,41 @@ def sighting_of(
     model = RowModel(rectifier.rig, rectifier.rectification)
     calibrated = ThroughRig(rectifier.rig, rectifier.rectification)
     return model, model.sighting(upright, maps_of(core, processed), calibrated, timed.late_s)
+
+
+_LEAST_PAIRS: Final = 7
+"""From the first to the last of a line."""
+
+
+class StillsWatch:
+    """Watches over the rig of some stills as over that of a run: a pair's number takes the place of its moment; nothing is corrected."""
+
+    def __init__(self) -> None:
+        self._watch: DriftWatch | None = None
+        self._trends = Trends(least=_LEAST_PAIRS)
+        self._number = 0
+
+    def add(self, core: StereoCore, processed: Processed, look: Examined) -> None:
+        """Take the next pair into account. Images that came rectified have no rig.
+
+        Args:
+            core: that has processed it.
+            processed: the pair.
+            look: what was seen in it.
+        """
+        self._number += 1
+        found = sighting_of(core, processed, look, Timed())
+        if found is None:
+            return
+        model, seen = found
+        self._watch = self._watch or DriftWatch(corrects=False, start=processed.overlay)
+        self._watch.add(model, seen, self._number)
+        fit = fit_rows(model, [seen])
+        if fit.features >= FEWEST_FEATURES and fit.cells >= FEWEST_CELLS:
+            values = fit.values[:PARAMETERS]
+            self._trends.add(self._number, values, model.rows_px(values))
+
+    @property
+    def drift(self) -> Drift | None:
+        """What is known so far, with pairs for seconds; None without a rig."""
+        return None if self._watch is None else replace(self._watch.drift, trend=self._trends.trend)

@@ -18,8 +18,7 @@ from common.errors import DataError
 from common.orientation import Flip, Orientation
 from phone_host.calibration.solve.bundle import Vector, rig_of
 from phone_host.calibration.solve.calibrate import Sizes, fit_rig
-from phone_host.calibration.solve.calibrate_alone import calibrate_alone, with_poses
-from phone_host.calibration.solve.relative_pose import prediction_errors_px, states_of
+from phone_host.calibration.solve.calibrate_alone import calibrate_alone, prediction_errors_px, states_of, with_poses
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import Board, Corners, agree
 from phone_host.calibration.target.pairs import BoardPair, Reason

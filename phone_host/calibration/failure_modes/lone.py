@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.calibration.solve.bundle import BundleState
-from phone_host.calibration.solve.calibrate_alone import LoneCamera, calibrate_alone, corners_of, errors_px, with_poses
-from phone_host.calibration.solve.relative_pose import prediction_errors_px, states_of
+from phone_host.calibration.solve.calibrate_alone import (
+    LoneCamera,
+    calibrate_alone,
+    corners_of,
+    errors_px,
+    prediction_errors_px,
+    states_of,
+    with_poses,
+)
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.geometry.lens import parameters_of
-from phone_host.model import Side
+from phone_host.geometry.lens import parameters_of, rays_through
+from phone_host.model import CameraModel, Lens, Rig, Side
 
 Vector = NDArray[np.float64]
 
@@ -92,3 +99,46 @@ def apart_px(pairs: list[BoardPair], left: Lone, right: Lone, points_m: Vector) 
 
 def _lone(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> Lone:
     return Lone(camera, float(np.nansum(np.square(errors_px(camera, pairs, points_m)))))
+
+
+_USUAL_TERMS: Final = 8
+"""Focal lengths, principal point and k1 k2 p1 p2: the search knows them itself."""
+
+_FARTHEST_RAD: Final = np.radians(60)
+"""Beyond, two coefficients do not follow a fisheye: those corners are left out of the search."""
+
+
+def with_plain_lenses(pairs: list[BoardPair], rig: Rig) -> list[BoardPair]:
+    """Return the corners (NaN: not seen) as cameras with plain lenses would have seen them; a camera whose lens is plain keeps its own.
+
+    The search for causes knows one lens of nine numbers. Views of a fisheye fit it badly, and each view contradicts it in its own way,
+    as views of a rolling shutter do. What the calibration found out about the lens takes that away: pixel -> ray -> pixel of the plain
+    lens that is nearest. What the views contradict besides stays.
+    """
+    left = _as_plain([pair.left_px for pair in pairs], rig.left)
+    right = _as_plain([pair.right_px for pair in pairs], rig.right)
+    return [BoardPair(pair.name, one, other) for pair, one, other in zip(pairs, left, right, strict=True)]
+
+
+def is_plain(model: CameraModel) -> bool:
+    """Return whether the search for causes knows such a lens itself."""
+    return model.lens is Lens.PINHOLE and not parameters_of(model)[_USUAL_TERMS:].any()
+
+
+def _as_plain(views: list[Vector], model: CameraModel) -> list[Vector]:
+    """Return (N, 2) corners of each view, px; NaN also where the lens bends too much."""
+    if is_plain(model):
+        return views
+    seen = np.concatenate(views)
+    slopes, known = np.full(seen.shape, np.nan), np.isfinite(seen).all(axis=1)
+    rays = rays_through(seen[known], model)
+    near = rays[:, 2] > np.cos(_FARTHEST_RAD) * np.linalg.norm(rays, axis=1)  # NaN is not near
+    slopes[np.flatnonzero(known)[near]] = rays[near, :2] / rays[near, 2:]
+    middle, focal_px = model.matrix[:2, 2], model.matrix[[0, 1], [0, 1]]
+    powers = (slopes**2).sum(axis=1)[:, np.newaxis] ** np.arange(3)
+    columns = slopes[:, :, np.newaxis] * powers[:, np.newaxis]  # x (1, r^2, r^4), and y
+    wanted = (seen - middle) / focal_px
+    used = np.isfinite(slopes).all(axis=1)
+    numbers = np.linalg.lstsq(columns[used].reshape(-1, 3), wanted[used].ravel(), rcond=None)[0]
+    plain = middle + focal_px * (columns @ numbers)
+    return np.split(plain, np.cumsum([len(view) for view in views])[:-1])

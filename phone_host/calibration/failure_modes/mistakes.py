@@ -1,11 +1,16 @@
-"""The mistakes that are told apart in a series of board views, and what is said about one. No behaviour."""
+"""The mistakes that are told apart in a series of board views, and what is said about one; a drift of the cameras is undone. Pure."""
 
 from dataclasses import dataclass
 from enum import Enum
 
+import cv2
+import numpy as np
+
 from phone_host.calibration.failure_modes.arrangement import Misplaced
 from phone_host.calibration.failure_modes.lone import Vector
 from phone_host.calibration.solve.verdict import Verdict
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.geometry.lens import project, rays_through
 from phone_host.model import CameraModel
 
 
@@ -102,3 +107,27 @@ class Finding:
     turned: Turned | None = None
     most: Verdict = Verdict.GOOD
     explained_px: float = float("nan")
+
+
+def unturned(pairs: list[BoardPair], turned: Turned) -> list[BoardPair]:
+    """Give the right corners of all views the place that they would have if the right camera had stood as it does last.
+
+    A turn about the camera's centre moves each ray alike, at any depth. So it is undone without knowing the board:
+    pixel -> ray -> turned ray -> pixel.
+
+    Args:
+        pairs: the corners, in the order in which they were taken.
+        turned: how it turned. A pair that was not looked at stands as the one before it.
+
+    Returns:
+        The pairs as the rig of the last view would see them.
+    """
+    by_name = dict(zip(turned.names, turned.turns_rad, strict=True))
+    last, turn = np.asarray(cv2.Rodrigues(turned.turns_rad[-1])[0]), turned.turns_rad[0]
+    result = []
+    for pair in pairs:
+        turn = by_name.get(pair.name, turn)
+        back = last @ np.asarray(cv2.Rodrigues(turn)[0]).T
+        seen = project(rays_through(pair.right_px, turned.lens) @ back.T, turned.lens)
+        result.append(BoardPair(pair.name, pair.left_px, seen))
+    return result

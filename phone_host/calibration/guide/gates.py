@@ -8,6 +8,7 @@ import numpy as np
 
 from phone_host.calibration.solve.verdict import REFERENCE_PX
 from phone_host.calibration.target.corners import Corners
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import BoardLook
 
 Size = tuple[int, int]
@@ -195,3 +196,23 @@ def _differences(one: Corners, other: Corners, width_px: int) -> tuple[float, fl
 def _factor(size_px: Size) -> float:
     """Return by how much limits in px grow with an image: as those of the verdict do."""
     return max(1.0, max(size_px) / REFERENCE_PX)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A view that was taken.
+
+    Attributes:
+        name: how reports name it.
+        glance: the board's corners in it.
+        looks: how it looks, left and right.
+    """
+
+    name: str
+    glance: Glance
+    looks: tuple[BoardLook, BoardLook]
+
+    @property
+    def pair(self) -> BoardPair:
+        """Its corners, as the calibration takes them."""
+        return BoardPair(self.name, self.glance.left_px, self.glance.right_px)

@@ -13,12 +13,13 @@ import math
 from collections import Counter
 from typing import Final
 
-from phone_host.calibration.guide.coverage import Coverage, Depth
+from phone_host.calibration.guide.coverage import Coverage, Depth, placement, usual_camera
 from phone_host.calibration.guide.gates import (
     NOT_SEEN,
     STILL_NS,
     Gate,
     Glance,
+    View,
     found,
     is_alike,
     is_far,
@@ -27,11 +28,9 @@ from phone_host.calibration.guide.gates import (
     sharp,
     speed_widths_s,
 )
-from phone_host.calibration.guide.placement import placement, usual_camera
 from phone_host.calibration.guide.progress import Progress
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
 from phone_host.calibration.guide.unseen import is_guessed, unseen, with_corners
-from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Speech, Words, done, taken
 from phone_host.calibration.solve.verdict import Assessment, Verdict

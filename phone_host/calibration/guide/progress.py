@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from phone_host.calibration.guide.wants import ORDER, Want, spot_of
-from phone_host.calibration.solve.next_view import DEPTH_M, after_one_m
+from phone_host.calibration.solve.next_view import DEPTH_M, DEPTHS_M, after_one_m
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.rig_sigma import DEPTHS_M
 from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.corners import Board
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from phone_host.calibration.guide.placement import placement
+from phone_host.calibration.guide.coverage import placement
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Placed, Want, is_seen
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.result import Calibration

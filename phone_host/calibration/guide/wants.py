@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from phone_host.calibration.guide.coverage import Depth
-from phone_host.calibration.guide.placement import Placement
+from phone_host.calibration.guide.coverage import Depth, Placement
 from phone_host.calibration.solve.next_view import Spot
 
 _TILT_DEG, _ASKED_TILT_DEG = 18.0, 30.0

@@ -20,29 +20,32 @@ from common.program.out_of_memory import is_out_of_memory
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_pose import fit_pose
 from phone_host.calibration.solve.bundle import (
+    BundleResult,
     BundleState,
     BundleView,
     FreeParameters,
     Vector,
     adjust,
 )
+from phone_host.calibration.solve.bundle_problem import GLOBALS, RigProblem
 from phone_host.calibration.solve.calibrate_alone import (
     LoneCamera,
     calibrate_alone,
     corners_of,
+    prediction_errors_px,
     require_enough,
+    states_of,
     with_poses,
 )
-from phone_host.calibration.solve.fitted_rig import Bends, Fitted, summed_up
+from phone_host.calibration.solve.fitted_rig import Bends, Fitted, misfits, summed_up
 from phone_host.calibration.solve.lens_choice import choose_lens, grows, is_fisheye
-from phone_host.calibration.solve.misfits import misfits
-from phone_host.calibration.solve.relative_pose import prediction_errors_px, states_of
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.geometry.lens import PARAMETERS
+from phone_host.geometry.rig_pixels import RIG
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.model import Rig, Side
+from phone_host.model import CameraModel, Lens, Rig, Side
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 """Width and height of the left and of the right images, px."""
@@ -280,18 +283,8 @@ def _both_grow(state: BundleState) -> bool:
     return grows(state.left) and grows(state.right)
 
 
-def fit_of_known_lenses(pairs: list[BoardPair], points_m: Vector, rig: Rig, bends: Bends) -> Fitted:
-    """Fit the relative pose alone, and reject pairs that do not fit it.
-
-    Args:
-        pairs: the pairs.
-        points_m: (N, 3) corners in the board's axes.
-        rig: whose lenses are kept.
-        bends: what its lenses are.
-
-    Raises:
-        DataError: fewer than three pairs are left.
-    """
+def _fit_of_known_lenses(pairs: list[BoardPair], points_m: Vector, rig: Rig, bends: Bends) -> Fitted:
+    """Fit the relative pose alone, and reject pairs that do not fit it."""
     require_enough(pairs, [])
     left, right = (
         with_poses(LoneCamera(side, model, np.empty((0, 6))), pairs, points_m)
@@ -301,3 +294,54 @@ def fit_of_known_lenses(pairs: list[BoardPair], points_m: Vector, rig: Rig, bend
     nothing = np.zeros(PARAMETERS, bool)
     fitted = _adjust_robustly(kept, points_m, start, bends, FreeParameters(nothing, nothing))
     return replace(fitted, rejected=[*rejected, *fitted.rejected])
+
+
+def solve_pose(pairs: list[BoardPair], board: Board, earlier: Rig) -> Calibration:
+    """Solve the relative pose of two cameras that were moved against each other, and keep their lenses.
+
+    The lenses' uncertainty stays what it was, and is carried on to the new pose: a focal length that is off by a sigma turns and
+    shifts the pose that explains the same corners.
+
+    Args:
+        pairs: corners of each pair, three or more.
+        board: the board.
+        earlier: the rig whose lenses are kept, for images of these pairs' size.
+
+    Returns:
+        The calibration, with every pair used or rejected.
+
+    Raises:
+        DataError: fewer than three pairs are left.
+    """
+    points_m = board.points_m()
+    fitted = _fit_of_known_lenses(pairs, points_m, earlier, (_bend(earlier.left), _bend(earlier.right)))
+    covariance = _carried(
+        fitted.result, [BundleView(pair.left_px, pair.right_px) for pair in fitted.kept], points_m, earlier
+    )
+    fitted = replace(fitted, result=replace(fitted.result, covariance=covariance))
+    return summed_up(fitted, points_m=points_m, board_side=earlier.board_side)
+
+
+def _bend(model: CameraModel) -> Bend:
+    """Return how freely a lens was let bend, as far as its coefficients tell."""
+    if model.lens is Lens.FISHEYE:
+        return Bend.FISHEYE
+    if model.lens is Lens.RATIONAL or model.distortion.size > Bend.WIDE.terms:
+        return Bend.RATIONAL
+    return Bend.WIDE if model.distortion.size == Bend.WIDE.terms and model.distortion[-1] else Bend.USUAL
+
+
+def _carried(result: BundleResult, views: list[BundleView], points_m: Vector, earlier: Rig) -> Vector:
+    """Return the covariance of lenses and pose together: what the corners leave open of the pose, and what the lenses do."""
+    lenses = earlier.covariance[: RIG.start, : RIG.start]
+    errors = (result.left_errors_px, result.right_errors_px)
+    sigmas = [max(float(np.sqrt(np.nanmean(each**2))), 1e-6) for each in errors]
+    problem = RigProblem(views, points_m, (np.zeros(GLOBALS), np.zeros(GLOBALS)), (sigmas[0], sigmas[1]))
+    whole = problem.linearised(result.state).reduced(0.0, np.ones(GLOBALS, bool))[0]
+    by_lens = -np.linalg.solve(whole[RIG, RIG], whole[RIG, : RIG.start])
+    covariance = result.covariance.copy()
+    covariance[: RIG.start, : RIG.start] = lenses
+    covariance[RIG, : RIG.start] = by_lens @ lenses
+    covariance[: RIG.start, RIG] = covariance[RIG, : RIG.start].T
+    covariance[RIG, RIG] += by_lens @ lenses @ by_lens.T
+    return covariance

@@ -1,4 +1,9 @@
-"""Calibrates one camera alone, without views that are plainly wrong. Gives `calibrate.py` its start. Pure."""
+"""Calibrates each camera alone, without views that are plainly wrong, and takes their relative pose from single pairs: where `calibrate.py` starts. Pure.
+
+OpenCV's `fisheye.calibrate` starts from half the image's width as the focal length and gives up where a view is ill-conditioned. Here
+several fields of view are tried: each gives the corners' rays, the rays give poses, and the one that fits best is
+adjusted with all coefficients free.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -8,14 +13,60 @@ import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.board_pose import fit_pose
-from phone_host.calibration.solve.bundle import Vector
-from phone_host.calibration.solve.fisheye_start import fisheye_camera
+from phone_host.calibration.solve.board_pose import fit_pose, rough_pose
+from phone_host.calibration.solve.bundle import BundleState, Vector, adjust_alone, alone_state, project_view, rms_px
 from phone_host.calibration.target.corners import Corners
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import SE3
-from phone_host.model import CameraModel, Side
+from phone_host.model import CameraModel, Lens, Side
+
+_FIELDS_RAD: Final = (0.9, 1.2, 1.6, 2.1, 2.7, 3.3)
+"""Fields of view across the image's width: 50 to 190 degrees, each a third wider than the one before."""
+
+
+def fisheye_camera(views: list[Corners], points_m: Vector, size_px: tuple[int, int]) -> tuple[CameraModel, Vector]:
+    """Calibrate one camera with a fisheye lens.
+
+    Args:
+        views: (N, 2) corners of each view.
+        points_m: (N, 3) corners in the board's axes.
+        size_px: width and height of the images.
+
+    Returns:
+        Its model, and the poses (V, 6).
+
+    Raises:
+        DataError: no field of view explains the views.
+    """
+    starts = [_start(views, points_m, size_px, size_px[0] / field) for field in _FIELDS_RAD]
+    known = [start for start in starts if start is not None]
+    if not known:
+        raise DataError("the views fit no fisheye lens", "show the board nearer to the middle, too")
+    _, start = min(known, key=lambda each: each[0])
+    found = adjust_alone(views, points_m, start, Bend.FISHEYE.free())
+    return found.left, found.poses
+
+
+def _start(
+    views: list[Corners], points_m: Vector, size_px: tuple[int, int], focal_px: float
+) -> tuple[float, BundleState] | None:
+    """Return the median error with an undistorted fisheye lens, px, and the state; None if the views have no poses in it."""
+    matrix = np.array([[focal_px, 0, (size_px[0] - 1) / 2], [0, focal_px, (size_px[1] - 1) / 2], [0, 0, 1]])
+    model = CameraModel(
+        width_px=size_px[0], height_px=size_px[1], matrix=matrix, distortion=np.zeros(4), lens=Lens.FISHEYE
+    )
+    try:
+        poses = np.array([rough_pose(points_m, corners, model) for corners in views])
+    except cv2.error:
+        return None
+    errors = [
+        np.linalg.norm(corners - project(SE3.of(pose).apply(points_m), model), axis=1)
+        for corners, pose in zip(views, poses, strict=True)
+    ]
+    median = float(np.nanmedian(np.concatenate(errors)))
+    return (median, alone_state(model, poses)) if np.isfinite(median) else None
+
 
 LEAST_PAIRS = 3
 """Fewer pairs do not determine focal length and distortion (Zhang 2000: two views suffice only without distortion)."""
@@ -190,3 +241,59 @@ def own_errors_px(points_m: Vector, corners: Corners, model: CameraModel) -> Vec
     """Return (N, 2) measured minus projected corners of one view, px, with the board's pose fitted to this view alone."""
     pose = fit_pose(points_m, corners, model)
     return np.asarray(corners - project(SE3.of(pose).apply(points_m), model), dtype=np.float64)
+
+
+def relative_pose(left: Vector, right: Vector) -> tuple[Vector, Vector]:
+    """Return the rotation vector and translation, right from left, from two poses (6,) of one board."""
+    pose = (SE3.of(right) @ SE3.of(left).inverse()).pose()
+    return pose[:3], pose[3:]
+
+
+def states_of(left: LoneCamera, right: LoneCamera) -> list[BundleState]:
+    """Return the rig that each pair gives on its own.
+
+    Args:
+        left: the left camera, with one pose for each pair.
+        right: the right camera, with as many.
+    """
+    return [
+        replace(state_of(left.parameters, right.parameters, a, b), poses=left.poses)
+        for a, b in zip(left.poses, right.poses, strict=True)
+    ]
+
+
+def state_of(left: CameraModel, right: CameraModel, left_pose: Vector, right_pose: Vector) -> BundleState:
+    """Return the rig that one pair gives.
+
+    Args:
+        left: the left camera.
+        right: the right camera.
+        left_pose: (6,) of the board in the left camera's axes.
+        right_pose: (6,) of the same board in the right camera's.
+    """
+    rotation, translation_m = relative_pose(left_pose, right_pose)
+    return BundleState(
+        left=left, right=right, rotation=rotation, translation_m=translation_m, poses=left_pose[np.newaxis]
+    )
+
+
+def prediction_errors_px(states: list[BundleState], right_px: list[Corners], points_m: Vector) -> Vector:
+    """Predict the right corners of all pairs from their left poses, by the rig that each pair gives.
+
+    Args:
+        states: of V pairs, as `states_of` gives them.
+        right_px: (N, 2) right corners of each pair.
+        points_m: (N, 3) corners in the board's axes.
+
+    Returns:
+        (V, V) root mean square error, px: rig by pair.
+    """
+    return np.array(
+        [
+            [
+                rms_px(seen - project_view(state, pose, points_m)[1])
+                for seen, pose in zip(right_px, state.poses, strict=True)
+            ]
+            for state in states
+        ]
+    )

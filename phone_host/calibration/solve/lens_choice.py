@@ -27,7 +27,7 @@ from phone_host.calibration.solve.bundle import (
     fit_poses,
 )
 from phone_host.calibration.solve.bundle_problem import errors_of
-from phone_host.calibration.solve.fisheye_start import fisheye_camera
+from phone_host.calibration.solve.calibrate_alone import fisheye_camera
 from phone_host.calibration.solve.result import LensTrial
 from phone_host.calibration.target.corners import Corners
 from phone_host.geometry.lens import farthest_angle, parameters_of, rays_through, with_parameters

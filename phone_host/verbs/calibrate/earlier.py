@@ -8,9 +8,8 @@ from pathlib import Path
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
 from common.words import counted
-from phone_host.calibration.solve.calibrate import Sizes, calibrate
+from phone_host.calibration.solve.calibrate import Sizes, calibrate, solve_pose
 from phone_host.calibration.solve.earlier_views import board_of, new_ones, pairs_of, together, views_of
-from phone_host.calibration.solve.pose_only import solve_pose
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.board_views import Mounted

@@ -23,10 +23,10 @@ from common.words import counted
 from phone_host.boards.opened import open_named
 from phone_host.calibration.failure_modes.mistakes import Mistake
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
+from phone_host.calibration.guide.gates import View
 from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.guide.unseen import unseen_in
-from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, Want
 from phone_host.calibration.solve.earlier_views import board_of, pairs_of
 from phone_host.calibration.solve.result import Calibration

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from common.errors import DataError
-from phone_host.calibration.failure_modes.mistakes import Course, Finding
+from phone_host.calibration.failure_modes.mistakes import Course, Finding, unturned
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake, placed
 from phone_host.calibration.failure_modes.out_of_step import out_of_step
-from phone_host.calibration.failure_modes.unturned import unturned
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.board_views import BoardViews

@@ -21,8 +21,7 @@ from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
 from phone_host.boards.opened import open_named
 from phone_host.calibration.time_offset.misfit_plot import misfit_svg
-from phone_host.calibration.time_offset.screen import PatternReader, counted, measure_screen
-from phone_host.calibration.time_offset.screen_page import pattern_page
+from phone_host.calibration.time_offset.screen import PatternReader, counted, measure_screen, pattern_page
 from phone_host.calibration.time_offset.shared_motion import measure_shared_motion
 from phone_host.calibration.time_offset.shots import Measured, Times, require_shots, to_seconds
 from phone_host.camera.examples import EXAMPLE

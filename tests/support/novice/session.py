@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from phone_host.calibration.solve.rig_sigma import depth_sigma_m
+from phone_host.calibration.solve.next_view import depth_sigma_m
 from phone_host.geometry.se3 import vectors_of
 from phone_host.model import Rig
 from phone_host.output.rig_yaml import read_rig

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from phone_host.calibration.drift.rows import RowModel, Sighting
-from phone_host.calibration.drift.trend import Trends
-from phone_host.calibration.drift.watch import DriftWatch
+from phone_host.calibration.drift.watch import DriftWatch, Trends
 from phone_host.measure.drift_words import drift_concerns
 from phone_host.measure.trust import Doubt
 from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, DriftState

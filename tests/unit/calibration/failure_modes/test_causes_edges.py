@@ -19,7 +19,7 @@ from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_plane import find_board_plane
 from phone_host.calibration.solve.board_pose import rough_pose
 from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem
-from phone_host.calibration.solve.pose_only import solve_pose
+from phone_host.calibration.solve.calibrate import solve_pose
 from phone_host.calibration.solve.result import Calibration, Squares
 from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.board_names import named_board

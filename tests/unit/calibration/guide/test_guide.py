@@ -10,21 +10,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.guide.gates import Gate, Glance, is_alike
+from phone_host.calibration.guide.gates import Gate, Glance, View, is_alike
 from phone_host.calibration.guide.guide import Guide
-from phone_host.calibration.guide.picture import guide_svg
+from phone_host.calibration.guide.picture import figure_lines, guide_svg, picture_lines
 from phone_host.calibration.guide.progress import Progress, Taught, lessons
 from phone_host.calibration.guide.snapshot import Ended, before_board
-from phone_host.calibration.guide.text_picture import figure_lines, picture_lines
 from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corners
-from phone_host.calibration.guide.view import View
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Want
 from phone_host.calibration.guide.words import Speech, Words
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.next_view import Spot, after_one_m
+from phone_host.calibration.solve.next_view import Spot, after_one_m, depth_sigma_m
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.rig_sigma import depth_sigma_m
 from phone_host.calibration.solve.verdict import Assessment, Verdict
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import BoardLook

@@ -10,7 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from phone_host.calibration.guide.coverage import COLUMNS, ROWS, Coverage, Depth, Tilt, depth_of, tilt_of
+from phone_host.calibration.guide.coverage import (
+    COLUMNS,
+    ROWS,
+    Coverage,
+    Depth,
+    Placement,
+    Tilt,
+    depth_of,
+    placement,
+    tilt_of,
+    usual_camera,
+)
 from phone_host.calibration.guide.gates import (
     Gate,
     Glance,
@@ -22,7 +33,6 @@ from phone_host.calibration.guide.gates import (
     sharp,
     speed_widths_s,
 )
-from phone_host.calibration.guide.placement import Placement, placement, usual_camera
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, back, is_there, missing, spot_of
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import BoardLook

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.solve.held_out import square_sides_m
+from phone_host.calibration.solve.fitted_rig import square_sides_m
 from phone_host.calibration.target.board_names import named_board
 from phone_host.model import Rig
 from tests.support.boards import BOARD, exact_pairs, poses

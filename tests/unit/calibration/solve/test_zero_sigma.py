@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.bundle import BundleState, BundleView, FreeParameters, adjust, rig_of
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.rig_sigma import depth_sigma_m, zero_sigma_px
+from phone_host.calibration.solve.next_view import depth_sigma_m, zero_sigma_px
 from phone_host.model import Rectification, Rig
 from phone_host.stereo.rectify import rectify_points, rectify_rig
 from tests.support.boards import BOARD, exact_pairs, poses

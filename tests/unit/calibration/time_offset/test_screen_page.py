@@ -3,8 +3,7 @@
 import json
 import re
 
-from phone_host.calibration.time_offset.screen import COUNT, HEIGHT, WIDTH, PatternReader, draw
-from phone_host.calibration.time_offset.screen_page import pattern_page
+from phone_host.calibration.time_offset.screen import COUNT, HEIGHT, WIDTH, PatternReader, draw, pattern_page
 
 
 def test_the_page_has_the_pattern_and_needs_nothing_else() -> None:
