@@ -30,12 +30,7 @@ Cells = NDArray[np.intp]
 
 
 def cells_of(model: RowModel, slopes: Points) -> Cells:
-    """Return the number of each feature's cell.
-
-    Args:
-        model: of the rig.
-        slopes: (N, 2) of points of the right image.
-    """
+    """Return the number of each feature's cell, from the slopes (N, 2) of points of the right image."""
     made, geometry = model.rectification, model.rectification.geometry
     places = slopes * geometry.focal_px + np.array([geometry.cx_px, geometry.cy_px])
     share = (places + 0.5) / np.array([made.width_px, made.height_px])
@@ -44,12 +39,7 @@ def cells_of(model: RowModel, slopes: Points) -> Cells:
 
 
 def medians(cell: Cells, values: Vector) -> Iterator[tuple[NDArray[np.bool_], float]]:
-    """Yield which features lie in a cell and their median, for each cell that has enough of them.
-
-    Args:
-        cell: number of each feature's.
-        values: (N,).
-    """
+    """Yield which features lie in a cell and the median of their values (N,), for each cell that has enough of them."""
     for number in np.unique(cell):
         here = cell == number
         if here.sum() >= _FEWEST:
@@ -57,12 +47,7 @@ def medians(cell: Cells, values: Vector) -> Iterator[tuple[NDArray[np.bool_], fl
 
 
 def typical_px(cell: Cells, off_px: Vector) -> float:
-    """Return how far features lie beside their rows: the mean over all cells of their medians, px; 0 without features.
-
-    Args:
-        cell: number of each feature's.
-        off_px: (N,) across the lines.
-    """
+    """Return how far features lie beside their rows: the mean over all cells of their medians of `off_px` (N,), px; 0 without features."""
     found = [abs(median_px) for _, median_px in medians(cell, off_px)]
     return float(np.mean(found)) if found else 0.0
 
@@ -125,12 +110,7 @@ class Fit:
 
 
 def fit_rows(model: RowModel, sightings: Sequence[Sighting]) -> Fit:
-    """Fit the parameters to all features of some sightings.
-
-    Args:
-        model: of the rig.
-        sightings: of one camera position or of several.
-    """
+    """Fit the parameters to all features of some sightings, of one camera position or of several."""
     slopes = np.concatenate([seen.slopes for seen in sightings])
     off_px = np.concatenate([seen.off_px for seen in sightings])
     speed = np.nan_to_num(np.concatenate([seen.speed_px_s for seen in sightings]))
@@ -186,11 +166,6 @@ def is_better(model: RowModel, sightings: Sequence[Sighting], sigmas: float) -> 
 
     Uncertainties are computed from what is assumed of lenses; this assumes nothing. A turn that is none follows some
     corners of the image and spoils others.
-
-    Args:
-        model: of the rig.
-        sightings: at least two.
-        sigmas: what proves a parameter.
     """
     before_px = after_px = 0.0
     halves = sightings[::2], sightings[1::2]
@@ -205,12 +180,7 @@ def is_better(model: RowModel, sightings: Sequence[Sighting], sigmas: float) -> 
 
 
 def proven(fit: Fit, sigmas: float) -> Vector:
-    """Return the parameters of a fit, (4,), with those at 0 that the features do not prove, and the others fitted without them.
-
-    Args:
-        fit: as `fit_rows` gives it.
-        sigmas: what proves a parameter.
-    """
+    """Return the parameters of a fit, (4,), with those at 0 that the features do not prove by so many sigmas, and the others fitted without them."""
     kept = list(range(PARAMETERS))
     while kept:
         information = np.linalg.inv(fit.covariance[:PARAMETERS, :PARAMETERS])

@@ -75,11 +75,7 @@ class RowModel:
         return 0 if self.rectification.epipolar.is_vertical else 1
 
     def columns(self, slopes: Points) -> Vector:
-        """Return (N, 4): how far a point moves across its line for each parameter, px per rad or per unit.
-
-        Args:
-            slopes: (N, 2) of points of the right image.
-        """
+        """Return (N, 4): how far points of the right image, at slopes (N, 2), move across their lines for each parameter, px per rad or per unit."""
         x, y = slopes.T
         one = np.ones(len(slopes))
         about = [-one - y * y, x * y, x] if self.axis == 1 else [-x * y, one + x * x, -y]

@@ -34,12 +34,6 @@ def sighting_of(
 ) -> tuple[RowModel, Sighting] | None:
     """Follow the features of a judged pair.
 
-    Args:
-        core: that has processed it.
-        processed: the pair.
-        look: what was seen in it.
-        timed: when it was exposed.
-
     Returns:
         The rig's model at this size, the same object as long as the size stays, and what was seen; None if no rig has
         rectified the pair.
@@ -75,13 +69,7 @@ class StillsWatch:
         self._number = 0
 
     def add(self, core: StereoCore, processed: Processed, look: Examined) -> None:
-        """Take the next pair into account. Images that came rectified have no rig.
-
-        Args:
-            core: that has processed it.
-            processed: the pair.
-            look: what was seen in it.
-        """
+        """Take the next pair into account. Images that came rectified have no rig."""
         self._number += 1
         found = sighting_of(core, processed, look, Timed())
         if found is None:

@@ -43,13 +43,7 @@ class Trends:
         self._count, self._every_s = 0, 0.0
 
     def add(self, at_s: float, values: Vector, rows_px: float) -> None:
-        """Add an estimate.
-
-        Args:
-            at_s: when, s.
-            values: (4,) its parameters.
-            rows_px: the vertical error it makes, px.
-        """
+        """Add an estimate at some time, s: its parameters (4,), and the vertical error that it makes, px."""
         self._count += 1
         if self._count % self._every or (self._kept and at_s - self._kept[-1][0] < self._every_s):
             return
@@ -138,7 +132,7 @@ class _Estimate:
 
 
 class DriftWatch:
-    """Watches over one rig.
+    """Watches over one rig. Its times are seconds since the start of the run.
 
     Args:
         corrects: whether the user wants corrections.
@@ -177,25 +171,14 @@ class DriftWatch:
         return news
 
     def returned(self, at_s: float, away_s: float) -> None:
-        """Start afresh: a camera or the board was away, and may have been touched.
-
-        Args:
-            at_s: now, s since the start of the run.
-            away_s: how long no pair came, s.
-        """
+        """Start afresh: a camera or the board was away, and may have been touched."""
         self._window.clear()
         self._aside.clear()
         self._trends.restart()
         self._note(Change(kind=ChangeKind.RETURNED, at_s=at_s, departure=self._departure, away_s=away_s))
 
     def add(self, model: RowModel, seen: Sighting, at_s: float) -> None:
-        """Take a sighting into account.
-
-        Args:
-            model: of the rig at the size of these images.
-            seen: the features of a judged pair.
-            at_s: now, s since the start of the run.
-        """
+        """Take a sighting into account."""
         self._judged += 1
         if self._model is None or self._model.rectification is not model.rectification:
             self._begin(model)

@@ -66,12 +66,6 @@ def misplaced(
 ) -> Misplaced | None:
     """Find out whether one side's images are turned or mirrored, where the calibration looks like it.
 
-    Args:
-        pairs: corners of each pair.
-        board: the board.
-        sizes_px: width and height of the left and of the right images.
-        found: what `calibrate` made of them.
-
     Returns:
         The side and its turn, with which the same corners give a rig that can be rectified; None if none does.
     """

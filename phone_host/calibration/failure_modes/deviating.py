@@ -90,12 +90,7 @@ class _Fitted:
 
 
 def deviation(pairs: tuple[BoardPair, ...], board: Board, sizes_px: Sizes) -> Finding | None:
-    """Name how the pairs deviate from one stiff rig.
-
-    Args:
-        pairs: the corners, in the order in which they were taken.
-        board: the board.
-        sizes_px: width and height of the left and of the right images.
+    """Name how the pairs, in the order in which they were taken, deviate from one stiff rig.
 
     Returns:
         The mistake; None if they do not deviate, or nothing explains how.

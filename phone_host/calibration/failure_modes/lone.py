@@ -51,11 +51,6 @@ def both_alone(
 ) -> tuple[list[BoardPair], Lone, Lone] | None:
     """Calibrate each camera alone, without views that are plainly wrong.
 
-    Args:
-        pairs: the corners.
-        points_m: (N, 3) corners in the board's axes.
-        sizes_px: width and height of the left and of the right images.
-
     Returns:
         The pairs left and both cameras; None if fewer than three are left.
 

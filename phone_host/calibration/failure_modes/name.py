@@ -115,10 +115,6 @@ class BoardSeries:
 def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
     """Name what is wrong with a series.
 
-    Args:
-        series: the series.
-        found: what `calibrate` made of it.
-
     Returns:
         The mistake with its figures; None if the views tell of none.
     """

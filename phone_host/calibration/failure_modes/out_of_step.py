@@ -44,13 +44,7 @@ class OutOfStep:
 def out_of_step(
     left: tuple[FileCorners, ...], right: tuple[FileCorners, ...], board: Board, sizes_px: tuple[tuple[int, int], ...]
 ) -> OutOfStep | None:
-    """Find the pictures without a partner, where they are not the last ones.
-
-    Args:
-        left: the left pictures, in the order in which they were paired.
-        right: the right ones.
-        board: the board.
-        sizes_px: width and height of the left and of the right images.
+    """Find the pictures without a partner, where they are not the last ones, in both sides in the order in which they were paired.
 
     Returns:
         What is missing; None if the counts agree, if pairs in order fit as well as any, or if nothing fits.

@@ -38,11 +38,6 @@ def wrong_partners(
 ) -> list[tuple[str, str]]:
     """Find pairs whose left picture belongs to another pair's right one.
 
-    Args:
-        pairs: the corners.
-        board: the board.
-        sizes_px: width and height of the left and of the right images.
-
     Returns:
         Names of (the left picture's pair, the pair of the right picture that belongs to it); empty if pairs fit or none does.
     """

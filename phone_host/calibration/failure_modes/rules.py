@@ -82,11 +82,7 @@ class Weighed:
 
 
 def weighed(loose: Loosened) -> list[Weighed]:
-    """Weigh every rule in each of its forms, the best first.
-
-    Args:
-        loose: the loosened rig of a series, its pairs in the order in which they were taken.
-    """
+    """Weigh every rule in each of its forms, the best first, for a series whose pairs are in the order in which they were taken."""
     results = [_weigh(loose, rule, columns, begins) for rule, columns, begins in _rules(loose)]
     return sorted(results, key=lambda each: each.criterion)
 

@@ -64,13 +64,7 @@ def usual_camera(size_px: tuple[int, int]) -> CameraModel:
 
 
 def placement(corners: Corners, board: Board, model: CameraModel) -> Placement:
-    """Return where a board stands.
-
-    Args:
-        corners: (N, 2) px; NaN: not seen.
-        board: the board.
-        model: the camera, as far as it is known.
-    """
+    """Return where a board stands."""
     size = np.array([model.width_px, model.height_px], float)
     low, high = np.nanmin(corners, axis=0) / size, np.nanmax(corners, axis=0) / size
     grid = corners.reshape(board.rows, board.columns, 2)
@@ -152,12 +146,7 @@ class Coverage:
         return sum(count > 0 for row in self.cells for count in row) / (COLUMNS * ROWS)
 
     def with_view(self, corners: Corners, placement: Placement) -> "Coverage":
-        """Return what is covered with one view more.
-
-        Args:
-            corners: (N, 2) px; NaN: not seen.
-            placement: of the board in it.
-        """
+        """Return what is covered with one view more."""
         seen = corners[np.isfinite(corners).all(axis=1)]
         counts, _, _ = np.histogram2d(
             seen[:, 1], seen[:, 0], bins=(ROWS, COLUMNS), range=((0, self.size_px[1]), (0, self.size_px[0]))

@@ -112,10 +112,6 @@ def speed_widths_s(before: Glance | None, now: Glance) -> float:
     """Return how fast the board moves in the faster of the two images, image widths per second; infinite: it cannot be told.
 
     An affine motion is fitted to the corners, so that their noise does not count as motion.
-
-    Args:
-        before: an earlier look that found the board; None: there is none.
-        now: this look.
     """
     if before is None or not 0 < now.at_ns - before.at_ns <= _STALE_NS:
         return float("inf")
@@ -150,13 +146,7 @@ def is_paired_well(glance: Glance, speed: float) -> bool:
 
 
 def sharp(looks: tuple[BoardLook, BoardLook], sizes_px: tuple[Size, Size], sharpest_px: tuple[float, float]) -> Gate:
-    """Return whether a view is sharp and evenly lit: READY, or why not.
-
-    Args:
-        looks: of the left and of the right image.
-        sizes_px: of both images.
-        sharpest_px: the narrowest edges of each camera so far, px; NaN: none yet.
-    """
+    """Return whether a view is sharp and evenly lit, beside the narrowest edges of each camera so far (px; NaN: none yet): READY, or why not."""
     for look, size_px, best_px in zip(looks, sizes_px, sharpest_px, strict=True):
         usual = _BLURRED_FACTOR * best_px if np.isfinite(best_px) else 0.0
         limit_px = min(max(_BLURRED_PX * _factor(size_px), usual), _MOST_BLURRED_PX * _factor(size_px))

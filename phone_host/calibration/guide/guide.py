@@ -127,10 +127,6 @@ class Guide:
     def see(self, glance: Glance, now_ns: int) -> Gate:
         """Judge a look at a pair.
 
-        Args:
-            glance: the board in it, found quickly.
-            now_ns: now.
-
         Returns:
             READY: `examine` is to be called with its exact corners; else why the view is refused.
         """
@@ -149,11 +145,6 @@ class Guide:
 
     def examine(self, glance: Glance, looks: tuple[BoardLook, BoardLook], now_ns: int) -> Gate:
         """Judge a view that was READY by its exact corners, and take it unless it is blurred.
-
-        Args:
-            glance: the board in it.
-            looks: how sharp and evenly lit the board is in both images.
-            now_ns: now.
 
         Returns:
             TAKEN, or why not.
@@ -186,12 +177,7 @@ class Guide:
         return self._note(Gate.TAKEN)
 
     def grow(self, progress: Progress, now_ns: int) -> None:
-        """Take the calibration of the views so far; end if it is enough.
-
-        Args:
-            progress: what it gives.
-            now_ns: now.
-        """
+        """Take the calibration of the views so far; end if it is enough."""
         self._progress = progress
         if self._asked not in self._open or now_ns - self._asked_ns < _RETHINK_NS:
             self._ask(now_ns)

@@ -105,11 +105,7 @@ _STYLE: Final = (
 
 
 def guide_svg(snapshot: GuideSnapshot) -> str:
-    """Draw a live calibration.
-
-    Args:
-        snapshot: the state to draw.
-    """
+    """Draw a live calibration."""
     parts = [f'<text class="words" x="{_MARGIN_PX}" y="36">{escape(snapshot.words)}</text>']
     bottom = float(_HEAD_PX)
     for index, (name, coverage, outline) in enumerate(

@@ -64,12 +64,7 @@ class Progress:
 
 
 def lessons(calibration: Calibration, board: Board) -> tuple[Taught, ...]:
-    """Return what each kind of view would add to a calibration.
-
-    Args:
-        calibration: of the views so far.
-        board: the board.
-    """
+    """Return what each kind of view would add to a calibration."""
     if calibration.rectification is None:
         return ()
     points_m = board.points_m()

@@ -13,11 +13,7 @@ from phone_host.model import CameraModel
 
 
 def unseen(places: Iterable[Placed]) -> frozenset[Want]:
-    """Return the image corners that no board reaches.
-
-    Args:
-        places: where the board was in each view.
-    """
+    """Return the image corners that no board reaches."""
     left = set(CORNERS)
     for placed in places:
         left -= {want for want in left if is_seen(want, placed)}
@@ -25,27 +21,14 @@ def unseen(places: Iterable[Placed]) -> frozenset[Want]:
 
 
 def unseen_in(pairs: Iterable[BoardPair], board: Board, left: CameraModel, right: CameraModel) -> frozenset[Want]:
-    """Return the image corners that the board reaches in none of some pairs.
-
-    Args:
-        pairs: their corners.
-        board: the board.
-        left: the left camera; only its size counts.
-        right: the right one.
-    """
+    """Return the image corners that the board reaches in none of some pairs; of the cameras only the sizes count."""
     return unseen(
         Placed(placement(pair.left_px, board, left), placement(pair.right_px, board, right)) for pair in pairs
     )
 
 
 def guessed_corners(found: Calibration, pairs: Iterable[BoardPair], board: Board) -> frozenset[Want]:
-    """Return the image corners that the board reaches in none of the pairs that a calibration used, if a lens is guessed there.
-
-    Args:
-        found: the calibration.
-        pairs: all that it was given, as they were seen.
-        board: the board.
-    """
+    """Return the image corners that the board reaches in none of the pairs (as they were seen) that a calibration used, if a lens is guessed there."""
     if not is_guessed(found.bends):
         return frozenset()
     used = {each.name for each in found.used}
@@ -56,9 +39,6 @@ def is_guessed(bends: Iterable[Bend]) -> bool:
     """Return whether a lens may bend freely where nothing was seen: one of more than four coefficients.
 
     Beyond what was seen the powers of the fifth coefficient and more run away; four stay near the truth, because webcams' lenses follow them.
-
-    Args:
-        bends: the formulas of both lenses.
     """
     return any(bend is not Bend.USUAL for bend in bends)
 

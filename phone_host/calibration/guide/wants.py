@@ -91,13 +91,7 @@ class Placed:
 
 
 def ahead(before: Placed, now: Placed, steps: float) -> Placed:
-    """Return where a board will be that goes on as it went between two looks.
-
-    Args:
-        before: the look before.
-        now: the newest look.
-        steps: how far ahead, in times between those two looks.
-    """
+    """Return where a board will be that goes on as it went between two looks, so many times that time ahead."""
     return Placed(_shifted(before.left, now.left, steps), _shifted(before.right, now.right, steps))
 
 
@@ -134,12 +128,7 @@ def is_there(want: Want, placed: Placed) -> bool:
 
 
 def missing(want: Want, placed: Placed) -> str:
-    """Return what a person is to do until a wanted view is there, in a few words; empty: it is.
-
-    Args:
-        want: the view.
-        placed: where the board is.
-    """
+    """Return what a person is to do until a wanted view is there, in a few words; empty: it is."""
     if want is Want.NEAR:
         return (
             "" if placed.fills >= _NEAR_FILLS or _is_full(placed) else ", ".join(filter(None, (_CLOSER, back(placed))))

@@ -54,11 +54,7 @@ class BentFit:
 
 
 def bow_shapes(board: Vector) -> Vector:
-    """Return (N, 2) depth of a board that is bent along its rows, and along its columns, so that its middle stands out by 1.
-
-    Args:
-        board: (N, 3) corners about their middle.
-    """
+    """Return (N, 2) depth of a board that is bent along its rows, and along its columns, so that its middle stands out by 1."""
     halves = np.ptp(board[:, :2], axis=0) / 2
     shapes: Vector = 1 - (board[:, :2] / halves) ** 2
     return shapes
@@ -170,11 +166,6 @@ class Crossings:
 def ray_crossings(pairs: Sequence[BoardPair], rig: Rig, sigmas_px: tuple[float, float] = (1.0, 1.0)) -> Crossings:
     """Intersect the rays of all corners.
 
-    Args:
-        pairs: V pairs of N corners; NaN where one is not seen.
-        rig: the rig.
-        sigmas_px: standard deviation of a coordinate in the left and in the right image, px.
-
     Returns:
         V N crossings, pair by pair.
     """
@@ -214,15 +205,7 @@ def misses(pairs: Sequence[BoardPair], rig: Rig, sigmas_px: tuple[float, float] 
 def boards_in_space(
     pairs: Sequence[BoardPair], points_m: Vector, rig: Rig, poses: Vector, sigmas_px: tuple[float, float]
 ) -> tuple[BoardInSpace, ...]:
-    """Check each view of a solved rig.
-
-    Args:
-        pairs: V pairs of N corners; NaN where one is not seen.
-        points_m: (N, 3) corners in the board's axes.
-        rig: the rig.
-        poses: (V, 6) of the boards in the left camera's axes, roughly.
-        sigmas_px: standard deviation of a coordinate in the left and in the right image, px.
-    """
+    """Check each view of a solved rig."""
     found = ray_crossings(pairs, rig, sigmas_px)
     shape = (len(pairs), len(points_m))
     points, covariances = found.points_m.reshape(*shape, 3), found.covariance_m2.reshape(*shape, 3, 3)

@@ -42,12 +42,7 @@ class BoardPlane:
     corners_bias_share: float = math.nan
 
     def covers(self, width_px: int, height_px: int) -> NDArray[np.bool_]:
-        """Return which pixels of the image lie inside the outline: (H, W) bool.
-
-        Args:
-            width_px: of the image.
-            height_px: of the image.
-        """
+        """Return which pixels of an image of this size lie inside the outline: (H, W) bool."""
         mask = np.zeros((height_px, width_px), np.uint8)
         cv2.fillConvexPoly(mask, self.outline_px.round().astype(np.int32), 1)
         return mask.astype(np.bool_)
@@ -55,12 +50,6 @@ class BoardPlane:
 
 def find_board_plane(pair: RectifiedPair, board: Board, geometry: StereoGeometry, name: str) -> BoardPlane:
     """Find a board and its plane.
-
-    Args:
-        pair: the rectified images; only the left one gives the plane.
-        board: what to look for.
-        geometry: of the rectified pair.
-        name: the left image, for errors.
 
     Returns:
         The board.
@@ -91,15 +80,7 @@ def find_board_plane(pair: RectifiedPair, board: Board, geometry: StereoGeometry
 def corners_bias_share(
     left: Corners, right: Corners, plane: DisparityPlane, geometry: StereoGeometry, epipolar: Epipolar
 ) -> float:
-    """Return by which share the depths of corners, from their disparities, exceed those of a plane, in the mean; NaN: they have none.
-
-    Args:
-        left: (N, 2) in the rectified left image, px.
-        right: (N, 2) the same corners in the right one.
-        plane: where they are.
-        geometry: of the rectified pair.
-        epipolar: which way the epipolar lines run.
-    """
+    """Return by which share the depths of corners (N, 2), the same in both rectified images, exceed those of a plane, in the mean; NaN: they have none."""
     apart = left - right
     disparity = {Epipolar.LEFT: apart[:, 0], Epipolar.UP: apart[:, 1], Epipolar.DOWN: -apart[:, 1]}[epipolar]
     true = plane_at(plane, left[:, 0], left[:, 1])
@@ -108,13 +89,7 @@ def corners_bias_share(
 
 
 def board_plane_of(corners: Corners, board: Board, geometry: StereoGeometry) -> BoardPlane:
-    """Compute the plane of a board from its corners.
-
-    Args:
-        corners: (N, 2) in the rectified left image, px, in the order of `Board.points_m`.
-        board: the board.
-        geometry: of the rectified pair.
-    """
+    """Compute the plane of a board from its corners (N, 2) in the rectified left image, px."""
     points = board.points_m()
     model = _rectified_camera(geometry)
     pose = fit_pose(points, corners, model)

@@ -18,13 +18,7 @@ _LEAST_CORNERS: Final = 4
 
 
 def fit_pose(points_m: Vector, corners: Corners, model: CameraModel) -> Vector:
-    """Return the (6,) pose of the board that best fits one view.
-
-    Args:
-        points_m: (N, 3) corners in the board's axes.
-        corners: (N, 2) px; NaN where one was not seen.
-        model: the camera.
-    """
+    """Return the (6,) pose of the board that best fits one view."""
     seen = np.isfinite(corners).all(axis=1)
     if model.lens is not Lens.FISHEYE:
         _, rotation, translation = cv2.solvePnP(
@@ -57,12 +51,7 @@ def rough_pose(points_m: Vector, corners: Corners, model: CameraModel) -> Vector
 
 
 def towards(corners: Corners, model: CameraModel) -> Vector:
-    """Return the (3, 3) turn from a camera's axes to those of one that looks at the middle of what it sees.
-
-    Args:
-        corners: (N, 2) px; NaN where one was not seen.
-        model: the camera.
-    """
+    """Return the (3, 3) turn from a camera's axes to those of one that looks at the middle of what it sees."""
     rays = rays_through(corners, model)
     return _turn_to(rays[np.isfinite(rays).all(axis=1)])
 

@@ -299,13 +299,7 @@ def adjust(views: list[BundleView], points_m: Vector, start: BundleState, free: 
 
 
 def fit_poses(views: list[BundleView], points_m: Vector, state: BundleState) -> BundleResult:
-    """Fit the boards' poses alone to views of a rig that is known.
-
-    Args:
-        views: the pairs.
-        points_m: (N, 3) corners in the board's axes.
-        state: the rig, with a start for each pose.
-    """
+    """Fit the boards' poses alone to views of a rig that is known."""
     nothing = FreeParameters(np.zeros(RIGHT.start, bool), np.zeros(RIGHT.start, bool), pose=False)
     problem = _problem(views, points_m, state, _prior(state))
     fitted = minimise(problem, state, nothing.flags(), ROUGHLY)
@@ -314,14 +308,7 @@ def fit_poses(views: list[BundleView], points_m: Vector, state: BundleState) -> 
 
 
 def adjust_alone(views: list[Vector], points_m: Vector, start: BundleState, free: NDArray[np.bool_]) -> BundleState:
-    """Adjust a single camera, roughly: the left one of a rig whose right one sees nothing.
-
-    Args:
-        views: (N, 2) corners of each view.
-        points_m: (N, 3) corners in the board's axes.
-        start: a state close enough.
-        free: (12,) which of its parameters are estimated.
-    """
+    """Adjust a single camera, roughly: the left one of a rig whose right one sees nothing."""
     unseen = [BundleView(corners, np.full(corners.shape, np.nan)) for corners in views]
     return adjust_roughly(unseen, points_m, start, FreeParameters(free, np.zeros_like(free), pose=False))
 

@@ -66,13 +66,7 @@ def globals_of(state: BundleState) -> Vector:
 
 
 def project_view(state: BundleState, pose: Vector, points_m: Vector) -> tuple[Vector, Vector]:
-    """Project a board into both cameras, (N, 2) px each.
-
-    Args:
-        state: the rig (its poses are ignored).
-        pose: (6,) rotation vector and translation of the board, m.
-        points_m: (N, 3) corners in the board's axes.
-    """
+    """Project a board into both cameras, (N, 2) px each."""
     left = points_m @ rotations_of(pose[:3]).T + pose[3:]
     right = left @ rotations_of(state.rotation).T + state.translation_m
     return project(left, state.left), project(right, state.right)

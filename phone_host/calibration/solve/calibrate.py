@@ -95,11 +95,6 @@ def calibrate(
 def fit_rig(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> Fitted:
     """Fit a rig as `calibrate` does, without choosing lenses and without figures.
 
-    Args:
-        pairs: corners of each pair, any number.
-        board: the board.
-        sizes_px: width and height of the left and of the right images.
-
     Raises:
         DataError: fewer than three pairs are left, or no lens explains them.
     """

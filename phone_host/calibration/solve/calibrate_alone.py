@@ -28,11 +28,6 @@ _FIELDS_RAD: Final = (0.9, 1.2, 1.6, 2.1, 2.7, 3.3)
 def fisheye_camera(views: list[Corners], points_m: Vector, size_px: tuple[int, int]) -> tuple[CameraModel, Vector]:
     """Calibrate one camera with a fisheye lens.
 
-    Args:
-        views: (N, 2) corners of each view.
-        points_m: (N, 3) corners in the board's axes.
-        size_px: width and height of the images.
-
     Returns:
         Its model, and the poses (V, 6).
 
@@ -128,13 +123,6 @@ def calibrate_alone(
 ) -> tuple[list[BoardPair], list[Rejected], LoneCamera]:
     """Calibrate one camera; reject views that are plainly wrong until none is left.
 
-    Args:
-        pairs: all pairs.
-        side: which of their views to look at.
-        points_m: (N, 3) corners in the board's axes.
-        size_px: width and height of the side's images.
-        bend: how freely its lens may bend.
-
     Returns:
         The pairs left, those rejected, and the camera with one pose for each pair left.
 
@@ -189,13 +177,7 @@ def _camera(
 
 
 def errors_px(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> Vector:
-    """Return measured minus projected corners of a camera's views, (V, N, 2) px; NaN where a corner was not seen.
-
-    Args:
-        camera: with one pose for each pair.
-        pairs: V pairs.
-        points_m: (N, 3) corners in the board's axes.
-    """
+    """Return measured minus projected corners of a camera's views, (V, N, 2) px; NaN where a corner was not seen."""
     return np.array(
         [
             corners_of(pair, camera.side) - project(SE3.of(pose).apply(points_m), camera.parameters)
@@ -250,12 +232,7 @@ def relative_pose(left: Vector, right: Vector) -> tuple[Vector, Vector]:
 
 
 def states_of(left: LoneCamera, right: LoneCamera) -> list[BundleState]:
-    """Return the rig that each pair gives on its own.
-
-    Args:
-        left: the left camera, with one pose for each pair.
-        right: the right camera, with as many.
-    """
+    """Return the rig that each pair gives on its own."""
     return [
         replace(state_of(left.parameters, right.parameters, a, b), poses=left.poses)
         for a, b in zip(left.poses, right.poses, strict=True)
@@ -263,14 +240,7 @@ def states_of(left: LoneCamera, right: LoneCamera) -> list[BundleState]:
 
 
 def state_of(left: CameraModel, right: CameraModel, left_pose: Vector, right_pose: Vector) -> BundleState:
-    """Return the rig that one pair gives.
-
-    Args:
-        left: the left camera.
-        right: the right camera.
-        left_pose: (6,) of the board in the left camera's axes.
-        right_pose: (6,) of the same board in the right camera's.
-    """
+    """Return the rig that one pair gives."""
     rotation, translation_m = relative_pose(left_pose, right_pose)
     return BundleState(
         left=left, right=right, rotation=rotation, translation_m=translation_m, poses=left_pose[np.newaxis]
@@ -279,11 +249,6 @@ def state_of(left: CameraModel, right: CameraModel, left_pose: Vector, right_pos
 
 def prediction_errors_px(states: list[BundleState], right_px: list[Corners], points_m: Vector) -> Vector:
     """Predict the right corners of all pairs from their left poses, by the rig that each pair gives.
-
-    Args:
-        states: of V pairs, as `states_of` gives them.
-        right_px: (N, 2) right corners of each pair.
-        points_m: (N, 3) corners in the board's axes.
 
     Returns:
         (V, V) root mean square error, px: rig by pair.

@@ -79,13 +79,7 @@ def _is_same(pair: BoardPair, other: BoardPair) -> bool:
 
 
 def views_of(calibration: Calibration, pairs: list[BoardPair], board: Board) -> RigViews:
-    """Return the pairs that a calibration used, for rig.yaml.
-
-    Args:
-        calibration: what was made of them.
-        pairs: all pairs that it was given.
-        board: the board.
-    """
+    """Return the pairs that a calibration used, for rig.yaml."""
     used = {each.name for each in calibration.used}
     kept = [pair for pair in pairs if pair.name in used]
     return RigViews(

@@ -120,14 +120,7 @@ _NEIGHBOUR: Final = 0.01
 
 
 def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleState, free: FreeParameters) -> Squares:
-    """Measure the squares of every pair by a rig that has not seen it.
-
-    Args:
-        pairs: the pairs that are used.
-        points_m: (N, 3) corners in the board's axes.
-        state: the rig fitted to all of them.
-        free: what was estimated.
-    """
+    """Measure the squares of every pair by a rig that has not seen it."""
     true_m = _side_m(points_m)
     sides: list[Vector] = []
     parts = min(_PARTS, len(pairs)) if len(pairs) >= _LEAST_PAIRS else 0
@@ -144,13 +137,7 @@ def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleStat
 
 
 def square_sides_m(pairs: list[BoardPair], points_m: Vector, rig: Rig) -> Vector:
-    """Return the sides of the squares between neighbouring corners, (M,) m, as a rig measures them: where its rays meet best.
-
-    Args:
-        pairs: the corners; NaN where one is not seen.
-        points_m: (N, 3) corners in the board's axes.
-        rig: the rig.
-    """
+    """Return the sides of the squares between neighbouring corners, (M,) m, as a rig measures them: where its rays meet best."""
     points = ray_crossings(pairs, rig).points_m.reshape(len(pairs), -1, 3)
     first, second = _neighbours(points_m)
     sides = np.linalg.norm(points[:, first] - points[:, second], axis=2)
@@ -189,13 +176,7 @@ class Fitted:
 
 
 def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibration:
-    """Make a rig and its figures from the optimum.
-
-    Args:
-        fitted: the optimum.
-        points_m: (N, 3) corners in the board's axes.
-        board_side: which camera is the board's.
-    """
+    """Make a rig and its figures from the optimum."""
     result, pairs, flat_m = fitted.result, fitted.kept, points_m
     boards = boards_in_space(pairs, flat_m, rig_of(result.state), result.state.poses, result.sigmas_px())
     bent = fit_bent(result, flat_m, boards, lambda shape_m, start: adjust(fitted.views(), shape_m, start, fitted.free))

@@ -90,13 +90,7 @@ def choose_lens(
 
 
 def is_fisheye(views: list[Corners], points_m: Vector, size_px: tuple[int, int]) -> bool:
-    """Return whether a fisheye lens explains the views of one camera far better than a wide one, or that one only by folding back; views may be wrong.
-
-    Args:
-        views: (N, 2) corners of each view.
-        points_m: (N, 3) corners in the board's axes.
-        size_px: width and height of the images.
-    """
+    """Return whether a fisheye lens explains the views of one camera far better than a wide one, or that one only by folding back; views may be wrong."""
     try:
         model, poses = fisheye_camera(views, points_m, size_px)
         middle = np.array([[1, 0, (size_px[0] - 1) / 2], [0, 1, (size_px[1] - 1) / 2], [0, 0, 1]])

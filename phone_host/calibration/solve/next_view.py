@@ -37,10 +37,6 @@ _COLUMNS, _ROWS = 9, 7
 def zero_sigma_px(rig: Rig, rectification: Rectification) -> float:
     """Return the standard uncertainty of the disparity of infinitely far points.
 
-    Args:
-        rig: with its covariance.
-        rectification: of that rig.
-
     Returns:
         Root mean square over the rectified image, px of that image; NaN if the covariance is not known.
     """
@@ -49,11 +45,6 @@ def zero_sigma_px(rig: Rig, rectification: Rectification) -> float:
 
 def depth_sigma_m(rig: Rig, rectification: Rectification, depth_m: float) -> float:
     """Return the standard uncertainty of depths that the calibration alone leaves, m.
-
-    Args:
-        rig: with its covariance.
-        rectification: of that rig.
-        depth_m: of the points, m.
 
     Returns:
         Root mean square over the rectified image, m; NaN if the covariance is not known or both cameras see nothing so near.
@@ -72,13 +63,7 @@ def _disparity_sigma_px(rig: Rig, rectification: Rectification, depth_m: float) 
 
 
 def disparity_derivatives(rig: Rig, rectification: Rectification, depth_m: float) -> Floats:
-    """Return the derivatives of disparities by the true parameters, (N, 30), px per unit, at points spread over what both cameras see.
-
-    Args:
-        rig: the cameras as they are estimated.
-        rectification: of that rig.
-        depth_m: of the points, m; may be infinite.
-    """
+    """Return the derivatives of disparities by the true parameters, (N, 30), px per unit, at points spread over what both cameras see; their depth may be infinite."""
     slopes = _slopes(rectification)
     axis = 1 if rectification.epipolar.is_vertical else 0
     if np.isfinite(depth_m):  # what the right camera does not see has no disparity
@@ -147,12 +132,6 @@ def next_view(
     result: BundleResult, free: FreeParameters, points_m: Vector, rectification: Rectification
 ) -> NextView | None:
     """Find out which view would teach a calibration most.
-
-    Args:
-        result: the rig fitted to the views so far.
-        free: what was estimated.
-        points_m: (N, 3) corners in the board's axes.
-        rectification: of the rig.
 
     Returns:
         The view; None if it cannot be told.
@@ -232,14 +211,7 @@ class Spot:
 
 
 def after_one_m(rig: Rig, rectification: Rectification, points_m: Vector, spot: Spot) -> float:
-    """Return the standard uncertainty of depth at 1 m that one more view would leave, m; NaN: it cannot be told.
-
-    Args:
-        rig: with its covariance and RMS.
-        rectification: of the rig.
-        points_m: (N, 3) corners in the board's axes.
-        spot: where the board would stand.
-    """
+    """Return the standard uncertainty of depth at 1 m that one more view would leave, m; NaN: it cannot be told."""
     if not np.isfinite(rig.covariance).all():
         return float("nan")
     state = BundleState(

@@ -58,11 +58,6 @@ class Taken:
 def series_views(taken: Taken, found: Calibration | None, rejected: tuple[Rejected, ...]) -> tuple[SeriesView, ...]:
     """Return all views of a series, used or not.
 
-    Args:
-        taken: what the series took.
-        found: what came of it; None: no rig.
-        rejected: the pairs that are not used, with the reasons.
-
     Returns:
         Those of an earlier calibration first, the others in their order, those without a partner last.
     """
@@ -87,13 +82,7 @@ def series_views(taken: Taken, found: Calibration | None, rejected: tuple[Reject
 
 
 def series_rig(found: Calibration, rig: Rig, far_m: float) -> SeriesRig:
-    """Return the rig with its figures.
-
-    Args:
-        found: what came of the views.
-        rig: as it is written.
-        far_m: depth beyond which it is a guess, m.
-    """
+    """Return the rig as it is written with its figures; beyond `far_m` depth is a guess."""
     left, right = (_tried(trials, bend) for trials, bend in zip(found.trials, found.bends, strict=True))
     return SeriesRig(
         rig=rig,

@@ -24,12 +24,6 @@ _STEPS: Final = 5
 def view_turns(pairs: list[BoardPair], poses: Vector, points_m: Vector, rig: Rig) -> ViewTurns | None:
     """Find out how the right camera stood in each view.
 
-    Args:
-        pairs: the corners of the V pairs that the rig was computed from, in their order.
-        poses: (V, 6) of the boards in the left camera's axes, near enough.
-        points_m: (N, 3) corners in the board's axes.
-        rig: the cameras.
-
     Returns:
         The turns; None if a view has too few corners to tell.
     """

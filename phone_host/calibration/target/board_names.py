@@ -48,11 +48,7 @@ def named_board(text: str, square_mm: float | None) -> Board:
 
 
 def board_name(board: Board) -> str:
-    """Write a board as `named_board` reads it.
-
-    Args:
-        board: with or without marks.
-    """
+    """Write a board as `named_board` reads it."""
     side_mm = board.square_m * 1e3
     match board.marks:
         case None:
@@ -81,12 +77,7 @@ def no_square() -> SettingsError:
 
 
 def require_marks(columns: int, rows: int, family: str) -> None:
-    """Check that a family has a mark for each white square of a chessboard.
-
-    Args:
-        columns: squares in a row.
-        rows: squares in a column.
-        family: of the marks, in words.
+    """Check that a family, named in words, has a mark for each white square of a chessboard of so many squares.
 
     Raises:
         SettingsError: it has fewer.

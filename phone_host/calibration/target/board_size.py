@@ -110,10 +110,6 @@ class Vote:
 def size_seen(grey: Image, way: int = _USUAL_WAY) -> Inner | None:
     """Return the inner corners of the chessboard in an image; None if there is none.
 
-    Args:
-        grey: (H, W) uint8.
-        way: how the detector looks.
-
     Returns:
         The two counts, the larger first. It may be a part of the board.
     """
@@ -125,9 +121,6 @@ def whole_size_seen(grey: Image) -> Inner | None:
 
     A board that reaches beyond the image, or that a hand covers, looks like a smaller one. On the side where it is cut there are more
     squares, a hand or nothing beside the outermost corners instead of a black-and-white row and then the margin.
-
-    Args:
-        grey: (H, W) uint8.
 
     Returns:
         The two counts, the larger first.
@@ -144,22 +137,14 @@ def whole_size_seen(grey: Image) -> Inner | None:
 
 
 def size_in_pictures(pictures: Sequence[Image]) -> Inner | None:
-    """Return the inner corners of the chessboard that pictures show, as `size_in_files` counts them; None if they do not tell.
-
-    Args:
-        pictures: (H, W) uint8 grey each, as different as can be.
-    """
+    """Return the inner corners of the chessboard that pictures show, as `size_in_files` counts them; None if they do not tell."""
     seen = [_Seen(small, _size_of(_lattice(small))) for small in map(small_for_sizes, pictures)]
     vote = Vote(len(seen), Counter(each.size for each in seen if each.size is not None))
     return _fitting(vote, _fits_of(seen), None)
 
 
 def small_for_sizes(grey: Image) -> Image:
-    """Return an image as small as it is searched for a board of unknown size.
-
-    Args:
-        grey: (H, W) uint8.
-    """
+    """Return an image as small as it is searched for a board of unknown size."""
     return shrunk(grey, min(1.0, _SEARCHED_PX / max(grey.shape)))[0]
 
 
@@ -172,13 +157,9 @@ def _lattice(grey: Image, way: int = _USUAL_WAY) -> Corners:
 
 
 def inner_lattice(grey: Image, grid: Corners) -> Corners:
-    """Return a lattice without outer rows that are no inner corners: the detector may take the outermost squares' own corners for some.
+    """Return a lattice (R, C, 2), px, without outer rows that are no inner corners: the detector may take the outermost squares' own corners for some.
 
     Beyond inner corners lie black and white squares in turns, beyond those the white margin alone.
-
-    Args:
-        grey: (H, W) uint8.
-        grid: (R, C, 2) corners of squares in it, px.
     """
     limit = _grey_between(grey, grid)
     for _ in range(4):  # each side comes first in turn
@@ -238,13 +219,7 @@ def _asked(images: Iterator[Path], look: Callable[[Path], _Seen | None]) -> tupl
 
 
 def _decided(files: ViewFiles, most_pixels: int, given: Inner | None = None) -> _Decided:
-    """Ask the images; if they show boards and do not agree, ask them again another way; then try what most boards have.
-
-    Args:
-        files: the pairs of files.
-        most_pixels: an image that claims more is passed over.
-        given: a size that is tried, too.
-    """
+    """Ask the images; if they show boards and do not agree, ask them again another way; then try what most boards have."""
     result, seen = _asked(_sample(files), lambda path: _seen_in(path, most_pixels, _USUAL_WAY))
     fits = _fits_of(seen)
     size = _fitting(result, fits, given)
@@ -283,10 +258,6 @@ def _area(size: Inner) -> int:
 def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Inner:
     """Find out which chessboard the images show.
 
-    Args:
-        files: the pairs of files.
-        most_pixels: an image that claims more is passed over.
-
     Returns:
         Its inner corners, the larger count first.
 
@@ -318,12 +289,7 @@ def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Inner:
 
 
 def require_size(files: ViewFiles, given: Inner, most_pixels: int = MOST_PIXELS) -> None:
-    """Check in some images that a chessboard has the size that was given; what cannot be told passes.
-
-    Args:
-        files: the pairs of files.
-        given: columns and rows of inner corners, as the user gives them.
-        most_pixels: an image that claims more is passed over.
+    """Check in some images that a chessboard has the size that was given, columns and rows of inner corners; what cannot be told passes.
 
     Raises:
         SettingsError: the images show another board.
@@ -349,11 +315,6 @@ def require_size(files: ViewFiles, given: Inner, most_pixels: int = MOST_PIXELS)
 
 def require_marks_of(files: ViewFiles, board: Board, most_pixels: int = MOST_PIXELS) -> Board:
     """Check in some images that the marks are those of the board that was given; what cannot be told passes.
-
-    Args:
-        files: the pairs of files.
-        board: the board, with marks.
-        most_pixels: an image that claims more is passed over.
 
     Returns:
         The board, with the arrangement of its marks as the images show it.

@@ -27,10 +27,6 @@ _FIRST: Final = 5
 def cameras_beside(files: ViewFiles, mounted: tuple[Orientation, Orientation]) -> tuple[Path, Cameras] | None:
     """Read the cameras.json that lies in the folder of the left or of the right images, or in their common one.
 
-    Args:
-        files: the images.
-        mounted: how the user says that the two cameras are mounted.
-
     Returns:
         The file and its cameras; None if there is none.
 
@@ -61,11 +57,6 @@ def cameras_beside(files: ViewFiles, mounted: tuple[Orientation, Orientation]) -
 def require_sizes(path: Path, cameras: Cameras, sizes_px: tuple[Size, Size]) -> None:
     """Check that images can come from the cameras of a cameras.json.
 
-    Args:
-        path: the cameras.json.
-        cameras: what it holds.
-        sizes_px: width and height of the upright left and right images, px.
-
     Raises:
         DataError: their size differs.
     """
@@ -79,13 +70,7 @@ def require_sizes(path: Path, cameras: Cameras, sizes_px: tuple[Size, Size]) -> 
 
 
 def with_cameras(rig: Rig, cameras: Cameras | None, mounted: tuple[Orientation, Orientation]) -> Rig:
-    """Return a rig that states its cameras, as far as they are known.
-
-    Args:
-        rig: the rig.
-        cameras: from cameras.json; None if there is none.
-        mounted: how the user says that the two cameras are mounted.
-    """
+    """Return a rig that states its cameras, as far as they are known."""
     if cameras is not None:
         return replace(rig, left_camera=cameras[0], right_camera=cameras[1])
     states = []
@@ -107,13 +92,7 @@ def _folders(files: ViewFiles) -> list[Path]:
 def first_sizes(
     files: ViewFiles, most_pixels: int = MOST_PIXELS, mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
 ) -> tuple[Size, Size] | None:
-    """Return the sizes that most of the first pairs have, upright; None if none of them can be read.
-
-    Args:
-        files: the images.
-        most_pixels: an image that claims more is passed over.
-        mounted: how the two cameras are mounted.
-    """
+    """Return the sizes that most of the first pairs have, upright; None if none of them can be read."""
     sizes = Counter[tuple[Size, Size]]()
     for _, *both in files.pairs[:_FIRST]:
         with suppress(DataError):

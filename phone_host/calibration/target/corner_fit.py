@@ -155,10 +155,7 @@ def fit_corners(
 
 
 def steps_between(grid: Floats) -> tuple[Floats, Floats]:
-    """Return the steps from each corner to the next along its row and along its column: means of both sides.
-
-    Args:
-        grid: (rows, columns, 2) px.
+    """Return the steps from each corner of a grid (rows, columns, 2) to the next along its row and along its column: means of both sides.
 
     Returns:
         (N, 2) px each.

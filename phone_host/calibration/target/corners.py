@@ -92,10 +92,6 @@ class Board:
 def parse_board(corners: str, square_mm: float) -> Board:
     """Read a board's size as people write it.
 
-    Args:
-        corners: inner corners, such as "9x6".
-        square_mm: side of a square, mm.
-
     Returns:
         The board.
 
@@ -114,10 +110,6 @@ def parse_board(corners: str, square_mm: float) -> Board:
 def find_corners(image: Image, board: Board) -> Corners:
     """Find the inner corners of a board in an image.
 
-    Args:
-        image: (H, W) grey or (H, W, 3) BGR, uint8.
-        board: what to look for.
-
     Returns:
         The corners in the order of `Board.points_m`, with the first inner square white if the board's parity tells;
         empty if the board was not found. Of a board with marks some may be NaN: not seen.
@@ -134,11 +126,6 @@ def order_by_colour(corners: Corners, grey: Image, board: Board) -> Corners:
 
     Rows run so that the grid is not mirrored. If one count is even and the other odd, half a turn swaps black and
     white; then the square inside the first four corners is the white one. Other boards look the same after half a turn.
-
-    Args:
-        corners: (N, 2), in any of the orders a detector may give.
-        grey: (H, W) uint8, the image they were found in.
-        board: the board.
 
     Returns:
         The same corners, reordered.
@@ -158,11 +145,6 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
     The board looks the same after some turns (half a turn; quarter turns of a square board). Of these, take the one
     whose rows and columns point most nearly the same way in both images: neither camera is upside down relative to the
     other.
-
-    Args:
-        left: (N, 2) corners of the left view.
-        right: (N, 2) corners of the right view.
-        board: the board.
 
     Returns:
         The right corners, reordered.
@@ -195,12 +177,7 @@ def _search(grey: Image, board: Board) -> Corners:
 
 
 def is_outlined(grey: Image, board: Board) -> bool:
-    """Return whether the quick search finds a chessboard; it may be a part of a larger one.
-
-    Args:
-        grey: (H, W) uint8, searched at its own size.
-        board: what to look for.
-    """
+    """Return whether the quick search finds a chessboard; it may be a part of a larger one."""
     return len(_by_outlines(grey, grey, np.ones(2), board)) > 0
 
 

@@ -84,12 +84,6 @@ def grid_lines(count: int, marks: AprilGrid) -> Corners:
 def find_marked(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
     """Find the corners of a board with marks.
 
-    Args:
-        grey: (H, W) uint8.
-        columns: corners in a row.
-        rows: corners in a column.
-        marks: the board's marks.
-
     Returns:
         (columns * rows, 2) px, row by row, NaN where one is not seen; (0, 2) if fewer than eight are.
     """
@@ -100,12 +94,6 @@ def find_marked(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
 
 def marked_corners(grey: Image, columns: int, rows: int, marks: Marks) -> Corners:
     """Find the corners of a board with marks, without asking whether they fit their neighbours: for those who fit a pose to them.
-
-    Args:
-        grey: as `find_marked` takes it, and the others.
-        columns: corners in a row.
-        rows: corners in a column.
-        marks: the board's marks.
 
     Returns:
         (columns * rows, 2) px, row by row, NaN where one is not seen.

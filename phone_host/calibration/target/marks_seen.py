@@ -52,12 +52,7 @@ class SeenMarks:
 
 
 def find_marks(images: Sequence[Image | None], families: Sequence[MarkFamily] = tuple(MarkFamily)) -> SeenMarks | None:
-    """Find the marks that most images show; None: there are none.
-
-    Args:
-        images: (H, W) uint8 grey; None: could not be read.
-        families: that are looked for.
-    """
+    """Find the marks that most images show; None: there are none. Images that could not be read are None."""
     seen = {family: tuple(_marks(grey, family) for grey in images if grey is not None) for family in families}
     counts = {family: sum(map(len, middles)) for family, middles in seen.items()}
     best = max(counts, key=counts.__getitem__)
@@ -68,10 +63,6 @@ def require_marks(seen: SeenMarks | None, board: Board) -> Board:
     """Check that marks are those of a board; what cannot be told passes.
 
     ChArUco boards of OpenCV before 4.6 and of calib.io are recognised by where their marks lie.
-
-    Args:
-        seen: the marks.
-        board: with marks.
 
     Returns:
         The board, with the arrangement that the marks have.

@@ -43,11 +43,7 @@ _PATIENT_LOOKS: Final = 12
 
 
 class BoardFinder:
-    """Finds one board in pair after pair.
-
-    Args:
-        board: the board.
-    """
+    """Finds one board in pair after pair."""
 
     def __init__(self, board: Board) -> None:
         self._board = board
@@ -55,10 +51,6 @@ class BoardFinder:
 
     def find(self, left: Image, right: Image) -> tuple[Corners, Corners]:
         """Find the board in both images of a pair, roughly.
-
-        Args:
-            left: (H, W) uint8 grey.
-            right: the same, any size.
 
         Returns:
             The corners in both, (N, 2) px, each empty if it was not found.
@@ -126,10 +118,6 @@ class SizeFinder:
     def find(self, left: Image, right: Image) -> Board | None:
         """Look at a pair; return the board once enough of them agree.
 
-        Args:
-            left: (H, W) uint8 grey.
-            right: the same, any size.
-
         Raises:
             DataError: the person shows a board of coded marks.
         """
@@ -158,11 +146,7 @@ class SizeFinder:
 
 
 class SizeCheck:
-    """Notices that a person shows a chessboard of another size than was given, or other marks.
-
-    Args:
-        board: the board that was given.
-    """
+    """Notices that a person shows a chessboard of another size than was given, or other marks."""
 
     def __init__(self, board: Board) -> None:
         self._board = board

@@ -24,13 +24,7 @@ _MOST_PX: Final = 640
 
 
 def fullest(pairs: list[BoardPair], rig: Rig, rectification: Rectification) -> BoardPair:
-    """Return the pair whose board fills most of both rectified images and is whole in them.
-
-    Args:
-        pairs: some, at least one.
-        rig: the cameras.
-        rectification: of the rig.
-    """
+    """Return the pair whose board fills most of both rectified images and is whole in them."""
 
     def filled(pair: BoardPair) -> tuple[float, float]:
         shares, areas = [], []
@@ -56,13 +50,6 @@ def rectified_view(
     most_pixels: int = MOST_PIXELS,
 ) -> RectifiedView | None:
     """Rectify one pair at a small size.
-
-    Args:
-        files: its images.
-        pair: its corners.
-        rig: the cameras.
-        mounted: how they are mounted.
-        most_pixels: an image that claims more is refused.
 
     Returns:
         The pair; None if a file has gone, or the rig cannot be rectified so small.

@@ -59,13 +59,7 @@ class SeenLook:
 
 
 def look_at(grey: Image, corners: Corners, board: Board) -> BoardLook:
-    """Measure an image.
-
-    Args:
-        grey: (H, W) uint8.
-        corners: (N, 2) the board's corners in it, px; (0, 2): it was not found. NaN: not seen.
-        board: the board.
-    """
+    """Measure an image."""
     bright = float((grey >= _BRIGHT).mean())
     if len(corners) == 0:
         marks = board.marks

@@ -22,35 +22,20 @@ def small_size(size_px: tuple[int, int], most_px: int) -> tuple[int, int]:
 
 
 def shrunk_to(image: Image, size_px: tuple[int, int]) -> Image:
-    """Return an image at a smaller size, each pixel the mean of those it covers.
-
-    Args:
-        image: (H, W) grey or (H, W, 3) BGR.
-        size_px: width and height wanted, px.
-    """
+    """Return an image at a smaller size, each pixel the mean of those it covers."""
     if (image.shape[1], image.shape[0]) == size_px:
         return image
     return np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def shrunk(image: Image, scale: float) -> tuple[Image, NDArray[np.float64]]:
-    """Return an image at a smaller size, and by what its columns and rows were really multiplied.
-
-    Args:
-        image: (H, W) grey or (H, W, 3) BGR.
-        scale: 0 to 1; 1 gives the image itself.
-    """
+    """Return an image at a smaller size (scale 0 to 1; 1 gives the image itself), and by what its columns and rows were really multiplied."""
     width, height = image.shape[1], image.shape[0]
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
     return shrunk_to(image, size), np.array([size[0] / width, size[1] / height])
 
 
 def small_jpeg(image: Image, most_px: int) -> bytes:
-    """Make an image into a JPEG file whose longer side is at most `most_px`.
-
-    Args:
-        image: (H, W) grey or (H, W, 3) BGR.
-        most_px: its longer side, px.
-    """
+    """Make an image into a JPEG file whose longer side is at most `most_px`."""
     small = shrunk_to(image, small_size((image.shape[1], image.shape[0]), most_px))
     return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()

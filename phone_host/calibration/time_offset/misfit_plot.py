@@ -17,11 +17,7 @@ _STYLE: Final = (
 
 
 def misfit_svg(measured: Measured) -> str:
-    """Draw the misfit over the offset, with the answer and its uncertainty.
-
-    Args:
-        measured: what was measured.
-    """
+    """Draw the misfit over the offset, with the answer and its uncertainty."""
     use = np.isfinite(measured.misfits)
     offsets_ms, misfits = measured.offsets_s[use] * 1e3, measured.misfits[use]
     first_ms, last_ms = span(offsets_ms)

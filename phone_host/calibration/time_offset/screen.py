@@ -114,9 +114,6 @@ class PatternReader:
     def read(self, image: Image) -> Reading | None:
         """Read the pattern.
 
-        Args:
-            image: (H, W) or (H, W, 3), uint8.
-
         Returns:
             The reading; None if the pattern is not seen well enough.
         """
@@ -146,10 +143,6 @@ class PatternReader:
 
 def measure_screen(board: Counted, host: Counted) -> Measured:
     """Measure the time offset.
-
-    Args:
-        board: what the board's camera read.
-        host: what the host's camera read.
 
     Raises:
         DataError: the recording is too short, the pattern was not seen, or it did not count.
@@ -209,12 +202,7 @@ def _begins(side: _Read, ticks_s: Times, slack_s: float) -> tuple[Times, Times]:
 
 
 def counted(times_s: Times, readings: list[Reading | None]) -> Counted:
-    """Gather what was read.
-
-    Args:
-        times_s: (N,) stamps of all frames.
-        readings: the reading of each frame.
-    """
+    """Gather what was read."""
     found = [(t, reading) for t, reading in zip(times_s, readings, strict=True) if reading is not None]
     return Counted(
         shots=len(times_s),
