@@ -16,8 +16,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.calibration.target.marked import MarkFamily
 from phone_host.calibration.target.sheet import Paper
-from phone_host.calibration.target.sheet_layout import Chessboard, Family, MarkedBoard, marked_sheet
+from phone_host.calibration.target.sheet_layout import Chessboard, MarkedBoard, marked_sheet
 from phone_host.model import CameraModel, Image, Rig, Side
 from phone_host.scene.objects import OBJECTS
 from phone_host.scene.printed import printed_sheet
@@ -39,7 +40,7 @@ from phone_host.scene.solid import Solid
 
 OBJECT_NAMES: Final = tuple(OBJECTS)
 
-MAT: Final = MarkedBoard(Chessboard(10, 8, 25.0), 18.0, Family.ARUCO_5X5)
+MAT: Final = MarkedBoard(Chessboard(10, 8, 25.0), 18.0, MarkFamily.ARUCO_5X5)
 """The mat that `target mat` prints."""
 
 BASELINE_M: Final = 0.060

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.target.marked import Charuco, MarkFamily
+from phone_host.calibration.target.marked import Charuco
 from phone_host.calibration.target.sheet import Ink
-from phone_host.calibration.target.sheet_layout import Chessboard, Family, MarkedBoard, marked_rectangles
+from phone_host.calibration.target.sheet_layout import Chessboard, MarkedBoard, marked_rectangles
 from phone_host.geometry.lens import rays_through
 from phone_host.geometry.se3 import SE3
 from phone_host.model import CameraModel, Image, Rig
@@ -27,11 +27,6 @@ _CELL_MM: Final = 0.125
 _FINE: Final = 4
 _MARGIN_MM: Final = 10.0
 _BLACK, _WHITE, _TABLE, _AROUND = 30.0, 215.0, 120.0, 60.0
-_FAMILIES: Final = {
-    MarkFamily.ARUCO_4X4: Family.ARUCO_4X4,
-    MarkFamily.ARUCO_5X5: Family.ARUCO_5X5,
-    MarkFamily.ARUCO_6X6: Family.ARUCO_6X6,
-}
 
 
 def sheet_of(mat: Mat) -> NDArray[np.float32]:
@@ -39,9 +34,7 @@ def sheet_of(mat: Mat) -> NDArray[np.float32]:
     marks, board = mat.board.marks, mat.board
     assert isinstance(marks, Charuco)
     side = board.square_m * 1e3
-    printed = MarkedBoard(
-        Chessboard(board.columns + 1, board.rows + 1, side), marks.mark_share * side, _FAMILIES[marks.family]
-    )
+    printed = MarkedBoard(Chessboard(board.columns + 1, board.rows + 1, side), marks.mark_share * side, marks.family)
     width, height = (round((each * 1e3 + 2 * _MARGIN_MM) / _CELL_MM) for each in mat.size_m)
     sheet = np.full((height, width), _WHITE, np.float32)
     for each in marked_rectangles(printed):

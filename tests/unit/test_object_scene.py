@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.target.sheet_layout import DICTIONARIES
 from phone_host.model import CameraModel, Image, Side
 from phone_host.scene.cast import cast, pixel_rays, project
 from phone_host.scene.distance import nearest_on
@@ -35,7 +34,7 @@ SHAPES = (*ROUND, Sphere(0.03), Box((0.05, 0.03, 0.004)))
 def charuco_corners(image: Image) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """What OpenCV finds: numbers (N,) and places (N, 2) px."""
     squares = MAT.squares
-    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[MAT.family])
+    dictionary = cv2.aruco.getPredefinedDictionary(MAT.family.value)
     board = cv2.aruco.CharucoBoard(
         (squares.columns, squares.rows), squares.square_mm / 1000.0, MAT.mark_mm / 1000.0, dictionary
     )

@@ -8,7 +8,9 @@ from common.errors import SettingsError
 from phone_host.calibration.target.corners import Board, parse_board
 from phone_host.calibration.target.marked import AprilGrid, Charuco, MarkFamily
 
-_FAMILIES: Final = {"4x4": MarkFamily.ARUCO_4X4, "5x5": MarkFamily.ARUCO_5X5, "6x6": MarkFamily.ARUCO_6X6}
+FAMILIES: Final = {"4x4": MarkFamily.ARUCO_4X4, "5x5": MarkFamily.ARUCO_5X5, "6x6": MarkFamily.ARUCO_6X6}
+"""By their names on the command line."""
+
 _LENGTH: Final = r"(\d+(?:\.\d+)?)\s*mm"
 _CHARUCO: Final = re.compile(
     rf"charuco:(\d{{1,3}})x(\d{{1,3}}):{_LENGTH}:{_LENGTH}:([456]x[456])(:legacy)?", re.IGNORECASE
@@ -54,7 +56,7 @@ def board_name(board: Board) -> str:
         case None:
             return f"{board.columns}x{board.rows}"
         case Charuco(family, share, is_legacy):
-            words = next(word for word, each in _FAMILIES.items() if each is family)
+            words = next(word for word, each in FAMILIES.items() if each is family)
             return f"charuco:{board.columns + 1}x{board.rows + 1}:{side_mm:.8g}mm:{side_mm * share:.8g}mm:{words}{_LEGACY if is_legacy else ''}"
         case AprilGrid(share):
             return f"aprilgrid:{board.columns // 2}x{board.rows // 2}:{side_mm:.8g}mm:{side_mm * share:.8g}mm"
@@ -64,7 +66,7 @@ def board_name(board: Board) -> str:
 
 def family_name(family: MarkFamily) -> str:
     """Write a family of marks in words."""
-    return next((f"ArUco {word}" for word, each in _FAMILIES.items() if each is family), "AprilTag 36h11")
+    return next((f"ArUco {word}" for word, each in FAMILIES.items() if each is family), "AprilTag 36h11")
 
 
 def no_square() -> SettingsError:
@@ -92,14 +94,14 @@ def require_marks(columns: int, rows: int, family: str) -> None:
 
 def _charuco(name: str, square_mm: float | None) -> Board:
     found = _CHARUCO.fullmatch(name)
-    if found is None or found[5] not in _FAMILIES or not 0.3 <= _share(found) <= 0.9:
+    if found is None or found[5] not in FAMILIES or not 0.3 <= _share(found) <= 0.9:
         raise SettingsError(
             f"--board {name!r} is no ChArUco board",
             "give squares, side of a square, side of a mark and family, as in charuco:10x8:25mm:18mm:5x5",
         )
     columns, rows = int(found[1]), int(found[2])
     require_marks(columns, rows, found[5])
-    marks = Charuco(_FAMILIES[found[5]], _share(found), is_legacy=bool(found[6]) and rows % 2 == 0)
+    marks = Charuco(FAMILIES[found[5]], _share(found), is_legacy=bool(found[6]) and rows % 2 == 0)
     return Board(columns - 1, rows - 1, _side_mm(float(found[3]), square_mm) / 1000, marks)
 
 

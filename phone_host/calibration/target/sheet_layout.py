@@ -6,30 +6,15 @@ CharucoBoard, without its legacy pattern). Their corners are those of the square
 
 import math
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Final
 
 import cv2
 import numpy as np
 
 from common.errors import SettingsError
+from phone_host.calibration.target.marked import MarkFamily
 from phone_host.calibration.target.sheet import Ink, Paper, Rectangle, Sheet, Words
 from phone_host.model import Image
-
-
-class Family(Enum):
-    """A family of coded marks; its value is how many bits a side has."""
-
-    ARUCO_4X4 = 4
-    ARUCO_5X5 = 5
-    ARUCO_6X6 = 6
-
-
-DICTIONARIES: Final = {
-    Family.ARUCO_4X4: cv2.aruco.DICT_4X4_1000,
-    Family.ARUCO_5X5: cv2.aruco.DICT_5X5_1000,
-    Family.ARUCO_6X6: cv2.aruco.DICT_6X6_1000,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +38,7 @@ class MarkedBoard:
 
     squares: Chessboard
     mark_mm: float
-    family: Family
+    family: MarkFamily
 
 
 def chessboard_rectangles(board: Chessboard) -> list[Rectangle]:
@@ -70,7 +55,7 @@ def chessboard_rectangles(board: Chessboard) -> list[Rectangle]:
 def marked_rectangles(board: MarkedBoard) -> list[Rectangle]:
     """Return the black squares, and the marks as black squares with white bits."""
     found = chessboard_rectangles(board.squares)
-    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[board.family])
+    dictionary = cv2.aruco.getPredefinedDictionary(board.family.value)
     white = [
         (column, row)
         for row in range(board.squares.rows)
@@ -78,7 +63,7 @@ def marked_rectangles(board: MarkedBoard) -> list[Rectangle]:
         if (row + column) % 2
     ]
     margin = (board.squares.square_mm - board.mark_mm) / 2
-    cells = board.family.value + 2
+    cells = dictionary.markerSize + 2
     for number, (column, row) in enumerate(white):
         x, y = (each * board.squares.square_mm + margin for each in (column, row))
         found.append(Rectangle(x, y, board.mark_mm, board.mark_mm))

@@ -13,12 +13,11 @@ import numpy as np
 from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
 from common.program.terminal import say
-from phone_host.calibration.target.board_names import require_marks
+from phone_host.calibration.target.board_names import FAMILIES, require_marks
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sheet import Paper, Sheet, pdf, svg
 from phone_host.calibration.target.sheet_layout import (
     Chessboard,
-    Family,
     MarkedBoard,
     ScreenBoard,
     chessboard_sheet,
@@ -40,7 +39,6 @@ _MARK_SHARE: Final = 0.72
 
 _LARGEST_MARK: Final = 0.9
 _MAT_MM: Final = 25.0
-_FAMILIES: Final = {"4x4": Family.ARUCO_4X4, "5x5": Family.ARUCO_5X5, "6x6": Family.ARUCO_6X6}
 _DEFAULT: Final = {"chessboard": "9x6", "charuco": "8x6", "mat": "10x8"}
 _INCH_MM: Final = 25.4
 _SCREENS_MM: Final = (50.0, 10_000.0)
@@ -123,7 +121,7 @@ def _on_paper(options: argparse.Namespace, columns: int, rows: int) -> _Made:
         use = f"phone-host calibrate left right {board}--out rig.yaml"
         what = f"{options.kind}, {size} squares of {side:g} mm, marks {mark:g} mm, ArUco {options.family}"
         sheet = marked_sheet(
-            MarkedBoard(Chessboard(columns, rows, side), mark, _FAMILIES[options.family]), paper, what, use
+            MarkedBoard(Chessboard(columns, rows, side), mark, FAMILIES[options.family]), paper, what, use
         )
     marks = "" if options.kind == "chessboard" else f"-{mark:g}mm-{options.family}"
     stem = f"{options.kind}-{size}-{side:g}mm{marks}-{paper.name.lower()}"

@@ -19,7 +19,7 @@ from phone_host.calibration.target.marks_seen import SeenMarks, find_marks, requ
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import SeenLook, look_at
 from phone_host.calibration.target.sheet import Ink
-from phone_host.calibration.target.sheet_layout import Chessboard, Family, MarkedBoard, marked_rectangles
+from phone_host.calibration.target.sheet_layout import Chessboard, MarkedBoard, marked_rectangles
 from phone_host.model import Image, Side
 from tests.support.boards import exact_pairs, poses
 from tests.support.rigs import unlike_rig
@@ -31,7 +31,7 @@ _PX_A_MM = 6
 
 def _charuco_sheet() -> tuple[Image, NDArray[np.float64]]:
     """The board as it is printed, 6 px to a mm, and its corners' places in that image, px."""
-    board = MarkedBoard(Chessboard(8, 6, 28.0), 20.0, Family.ARUCO_5X5)
+    board = MarkedBoard(Chessboard(8, 6, 28.0), 20.0, MarkFamily.ARUCO_5X5)
     image = np.full(((6 * 28 + 40) * _PX_A_MM, (8 * 28 + 40) * _PX_A_MM), 255, np.uint8)
     for each in marked_rectangles(board):
         x, y = ((at + 20) * _PX_A_MM for at in (each.x_mm, each.y_mm))

@@ -11,11 +11,10 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.calibration.target.corners import Board, find_corners
+from phone_host.calibration.target.marked import MarkFamily
 from phone_host.calibration.target.sheet import Ink, Paper, Sheet, pdf, svg
 from phone_host.calibration.target.sheet_layout import (
-    DICTIONARIES,
     Chessboard,
-    Family,
     MarkedBoard,
     chessboard_sheet,
     largest_square_mm,
@@ -65,9 +64,9 @@ def test_a_chessboard_is_found_in_its_print_with_squares_of_the_right_size(board
 
 def test_the_mat_is_a_charuco_board_of_opencv() -> None:
     """OpenCV's own detector finds all 63 corners of the printed mat, numbered as in its CharucoBoard, 25 mm apart."""
-    mat = MarkedBoard(Chessboard(10, 8, 25.0), 18.0, Family.ARUCO_5X5)
+    mat = MarkedBoard(Chessboard(10, 8, 25.0), 18.0, MarkFamily.ARUCO_5X5)
     sheet = marked_sheet(mat, Paper.A4, "mat", "phone-host scan")
-    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[Family.ARUCO_5X5])
+    dictionary = cv2.aruco.getPredefinedDictionary(MarkFamily.ARUCO_5X5.value)
     board = cv2.aruco.CharucoBoard((10, 8), 25.0, 18.0, dictionary)
     corners, ids, _, marks = cv2.aruco.CharucoDetector(board).detectBoard(_rendered(sheet))
     assert sorted(marks.ravel().tolist()) == list(range(40))
@@ -99,7 +98,7 @@ def test_a_ruler_of_100_mm_lies_beside_the_board() -> None:
 def test_a_mat_says_what_it_is_though_it_fills_the_paper(paper: Paper, shape: tuple[int, int]) -> None:
     """Name, ruler and "print at 100 %" stand where there is room, run to no edge that printers leave blank, and cover no square. What has no ruler is measured itself."""
     sheet = marked_sheet(
-        MarkedBoard(Chessboard(*shape, 25.0), 18.0, Family.ARUCO_5X5), paper, "mat, named", "calibrate it"
+        MarkedBoard(Chessboard(*shape, 25.0), 18.0, MarkFamily.ARUCO_5X5), paper, "mat, named", "calibrate it"
     )
     left, upper = (sheet.width_mm - shape[0] * 25) / 2, (sheet.height_mm - shape[1] * 25) / 2
     rulers = [each for each in sheet.rectangles if max(each.width_mm, each.height_mm) == 100]
@@ -138,7 +137,9 @@ def test_the_pdf_says_in_words_what_it_is() -> None:
 
 def test_svg_and_pdf_paint_the_same() -> None:
     """The SVG's user unit is a millimetre, and its rectangles are those of the sheet."""
-    sheet = marked_sheet(MarkedBoard(Chessboard(4, 3, 20.0), 14.0, Family.ARUCO_4X4), Paper.LETTER, "a <mat>", "& on")
+    sheet = marked_sheet(
+        MarkedBoard(Chessboard(4, 3, 20.0), 14.0, MarkFamily.ARUCO_4X4), Paper.LETTER, "a <mat>", "& on"
+    )
     root = ET.fromstring(svg(sheet))
     assert root.get("width") == f"{sheet.width_mm:g}mm"
     assert root.get("viewBox") == f"0 0 {sheet.width_mm:g} {sheet.height_mm:g}"
@@ -149,7 +150,7 @@ def test_svg_and_pdf_paint_the_same() -> None:
         x, y, width, height = (float(each.get(name, "")) for name in ("x", "y", "width", "height"))
         part = tuple(slice(round(at * 4), round((at + size) * 4)) for at, size in ((y, height), (x, width)))
         image[part] = 0 if each.get("fill") == Ink.BLACK.value else 255
-    dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[Family.ARUCO_4X4])
+    dictionary = cv2.aruco.getPredefinedDictionary(MarkFamily.ARUCO_4X4.value)
     _, ids, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(image)
     assert sorted(ids.ravel().tolist()) == list(range(6))
 
