@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import BundleState, BundleView, FreeParameters, adjust
-from phone_host.calibration.solve.bundle_problem import moved
+from phone_host.calibration.solve.bundle import FreeParameters, adjust
+from phone_host.calibration.solve.bundle_problem import BundleState, BundleView, moved
 from phone_host.geometry.rig_pixels import standard_errors
 from phone_host.geometry.se3 import rotations_of, vectors_of
 from phone_host.model import Rig

@@ -11,12 +11,12 @@ import pytest
 from common.errors import DataError, SettingsError
 from phone_host.calibration.solve.calibrate import calibrate, solve_pose
 from phone_host.calibration.solve.earlier_views import board_of, pairs_of, together, views_of
-from phone_host.calibration.solve.verdict import Verdict, judge
+from phone_host.calibration.solve.verdict import judge
 from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.se3 import rotations_of, vectors_of
-from phone_host.model import Lens, Rectification, Rig, Side, TimeOffset
+from phone_host.model import Lens, Rectification, Rig, Side, TimeOffset, Verdict
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
 from phone_host.stereo.rectify import rectify_rig

@@ -11,7 +11,8 @@ import pytest
 from common.errors import DataError
 from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, Turned
 from phone_host.calibration.guide.snapshot import before_board
-from phone_host.calibration.solve.verdict import Assessment, Verdict
+from phone_host.calibration.solve.verdict import Assessment
+from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import Imported, RigKind
 from phone_host.verbs.calibrate.report import Exported, ImportReport, Judged

@@ -17,8 +17,8 @@ from common.recording.layout import ABOUT, About, image_topic
 from common.recording.recording_file import written
 from common.recording.ros_messages import COMPRESSED_IMAGE, RecordedImage, image_message
 from phone_host.calibration.failure_modes.mistakes import Finding, Mistake
-from phone_host.calibration.solve.verdict import Assessment, Verdict
-from phone_host.model import Image, Side
+from phone_host.calibration.solve.verdict import Assessment
+from phone_host.model import Image, Side, Verdict
 from phone_host.output.rig_yaml import read_rig
 from phone_host.verbs.calibrate.arguments import add_arguments
 from phone_host.verbs.calibrate.cause import with_cause

@@ -9,8 +9,8 @@ from common.camera_identity import Lock
 from common.ledger import StageTimes
 from common.protocol.message import Lane, LockState, SetLocks
 from common.protocol.session import MS
-from phone_host.calibration.solve.bundle import BundleResult, BundleState, FreeParameters
-from phone_host.calibration.solve.bundle_problem import GLOBALS
+from phone_host.calibration.solve.bundle import BundleResult, FreeParameters
+from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState
 from phone_host.calibration.solve.next_view import next_view
 from phone_host.model import Crop, CutCounts, Image, Processed, RectifiedPair, Search, StereoGeometry
 from phone_host.stereo.evidence_features import Matches

@@ -19,7 +19,6 @@ from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.calibration.guide.gates import Gate, Glance
 from phone_host.calibration.guide.snapshot import before_board
-from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.board_names import named_board
 from phone_host.calibration.target.board_size import whole_size_seen
 from phone_host.calibration.target.corners import Board, find_corners
@@ -30,7 +29,7 @@ from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken
 from phone_host.live.newest import Newest
 from phone_host.live.voice import Voice, speech_program
-from phone_host.model import Image
+from phone_host.model import Image, Verdict
 from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.run.host_settings import HostSettings
 from phone_host.verbs.calibrate.arguments import add_arguments

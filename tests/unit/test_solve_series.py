@@ -17,11 +17,11 @@ from phone_host.calibration.failure_modes.mistakes import Course, Mistake
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Verdict, judge
+from phone_host.calibration.solve.verdict import judge
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.se3 import vectors_of
-from phone_host.model import Rig, Side
+from phone_host.model import Rig, Side, Verdict
 from phone_host.output.rig_yaml import read_rig_views, write_rig
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.earlier import Series, saved_views

@@ -13,6 +13,9 @@ from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.evidence_track import Followed, follow
 from phone_host.stereo.stacked import lying, upright_points, upright_steps
 
+_LEAST_PAIRS: Final = 7
+"""From the first to the last of a line."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timed:
@@ -54,10 +57,6 @@ def sighting_of(
     model = RowModel(rectifier.rig, rectifier.rectification)
     calibrated = ThroughRig(rectifier.rig, rectifier.rectification)
     return model, model.sighting(upright, maps_of(core, processed), calibrated, timed.late_s)
-
-
-_LEAST_PAIRS: Final = 7
-"""From the first to the last of a line."""
 
 
 class StillsWatch:

@@ -16,7 +16,8 @@ import numpy as np
 
 from common.errors import DataError
 from common.orientation import Flip, Orientation
-from phone_host.calibration.solve.bundle import Vector, rig_of
+from phone_host.calibration.solve.bundle import rig_of
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.solve.calibrate import Sizes, fit_rig
 from phone_host.calibration.solve.calibrate_alone import calibrate_alone, prediction_errors_px, states_of, with_poses
 from phone_host.calibration.solve.result import Calibration
@@ -147,7 +148,6 @@ def _explaining(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> tuple[
 
 def _orders(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> Iterator[tuple[bool, list[BoardPair]]]:
     """Give the pairs with their right corners in each order in which the board's symmetry leaves them, the present one first."""
-    quarters = (0,) if (board.columns + board.rows) % 2 else (0, 1, 2, 3) if board.columns == board.rows else (0, 2)
     shape = (board.rows, board.columns, 2)
     if board.marks is not None:  # they tell the corners apart, and are not read in a mirror
         yield False, pairs
@@ -155,7 +155,7 @@ def _orders(pairs: list[BoardPair], board: Board, sizes_px: Sizes) -> Iterator[t
     for flip in (Flip.NONE, Flip.H):
         turn = Orientation(0, flip)
         right = [turned_corners(pair.right_px, sizes_px[1], turn, board) for pair in pairs]
-        for quarter in quarters:
+        for quarter in board.quarter_turns:
             yield (
                 flip is Flip.H,
                 [

@@ -11,7 +11,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.failure_modes.lone import Vector, apart_px, both_alone
+from phone_host.calibration.failure_modes.lone import apart_px, both_alone
 from phone_host.calibration.failure_modes.loosened import (
     FOCUS_LEFT,
     FOCUS_RIGHT,
@@ -24,11 +24,12 @@ from phone_host.calibration.failure_modes.loosened import (
 )
 from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, Turned
 from phone_host.calibration.failure_modes.rules import Rule, Weighed, again, criterion, scatter, significance, weighed
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.solve.calibrate import Sizes
-from phone_host.calibration.solve.verdict import REFERENCE_PX, Verdict
+from phone_host.calibration.solve.verdict import REFERENCE_PX
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.model import CameraModel, Side
+from phone_host.model import CameraModel, Side, Verdict
 
 _LEAST_PAIRS: Final = 6
 """With fewer, hardly a rule leaves anything to check it by."""

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.solve.bundle import BundleState
+from phone_host.calibration.solve.bundle_problem import BundleState, Vector
 from phone_host.calibration.solve.calibrate_alone import (
     LoneCamera,
     calibrate_alone,
@@ -25,12 +24,16 @@ from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import parameters_of, rays_through
 from phone_host.model import CameraModel, Lens, Rig, Side
 
-Vector = NDArray[np.float64]
-
 LENS: Final = 9
 """Numbers of a usual lens: fx fy cx cy k1 k2 p1 p2 k3."""
 
 _LEAST_CORNERS: Final = 6
+
+_USUAL_TERMS: Final = 8
+"""Focal lengths, principal point and k1 k2 p1 p2: the search knows them itself."""
+
+_FARTHEST_RAD: Final = np.radians(60)
+"""Beyond, two coefficients do not follow a fisheye: those corners are left out of the search."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,13 +97,6 @@ def apart_px(pairs: list[BoardPair], left: Lone, right: Lone, points_m: Vector) 
 
 def _lone(camera: LoneCamera, pairs: list[BoardPair], points_m: Vector) -> Lone:
     return Lone(camera, float(np.nansum(np.square(errors_px(camera, pairs, points_m)))))
-
-
-_USUAL_TERMS: Final = 8
-"""Focal lengths, principal point and k1 k2 p1 p2: the search knows them itself."""
-
-_FARTHEST_RAD: Final = np.radians(60)
-"""Beyond, two coefficients do not follow a fisheye: those corners are left out of the search."""
 
 
 def with_plain_lenses(pairs: list[BoardPair], rig: Rig) -> list[BoardPair]:

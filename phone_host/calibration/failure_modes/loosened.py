@@ -18,7 +18,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.failure_modes.lone import LENS, Vector
+from phone_host.calibration.failure_modes.lone import LENS
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.schur import NormalEquations, eliminated, minimise
 

@@ -7,11 +7,10 @@ import cv2
 import numpy as np
 
 from phone_host.calibration.failure_modes.arrangement import Misplaced
-from phone_host.calibration.failure_modes.lone import Vector
-from phone_host.calibration.solve.verdict import Verdict
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project, rays_through
-from phone_host.model import CameraModel
+from phone_host.model import CameraModel, Verdict
 
 
 class Mistake(Enum):

@@ -22,35 +22,14 @@ from phone_host.calibration.failure_modes.partners import wrong_partners
 from phone_host.calibration.solve.board_in_space import BENT_SIGMAS, common_bows_m
 from phone_host.calibration.solve.calibrate import Sizes
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import REFERENCE_PX, Verdict, size_factor
+from phone_host.calibration.solve.verdict import REFERENCE_PX, size_factor
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair, Reason
 from phone_host.calibration.target.sharpness import SeenLook
-from phone_host.model import Side
+from phone_host.model import Side, Verdict
 
 _BENT: Final = 0.004
 """Share of the board's side: 0.8 mm of 200 mm. Boards of four real rigs, whose results are good, stay at 0.003 and below."""
-
-
-def bent(found: Calibration, board: Board) -> Finding | None:
-    """Name a board that is bent in all views alike, as noise and what contradicts a stiff rig are not.
-
-    The rig was calibrated with that bend (`solve.board_in_space`): what is told is what a flat board would spare.
-    """
-    bows, sigmas = common_bows_m([used.in_space for used in found.used])
-    sides = np.array([board.columns - 1, board.rows - 1]) * board.square_m
-    shares = np.where(np.abs(bows) > BENT_SIGMAS * sigmas, np.abs(bows) / sides, 0.0)
-    axis = int(shares.argmax())
-    if not shares[axis] > _BENT:
-        return None
-    along = ("rows", "columns")[axis]
-    bow = f"{abs(bows[axis]) * 1e3:.2f} +- {sigmas[axis] * 1e3:.2f} mm over {sides[axis] * 1e3:.0f} mm"
-    return Finding(
-        mistake=Mistake.BENT,
-        sentence=f"the board is not flat: along its {along} it is bent by {bow}",
-        remedy="glue it to glass or another flat plate, and take all views again",
-    )
-
 
 _SPOILED_SHARE: Final = 0.2
 """A series is blurred or glaring if this share of its images is."""
@@ -91,6 +70,26 @@ _LEAST_SHIFTED, _SHIFTED_SHARE = 3, 0.8
 
 _EXPLAINED_SHARE: Final = 0.35
 """Of the squares of each view alone: a good series's cannot be explained so."""
+
+
+def bent(found: Calibration, board: Board) -> Finding | None:
+    """Name a board that is bent in all views alike, as noise and what contradicts a stiff rig are not.
+
+    The rig was calibrated with that bend (`solve.board_in_space`): what is told is what a flat board would spare.
+    """
+    bows, sigmas = common_bows_m([used.in_space for used in found.used])
+    sides = np.array([board.columns - 1, board.rows - 1]) * board.square_m
+    shares = np.where(np.abs(bows) > BENT_SIGMAS * sigmas, np.abs(bows) / sides, 0.0)
+    axis = int(shares.argmax())
+    if not shares[axis] > _BENT:
+        return None
+    along = ("rows", "columns")[axis]
+    bow = f"{abs(bows[axis]) * 1e3:.2f} +- {sigmas[axis] * 1e3:.2f} mm over {sides[axis] * 1e3:.0f} mm"
+    return Finding(
+        mistake=Mistake.BENT,
+        sentence=f"the board is not flat: along its {along} it is bent by {bow}",
+        remedy="glue it to glass or another flat plate, and take all views again",
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

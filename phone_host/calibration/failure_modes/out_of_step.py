@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.calibration.solve.board_pose import fit_pose
-from phone_host.calibration.solve.bundle import Vector, project_view, rms_px
+from phone_host.calibration.solve.bundle import rms_px
+from phone_host.calibration.solve.bundle_problem import Vector, project_view
 from phone_host.calibration.solve.calibrate_alone import LEAST_PAIRS, LoneCamera, calibrate_alone, state_of
 from phone_host.calibration.target.corners import Board, agree
 from phone_host.calibration.target.pairs import BoardPair, FileCorners

@@ -11,8 +11,9 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.failure_modes.lone import Vector, lone_camera
+from phone_host.calibration.failure_modes.lone import lone_camera
 from phone_host.calibration.solve.board_pose import fit_pose
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.target.corners import Board, agree
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project
@@ -92,11 +93,8 @@ def _best_errors(pairs: list[BoardPair], board: Board, models: list[CameraModel]
 
 def _orders(corners: Vector, board: Board) -> Vector:
     """Return (T, N, 2): corners in each order in which the board's colours leave them."""
-    if (board.columns + board.rows) % 2:
-        return corners[np.newaxis]
     grid = corners.reshape(board.rows, board.columns, 2)
-    turns = (0, 1, 2, 3) if board.rows == board.columns else (0, 2)
-    return np.array([np.rot90(grid, turn).reshape(-1, 2) for turn in turns])
+    return np.array([np.rot90(grid, turn).reshape(-1, 2) for turn in board.quarter_turns])
 
 
 def _same_way(left: Vector, orders: Vector, board: Board) -> int:

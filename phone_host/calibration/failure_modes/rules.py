@@ -13,7 +13,6 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.failure_modes.lone import Vector
 from phone_host.calibration.failure_modes.loosened import (
     DEVIATIONS,
     FOCUS_LEFT,
@@ -24,6 +23,7 @@ from phone_host.calibration.failure_modes.loosened import (
     TURN,
     Loosened,
 )
+from phone_host.calibration.solve.bundle_problem import Vector
 
 _PIVOTS: Final = (0.0, 0.5, 1.0)
 """About which the right camera may turn, from its own centre to the left camera's."""

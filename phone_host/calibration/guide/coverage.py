@@ -20,6 +20,11 @@ _FOCAL_WIDTHS: Final = 0.9
 CORNERS: Final = ((-1, -1), (1, -1), (-1, 1), (1, 1))
 """The corners of an image: left or right, top or bottom."""
 
+COLUMNS, ROWS = 8, 6
+"""Cells of an image: as fine as lenses bend."""
+
+_FLAT_DEG: Final = 12.0
+
 
 @dataclass(frozen=True, slots=True)
 class Placement:
@@ -99,10 +104,6 @@ def _tilt_deg(corners: Corners, board: Board, model: CameraModel) -> tuple[float
     return math.degrees(math.atan2(sign * x, forward)), math.degrees(math.atan2(sign * y, forward))
 
 
-COLUMNS, ROWS = 8, 6
-"""Cells of an image: as fine as lenses bend."""
-
-
 class Depth(Enum):
     """How far the board is, by the share of the width that it fills, up to which."""
 
@@ -119,9 +120,6 @@ class Tilt(Enum):
     RIGHT_AWAY = "right away"
     TOP_AWAY = "top away"
     BOTTOM_AWAY = "bottom away"
-
-
-_FLAT_DEG: Final = 12.0
 
 
 @dataclass(frozen=True, slots=True)

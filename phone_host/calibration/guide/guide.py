@@ -33,10 +33,10 @@ from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
 from phone_host.calibration.guide.unseen import is_guessed, unseen, with_corners
 from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
 from phone_host.calibration.guide.words import Speech, Words, done, taken
-from phone_host.calibration.solve.verdict import Assessment, Verdict
+from phone_host.calibration.solve.verdict import Assessment
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import BoardLook
-from phone_host.model import Rig
+from phone_host.model import Rig, Verdict
 
 _PATIENCE_NS: Final = 8_000_000_000
 """A wanted view that is not reached in this time is given up."""

@@ -21,6 +21,17 @@ _NOW: Final = "++"
 _WIDTH: Final = 2 * COLUMNS
 _ARROWS: Final = {Tilt.LEFT_AWAY: "←", Tilt.RIGHT_AWAY: "→", Tilt.TOP_AWAY: "↑", Tilt.BOTTOM_AWAY: "↓"}
 
+_WIDTH_PX, _PANEL_PX, _GAP_PX, _MARGIN_PX = 720, 332, 24, 16
+_HEAD_PX: Final = 64
+_BAR_PX: Final = 16
+_FULL: Final = 36
+"""Corners of a cell for the strongest colour: about three views."""
+
+_STYLE: Final = (
+    "text{font:13px system-ui,sans-serif;fill:#333}.words{font-size:24px;font-weight:600;fill:#111}.cell{stroke:#ddd}"
+    ".cell,.bar{fill:#0072b2}.now{fill:none;stroke:#d55e00;stroke-width:2.5}.empty{fill:none;stroke:#ccc}"
+)
+
 
 def picture_lines(snapshot: GuideSnapshot) -> tuple[str, ...]:
     """Return the two pictures, 38 characters wide; none before the board was seen in both."""
@@ -90,18 +101,6 @@ def _cells_of(outline: Outline) -> set[tuple[int, int]]:
     return {
         (column, row) for column in range(min(columns), max(columns) + 1) for row in range(min(rows), max(rows) + 1)
     }
-
-
-_WIDTH_PX, _PANEL_PX, _GAP_PX, _MARGIN_PX = 720, 332, 24, 16
-_HEAD_PX: Final = 64
-_BAR_PX: Final = 16
-_FULL: Final = 36
-"""Corners of a cell for the strongest colour: about three views."""
-
-_STYLE: Final = (
-    "text{font:13px system-ui,sans-serif;fill:#333}.words{font-size:24px;font-weight:600;fill:#111}.cell{stroke:#ddd}"
-    ".cell,.bar{fill:#0072b2}.now{fill:none;stroke:#d55e00;stroke-width:2.5}.empty{fill:none;stroke:#ccc}"
-)
 
 
 def guide_svg(snapshot: GuideSnapshot) -> str:

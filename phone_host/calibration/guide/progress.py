@@ -6,8 +6,8 @@ from typing import Final
 from phone_host.calibration.guide.wants import ORDER, Want, spot_of
 from phone_host.calibration.solve.next_view import DEPTH_M, DEPTHS_M, after_one_m
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.corners import Board
+from phone_host.model import Verdict
 
 LEAST_STATED: Final = 5
 """Fewer views do not show how much they contradict each other (`bundle`): what a rig of them states is too good, and is not told."""

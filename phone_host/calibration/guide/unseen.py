@@ -6,10 +6,10 @@ from phone_host.calibration.guide.coverage import placement
 from phone_host.calibration.guide.wants import CORNERS, ORDER, Placed, Want, is_seen
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment, Verdict
+from phone_host.calibration.solve.verdict import Assessment
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.model import CameraModel
+from phone_host.model import CameraModel, Verdict
 
 
 def unseen(places: Iterable[Placed]) -> frozenset[Want]:

@@ -21,7 +21,8 @@ from typing import Final
 import numpy as np
 
 from phone_host.calibration.solve.board_pose import towards
-from phone_host.calibration.solve.bundle import BundleResult, BundleState, Vector
+from phone_host.calibration.solve.bundle import BundleResult
+from phone_host.calibration.solve.bundle_problem import BundleState, Vector
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import parameters_of, project_linearised, rays_through
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of, vectors_of
@@ -38,6 +39,16 @@ _ADJUSTMENTS: Final = 1
 
 _STEP_SHARE: Final = 1e-3
 """Of the board's size: the step of the derivatives, small beside its distance and large beside the search's end."""
+
+_STEPS: Final = 4
+"""Gauss-Newton from the rig's own pose of the board: the second step is already below the noise."""
+
+_SIZE: Final = 6
+_BOWS: Final = slice(7, 9)
+_FITTED: Final = 9
+"""Places in the fit, behind place and attitude; and how many numbers it has."""
+
+_LEAST_CORNERS: Final = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,17 +146,6 @@ def _between(start: BundleState, end: BundleState) -> Vector:
             end.translation_m - start.translation_m,
         ]
     )
-
-
-_STEPS: Final = 4
-"""Gauss-Newton from the rig's own pose of the board: the second step is already below the noise."""
-
-_SIZE: Final = 6
-_BOWS: Final = slice(7, 9)
-_FITTED: Final = 9
-"""Places in the fit, behind place and attitude; and how many numbers it has."""
-
-_LEAST_CORNERS: Final = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.calibration.solve.bundle import BundleView, Vector, alone_state, fit_poses
+from phone_host.calibration.solve.bundle import alone_state, fit_poses
+from phone_host.calibration.solve.bundle_problem import BundleView, Vector
 from phone_host.calibration.target.corners import Corners
 from phone_host.geometry.lens import rays_through
 from phone_host.geometry.se3 import SE3, rotations_of

@@ -30,7 +30,6 @@ from phone_host.calibration.solve.bundle_problem import (
     RigProblem,
     Vector,
     errors_of,
-    project_view,
 )
 from phone_host.geometry.rig_pixels import LEFT, RIGHT
 from phone_host.geometry.schur import inverse_of, minimise
@@ -56,6 +55,23 @@ _LEAST_LEFT: Final = 1e-6
 
 _TO_MEAN: Final = 0.5
 """How far a scatter that a dozen views show is drawn to its mean."""
+
+_MOST_PASSES = 4  # each has a noise estimate that the outliers of the one before no longer inflate
+_SAME_NOISE = 0.002  # relative change of the noise estimate below which another pass changes nothing
+ROUGHLY = 1e-5
+"""Relative decrease of the cost at which a search may end whose result is only compared."""
+# A view's corners err together by about as much, whatever the detector: smaller weights would let one camera's lucky corners, and Huber's limit,
+# rule. Also, with a test's exact corners it keeps the cost quadratic. What is stated does not know it.
+_LEAST_SIGMA_PX = 0.02
+# Where the views do not determine the principal point (all boards parallel), this prior keeps it near the middle: a
+# tenth of the image width, ten times more than lenses are off. Views that do determine it outweigh the prior
+# ten-thousandfold.
+_PRINCIPAL_POINT_SHARE = 0.1
+# Numerator and denominator of the rational lens may grow together without end; real ones' coefficients are a few units.
+_RATIONAL_SIGMA = 3.0
+# Coefficients of published fisheye calibrations are a few hundredths (0.1 let 1 of 20 fisheyes of 120 degrees fold back inside the image); where boards do not reach, a fit is not free to invent a lens
+# that turns back.
+_FISHEYE_SIGMA = 0.03
 
 
 def deviation_px(errors: Vector) -> float:
@@ -161,40 +177,6 @@ def _covariance(inverse: Vector, pulls: Vector, moves: Vector) -> Vector:
     shares, directions = np.linalg.eigh(scatter)
     spread = root @ directions * np.sqrt(np.maximum(shares, 1.0))
     return np.asarray(spread @ spread.T, np.float64)
-
-
-__all__ = [
-    "BundleResult",
-    "BundleState",
-    "BundleView",
-    "FreeParameters",
-    "Vector",
-    "adjust",
-    "adjust_alone",
-    "adjust_roughly",
-    "alone_state",
-    "fit_poses",
-    "project_view",
-    "rig_of",
-    "rms_px",
-]
-
-_MOST_PASSES = 4  # each has a noise estimate that the outliers of the one before no longer inflate
-_SAME_NOISE = 0.002  # relative change of the noise estimate below which another pass changes nothing
-ROUGHLY = 1e-5
-"""Relative decrease of the cost at which a search may end whose result is only compared."""
-# A view's corners err together by about as much, whatever the detector: smaller weights would let one camera's lucky corners, and Huber's limit,
-# rule. Also, with a test's exact corners it keeps the cost quadratic. What is stated does not know it.
-_LEAST_SIGMA_PX = 0.02
-# Where the views do not determine the principal point (all boards parallel), this prior keeps it near the middle: a
-# tenth of the image width, ten times more than lenses are off. Views that do determine it outweigh the prior
-# ten-thousandfold.
-_PRINCIPAL_POINT_SHARE = 0.1
-# Numerator and denominator of the rational lens may grow together without end; real ones' coefficients are a few units.
-_RATIONAL_SIGMA = 3.0
-# Coefficients of published fisheye calibrations are a few hundredths (0.1 let 1 of 20 fisheyes of 120 degrees fold back inside the image); where boards do not reach, a fit is not free to invent a lens
-# that turns back.
-_FISHEYE_SIGMA = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,15 +19,8 @@ from common.errors import DataError
 from common.program.out_of_memory import is_out_of_memory
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_pose import fit_pose
-from phone_host.calibration.solve.bundle import (
-    BundleResult,
-    BundleState,
-    BundleView,
-    FreeParameters,
-    Vector,
-    adjust,
-)
-from phone_host.calibration.solve.bundle_problem import GLOBALS, RigProblem
+from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, adjust
+from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem, Vector
 from phone_host.calibration.solve.calibrate_alone import (
     LoneCamera,
     calibrate_alone,

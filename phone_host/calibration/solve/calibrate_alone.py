@@ -14,7 +14,8 @@ import numpy as np
 from common.errors import DataError
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_pose import fit_pose, rough_pose
-from phone_host.calibration.solve.bundle import BundleState, Vector, adjust_alone, alone_state, project_view, rms_px
+from phone_host.calibration.solve.bundle import adjust_alone, alone_state, rms_px
+from phone_host.calibration.solve.bundle_problem import BundleState, Vector, project_view
 from phone_host.calibration.target.corners import Corners
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.geometry.lens import project
@@ -23,6 +24,24 @@ from phone_host.model import CameraModel, Lens, Side
 
 _FIELDS_RAD: Final = (0.9, 1.2, 1.6, 2.1, 2.7, 3.3)
 """Fields of view across the image's width: 50 to 190 degrees, each a third wider than the one before."""
+
+LEAST_PAIRS = 3
+"""Fewer pairs do not determine focal length and distortion (Zhang 2000: two views suffice only without distortion)."""
+
+_STEADY_VIEWS: Final = 5
+"""With fewer views OpenCV's search starts steadier with the first radial coefficient alone; the bundle adjustment adds the others."""
+
+# Nothing is certain yet, so only views that are plainly wrong are rejected.
+_GROSS_FACTOR, _GROSS_FLOOR_PX = 4.0, 1.0
+
+_STEPS = {
+    Bend.USUAL: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, np.finfo(float).eps),
+    Bend.WIDE: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 300, np.finfo(float).eps),
+}
+"""OpenCV's own limit is 30 steps. With k3 that leaves views of a wide lens off by 10 px, which then look wrong."""
+
+FAR_OFF_PX: Final = 1000
+"""Corners of the right board in a whole photograph are never so far off: the fit has diverged, and its number means nothing."""
 
 
 def fisheye_camera(views: list[Corners], points_m: Vector, size_px: tuple[int, int]) -> tuple[CameraModel, Vector]:
@@ -63,27 +82,6 @@ def _start(
     return (median, alone_state(model, poses)) if np.isfinite(median) else None
 
 
-LEAST_PAIRS = 3
-"""Fewer pairs do not determine focal length and distortion (Zhang 2000: two views suffice only without distortion)."""
-
-_STEADY_VIEWS: Final = 5
-"""With fewer views OpenCV's search starts steadier with the first radial coefficient alone; the bundle adjustment adds the others."""
-
-# Nothing is certain yet, so only views that are plainly wrong are rejected.
-_GROSS_FACTOR, _GROSS_FLOOR_PX = 4.0, 1.0
-
-
-_STEPS = {
-    Bend.USUAL: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, np.finfo(float).eps),
-    Bend.WIDE: (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 300, np.finfo(float).eps),
-}
-"""OpenCV's own limit is 30 steps. With k3 that leaves views of a wide lens off by 10 px, which then look wrong."""
-
-
-FAR_OFF_PX: Final = 1000
-"""Corners of the right board in a whole photograph are never so far off: the fit has diverged, and its number means nothing."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class LoneCamera:
     """One camera calibrated alone: its model, and the poses (V, 6) of the boards in its axes."""
@@ -106,16 +104,13 @@ def require_enough(pairs: list[BoardPair], rejected: list[Rejected]) -> None:
     """
     if len(pairs) < LEAST_PAIRS:
         why = f" ({len(rejected)} rejected: {rejected[0].name}: {rejected[0].detail}, ...)" if rejected else ""
-        check = "check that the two images of each pair belong together, and " if _misfits(rejected) else ""
+        misfits = {Reason.MOVED, Reason.CORNERS_LEFT, Reason.CORNERS_RIGHT}
+        is_misfit = any(each.reason in misfits for each in rejected)
+        check = "check that the two images of each pair belong together, and " if is_misfit else ""
         raise DataError(
             f"only {len(pairs)} of at least {LEAST_PAIRS} pairs can be used{why}",
             f"{check}take 15 or more pairs with the whole board sharp in both images",
         )
-
-
-def _misfits(rejected: list[Rejected]) -> bool:
-    """Whether a pair was rejected because it does not fit the others."""
-    return any(each.reason in {Reason.MOVED, Reason.CORNERS_LEFT, Reason.CORNERS_RIGHT} for each in rejected)
 
 
 def calibrate_alone(
@@ -225,12 +220,6 @@ def own_errors_px(points_m: Vector, corners: Corners, model: CameraModel) -> Vec
     return np.asarray(corners - project(SE3.of(pose).apply(points_m), model), dtype=np.float64)
 
 
-def relative_pose(left: Vector, right: Vector) -> tuple[Vector, Vector]:
-    """Return the rotation vector and translation, right from left, from two poses (6,) of one board."""
-    pose = (SE3.of(right) @ SE3.of(left).inverse()).pose()
-    return pose[:3], pose[3:]
-
-
 def states_of(left: LoneCamera, right: LoneCamera) -> list[BundleState]:
     """Return the rig that each pair gives on its own."""
     return [
@@ -241,10 +230,8 @@ def states_of(left: LoneCamera, right: LoneCamera) -> list[BundleState]:
 
 def state_of(left: CameraModel, right: CameraModel, left_pose: Vector, right_pose: Vector) -> BundleState:
     """Return the rig that one pair gives."""
-    rotation, translation_m = relative_pose(left_pose, right_pose)
-    return BundleState(
-        left=left, right=right, rotation=rotation, translation_m=translation_m, poses=left_pose[np.newaxis]
-    )
+    pose = (SE3.of(right_pose) @ SE3.of(left_pose).inverse()).pose()
+    return BundleState(left=left, right=right, rotation=pose[:3], translation_m=pose[3:], poses=left_pose[np.newaxis])
 
 
 def prediction_errors_px(states: list[BundleState], right_px: list[Corners], points_m: Vector) -> Vector:

@@ -14,17 +14,8 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_in_space import boards_in_space, fit_bent, misses, ray_crossings
-from phone_host.calibration.solve.bundle import (
-    BundleResult,
-    BundleState,
-    BundleView,
-    FreeParameters,
-    Vector,
-    adjust,
-    adjust_roughly,
-    rig_of,
-    rms_px,
-)
+from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, adjust, adjust_roughly, rig_of, rms_px
+from phone_host.calibration.solve.bundle_problem import BundleState, BundleView, Vector
 from phone_host.calibration.solve.calibrate_alone import FAR_OFF_PX, corners_of, off_words, own_errors_px
 from phone_host.calibration.solve.next_view import DEPTHS_M, depth_sigma_m, next_view, zero_sigma_px
 from phone_host.calibration.solve.result import Calibration, LensTrial, Squares, Used
@@ -41,6 +32,14 @@ _FEW_PAIRS, _FEW_FACTOR = 8, 3.0
 # By how much rays miss each other carries a quarter of the information and scatters more from pair to pair. Rows that differ by
 # 0.3 px are brought together by moving both corners by half of that.
 _RAYS_FACTOR, _RAYS_FLOOR_PX = 2.5, 0.3 / 2**0.5
+
+_PARTS: Final = 5
+_LEAST_PAIRS: Final = 6
+_NEIGHBOUR: Final = 0.01
+"""Corners whose distance is a side, up to this share, span one."""
+
+Bends = tuple[Bend, Bend]
+"""How freely the left and the right lens may bend."""
 
 
 def misfits(pairs: list[BoardPair], result: BundleResult, points_m: Vector) -> list[tuple[int, Rejected]]:
@@ -113,12 +112,6 @@ def rms(values: Vector) -> float:
     return float(np.sqrt((values**2).mean())) if values.size else float("nan")
 
 
-_PARTS: Final = 5
-_LEAST_PAIRS: Final = 6
-_NEIGHBOUR: Final = 0.01
-"""Corners whose distance is a side, up to this share, span one."""
-
-
 def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleState, free: FreeParameters) -> Squares:
     """Measure the squares of every pair by a rig that has not seen it."""
     true_m = _side_m(points_m)
@@ -153,10 +146,6 @@ def _neighbours(points_m: Vector) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     apart, side_m = np.linalg.norm(points_m[:, np.newaxis] - points_m[np.newaxis], axis=2), _side_m(points_m)
     first, second = np.nonzero(np.triu(np.abs(apart - side_m) <= side_m * _NEIGHBOUR, 1))
     return first, second
-
-
-Bends = tuple[Bend, Bend]
-"""How freely the left and the right lens may bend."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

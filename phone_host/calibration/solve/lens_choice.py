@@ -18,15 +18,8 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_pose import fit_pose
-from phone_host.calibration.solve.bundle import (
-    BundleState,
-    BundleView,
-    Vector,
-    adjust_alone,
-    alone_state,
-    fit_poses,
-)
-from phone_host.calibration.solve.bundle_problem import errors_of
+from phone_host.calibration.solve.bundle import adjust_alone, alone_state, fit_poses
+from phone_host.calibration.solve.bundle_problem import BundleState, BundleView, Vector, errors_of
 from phone_host.calibration.solve.calibrate_alone import fisheye_camera
 from phone_host.calibration.solve.result import LensTrial
 from phone_host.calibration.target.corners import Corners

@@ -19,19 +19,41 @@ from typing import Final, assert_never
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.solve.bundle import BundleResult, BundleView, FreeParameters, Vector, rig_of
-from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, RigProblem, project_view
+from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, rig_of
+from phone_host.calibration.solve.bundle_problem import (
+    GLOBALS,
+    BundleState,
+    BundleView,
+    RigProblem,
+    Vector,
+    project_view,
+)
 from phone_host.geometry.rig_pixels import pixel_derivatives
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
 from phone_host.model import CameraModel, Epipolar, Rectification, Rig
-
-Floats = NDArray[np.float64]
 
 DEPTHS_M: Final = (0.3, 0.5, 1.0, 2.0)
 """Depths at which a calibration states its depth error."""
 
 _COLUMNS, _ROWS = 9, 7
 """Points over the image. The error bends as slowly as the lens: a finer grid changes the result by less than a tenth."""
+
+DEPTH_M: Final = 1.0
+"""Where the depth error counts that is to become smaller."""
+
+_FILLS: Final = 0.4
+"""Share of the image's width that an imagined board fills, where nothing else is said."""
+
+_NEAR_FILLS, _FAR_FILLS = 0.6, 0.2
+_TILT_DEG: Final = 35.0
+_ASIDE: Final = 0.28
+"""How far from the middle, in image sizes, a board in a corner has its own middle."""
+
+_LEAST_SEEN: Final = 0.5
+"""An imagined view of which a camera would see less than this share of the corners would not be found."""
+
+_LEAST_SIGMA_PX: Final = 0.02
+"""Corners of rendered boards err by about as much: no view teaches without limit."""
 
 
 def zero_sigma_px(rig: Rig, rectification: Rectification) -> float:
@@ -62,7 +84,7 @@ def _disparity_sigma_px(rig: Rig, rectification: Rectification, depth_m: float) 
     return float(np.sqrt(variances.clip(min=0).mean())) if len(variances) else float("nan")
 
 
-def disparity_derivatives(rig: Rig, rectification: Rectification, depth_m: float) -> Floats:
+def disparity_derivatives(rig: Rig, rectification: Rectification, depth_m: float) -> Vector:
     """Return the derivatives of disparities by the true parameters, (N, 30), px per unit, at points spread over what both cameras see; their depth may be infinite."""
     slopes = _slopes(rectification)
     axis = 1 if rectification.epipolar.is_vertical else 0
@@ -76,31 +98,13 @@ def disparity_derivatives(rig: Rig, rectification: Rectification, depth_m: float
     return np.asarray(both[:, 0] - both[:, 1], np.float64)
 
 
-def _slopes(rectification: Rectification) -> Floats:
+def _slopes(rectification: Rectification) -> Vector:
     """Return slopes (N, 2) spread evenly over the rectified image."""
     geometry = rectification.geometry
     columns = (np.arange(_COLUMNS) + 0.5) / _COLUMNS * rectification.width_px
     rows = (np.arange(_ROWS) + 0.5) / _ROWS * rectification.height_px
     x, y = (axis.ravel() for axis in np.meshgrid(columns, rows))
     return np.column_stack([x - geometry.cx_px, y - geometry.cy_px]) / geometry.focal_px
-
-
-DEPTH_M: Final = 1.0
-"""Where the depth error counts that is to become smaller."""
-
-_FILLS: Final = 0.4
-"""Share of the image's width that an imagined board fills, where nothing else is said."""
-
-_NEAR_FILLS, _FAR_FILLS = 0.6, 0.2
-_TILT_DEG: Final = 35.0
-_ASIDE: Final = 0.28
-"""How far from the middle, in image sizes, a board in a corner has its own middle."""
-
-_LEAST_SEEN: Final = 0.5
-"""An imagined view of which a camera would see less than this share of the corners would not be found."""
-
-_LEAST_SIGMA_PX: Final = 0.02
-"""Corners of rendered boards err by about as much: no view teaches without limit."""
 
 
 class Kind(Enum):

@@ -6,7 +6,7 @@ import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import Vector
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.solve.next_view import NextView
 from phone_host.calibration.target.pairs import Rejected
 from phone_host.model import CameraModel, Rectification, Rig

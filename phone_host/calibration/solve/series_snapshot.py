@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import Vector
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.solve.fitted_rig import vertical_errors_px
 from phone_host.calibration.solve.result import Calibration, LensTrial
 from phone_host.calibration.solve.verdict import limits_of

@@ -19,18 +19,6 @@ from phone_host.calibration.target.pairs import Reason, Rejected
 from phone_host.model import Rig, Verdict
 from phone_host.model.calibration_series import Limits
 
-__all__ = [
-    "GOOD_PX",
-    "REFERENCE_PX",
-    "USABLE_PX",
-    "Assessment",
-    "Verdict",
-    "judge",
-    "limits_of",
-    "size_factor",
-    "vertical_p95_px",
-]
-
 GOOD_PX, USABLE_PX = 0.25, 0.5
 """Limits of the 95th percentile of the vertical error, for images of up to `REFERENCE_PX`."""
 

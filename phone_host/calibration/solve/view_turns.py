@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.solve.bundle import Vector
+from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import project_linearised
 from phone_host.geometry.se3 import SE3, cross_matrices, rotations_of

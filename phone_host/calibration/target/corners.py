@@ -88,6 +88,11 @@ class Board:
         rows, columns = np.mgrid[0 : self.rows, 0 : self.columns]
         return np.column_stack([columns.ravel(), rows.ravel(), np.zeros(rows.size)]) * self.square_m
 
+    @property
+    def quarter_turns(self) -> tuple[int, ...]:
+        """By how many quarters a chessboard without marks can be turned and looks the same, colours included."""
+        return (0,) if (self.columns + self.rows) % 2 else (0, 1, 2, 3) if self.rows == self.columns else (0, 2)
+
 
 def parse_board(corners: str, square_mm: float) -> Board:
     """Read a board's size as people write it.
@@ -149,12 +154,11 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
     Returns:
         The right corners, reordered.
     """
-    if board.marks is not None or (board.columns + board.rows) % 2 == 1:
+    if board.marks is not None or len(board.quarter_turns) == 1:
         return right  # the marks or the colours have determined the order
     reference = left.reshape(board.rows, board.columns, 2)
     grid = right.reshape(board.rows, board.columns, 2)
-    turns = (0, 1, 2, 3) if board.rows == board.columns else (0, 2)
-    best = max((np.rot90(grid, turn) for turn in turns), key=lambda turned: _same_way(reference, turned))
+    best = max((np.rot90(grid, turn) for turn in board.quarter_turns), key=lambda turned: _same_way(reference, turned))
     return np.ascontiguousarray(best.reshape(-1, 2))
 
 

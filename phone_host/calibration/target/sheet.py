@@ -5,6 +5,8 @@ from enum import Enum
 from html import escape
 from typing import Final
 
+_POINTS_A_MM: Final = 72 / 25.4
+
 
 class Paper(Enum):
     """A sheet's size, portrait: width and height, mm (ISO 216; ANSI Letter)."""
@@ -62,9 +64,6 @@ class Sheet:
     check: str
     rectangles: tuple[Rectangle, ...]
     words: tuple[Words, ...] = field(default=())
-
-
-_POINTS_A_MM: Final = 72 / 25.4
 
 
 def pdf(sheet: Sheet) -> bytes:

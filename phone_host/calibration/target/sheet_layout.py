@@ -16,6 +16,18 @@ from phone_host.calibration.target.marked import MarkFamily
 from phone_host.calibration.target.sheet import Ink, Paper, Rectangle, Sheet, Words
 from phone_host.model import Image
 
+_MARGIN_MM: Final = 4.8
+"""Office printers leave 4.2 mm to 4.6 mm of the paper's edge blank."""
+
+_RULER_MM: Final = 100
+_TICK_MM, _LINE_MM = 2.5, 0.2
+_RULER_NEEDS_MM: Final = 10.0
+"""Between the pattern and the paper's edge: 4.2 mm that printers leave blank, and the ruler."""
+
+_WORDS_MM, _GAP_MM = 2.2, 1.2
+_LETTER: Final = 0.72
+"""Width of a letter, and a little more than that, in heights of capitals: those of the longest line are 0.63 of it on average."""
+
 
 @dataclass(frozen=True, slots=True)
 class Chessboard:
@@ -87,19 +99,6 @@ def _runs(bits: np.ndarray, x_mm: float, y_mm: float, cell_mm: float) -> list[Re
                     else Rectangle(x_mm + across, y_mm + along, cell_mm, length, Ink.WHITE)
                 )
     return found
-
-
-_MARGIN_MM: Final = 4.8
-"""Office printers leave 4.2 mm to 4.6 mm of the paper's edge blank."""
-
-_RULER_MM: Final = 100
-_TICK_MM, _LINE_MM = 2.5, 0.2
-_RULER_NEEDS_MM: Final = 10.0
-"""Between the pattern and the paper's edge: 4.2 mm that printers leave blank, and the ruler."""
-
-_WORDS_MM, _GAP_MM = 2.2, 1.2
-_LETTER: Final = 0.72
-"""Width of a letter, and a little more than that, in heights of capitals: those of the longest line are 0.63 of it on average."""
 
 
 def largest_square_mm(paper: Paper, columns: int, rows: int, margin_squares: float) -> float:

@@ -5,8 +5,9 @@ from typing import Final
 from phone_host.calibration.failure_modes.arrangement import is_contradicted
 from phone_host.calibration.failure_modes.mistakes import Finding, Mistake
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment, Verdict, judge
+from phone_host.calibration.solve.verdict import Assessment, judge
 from phone_host.calibration.target.pairs import Rejected
+from phone_host.model import Verdict
 
 _BEST_FIRST: Final = (Verdict.GOOD, Verdict.USABLE, Verdict.REJECT)
 

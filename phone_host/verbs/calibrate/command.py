@@ -5,7 +5,7 @@ import argparse
 from common.errors import DataError
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.terminal import say
-from phone_host.calibration.solve.verdict import Verdict
+from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
 from phone_host.verbs.calibrate.earlier import asked_of
 from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place

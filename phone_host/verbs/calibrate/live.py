@@ -30,7 +30,6 @@ from phone_host.calibration.guide.unseen import unseen_in
 from phone_host.calibration.guide.wants import CORNERS, Want
 from phone_host.calibration.solve.earlier_views import board_of, pairs_of
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.board_views import BoardViews, Size
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import SeenLook
@@ -40,7 +39,7 @@ from phone_host.camera.factory import open_camera
 from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, Shows, SnapshotFiles, Spoken, tell_sides
 from phone_host.live.voice import Voice, speech_program
-from phone_host.model import Side, TimeOffset
+from phone_host.model import Side, TimeOffset, Verdict
 from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import Sink
 from phone_host.settings import key_folder, most_pixels

@@ -14,7 +14,6 @@ from common.program.extensions import registered_names
 from common.program.invocation import command_line
 from common.program.settings import log_level
 from common.stamp import HOST_CLOCK
-from phone_host.calibration.solve.verdict import Verdict
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera, require_replayed
@@ -25,6 +24,7 @@ from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
 from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.model import Verdict
 from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.data_folder import data_folder

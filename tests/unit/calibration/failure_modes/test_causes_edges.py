@@ -21,7 +21,6 @@ from phone_host.calibration.solve.board_pose import rough_pose
 from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem
 from phone_host.calibration.solve.calibrate import solve_pose
 from phone_host.calibration.solve.result import Calibration, Squares
-from phone_host.calibration.solve.verdict import Verdict
 from phone_host.calibration.target.board_names import named_board
 from phone_host.calibration.target.corners import Board, find_corners
 from phone_host.calibration.target.marked import MarkFamily
@@ -29,7 +28,7 @@ from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import look_at
 from phone_host.geometry.lens import project
 from phone_host.geometry.se3 import SE3
-from phone_host.model import CameraModel, Lens, RectifiedPair, Rig, StereoGeometry
+from phone_host.model import CameraModel, Lens, RectifiedPair, Rig, StereoGeometry, Verdict
 from tests.support.boards import BOARD, exact_pairs, poses, render_board
 from tests.support.rigs import fisheye_rig, small_rig, unlike_rig
 

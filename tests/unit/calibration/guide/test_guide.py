@@ -22,10 +22,10 @@ from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.next_view import Spot, after_one_m, depth_sigma_m
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment, Verdict
+from phone_host.calibration.solve.verdict import Assessment
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import BoardLook
-from phone_host.model import Side
+from phone_host.model import Side, Verdict
 from tests.support.boards import exact_pairs, poses
 from tests.support.guided import follow
 from tests.support.rigs import unlike_rig

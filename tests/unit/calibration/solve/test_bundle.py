@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import BundleState, BundleView, FreeParameters, adjust
+from phone_host.calibration.solve.bundle import FreeParameters, adjust
+from phone_host.calibration.solve.bundle_problem import BundleState, BundleView
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.target.pairs import BoardPair
 from tests.support.boards import BOARD, exact_pairs, poses

@@ -16,9 +16,9 @@ from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.calibrate_alone import off_words
 from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment, Verdict, judge, size_factor, vertical_p95_px
+from phone_host.calibration.solve.verdict import Assessment, judge, size_factor, vertical_p95_px
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
-from phone_host.model import CameraModel, Rig
+from phone_host.model import CameraModel, Rig, Verdict
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import project_points, unlike_rig
 

@@ -5,16 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import (
-    BundleResult,
-    BundleState,
-    BundleView,
-    FreeParameters,
-    adjust,
-    deviation_px,
-    noise_of,
-)
-from phone_host.calibration.solve.bundle_problem import GLOBALS, RigProblem
+from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, adjust, deviation_px, noise_of
+from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem
 from phone_host.geometry.se3 import vectors_of
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig

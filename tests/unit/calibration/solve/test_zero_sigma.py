@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import BundleState, BundleView, FreeParameters, adjust, rig_of
+from phone_host.calibration.solve.bundle import FreeParameters, adjust, rig_of
+from phone_host.calibration.solve.bundle_problem import BundleState, BundleView
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.next_view import depth_sigma_m, zero_sigma_px
 from phone_host.model import Rectification, Rig
