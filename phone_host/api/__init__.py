@@ -36,13 +36,13 @@ from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.run.kept_field import read_field
 from phone_host.run.model_job import check_model, export_model, print_model
 from phone_host.scan.box import Box
+from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.mat import Mat, parse_mat
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
-from phone_host.scan.ways import scan_for
 from phone_host.stereo.matcher_protocol import Matcher, ReportingMatcher
 
 __all__ = [

@@ -23,14 +23,14 @@ from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import own_axes, report_of
 from phone_host.run.sinks import FunctionSink
 from phone_host.run.turn_remarks import field_of_turn, turn_remarks
-from phone_host.run.unused_mat import UnusedMat
+from phone_host.run.unused_mat import unused_mat
 from phone_host.scan.box import Box
+from phone_host.scan.factory import scan_for
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING
 from phone_host.scan.volume_settings import LEAST_WEIGHT
-from phone_host.scan.ways import scan_for
 
 _SINK: Final = "scan"
 _NS: Final = 1e9
@@ -71,7 +71,6 @@ class LiveScan:
         is_timeless: bool,
     ) -> None:
         self.scan, self.axes, self._is_timeless = scan_for(wanted), own_axes(wanted), is_timeless
-        self._mat = UnusedMat(wanted)
         self.kept = KeptSubmaps(kept_in, self.scan, resumed)
         self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
@@ -107,11 +106,11 @@ class LiveScan:
 
     def renew_surface(self) -> None:
         """Make the surface again. The run has ended, or calls this itself."""
-        tracker = self.scan.tracker
-        if tracker is None:
+        volume = self.scan.volume
+        if volume is None:
             return
         with self._watching:
-            self.patches.renew(tracker.volume)
+            self.patches.renew(volume)
             self._renewed_ns = now.monotonic_ns()
 
     def crop(self, box: Box | None) -> None:
@@ -131,7 +130,7 @@ class LiveScan:
         count = f"{counted(self._counts[1], 'pair')} in the model"
         if self._has_ended:
             return f"{count}: all pairs have arrived, the model is being made"
-        unused, weakness = self._mat.remark, last.weakness
+        unused, weakness = unused_mat(self.scan), last.weakness
         if unused is not None and (not weakness.advice or weakness in (*OF_TURNING, *OF_TABLE)):
             return f"{count}: {unused.text}"
         return f"{count}: {weakness.advice}" if weakness.advice else f"{count}: go on"
@@ -164,8 +163,7 @@ class LiveScan:
                 shown = model.with_unseen(self.scan.wanted.unseen)
                 self.patches.become(shown.mesh, self.scan.settings.voxel_m, shown.seen)
         remarks.extend(turn_remarks(self.scan))
-        pairs, unused = self.scan.pairs, self._mat.remark
-        report = report_of(self.scan, model, pairs, remarks, matcher=matcher, axes=axes, unused_mat=unused)
+        report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
         return FinishedScan(report, model, field=field_of_turn(self.scan))
 
     def _take(self, result: Result) -> None:
@@ -180,7 +178,6 @@ class LiveScan:
         if earlier and not self._is_replayed:  # numbers and times go on where they ended
             number, stamp_s = number + len(earlier), stamp_s + earlier[-1].stamp_s + 1
         skew_s = 0.0 if self._is_timeless else result.pair.time_skew_ns / _NS
-        self._mat.look(result.processed)
         self._last = self.scan.take(str(number), stamp_s, result.processed, skew_s)
         # Not one more: with a pair, others that were lost may have become part of the model.
         self._counts = self._counts[0] + 1, self.scan.fused

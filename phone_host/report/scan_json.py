@@ -8,7 +8,7 @@ from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_number
 from phone_host.report.scan_report import ScanReport, scan_verdict
 from phone_host.report.stereo_report import FailedPair
-from phone_host.scan.scanned import PoseSource, ScannedPair
+from phone_host.scan.scanned import PoseOrigin, ScannedPair
 from phone_host.scan.surface_error import ErrorScope
 
 
@@ -78,7 +78,7 @@ def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
         "name": pair.name,
         "stamp_s": pair.stamp_s,
         "state": pair.state.value,
-        "pose": pair.pose_source.value,
+        "pose": pair.pose_origin.value,
         "weakness": pair.weakness.value,
         "density": round(pair.density, 4),
         "corners": pair.corners,
@@ -93,6 +93,6 @@ def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
             "sigma_m": json_number(pair.mat.sigma_m),
         },
         "place_m": None
-        if pair.pose_source is PoseSource.NONE
+        if pair.pose_origin is PoseOrigin.NONE
         else [round(value, 6) for value in pair.world_camera.t_m.tolist()],
     }

@@ -20,7 +20,7 @@ from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
 from phone_host.run.kept_field import FIELD
 from phone_host.scan.scan_model import ScanModel
-from phone_host.scan.scanned import PoseSource
+from phone_host.scan.scanned import PoseOrigin
 
 NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html|field\.bin"
 """The names that `scan` writes into its folder."""
@@ -89,7 +89,7 @@ def trajectory_of(report: ScanReport) -> str:
     """Return the content of trajectory.txt: the pairs whose pose is known, in the model or not, in the axes of model.ply."""
     stations = []
     for pair in report.scanned:
-        if pair.pose_source is not PoseSource.NONE:
+        if pair.pose_origin is not PoseOrigin.NONE:
             pose = pair.world_camera
             signs = report.axes.signs.astype(float)
             stations.append(Station(pair.stamp_s, signs[:, None] * pose.R, signs * pose.t_m))

@@ -29,10 +29,11 @@ from phone_host.run.scan_result import report_of, require_something
 from phone_host.run.stereo_job import Watcher
 from phone_host.run.stereo_trust import judge_pair
 from phone_host.run.turn_remarks import field_of_turn, turn_remarks
-from phone_host.run.unused_mat import UnusedMat
+from phone_host.run.unused_mat import unused_mat
+from phone_host.scan.factory import scan_for
+from phone_host.scan.mat_in_view import MatInView
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
-from phone_host.scan.ways import scan_for
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_files, open_image
 from phone_host.stereo.view_files import ViewFiles
@@ -129,7 +130,7 @@ class _Work:
     def __init__(self, job: ScanJob, watcher: Watcher) -> None:
         self._job, self._watcher = job, watcher
         self._cores = Cores(job.make_core)
-        self.scan, self._mat = scan_for(job.wanted), UnusedMat(job.wanted)
+        self.scan = scan_for(job.wanted, self._tell_of_mat)
         self.kept = KeptSubmaps(job.out, self.scan, job.resumed)
         self._known = {pair.name: pair for pair in self.scan.pairs}
         self._is_judged = False
@@ -177,12 +178,14 @@ class _Work:
             index & (index - 1) == 0 or not self._is_judged
         ):  # 0, 1, 2, 4, 8 ...: what is wrong with a rig is wrong with all of its pairs
             self._judge(core, processed)
-        if unused := self._mat.look(processed):
-            self._job.tell(unused.line)
         pair = self.scan.take(name, float(name) if self._job.files.by_number else float(index), processed)
         if pair.weakness.advice:
             self._watcher.say(f"{name}: {pair.weakness.advice}")
         return pair
+
+    def _tell_of_mat(self, _: MatInView) -> None:
+        if remark := unused_mat(self.scan):
+            self._job.tell(remark.line)
 
     def _judge(self, core: StereoCore, processed: Processed) -> None:
         self._is_judged = True
@@ -200,13 +203,5 @@ class _Work:
             *turn_remarks(self.scan),
         )
         pairs = [pair if isinstance(pair, FailedPair) else self.scan.final(pair) for pair in self._pairs]
-        report = report_of(
-            self.scan,
-            model,
-            pairs,
-            remarks,
-            matcher=self._job.matcher,
-            axes=self._job.axes,
-            unused_mat=self._mat.remark,
-        )
+        report = report_of(self.scan, model, pairs, remarks, matcher=self._job.matcher, axes=self._job.axes)
         return FinishedScan(report, model, self._job.commands, field_of_turn(self.scan))

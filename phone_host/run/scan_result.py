@@ -15,13 +15,13 @@ from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
 from phone_host.run.turn_remarks import keeps_field
+from phone_host.run.unused_mat import unused_mat
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.stretches import WayCertainty
-from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 
 _EMPTY_BOX = Remark(
@@ -51,7 +51,6 @@ def report_of(
     *,
     matcher: str,
     axes: Axes,
-    unused_mat: Remark | None = None,
 ) -> ScanReport:
     """Make the report of a scan.
 
@@ -62,9 +61,8 @@ def report_of(
         remarks: what the user must know.
         matcher: its name.
         axes: of model.ply.
-        unused_mat: what must be said of a printed mat that is in view and not used; None: there is none.
     """
-    certainty = scan.tracker.certainty if isinstance(scan.tracker, Tracker) else None
+    unused = unused_mat(scan)
     report = ScanReport(
         pairs=tuple(pairs),
         model=figures_of(scan, model),
@@ -74,16 +72,16 @@ def report_of(
         matcher=matcher,
         axes=axes,
         remarks=(
-            *([] if unused_mat is None else [unused_mat]),
+            *([] if unused is None else [unused]),
             *remarks,
             *memory_remarks(scan),
-            *way_remarks(certainty),
+            *way_remarks(scan.poses.certainty),
             *_box_remarks(scan, model),
             *_unseen_remarks(scan.wanted, model),
         ),
         keeps_field=keeps_field(scan),
         mat=scan.wanted.mat,
-        unused_mat=unused_mat,
+        unused_mat=unused,
         unseen=scan.wanted.unseen,
     )
     on_mat = report.on_mat
@@ -218,8 +216,8 @@ def memory_remarks(scan: Scan) -> Sequence[Remark]:
         scan: that made it.
     """
     settings, remarks = scan.settings, list[Remark]()
-    if settings is not None and settings.voxel_m > scan.begun_voxel_m:
-        begun, now = (distance_text(each) for each in (scan.begun_voxel_m, settings.voxel_m))
+    if settings is not None and settings.voxel_m > scan.poses.begun_voxel_m:
+        begun, now = (distance_text(each) for each in (scan.poses.begun_voxel_m, settings.voxel_m))
         remarks.append(
             Remark(
                 f"the model has filled its memory: its voxels became {now} wide, {begun} at first",

@@ -8,8 +8,8 @@ from phone_host.report.stereo_report import Remark
 from phone_host.scan.field_bytes import field_bytes
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn
 from phone_host.scan.scan import Scan
-from phone_host.scan.surface_match import Match
-from phone_host.scan.turntable import TurntableScan
+from phone_host.scan.surface_match import Match, SurfaceMatch
+from phone_host.scan.turntable import TurntablePoses
 
 _REMEDY = "turn it all the way round about one axis, by 3 to 15 degrees between the pairs"
 _BOTH = "let both passes show the object's sides, and leave its shape as it is when you turn it over"
@@ -21,19 +21,21 @@ def turn_remarks(scan: Scan) -> Sequence[Remark]:
     Args:
         scan: whose model was made.
     """
-    if not isinstance(scan, TurntableScan) or not scan.fused:
+    poses = scan.poses
+    if not isinstance(poses, TurntablePoses) or not scan.fused:
         return ()
-    if scan.views < LEAST_VIEWS:
-        few = f"only {counted(scan.views, 'pair')} of the object as it turns: {LEAST_VIEWS} are needed to find its axis"
+    if poses.views < LEAST_VIEWS:
+        few = (
+            f"only {counted(poses.views, 'pair')} of the object as it turns: {LEAST_VIEWS} are needed to find its axis"
+        )
         return (Remark(few, _REMEDY, is_blocking=True),)
-    turn = scan.turn
+    turn = poses.fit.turn
     if turn is None:
         return (Remark("the pairs do not agree on the axis about which the object turns", _REMEDY, is_blocking=True),)
-    return (*_match_remarks(scan), *_closing_remarks(turn))
+    return (*_match_remarks(poses.fit.match), *_closing_remarks(turn))
 
 
-def _match_remarks(scan: TurntableScan) -> Sequence[Remark]:
-    match = scan.match
+def _match_remarks(match: SurfaceMatch | None) -> Sequence[Remark]:
     if match is None:
         return ()
     if match.match is Match.NONE:
@@ -63,9 +65,10 @@ def keeps_field(scan: Scan) -> bool:
     Args:
         scan: whose model was made.
     """
-    if not isinstance(scan, TurntableScan) or scan.turn is None:
+    poses = scan.poses
+    if not isinstance(poses, TurntablePoses) or poses.fit.turn is None:
         return False
-    return scan.match is None or scan.match.match is Match.FOUND
+    return poses.fit.match is None or poses.fit.is_on_earlier_pass
 
 
 def field_of_turn(scan: Scan) -> bytes:
@@ -74,6 +77,4 @@ def field_of_turn(scan: Scan) -> bytes:
     Args:
         scan: whose model was made.
     """
-    if not isinstance(scan, TurntableScan) or scan.volume is None or not keeps_field(scan):
-        return b""
-    return field_bytes(scan.volume, scan.carved)
+    return field_bytes(scan.volume, scan.carved) if scan.volume is not None and keeps_field(scan) else b""

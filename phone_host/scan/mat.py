@@ -14,6 +14,7 @@ from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.marked import marked_corners
 from phone_host.model import Image
+from phone_host.scan.box import Box
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +22,12 @@ USUAL_MAT: Final = "10x8:25mm:18mm:5x5"
 """The sheet of `phone-host target mat`: squares, side of a square, side of a mark, family."""
 
 _KIND: Final = "charuco:"
+
+ABOVE_M: Final = 0.0025
+"""What is lower is the sheet: paper is not flat to a millimetre, and neither is its depth."""
+
+_HEIGHT_SHARE: Final = 2.0
+"""Of the longer side of the sheet: higher things do not stand on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +49,12 @@ class Mat:
     def size_m(self) -> tuple[float, float]:
         """Width and height of the printed squares, m."""
         return (self.board.columns + 1) * self.board.square_m, (self.board.rows + 1) * self.board.square_m
+
+    @property
+    def room(self) -> Box:
+        """The room above it, in its axes."""
+        width, height = self.size_m
+        return Box((-width / 2, -height / 2, ABOVE_M), (width / 2, height / 2, _HEIGHT_SHARE * max(width, height)))
 
     def points_m(self) -> Floats:
         """Return its corners in the order of `Board.points_m`, (N, 3), m, in the mat's axes."""

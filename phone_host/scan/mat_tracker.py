@@ -7,7 +7,7 @@ its corners from the last one and laid against the model.
 What lies outside the box above the sheet gets no room in the model. It still tells that nothing is before it.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -17,24 +17,23 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.box import Box
 from phone_host.scan.exact_depths import with_exact_depths
-from phone_host.scan.fineness import thinner
-from phone_host.scan.mat import Mat, mat_corners
+from phone_host.scan.fineness import fineness_for, thinner
+from phone_host.scan.mat import ABOVE_M, Mat, mat_corners
 from phone_host.scan.mat_pose import MatPose, MatScale, fit_mat
-from phone_host.scan.odometry import Moved, Odometry, OdometrySettings
+from phone_host.scan.odometry import Odometry, OdometrySettings
+from phone_host.scan.piece import PoseGate
+from phone_host.scan.pose_source import PoseSource
 from phone_host.scan.reflections import without_reflections
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
-from phone_host.scan.tracker import Tracked, TrackerState
+from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.scanned import Submap
+from phone_host.scan.surface_error import PoseErrors
+from phone_host.scan.tracker import NOT_MOVED, Tracked, TrackerState, lost
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, Depth, View, narrowed, reduced
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
-
-ABOVE_M: Final = 0.0025
-"""What is lower is the sheet: paper is not flat to a millimetre, and neither is its depth."""
-
-_HEIGHT_SHARE: Final = 2.0
-"""Of the longer side of the sheet: higher things do not stand on it."""
 
 _TRUNCATION_SHARE: Final = 1 / 2
 """Of the usual truncation. Poses are exact, so the field need not bridge their errors, and a surface seen from one side only is fattened by less. With two
@@ -64,28 +63,25 @@ _FUSED_OFF_VOXELS: Final = 2.0
 """Mean distance to the model beyond which a view without a mat is not believed."""
 
 
-def box_of_mat(mat: Mat) -> Box:
-    """Return the room above a mat, in its axes."""
-    width, height = mat.size_m
-    top = _HEIGHT_SHARE * max(width, height)
-    return Box((-width / 2, -height / 2, ABOVE_M), (width / 2, height / 2, top))
-
-
 class MatFinder:
     """Finds the mat in one view after another, and learns how large its squares are.
+
+    Attributes:
+        mat: which one.
+        scale: of its squares, as far as is known.
 
     Args:
         mat: which one.
     """
 
     def __init__(self, mat: Mat) -> None:
-        self._mat, self._points_m = mat, mat.points_m()
+        self.mat, self._points_m = mat, mat.points_m()
         self.scale = _FIRST_SCALE
 
     def find(self, view: View) -> MatPose | None:
         """Find it in a view that holds its right image, too; None: too little of it is seen."""
         assert view.right is not None
-        corners = mat_corners(view.grey, view.right, self._mat)
+        corners = mat_corners(view.grey, view.right, self.mat)
         known = MatScale(self.scale.value, float(np.hypot(self.scale.sigma, _SCALE_DRIFT)))
         found = fit_mat(self._points_m, corners, view.geometry, view.epipolar, known)
         if found is not None:
@@ -93,70 +89,93 @@ class MatFinder:
         return found
 
 
-class MatTracker:
-    """Follows a mat and builds the model of what stands on it.
+class MatPoses(PoseSource):
+    """Poses from a mat, and the model of what stands on it.
 
     Args:
+        wanted: of the scan; its box is in the mat's axes.
         mat: which one.
-        box: where the model is, in the mat's axes.
-        settings: of the model.
-        threads: that compute, >= 1; results do not depend on them.
         library: computes; None: that of this installation.
     """
 
-    def __init__(
-        self,
-        mat: Mat,
-        box: Box,
-        settings: VolumeSettings,
-        threads: int = 1,
-        library: Library | Missing | None = None,
-    ) -> None:
-        found = native() if library is None else library
-        self.volume = Volume(settings, threads, found)
-        self._library = found if isinstance(found, Library) else None
-        self._finder, self._threads = MatFinder(mat), threads
-        self._box, self._room = box, room_of(box, settings.truncation_m + 2 * settings.voxel_m)
+    def __init__(self, wanted: ScanWanted, mat: Mat, library: Library | Missing | None = None) -> None:
+        self._found = native() if library is None else library
+        self._library = self._found if isinstance(self._found, Library) else None
+        self._wanted, self._finder, self._box = wanted, MatFinder(mat), wanted.model_box or mat.room
+        self._volume: Volume | None = None
+        self._room = self._box
         self._pose = SE3.identity()
         self._was_lost = False
         self._last: View | None = None
 
-    def track(self, view: View) -> Tracked:
-        """Take the next view; all have one size and one geometry.
+    @property
+    def volume(self) -> Volume | None:
+        """The model; None before the first view of the mat that shows something in the box."""
+        return self._volume
 
-        Returns:
-            Where it was taken, and how sure that is.
-        """
-        found, most_m = self._finder.find(view), _MOST_SIGMA_VOXELS * self.volume.settings.voxel_m
-        if found is not None and found.sigma_at(STANDS_M) <= most_m:
-            return replace(self._fused(view, found.camera_mat.inverse(), Weakness.NONE, None), mat=found.said(STANDS_M))
+    @property
+    def pose_errors(self) -> PoseErrors:
+        """Each pose is told by itself."""
+        return PoseErrors.INDEPENDENT
+
+    def track(self, number: int, view: View) -> Tracked:
+        """See `PoseSource.track`."""
+        del number
+        if self._volume is None:
+            begun = self._begun(view) if view.density >= PoseGate().least_depths else Weakness.NO_DEPTH
+            if isinstance(begun, Weakness):
+                return lost(begun)
+            self._begin(begun)
+        assert self._volume is not None
+        found, voxel_m = self._finder.find(view), self._volume.settings.voxel_m
+        if found is not None and found.sigma_at(STANDS_M) <= _MOST_SIGMA_VOXELS * voxel_m:
+            told = self._fused(self._volume, view, found.camera_mat.inverse(), Weakness.NONE, None)
+            return replace(told, mat=found.said(STANDS_M))
         start = self._followed(view)
         if start is None:
             return self._lost(None)
-        fit = self._laid(view, start)
+        fit = self._laid(self._volume, view, start)
         is_told = fit.told >= _LEAST_DIRECTIONS and fit.overlap >= _LEAST_OVERLAP and fit.near >= _LEAST_NEAR
-        if not is_told or not fit.off_m <= _FUSED_OFF_VOXELS * self.volume.settings.voxel_m:
+        if not is_told or not fit.off_m <= _FUSED_OFF_VOXELS * voxel_m:
             return self._lost(fit)
-        return self._fused(view, start @ fit.start_now, Weakness.NO_MAT, fit)
+        return self._fused(self._volume, view, start @ fit.start_now, Weakness.NO_MAT, fit)
 
-    def kept(self, places_before: int) -> TrackerState:
-        """See `Tracker.kept`: there are no places, the mat is one."""
+    def state(self, places_before: int) -> TrackerState:
+        """See `PoseSource.state`: there are no places, the mat is one."""
         del places_before
         return TrackerState(self._pose, float("nan"), ())
 
-    def go_on(self, state: TrackerState) -> None:
-        """See `Tracker.go_on`."""
-        self._pose, self._was_lost = state.pose, True
+    def go_on(self, submaps: Sequence[Submap]) -> None:
+        """See `PoseSource.go_on`; what was learnt of the printed squares is known on."""
+        volume = self._begin(replace(submaps[0].settings, most_bytes=self._wanted.most_bytes))
+        for each in submaps:
+            volume.put(each.blocks)
+            self._pose, self._was_lost = each.tracker.pose, True
+            for pair in each.pairs:
+                if pair.mat is not None:
+                    self._finder.scale = pair.mat.scale
 
-    def know(self, scale: MatScale) -> None:
-        """Take what an earlier tracker has learnt of the printed squares."""
-        self._finder.scale = scale
+    def _begun(self, view: View) -> VolumeSettings | Weakness:
+        """Choose how the model is made by a view of what is in the box; or say why that cannot be: too little of the mat is seen, or nothing in the box has a depth."""
+        found = MatFinder(self._finder.mat).find(view)
+        if found is None:
+            return Weakness.NO_MAT
+        inside = depths_inside(view, found.camera_mat.inverse(), room_of(self._box, ABOVE_M))
+        if not np.isfinite(inside).any():
+            return Weakness.EMPTY_BOX
+        usual = fineness_for(replace(view, depth_m=inside), self._wanted.voxel_m, self._wanted.most_bytes)
+        return replace(thinner(usual, _TRUNCATION_SHARE), far_m=_FAR_M)
+
+    def _begin(self, settings: VolumeSettings) -> Volume:
+        self._volume, self.begun_voxel_m = Volume(settings, self._wanted.threads, self._found), settings.voxel_m
+        self._room = room_of(self._box, settings.truncation_m + 2 * settings.voxel_m)
+        return self._volume
 
     def _lost(self, fit: Registered | None) -> Tracked:
         self._was_lost = True
-        return _told(self._pose, Tracking.LOST, Weakness.NO_MAT, fit)
+        return replace(lost(Weakness.NO_MAT), world_camera=self._pose, fit=fit)
 
-    def _fused(self, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
+    def _fused(self, volume: Volume, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> Tracked:
         self._pose = pose
         thing = depths_inside(view, pose, self._box)
         view = with_exact_depths(view, thing)
@@ -164,12 +183,12 @@ class MatTracker:
         self._last = reduced(replace(view, depth_m=inside))
         view = without_reflections(view, thing)
         inside = np.where(np.isfinite(view.depth_m), inside, np.float32(np.nan))
-        self.volume.fuse(view, pose, inside)
+        volume.fuse(view, pose, inside)
         state = Tracking.TRACKING if weakness is Weakness.NONE else Tracking.WEAK
-        if self._was_lost and state is Tracking.TRACKING and self.volume.fused > 1:
+        if self._was_lost and state is Tracking.TRACKING and volume.fused > 1:
             state = Tracking.RELOCALISED
         self._was_lost = False
-        return replace(_told(pose, state, weakness, fit), used=view)
+        return Tracked(world_camera=pose, state=state, weakness=weakness, moved=NOT_MOVED, fit=fit, used=view)
 
     def _followed(self, view: View) -> SE3 | None:
         """Return where a view was taken by the corners that stand on the mat; None: too few are followed from the last view.
@@ -183,45 +202,20 @@ class MatTracker:
         moved = odometry.step(reduced(view))
         return self._pose @ moved.before_now if moved.is_known and moved.inliers >= _LEAST_CORNERS else None
 
-    def _laid(self, view: View, start: SE3) -> Registered:
+    def _laid(self, volume: Volume, view: View, start: SE3) -> Registered:
         """Lay what a view shows near the model against it."""
         depth, geometry, step = narrowed(depths_inside(view, start, self._room), view.geometry, _ALIGNED_PX)
-        surface = self.volume.cast(Camera(geometry, depth.shape, start), depth)
-        voxel_m = self.volume.settings.voxel_m
+        surface = volume.cast(Camera(geometry, depth.shape, start), depth)
+        voxel_m = volume.settings.voxel_m
         settings = RegistrationSettings(
             most_m=_PARTNER_VOXELS * voxel_m,
             floor_m=_FLOOR_VOXELS * voxel_m,
             noise_per_m=view.noise_per_m,
             geometry=geometry,
             patch_px=view.patch_px / step,
-            threads=self._threads,
+            threads=self._wanted.threads,
         )
         return registered(depth, surface, settings, self._library)
-
-
-def begun_on_mat(
-    view: View, mat: Mat, box: Box, fineness: Callable[[View], VolumeSettings], threads: int
-) -> MatTracker | Weakness:
-    """Begin with a view of a mat.
-
-    Args:
-        view: the first one that has depth.
-        mat: which one.
-        box: where the model is, in the mat's axes.
-        fineness: how fine a model is made from a view of what is in it.
-        threads: that compute.
-
-    Returns:
-        A tracker that has not taken the view yet; or why not: too little of the mat is seen, or nothing in the box has a depth.
-    """
-    found = MatFinder(mat).find(view)
-    if found is None:
-        return Weakness.NO_MAT
-    inside = depths_inside(view, found.camera_mat.inverse(), room_of(box, ABOVE_M))
-    if not np.isfinite(inside).any():
-        return Weakness.EMPTY_BOX
-    usual = fineness(replace(view, depth_m=inside))
-    return MatTracker(mat, box, replace(thinner(usual, _TRUNCATION_SHARE), far_m=_FAR_M), threads)
 
 
 def room_of(box: Box, rim_m: float) -> Box:
@@ -250,10 +244,3 @@ def depths_inside(view: View, world_camera: SE3, box: Box) -> Depth:
             at = turn[axis, 0] * aside + turn[axis, 1] * below + turn[axis, 2] * depth + shift[axis]
             inside &= (at >= box.low_m[axis]) & (at <= box.high_m[axis])
     return np.where(inside, depth, np.float32(np.nan))
-
-
-_NOT_MOVED: Final = Moved(world_camera=SE3.identity(), before_now=SE3.identity(), is_known=False, followed=0, inliers=0)
-
-
-def _told(pose: SE3, state: Tracking, weakness: Weakness, fit: Registered | None) -> Tracked:
-    return Tracked(world_camera=pose, state=state, weakness=weakness, moved=_NOT_MOVED, fit=fit)

@@ -9,8 +9,7 @@ from phone_host.scan.box import Box
 from phone_host.scan.closing import Floor
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.loop_closing import LoopSettings
-from phone_host.scan.mat import Mat
-from phone_host.scan.mat_tracker import ABOVE_M, box_of_mat
+from phone_host.scan.mat import ABOVE_M, Mat
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +56,7 @@ class ScanWanted:
     @property
     def model_box(self) -> Box | None:
         """What lies outside does not belong to the model: the box that was asked for, or the room above the mat; None: everything belongs."""
-        return box_of_mat(self.mat) if self.box is None and self.mat is not None else self.box
+        return self.mat.room if self.box is None and self.mat is not None else self.box
 
     @property
     def floor(self) -> Floor | None:

@@ -15,7 +15,7 @@ from phone_host.scan.volume import BlockValues
 from phone_host.scan.volume_settings import VolumeSettings
 
 
-class PoseSource(Enum):
+class PoseOrigin(Enum):
     """What tells the pose of a pair.
 
     MODEL: the pair is fused. ODOMETRY: it is tracked, but not fused. NONE: it is lost, and its pose is not known.
@@ -62,11 +62,11 @@ class ScannedPair:
         return self.state is not Tracking.LOST
 
     @property
-    def pose_source(self) -> PoseSource:
+    def pose_origin(self) -> PoseOrigin:
         """What tells its pose."""
         if self.is_fused:
-            return PoseSource.MODEL
-        return PoseSource.ODOMETRY if self.is_followed else PoseSource.NONE
+            return PoseOrigin.MODEL
+        return PoseOrigin.ODOMETRY if self.is_followed else PoseOrigin.NONE
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.box import Box
+from phone_host.scan.mat import ABOVE_M
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View, narrowed
 
@@ -55,9 +56,6 @@ _FOOT_SHARE: Final = 0.45
 
 _RIM_SHARE: Final = 0.2
 """Of a thing's width: so far around it the table is not measured."""
-
-ABOVE_M: Final = 0.0025
-"""What is lower is the table, as with a mat."""
 
 _ROOM: Final = 1.5
 """Times the thing's greatest side, as the first view shows it, to either side of its middle: so far it can grow."""

@@ -56,7 +56,7 @@ class Tracked:
         joined: earlier views that were lost, and have become part of the model with this one.
         moved_views: where the views in the model were taken, this one too, if a loop has moved them; else none.
         mat: what a mat told; None: there is none, or it was not seen.
-        used: the view with the depths that went into the model; None: with all that it had.
+        used: the view with the depths that went into the model, or may do so later; None: there are none.
         is_followed: whether odometry tells the pose of a view that is not fused, without a gap since one that is.
     """
 
@@ -75,6 +75,36 @@ class Tracked:
     def is_fused(self) -> bool:
         """Whether the view became part of the model."""
         return self.state is not Tracking.LOST
+
+    def unless_flat(self) -> "Tracked":
+        """Return it where something else tells what a flat or round thing does not: the axis of a turn, the corners on a table."""
+        state, weakness = _unless_flat(self.state, self.weakness)
+        joined = []
+        for each in self.joined:
+            its_state, its_weakness = _unless_flat(each.state, each.weakness)
+            joined.append(replace(each, state=its_state, weakness=its_weakness))
+        return replace(self, state=state, weakness=weakness, joined=tuple(joined))
+
+    def unless_restless(self) -> "Tracked":
+        """Return it as weak where something moves against the rest."""
+        if self.state is not Tracking.TRACKING or not self.moved.others:
+            return self
+        return replace(self, state=Tracking.WEAK, weakness=Weakness.RESTLESS)
+
+
+NOT_MOVED: Final = Moved(world_camera=SE3.identity(), before_now=SE3.identity(), is_known=False, followed=0, inliers=0)
+"""What is known of the motion of a view for which odometry was not asked."""
+
+
+def lost(why: Weakness) -> Tracked:
+    """Return what is said of a view of whose place nothing is known."""
+    return Tracked(world_camera=SE3.identity(), state=Tracking.LOST, weakness=why, moved=NOT_MOVED, fit=None)
+
+
+def _unless_flat(state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
+    if weakness is not Weakness.FLAT:
+        return state, weakness
+    return Tracking.TRACKING if state is Tracking.WEAK else state, Weakness.NONE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,7 +199,7 @@ class Tracker:
         tracked = self._track(view)
         if self._pieces.active is piece:
             self._step = (before.inverse() @ self._pose).exact()
-        return tracked
+        return replace(tracked, used=view)
 
     def _track(self, view: View) -> Tracked:
         self._count += 1
@@ -181,7 +211,7 @@ class Tracker:
         self._pieces.moved(moved, self._steps_since(view))
         view = self._as_sure_as_timed(view, shift_px)
         believed = (self._pose @ self._motion_since(moved)).exact()
-        if not np.isfinite(view.depth_m).mean() >= self._gate.least_depths:
+        if view.density < self._gate.least_depths:
             return self._lost(believed, moved, Weakness.NO_DEPTH, None)
         if self.volume.blocks.count == 0:
             return self._fused(view, believed, moved, Weakness.NONE, None)

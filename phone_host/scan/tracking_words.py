@@ -63,18 +63,6 @@ class Weakness(Enum):
         }[self]
 
 
-def unless_flat(state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
-    """Return what tracking says where something else tells what a flat or round thing does not: the axis of a turn, the corners on a table.
-
-    Args:
-        state: as the tracker told it.
-        weakness: as the tracker told it.
-    """
-    if weakness is not Weakness.FLAT:
-        return state, weakness
-    return Tracking.TRACKING if state is Tracking.WEAK else state, Weakness.NONE
-
-
 OF_TURNING: Final = (Weakness.NOTHING_TURNS, Weakness.ALL_TURNS, Weakness.OUTSIDE)
 """Why a pair is of no use where an object is to turn before cameras that stand still."""
 

@@ -7,39 +7,40 @@ around it is carved by all views, those of an earlier pass, too, and closed; wha
 Views are kept in memory, cropped to the thing, one every two degrees, some 0.3 MB each, and never more than `_MOST_BYTES`; folders are not read twice.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
-from phone_host.model import Processed
 from phone_host.scan.box import Box
-from phone_host.scan.carving import Carved, Carving
+from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
+from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.fineness import fineness_for, thinner
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
+from phone_host.scan.fusion import Fusion
 from phone_host.scan.ground import Ground
 from phone_host.scan.map_fragment import Joined
 from phone_host.scan.merged_field import merged
 from phone_host.scan.piece import PoseGate
-from phone_host.scan.scan import Scan
+from phone_host.scan.pose_source import PoseSource
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
+from phone_host.scan.stretches import Placed
 from phone_host.scan.surface_error import FusedDepths, PoseErrors
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.table_cut import above, ground_of, points_of, table_height_m
-from phone_host.scan.taken_view import require_size, view_of
-from phone_host.scan.tracker import Tracker
-from phone_host.scan.tracking_words import Tracking, Weakness, unless_flat
+from phone_host.scan.tracker import Tracked, Tracker, lost
+from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.turning_background import Background
 from phone_host.scan.turning_mask import Turning, TurningMask
 from phone_host.scan.view import View
 from phone_host.scan.volume import Volume
-from phone_host.stereo.images import size_px
 
 _LEAST_TURN: Final = 0.035
 """rad from one kept view to the next, 2 degrees."""
@@ -64,7 +65,7 @@ _WORDS: Final = {
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Station:
+class _Keyframe:
     """A view that is kept: the pair's number, the view with the depths of the background, the thing's pixels, where tracking puts the camera, and how surely."""
 
     pair: int
@@ -80,21 +81,36 @@ class _Station:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Finished:
-    """The end of a scan: how many pairs were taken, the turn, the background, the volume made again, what the thing stands on, and how it lies on that of an earlier pass."""
+class TurnFit:
+    """The end of a scan.
+
+    Attributes:
+        taken: pairs so far.
+        turn: that was fitted; None: too few views agree on an axis.
+        poses: where the views on the circle were taken, by the numbers of their pairs, in the axes of this pass.
+        background: that was learnt.
+        volume: made again from the views of the turn.
+        ground: what the thing stands on.
+        match: how this pass lies on the earlier one; None: there is none.
+    """
 
     taken: int
     turn: FullTurn | None = None
+    poses: Mapping[int, SE3] = field(default_factory=dict)
     background: Background | None = None
     volume: Volume | None = None
     ground: Ground | None = None
     match: SurfaceMatch | None = None
 
     @property
+    def is_on_earlier_pass(self) -> bool:
+        """Whether this pass lies on an earlier one."""
+        return self.match is not None and self.match.match is Match.FOUND
+
+    @property
     def model_own(self) -> SE3:
         """Takes the axes of this pass to those of the model: to the earlier pass's, if it lies on that."""
-        is_laid = self.match is not None and self.match.match is Match.FOUND
-        return self.match.first_second if self.match is not None and is_laid else SE3.identity()
+        return self.match.first_second if self.match is not None and self.is_on_earlier_pass else SE3.identity()
 
     @property
     def model_ground(self) -> Ground | None:
@@ -102,228 +118,147 @@ class _Finished:
         return None if self.ground is None else self.ground.moved(self.model_own)
 
 
-class TurntableScan(Scan):
-    """Takes pairs of a thing that turns and grows a model of it.
+class TurntablePoses(PoseSource):
+    """Poses of cameras that stand still, in the axes of a thing that turns before them.
+
+    Attributes:
+        fit: the end of the scan, once the model was asked for.
 
     Args:
-        wanted: what for.
+        wanted: of the scan.
     """
 
+    is_resumable = False
+
     def __init__(self, wanted: ScanWanted) -> None:
-        super().__init__(wanted)
+        self._wanted = wanted
+        self.fit = TurnFit(0)
+        self._tracker: Tracker | None = None
         self._mask = TurningMask()
+        self._taken = 0
         self._waiting: tuple[int, View] | None = None
-        self._last: ScannedPair | None = None
+        self._last: Tracked | None = None
         self._window: tuple[slice, slice] | None = None
-        self._stations: list[_Station] = []
+        self._keyframes: list[_Keyframe] = []
         self._tracked_pairs: list[int] = []
         self._least_turn = _LEAST_TURN
         self._turned = 0.0
         self._direction = np.zeros(3)
-        self._finished: _Finished | None = None
-
-    @property
-    def is_submap_due(self) -> bool:
-        """Never: what the end needs are the views."""
-        return False
-
-    @property
-    def is_submap_open(self) -> bool:
-        """Never, likewise."""
-        return False
 
     @property
     def volume(self) -> Volume | None:
         """The model; in the end the one that was made again."""
-        finished = self._finished
-        return super().volume if finished is None or finished.volume is None else finished.volume
+        tracked = None if self._tracker is None else self._tracker.volume
+        return tracked if self.fit.volume is None else self.fit.volume
 
     @property
-    def turn(self) -> FullTurn | None:
-        """The turn, once the model was asked for; None: too few views agree on an axis."""
-        return None if self._finished is None else self._finished.turn
+    def has_size(self) -> bool:
+        """Whether there was a view to which others are compared."""
+        return self._taken > 0
 
     @property
-    def match(self) -> SurfaceMatch | None:
-        """How this pass lies on the earlier one, once the model was asked for; None: there is none, or no turn."""
-        return None if self._finished is None else self._finished.match
-
-    @property
-    def pairs(self) -> tuple[ScannedPair, ...]:
-        """What became of each pair, in order; in the axes of the model."""
-        if self._finished is None or self._finished.match is None:
-            return tuple(self._pairs)
-        move = self._finished.model_own
-        return tuple(
-            replace(pair, world_camera=move @ pair.world_camera) if pair.is_fused else pair for pair in self._pairs
-        )
-
-    @property
-    def carved(self) -> Carved | None:
-        """What the views told of the box around the thing, once the model was asked for; None: there is none."""
-        return None if self._carving is None else self._carving.carved
+    def pose_errors(self) -> PoseErrors:
+        """The errors of poses on one circle, once it is fitted."""
+        return PoseErrors.DRIFT if self.fit.turn is None else PoseErrors.CIRCLE
 
     @property
     def views(self) -> int:
         """How many views are kept."""
-        return len(self._stations)
+        return len(self._keyframes)
 
-    def take(self, name: str, stamp_s: float, processed: Processed, skew_s: float = 0.0) -> ScannedPair:
-        """Take the next pair.
-
-        Args:
-            name: of the pair.
-            stamp_s: when it was taken, s.
-            processed: with disparity and cloud.
-            skew_s: passed over: between the pairs that count, the object rests.
-
-        Returns:
-            What became of it.
-
-        Raises:
-            DataError: its size is not that of the pairs before it.
-        """
-        del skew_s
-        view = view_of(processed)
-        if not self._pairs:
-            self.geometry, self.size_px = view.geometry, size_px(view.grey)
-        require_size(name, view, self.size_px)
-        density = float(np.isfinite(view.depth_m).mean())
-        found = self._mask.take(view.grey, view.depth_m, view.geometry)
+    def track(self, number: int, view: View) -> Tracked:
+        """See `PoseSource.track`. Times do not count: between the pairs that do, the object rests."""
+        self._taken = number + 1
+        view = replace(view, stamp_s=math.nan, skew_s=0.0)
+        found, before = self._mask.take(view.grey, view.depth_m, view.geometry), tuple[Joined, ...]()
         if found.turning is Turning.THING and self._waiting is not None:
-            self._take_waiting()
-        if density < PoseGate().least_depths:
-            pair = _lost(name, stamp_s, density, Weakness.NO_DEPTH)
+            before = self._take_waiting(*self._waiting)
+        if view.density < PoseGate().least_depths:
+            told = lost(Weakness.NO_DEPTH)
         elif found.turning is Turning.NOTHING and self._last is not None:
-            pair = replace(self._last, name=name, stamp_s=stamp_s, density=density)  # it pauses, or turns slowly
+            told = replace(self._last, joined=())  # it pauses, or turns slowly
         elif found.turning is not Turning.THING:
-            if not self._stations:
-                self._waiting = len(self._pairs), view
-            pair = _lost(name, stamp_s, density, _WORDS[found.turning])
+            if not self._keyframes:
+                self._waiting = number, view
+            told = lost(_WORDS[found.turning])
         else:
-            pair = self._tracked(len(self._pairs), view, found.mask, (name, stamp_s, density))
-        self._pairs.append(pair)
-        if pair.is_fused:
-            self._last = pair
-        return pair
+            told = self._tracked(number, view, found.mask)
+        if told.is_fused:
+            self._last = told
+        return replace(told, joined=(*before, *told.joined))
 
-    def final(self, pair: ScannedPair) -> ScannedPair:
-        """Return what has become of a pair in the end: the views of the turn lie on its circle.
+    def settle(self) -> Sequence[Placed]:
+        """Fit the turn, and make the model again from all views together once there are enough of them; `final` tells the poses."""
+        if not self._taken or self.fit.taken != self._taken:
+            self.fit = self._fitted()
+        return ()
 
-        Args:
-            pair: as it was told when it was taken.
-        """
-        return next((each for each in self.pairs if each.name == pair.name), pair)
+    def final(self, number: int, pair: ScannedPair) -> ScannedPair:
+        """See `PoseSource.final`: the views of the turn lie on its circle, in the axes of the model."""
+        pose = self.fit.poses.get(number)
+        if pose is not None:
+            pair = replace(pair, world_camera=pose)
+            if not pair.is_fused:  # the others have shown where it belongs
+                pair = replace(pair, state=Tracking.RELOCALISED, weakness=Weakness.NONE)
+        is_moved = self.fit.match is not None and pair.is_fused
+        return replace(pair, world_camera=self.fit.model_own @ pair.world_camera) if is_moved else pair
 
-    def _surface(self) -> ScanModel:
-        """Return the surface so far, made from all views together once there are enough of them."""
-        if self._finished is None or self._finished.taken != len(self._pairs):
-            self._finished = self._end()
-        volume, box = self.volume, self._wanted.box or self._box_around()
-        if volume is None or box is None:
-            return super()._surface()
-        self._carving = self._carved_by_all(Cells.of(box, volume.settings.voxel_m), self._finished)
-        return closed_model(volume, self._carving, box, self._finished.model_ground)
-
-    @property
-    def _pose_errors(self) -> PoseErrors:
-        """The errors of poses on one circle, once it is fitted."""
-        return super()._pose_errors if self.turn is None else PoseErrors.CIRCLE
-
-    @property
-    def _lacks_views(self) -> bool:
-        """Whether an earlier pass, whose views are not here, is part of the model."""
-        return self.match is not None and self.match.match is Match.FOUND
-
-    def _fused_views(self) -> Sequence[FusedDepths]:
-        """Return the depths of the views that are kept and in the model, without the background."""
-        pairs, turn = self.pairs, self.turn
-        used = [True] * len(self._stations) if turn is None else turn.used
-        kept = [(each.thing, pairs[each.pair]) for each, is_used in zip(self._stations, used, strict=True) if is_used]
-        return [FusedDepths.of(thing, pair.world_camera) for thing, pair in kept if pair.is_fused]
-
-    def _box_around(self) -> Box | None:
-        """Return a box around the thing; None: it is not known how it has turned."""
-        volume = None if self._finished is None else self._finished.volume
-        points = np.zeros((0, 3)) if volume is None else open_model(volume).mesh.points_m.astype(np.float64)
-        if volume is None or not len(points):
+    def fused_views(self, kept: Sequence[FusedDepths]) -> Sequence[FusedDepths] | None:
+        """See `PoseSource.fused_views`: those of the thing alone; if an earlier pass is part of the model, its views are not here."""
+        del kept
+        if self.fit.is_on_earlier_pass:
             return None
-        margin_m = _MARGIN_VOXELS * volume.settings.voxel_m
-        (x, y, z), (far_x, far_y, far_z) = (
-            (points.min(axis=0) - margin_m).tolist(),
-            (points.max(axis=0) + margin_m).tolist(),
-        )
-        return Box((x, y, z), (far_x, far_y, far_z))
+        used = [True] * self.views if self.fit.turn is None else self.fit.turn.used.tolist()
+        return [
+            FusedDepths.of(each.thing, pose)
+            for each, is_used in zip(self._keyframes, used, strict=True)
+            if is_used and (pose := self._pose_of(each)) is not None
+        ]
 
-    def _carved_by_all(self, cells: Cells, finished: _Finished) -> Carving:
-        """Let the views carve, from where they are known to lie in the end, and those of an earlier pass."""
-        carving, pairs, onto = Carving(cells, self._wanted.threads), self.pairs, self._wanted.onto
-        background = finished.background
-        for station in self._stations:
-            if pairs[station.pair].is_fused:
-                view = station.view if background is None else background.opened(station.view)
-                carving.see(view, pairs[station.pair].world_camera)
-        if finished.model_ground is not None:
-            carving.take_empty(finished.model_ground.below(cells))
-        if (
-            onto is not None
-            and onto.carved is not None
-            and finished.match is not None
-            and finished.match.match is Match.FOUND
-        ):
-            carving.take_in(onto.carved)
-        return carving
+    def carve(self, carving: Carving) -> None:
+        """Let the kept views carve, from where they are known to lie in the end; what shows the background tells that nothing is before it."""
+        background = self.fit.background
+        for each in self._keyframes:
+            pose = self._pose_of(each)
+            if pose is not None:
+                carving.see(each.view if background is None else background.opened(each.view), pose)
 
-    def _tracked(
-        self, number: int, view: View, mask: NDArray[np.bool_], told_of: tuple[str, float, float]
-    ) -> ScannedPair:
+    def _pose_of(self, of: _Keyframe) -> SE3 | None:
+        """Return where a kept view was taken, in the axes of the model; None: it is lost."""
+        pose = self.fit.poses.get(of.pair, of.world_camera if of.is_sure else None)
+        return pose if pose is None or self.fit.match is None else self.fit.model_own @ pose
+
+    def _tracked(self, number: int, view: View, mask: NDArray[np.bool_]) -> Tracked:
         """Track a view of the thing; keep it if it is fused and shows it from a new side."""
         rows, columns = self._window_of(view)
         cropped = view.cropped(rows, columns)
         own = np.ascontiguousarray(mask[rows, columns])
         thing = cropped.masked(own)
-        if self.tracker is None:
-            self.tracker = Tracker(
+        if self._tracker is None:
+            self._tracker = Tracker(
                 fineness_for(thing, self._wanted.voxel_m, self._wanted.most_bytes),
                 self._wanted.threads,
                 gate=PoseGate(is_turned_by_others=True),
             )
         self._tracked_pairs.append(number)
-        told = self.tracker.track(thing)
-        self._joined(told.joined)
-        state, weakness = unless_flat(told.state, told.weakness)
-        self._keep(_Station(number, cropped, own, told.world_camera, told.is_fused))
-        name, stamp_s, density = told_of
-        return ScannedPair(
-            name=name,
-            stamp_s=stamp_s,
-            world_camera=told.world_camera,
-            state=state,
-            weakness=weakness,
-            density=density,
-            corners=told.moved.inliers,
-            overlap=np.nan if told.fit is None else told.fit.overlap,
-            off_m=np.nan if told.fit is None else told.fit.off_m,
-        )
-
-    def _joined(self, views: Sequence[Joined]) -> None:
-        """Note that pairs that were lost have become part of the model, and where they were taken."""
-        for view in views:
-            at = self._tracked_pairs[view.number - 1]
-            state, weakness = unless_flat(view.state, view.weakness)
-            self._pairs[at] = replace(self._pairs[at], world_camera=view.world_camera, state=state, weakness=weakness)
-            self._stations = [
-                replace(each, world_camera=view.world_camera, is_sure=True) if each.pair == at else each
-                for each in self._stations
+        told = self._tracker.track(thing).unless_flat()
+        joined = tuple(replace(each, number=self._tracked_pairs[each.number - 1]) for each in told.joined)
+        for view_again in joined:
+            self._keyframes = [
+                replace(each, world_camera=view_again.world_camera, is_sure=True)
+                if each.pair == view_again.number
+                else each
+                for each in self._keyframes
             ]
+        self._keep(_Keyframe(number, cropped, own, told.world_camera, told.is_fused))
+        # Kept depths and followed motions are not asked for: the keyframes carve in the end, and their fit tells the poses.
+        return replace(told, joined=joined, used=None, is_followed=False)
 
-    def _take_waiting(self) -> None:
+    def _take_waiting(self, number: int, view: View) -> tuple[Joined, ...]:
         """Take the view before the first one in which something had turned: now it is known what."""
-        assert self._waiting is not None
-        (number, view), self._waiting = self._waiting, None
-        mask = self._mask.before(view.depth_m, view.geometry)
-        pair = self._pairs[number]
-        self._pairs[number] = self._tracked(number, view, mask, (pair.name, pair.stamp_s, pair.density))
+        self._waiting = None
+        told = self._tracked(number, view, self._mask.before(view.depth_m, view.geometry))
+        return Joined(number, told.world_camera, told.state, told.weakness), *told.joined
 
     def _window_of(self, view: View) -> tuple[slice, slice]:
         if self._window is None:
@@ -331,63 +266,95 @@ class TurntableScan(Scan):
             self._window = self._mask.ball.window(view.grey.shape, view.geometry)
         return self._window
 
-    def _keep(self, station: _Station) -> None:
-        if self._stations:
-            step = vectors_of((self._stations[-1].world_camera.inverse() @ station.world_camera).R)
+    def _keep(self, keyframe: _Keyframe) -> None:
+        if self._keyframes:
+            step = vectors_of((self._keyframes[-1].world_camera.inverse() @ keyframe.world_camera).R)
             self._direction = self._direction + (step if step @ self._direction >= 0 else -step)
             along = float(step @ self._direction) / max(float(np.linalg.norm(self._direction)), 1e-9)
             if np.linalg.norm(step) < self._least_turn or self._turned > _MOST_TURN:
                 return
             self._turned += along
-        self._stations.append(station)
-        if sum(each.view.grey.nbytes * 8 + each.mask.nbytes for each in self._stations) > _MOST_BYTES:
-            self._stations, self._least_turn = self._stations[::2], 2 * self._least_turn
+        self._keyframes.append(keyframe)
+        if sum(each.view.grey.nbytes * 8 + each.mask.nbytes for each in self._keyframes) > _MOST_BYTES:
+            self._keyframes, self._least_turn = self._keyframes[::2], 2 * self._least_turn
 
-    def _end(self) -> _Finished:
+    def _fitted(self) -> TurnFit:
         """Fit the turn, and make the model again."""
-        taken = len(self._pairs)
-        if self.tracker is None or len(self._stations) < LEAST_VIEWS:
-            return _Finished(taken)
-        tracked = self.tracker.volume.settings
+        taken, keyframes, wanted = self._taken, self._keyframes, self._wanted
+        if self._tracker is None or len(keyframes) < LEAST_VIEWS:
+            return TurnFit(taken)
+        tracked = self._tracker.volume.settings
         settings = thinner(tracked, _TRUNCATION_SHARE)
-        background = Background(
-            [each.view.grey for each in self._stations], [each.view.depth_m for each in self._stations]
-        )
+        background = Background([each.view.grey for each in keyframes], [each.view.depth_m for each in keyframes])
         things = [
-            each.view.masked(each.mask & ~background.is_seen(each.view.grey, each.view.depth_m))
-            for each in self._stations
+            each.view.masked(each.mask & ~background.is_seen(each.view.grey, each.view.depth_m)) for each in keyframes
         ]
         given = [
-            TurnView(thing, each.world_camera, each.is_sure) for thing, each in zip(things, self._stations, strict=True)
+            TurnView(thing, each.world_camera, each.is_sure) for thing, each in zip(things, keyframes, strict=True)
         ]
-        turn = full_turn(given, tracked, self._wanted.threads)
+        turn = full_turn(given, tracked, wanted.threads)
         if turn is None:
-            return _Finished(taken)
-        volume = Volume(settings, self._wanted.threads)
-        still = points_of(background.depth_m, self._stations[0].view.geometry)
+            return TurnFit(taken)
+        volume, poses = Volume(settings, wanted.threads), dict[int, SE3]()
+        still = points_of(background.depth_m, keyframes[0].view.geometry)
         seen = np.concatenate([points_of(thing.depth_m, thing.geometry) for thing in things[:LEAST_VIEWS]])
         height_m = table_height_m(still, seen, turn.axis, settings.voxel_m)
-        for station, thing, angle, is_used in zip(self._stations, things, turn.angles, turn.used, strict=True):
+        for keyframe, thing, angle, is_used in zip(keyframes, things, turn.angles, turn.used, strict=True):
             if is_used:
-                pose = turn.axis.camera_world(float(angle)).inverse()
+                pose = poses[keyframe.pair] = turn.axis.camera_world(float(angle)).inverse()
                 volume.fuse(above(thing, turn.axis, height_m, settings.voxel_m), pose)
-                pair = replace(self._pairs[station.pair], world_camera=pose)
-                if not station.is_sure:  # the others have shown where it belongs
-                    pair = replace(pair, state=Tracking.RELOCALISED, weakness=Weakness.NONE)
-                self._pairs[station.pair] = pair
         ground = ground_of(turn.axis, height_m, open_model(volume).mesh.points_m.astype(np.float64))
         if ground is not None:
             ground.forget_below(volume.blocks, settings.voxel_m)
-        if self._wanted.onto is None:
-            return _Finished(taken, turn, background, volume, ground)
-        first = self._wanted.onto.volume(self._wanted.threads)
+        fit = TurnFit(taken, turn, poses, background, volume, ground)
+        if wanted.onto is None:
+            return fit
+        first = wanted.onto.volume(wanted.threads)
         match = matched_surfaces(first, volume)
-        if match.match is Match.FOUND:
-            volume = merged(first, volume, match.first_second, self._wanted.threads)
-        return _Finished(taken, turn, background, volume, ground, match)
+        both = merged(first, volume, match.first_second, wanted.threads) if match.match is Match.FOUND else volume
+        return replace(fit, volume=both, match=match)
 
 
-def _lost(name: str, stamp_s: float, density: float, why: Weakness) -> ScannedPair:
-    return ScannedPair(
-        name=name, stamp_s=stamp_s, world_camera=SE3.identity(), state=Tracking.LOST, weakness=why, density=density
+class TurnSurface:
+    """The thing, closed in a box around it and down to what it stands on, carved by all views together once they are known to lie on a circle.
+
+    Args:
+        poses: which keep the views.
+        onto: an earlier pass; None: there is none.
+    """
+
+    def __init__(self, poses: TurntablePoses, onto: KeptField | None) -> None:
+        self._poses, self._onto = poses, onto
+
+    def cells(self, box: Box | None, voxel_m: float) -> None:
+        """See `Surface.cells`: nothing is carved before the end."""
+        del box, voxel_m
+
+    def model(self, volume: Volume, fusion: Fusion, box: Box | None) -> ScanModel:
+        """See `Surface.model`."""
+        fit = self._poses.fit
+        box = box or _box_around(fit.volume)
+        if box is None:
+            return open_model(volume)
+        fusion.carve(None)
+        fusion.carve(Cells.of(box, volume.settings.voxel_m))
+        assert fusion.carving is not None
+        self._poses.carve(fusion.carving)
+        if fit.model_ground is not None:
+            fusion.carving.take_empty(fit.model_ground.below(fusion.carving.cells))
+        if self._onto is not None and self._onto.carved is not None and fit.is_on_earlier_pass:
+            fusion.carving.take_in(self._onto.carved)
+        return closed_model(volume, fusion.carving, box, fit.model_ground)
+
+
+def _box_around(volume: Volume | None) -> Box | None:
+    """Return a box around the thing; None: it is not known how it has turned."""
+    points = np.zeros((0, 3)) if volume is None else open_model(volume).mesh.points_m.astype(np.float64)
+    if volume is None or not len(points):
+        return None
+    margin_m = _MARGIN_VOXELS * volume.settings.voxel_m
+    (x, y, z), (far_x, far_y, far_z) = (
+        (points.min(axis=0) - margin_m).tolist(),
+        (points.max(axis=0) + margin_m).tolist(),
     )
+    return Box((x, y, z), (far_x, far_y, far_z))

@@ -54,6 +54,11 @@ class View:
         """Standard deviation of the depth 1 m away, m; it grows with the depth squared."""
         return self.noise_px / (self.geometry.focal_px * self.geometry.baseline_m)
 
+    @property
+    def density(self) -> float:
+        """Share of the pixels that have a depth, 0..1."""
+        return float(np.isfinite(self.depth_m).mean())
+
     def observed(self, pixels: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
         """Return u, v and the disparity of the nearest pixel, (N, 3), px, NaN = none, at pixels (N, 2) inside the image."""
         geometry, places = self.geometry, np.rint(pixels).astype(np.int64)

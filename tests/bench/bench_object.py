@@ -25,10 +25,10 @@ from common import now
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Processed
 from phone_host.scan.box import Box
+from phone_host.scan.factory import scan_for
 from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatScale, fit_mat
 from phone_host.scan.mesh import Mesh
-from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scene.object_scene import ObjectScene, Setting, Size, object_scene
@@ -132,7 +132,7 @@ def surface_row(name: str, size: Size, views: int) -> tuple[SurfaceRow, list[Pro
     rectifier = Rectifier(scene.rig)
     settings = MatchSettings(matcher=MatcherName.TANDEM, disparities=512)
     core = StereoCore(settings, rectifier, wanted=DepthWanted(search_from_m=NEAR_M))
-    scan, seen, took, off = Scan(ScanWanted(mat=parse_mat(USUAL_MAT))), [], [], []
+    scan, seen, took, off = scan_for(ScanWanted(mat=parse_mat(USUAL_MAT))), [], [], []
     for number in range(views):
         view = scene.view(number)
         seen.append(core.compute(view.left, view.right, now.monotonic_ns))
@@ -196,7 +196,7 @@ def too_large_percent(model: ScanModel, scene: ObjectScene) -> tuple[float, floa
 def box_verdict(seen: Sequence[Processed], threads: int) -> Verdict:
     """Take views into a box of 0.3 m at 2 mm: how many a second of processor time?"""
     wanted = ScanWanted(mat=parse_mat(USUAL_MAT), voxel_m=0.002, box=_BOX, threads=threads)
-    scan, took = Scan(wanted), []
+    scan, took = scan_for(wanted), []
     for number, each in enumerate(seen):
         began = time.process_time()
         scan.take(str(number), float(number), each)

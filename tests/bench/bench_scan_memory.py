@@ -24,7 +24,7 @@ from rich.progress import track
 from common.ledger import StageTimes
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair, StereoGeometry
-from phone_host.scan.scan import Scan
+from phone_host.scan.factory import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
@@ -130,7 +130,7 @@ def main() -> int:
     parser.add_argument("--threads", type=int, default=2, help="of the native library and of OpenCV (default 2)")
     options = parser.parse_args()
     cv2.setNumThreads(options.threads)
-    passage, scan = Passage(), Scan(ScanWanted(threads=options.threads))
+    passage, scan = Passage(), scan_for(ScanWanted(threads=options.threads))
     scan.take("first", 0.0, passage.seen(_pose(0.0)))
     own, states, sizes, at_rest = _own_bytes(), Counter[str](), list[int](), list[int]()
     going, resting = (round(60 * _HZ * minutes) for minutes in (options.minutes, options.rest))
@@ -158,7 +158,7 @@ def main() -> int:
     facts = {
         "before_bytes": own,
         "model_bytes": volume.memory_bytes,
-        "voxel_m": [scan.begun_voxel_m, volume.settings.voxel_m],
+        "voxel_m": [scan.poses.begun_voxel_m, volume.settings.voxel_m],
         "blocks_left_out": volume.left_out,
         "states": dict(states),
     }

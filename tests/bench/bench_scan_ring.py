@@ -29,12 +29,12 @@ from rich.progress import track
 from common.ledger import StageTimes
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair
+from phone_host.scan.factory import scan_for
 from phone_host.scan.loop_closing import LoopSettings
-from phone_host.scan.scan import Scan
+from phone_host.scan.pose_source import VisualPoses
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.scanned import PoseSource, ScannedPair
+from phone_host.scan.scanned import PoseOrigin, ScannedPair
 from phone_host.scan.stretches import ClosedLoop
-from phone_host.scan.tracker import Tracker
 from phone_host.stereo.match import MatchSettings, create_matcher
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
@@ -92,7 +92,7 @@ def processed(scene: RingScene, cache: Path | None) -> Iterator[Processed]:
 def run(ring: Ring, options: argparse.Namespace) -> Row:
     """Scan a ring and judge it."""
     scene, began = RingScene(ring), time.monotonic()
-    scan = Scan(ScanWanted(threads=options.threads, loops=None if options.no_loops else LoopSettings()))
+    scan = scan_for(ScanWanted(threads=options.threads, loops=None if options.no_loops else LoopSettings()))
     cache = None if options.cache is None else options.cache / _key(ring)
     pairs, console = processed(scene, cache), Console(stderr=True)
     shown = track(pairs, "scanning", len(scene.poses), console=console, disable=not console.is_terminal)
@@ -105,8 +105,9 @@ def run(ring: Ring, options: argparse.Namespace) -> Row:
             figures = f"{pair.corners} {pair.overlap:.2f} {np.linalg.norm(off[3:]):.3f} {np.linalg.norm(off[:3]):.3f}"
             print(number, pair.state.value, pair.weakness.value, figures, file=sys.stderr, flush=True)
     scan.model()
-    tracker = scan.tracker
-    assert isinstance(tracker, Tracker)
+    assert isinstance(scan.poses, VisualPoses)
+    tracker = scan.poses.tracker
+    assert tracker is not None
     rows = _rows(scan.pairs)
     found, truth = [scan.pairs[at].world_camera for at in rows], [scene.poses[at] for at in rows]
     # Half a lap has some turns more than pairs along the way.
@@ -133,7 +134,7 @@ def _key(ring: Ring) -> str:
 
 def _rows(pairs: Sequence[ScannedPair]) -> list[int]:
     """Return the numbers of the pairs that have a row in the trajectory."""
-    return [at for at, pair in enumerate(pairs) if pair.pose_source is not PoseSource.NONE]
+    return [at for at, pair in enumerate(pairs) if pair.pose_origin is not PoseOrigin.NONE]
 
 
 def _wrong(pairs: Sequence[ScannedPair], truth: Sequence[SE3]) -> set[int]:

@@ -15,8 +15,9 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+from phone_host.scan.factory import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.turntable import TurntableScan
+from phone_host.scan.turntable import TurntablePoses
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.turning_things import (
@@ -39,7 +40,8 @@ def turntable_verdicts(step_deg: float = 5.0) -> list[Verdict]:
     Args:
         step_deg: from pair to pair.
     """
-    scan, took = TurntableScan(ScanWanted(turntable=True)), 0.0
+    scan, took = scan_for(ScanWanted(turntable=True)), 0.0
+    assert isinstance(scan.poses, TurntablePoses)
     count = round(_SPAN_DEG / step_deg) + 1
     console = Console(stderr=True)
     for number in track(range(count), "turning", console=console, transient=True, disable=not console.is_terminal):
@@ -50,7 +52,7 @@ def turntable_verdicts(step_deg: float = 5.0) -> list[Verdict]:
         took += time.process_time() - began
     began = time.process_time()
     points = scan.model().seen_mesh.points_m.astype(np.float64)
-    ended, turn = time.process_time() - began, scan.turn
+    ended, turn = time.process_time() - began, scan.poses.fit.turn
     off_mm = 1e3 * np.abs(off_thing_m(points))
     mean, far = (float(off_mm.mean()), float(np.percentile(off_mm, 95))) if len(off_mm) else (math.nan, math.nan)
     closed_mm = 1e3 * turn.closed_m if turn is not None else math.nan

@@ -13,8 +13,8 @@ import pytest
 
 from common.errors import DataError
 from phone_host.geometry.se3 import SE3
+from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import Arrays, field_bytes, field_of, packed, unpacked
-from phone_host.scan.scan import Scan
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.view import Camera
 from phone_host.scan.volume import Volume
@@ -32,7 +32,7 @@ _LIBRARIES = [NONE, *([native()] if isinstance(native(), Library) else [])]
 @pytest.fixture(scope="module")
 def submap() -> bytes:
     """A sound one."""
-    return submap_bytes(taken(Scan(WANTED), POSES[:1]).close_submap())
+    return submap_bytes(taken(scan_for(WANTED), POSES[:1]).close_submap())
 
 
 def _changed(content: bytes, head: bytes, change: Callable[[Arrays], None]) -> bytes:

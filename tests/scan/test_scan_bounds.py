@@ -15,11 +15,11 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.cell_field import CellField, cell_field
 from phone_host.scan.cells import Cells
 from phone_host.scan.circle_tracks import tracks_of
+from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.full_turn import TurnView, full_turn
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import without_loose_bodies
-from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.table_cut import above, table_height_m
@@ -89,7 +89,7 @@ def test_a_field_of_impossible_settings_is_refused(settings: tuple[float, ...]) 
 def test_a_box_of_impossible_cells_is_refused() -> None:
     """What the views told of a box has three kinds of counts: with another number the submap is no submap."""
     view = grey_view(1.0)
-    scan = Scan(ScanWanted(voxel_m=0.02, box=Box((-0.1, -0.1, 0.9), (0.1, 0.1, 1.1))))
+    scan = scan_for(ScanWanted(voxel_m=0.02, box=Box((-0.1, -0.1, 0.9), (0.1, 0.1, 1.1))))
     scan.take("0", 0.0, processed_of(view))
     content = submap_bytes(scan.close_submap())
     head = content.index(b"\n") + 1

@@ -17,7 +17,7 @@ from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor, closed
-from phone_host.scan.kept_depths import KeptDepths
+from phone_host.scan.fusion import KeptDepths
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.scan_model import ScanModel, closed_model
 from phone_host.scan.view import View

@@ -8,6 +8,7 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.box import Box
+from phone_host.scan.factory import scan_for
 from phone_host.scan.loop_closing import LoopCloser, LoopSettings
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.scan import Scan
@@ -161,7 +162,7 @@ def scans() -> tuple[Scan, Scan]:
     """A round and three pairs, scanned with loops, in a box, and without them."""
     box, both = Box((-2.0, -1.0, -2.0), (2.0, 1.0, 2.0)), []
     for loops in (NARROW, None):
-        scan = Scan(ScanWanted(voxel_m=0.04, box=box if loops else None, loops=loops))
+        scan = scan_for(ScanWanted(voxel_m=0.04, box=box if loops else None, loops=loops))
         for number in range(ONCE + 3):
             scan.take(str(number), float(number), processed_of(seen(number, PAPERS)))
         both.append(scan)
@@ -193,7 +194,7 @@ def test_pairs_are_told_where_a_loop_put_them(scans: tuple[Scan, Scan]) -> None:
 def test_a_scan_whose_model_was_moved_goes_on_from_its_submap(scans: tuple[Scan, Scan]) -> None:
     """The submap after a loop is whole; the scan that goes on from it finds the next view."""
     looped, _ = scans
-    again = Scan(ScanWanted(voxel_m=0.04, box=Box((-2.0, -1.0, -2.0), (2.0, 1.0, 2.0))))
+    again = scan_for(ScanWanted(voxel_m=0.04, box=Box((-2.0, -1.0, -2.0), (2.0, 1.0, 2.0))))
     again.go_on([submap_of(submap_bytes(looped.close_submap(whole=True)), "a file")])
     told = again.take("next", 99.0, processed_of(seen(ONCE + 3, PAPERS)))
     assert told.is_fused

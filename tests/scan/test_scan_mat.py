@@ -24,16 +24,15 @@ from phone_host.output.meshes.solid import Solid
 from phone_host.output.rig_yaml import write_rig
 from phone_host.report.mat_figures import mat_figures
 from phone_host.scan.box import Box
-from phone_host.scan.mat import USUAL_MAT, MatCorners, mat_corners, parse_mat
+from phone_host.scan.factory import scan_for
+from phone_host.scan.mat import ABOVE_M, USUAL_MAT, MatCorners, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
-from phone_host.scan.mat_tracker import ABOVE_M
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracking_words import Tracking, Weakness
-from phone_host.scan.ways import scan_for
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
@@ -255,7 +254,7 @@ def test_a_choice_for_unseen_surface_that_changes_nothing_is_a_note(
 
 def test_a_pair_without_the_mat_is_lost_with_a_reason_or_followed_by_what_stands_on_it() -> None:
     """Before the mat was seen nothing is fused. Later the ball alone tells where it is when it hardly moved, not when it was turned half around."""
-    scan = Scan(WANTED)
+    scan = scan_for(WANTED)
     first = scan.take("first", 0.0, without_marks(0))
     assert (first.state, first.weakness) == (Tracking.LOST, Weakness.NO_MAT)
     seen = scan.take("seen", 1.0, walked(0))
@@ -326,7 +325,7 @@ def test_what_a_mat_told_is_kept_in_submaps() -> None:
     scan, pairs = scanned([0, 60], WANTED)
     kept = submap_of(submap_bytes(scan.close_submap()), "kept")
     assert [pair.mat for pair in kept.pairs] == [pair.mat for pair in pairs]
-    later = Scan(WANTED)
+    later = scan_for(WANTED)
     later.go_on([kept])
     after, without_end = later.take("next", 2.0, walked(180)), scan.take("next", 2.0, walked(180))
     assert after.is_fused
@@ -345,7 +344,7 @@ def test_a_scan_on_a_mat_goes_on_with_the_same_mat_and_box_only() -> None:
         (replace(WANTED, mat=parse_mat("8x6:28mm:20mm:5x5")), "another box"),
     ):
         with pytest.raises(SettingsError, match=told):
-            Scan(wanted).go_on([kept])
+            scan_for(wanted).go_on([kept])
 
 
 def test_corners_that_no_pose_explains_have_none() -> None:
@@ -359,8 +358,8 @@ def test_a_mat_with_nothing_on_it_begins_no_model() -> None:
     """The mat is seen, but all depths are far behind it: there is nothing to choose a fineness by, and the pair is lost."""
     whole = walked(0)
     assert whole.cloud is not None
-    scan = Scan(WANTED)
+    scan = scan_for(WANTED)
     pair = scan.take("bare", 0.0, replace(whole, cloud=3 * whole.cloud))
     assert pair.state is Tracking.LOST
-    assert scan.tracker is None
+    assert scan.volume is None
     assert scan.take("ball", 1.0, whole).state is Tracking.TRACKING

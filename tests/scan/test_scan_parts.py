@@ -14,10 +14,10 @@ from phone_host.output.axes import Axes
 from phone_host.output.ply import PointCloud, write_surface
 from phone_host.output.trajectory_text import Station, tum_text
 from phone_host.scan.box import Box
+from phone_host.scan.factory import scan_for
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import NO_SIZE, only, size_of, thinned, without_crumbs
-from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import surface_noise_m
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.taken_view import view_of, without_edges
@@ -136,7 +136,7 @@ def test_the_noise_of_a_surface_falls_with_the_root_of_the_views() -> None:
 
 def test_a_scan_waits_for_depth_and_refuses_another_size() -> None:
     """Pairs without depth are lost in words, and there is no model; then one begins it; a pair of another size is an error."""
-    scan = Scan(ScanWanted(voxel_m=0.05))
+    scan = scan_for(ScanWanted(voxel_m=0.05))
     none = scan.take("0", 0.0, processed(math.nan))
     assert (none.state, none.weakness, none.density) == (Tracking.LOST, Weakness.NO_DEPTH, 0.0)
     assert (scan.settings, len(scan.model().mesh.triangles), scan.fused) == (None, 0, 0)
@@ -148,7 +148,7 @@ def test_a_scan_waits_for_depth_and_refuses_another_size() -> None:
 
 def test_a_wide_view_is_laid_against_the_model_at_less_than_its_size() -> None:
     """The second of two pairs of a wall, 300 px wide, lies on what the first has made; without texture that is weak."""
-    scan = Scan(ScanWanted(voxel_m=0.05))
+    scan = scan_for(ScanWanted(voxel_m=0.05))
     scan.take("0", 0.0, processed(1.0, side=300))
     pair = scan.take("1", 1.0, processed(1.0, side=300))
     assert (pair.state, pair.weakness) == (Tracking.WEAK, Weakness.FEW_CORNERS)
@@ -159,7 +159,7 @@ def test_a_wide_view_is_laid_against_the_model_at_less_than_its_size() -> None:
 def test_only_what_lies_in_the_box_belongs_to_the_model() -> None:
     """The wall is 1 m away; a box of the left half keeps that, no box the right half, too."""
     box = Box((-0.1, -0.1, 0.9), (0.0, 0.1, 1.1))
-    scan, whole = Scan(ScanWanted(voxel_m=0.02, box=box)), Scan(ScanWanted(voxel_m=0.02))
+    scan, whole = scan_for(ScanWanted(voxel_m=0.02, box=box)), scan_for(ScanWanted(voxel_m=0.02))
     for one in (scan, whole):
         one.take("0", 0.0, processed(1.0))
     model = scan.model()

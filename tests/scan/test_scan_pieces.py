@@ -10,13 +10,13 @@ from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.cells import Cells
-from phone_host.scan.kept_depths import KeptDepths
+from phone_host.scan.factory import scan_for
+from phone_host.scan.fusion import KeptDepths
 from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.map_fragment import Found, Joining
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Pieces
-from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracker import Tracked, Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
@@ -122,7 +122,7 @@ def test_pieces_give_way_to_the_model() -> None:
 def test_what_a_joined_piece_saw_carves_too() -> None:
     """Every view in the model has looked through the box, those that were lost at first as well; a box that is chosen later is carved by them all, too."""
     box = Box((-0.4, -0.4, 0.4), (0.4, 0.1, 1.2))
-    scan = Scan(ScanWanted(voxel_m=0.02, box=box))
+    scan = scan_for(ScanWanted(voxel_m=0.02, box=box))
     pairs = [
         scan.take(str(number), float(number), processed_of(view)) for number, view in enumerate(film([*SEEN, *BACK]))
     ]

@@ -14,10 +14,9 @@ from phone_host.model import Side
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.small_view import small_view
-from phone_host.scan.tracker import Tracker
-from phone_host.scan.volume_settings import VolumeSettings
 from tests.support.plane_films import CORNER, plane_view, texture
 from tests.support.screen import Screen
+from tests.support.turning_things import processed_of
 
 RED, BLUE = (200, 0, 0), (0, 0, 200)
 
@@ -54,8 +53,7 @@ def test_a_terminal_shows_words_and_surface(tmp_path: Path, width: int, height: 
     """Words stand on top, the surface below; it fits, and nothing stays when it ends."""
     stream = io.StringIO()
     live = LiveScan(ScanWanted(voxel_m=0.01), Side.LEFT, tmp_path, waits=False, is_timeless=False)
-    live.scan.tracker = Tracker(VolumeSettings(voxel_m=0.01, far_m=3.0))
-    live.scan.tracker.track(plane_view(SE3.identity(), texture(), CORNER))
+    live.scan.take("0", 0.0, processed_of(plane_view(SE3.identity(), texture(), CORNER)))
     live.renew_surface()
     console = Console(file=stream, width=width, height=height, force_terminal=True, color_system="truecolor")
     screen = Screen(width, height)

@@ -15,11 +15,11 @@ from phone_host.output.axes import Axes
 from phone_host.report.scan_json import scan_json
 from phone_host.run.scan_files import trajectory_of
 from phone_host.run.scan_result import report_of
+from phone_host.scan.factory import scan_for
 from phone_host.scan.fineness import fineness_for
 from phone_host.scan.odometry import Odometry, OdometrySettings
-from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.scanned import PoseSource
+from phone_host.scan.scanned import PoseOrigin
 from phone_host.scan.street_tracking import odometry_for, pose_gate_for
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracker import Tracker
@@ -105,13 +105,13 @@ def test_a_street_is_tracked_as_well_as_odometry_does(baseline_m: float) -> None
 def test_a_model_of_wide_voxels_becomes_coarser_and_goes_on_from_its_submap() -> None:
     """Voxels of 25 cm become 50 cm wide where the memory is full; the scan that goes on has the same mesh, and takes pairs from where the last one was."""
     views = drive(0.3)
-    scan = Scan(ScanWanted(most_bytes=1_000_000))
+    scan = scan_for(ScanWanted(most_bytes=1_000_000))
     for number, view in enumerate(views[:5]):
         assert scan.take(str(number), float(number), processed_of(view)).is_fused
-    assert scan.begun_voxel_m == 0.25
+    assert scan.poses.begun_voxel_m == 0.25
     assert scan.settings is not None
     assert scan.settings.voxel_m > 0.25
-    again = Scan(ScanWanted(most_bytes=1_000_000))
+    again = scan_for(ScanWanted(most_bytes=1_000_000))
     again.go_on([submap_of(submap_bytes(scan.close_submap()), "a file")])
     mesh = scan.model().mesh
     assert len(mesh.triangles) > 100
@@ -131,13 +131,13 @@ def test_pairs_that_are_not_fused_keep_the_pose_of_odometry() -> None:
     for at in (4, 5):
         dark, no_depth = np.zeros_like(views[at].grey), np.full_like(views[at].depth_m, np.nan)
         views[at] = replace(views[at], grey=dark, colours=np.zeros_like(views[at].colours), depth_m=no_depth)
-    scan = Scan(ScanWanted(voxel_m=0.02))
+    scan = scan_for(ScanWanted(voxel_m=0.02))
     for number, view in enumerate(views):
         scan.take(str(number), float(number), processed_of(view))
-    model, odometry, none = PoseSource.MODEL, PoseSource.ODOMETRY, PoseSource.NONE
-    assert [pair.pose_source for pair in scan.pairs] == [model, model, odometry, odometry, none, none, model]
+    model, odometry, none = PoseOrigin.MODEL, PoseOrigin.ODOMETRY, PoseOrigin.NONE
+    assert [pair.pose_origin for pair in scan.pairs] == [model, model, odometry, odometry, none, none, model]
     kept = submap_of(submap_bytes(scan.close_submap()), "a file").pairs
-    assert [pair.pose_source for pair in kept] == [pair.pose_source for pair in scan.pairs]
+    assert [pair.pose_origin for pair in kept] == [pair.pose_origin for pair in scan.pairs]
     report = report_of(scan, scan.model(), scan.pairs, (), matcher="tandem", axes=Axes.CAMERA)
     written = np.loadtxt(trajectory_of(report).splitlines())
     assert written[:, 0].tolist() == [0, 1, 2, 3, 6]

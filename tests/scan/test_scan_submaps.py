@@ -15,6 +15,7 @@ from phone_host.model import Processed, RectifiedPair
 from phone_host.run.kept_submaps import KeptSubmaps, read_submaps
 from phone_host.run.scan_result import memory_remarks
 from phone_host.scan.box import Box
+from phone_host.scan.factory import scan_for
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
@@ -52,11 +53,11 @@ def triangles(scan: Scan) -> NDArray[np.float32]:
 
 def test_a_scan_goes_on_from_its_submaps() -> None:
     """Two submaps, as bytes and back, give model and pairs of the scan that closed them; the next view is found and fused."""
-    scan = taken(Scan(WANTED), POSES[:2])
+    scan = taken(scan_for(WANTED), POSES[:2])
     first = scan.close_submap()
     second = taken(scan, POSES[2:4], 2).close_submap()
     assert (first.is_whole, second.is_whole) == (True, False)
-    again = Scan(WANTED)
+    again = scan_for(WANTED)
     again.go_on([submap_of(submap_bytes(each), "a file") for each in (first, second)])
     assert np.array_equal(triangles(again), triangles(scan))
     assert [pair.name for pair in again.pairs] == ["0", "1", "2", "3"]
@@ -71,7 +72,7 @@ def test_a_scan_goes_on_from_its_submaps() -> None:
 
 def test_what_is_joined_later_is_in_the_submaps() -> None:
     """Pairs that were lost when a submap was closed and in the model afterwards: the next one is whole, and a scan goes on from it with all."""
-    scan = taken(Scan(WANTED), POSES[:3])
+    scan = taken(scan_for(WANTED), POSES[:3])
     away = [SE3.of(np.array([0.0, turn, 0.0, 0.3 * turn, 0.0, 0.0])) for turn in np.linspace(1.1, 0.1, 11)]
     told = [scan.take(f"away {number}", 3.0 + number, shown(pose)) for number, pose in enumerate(away[:3])]
     assert [pair.is_fused for pair in told] == [False] * 3
@@ -83,7 +84,7 @@ def test_what_is_joined_later_is_in_the_submaps() -> None:
     assert all(scan.final(pair).is_fused for pair in told)
     second = scan.close_submap()
     assert second.is_whole
-    again = Scan(WANTED)
+    again = scan_for(WANTED)
     again.go_on([submap_of(submap_bytes(second), "a file")])
     assert np.array_equal(triangles(again), triangles(scan))
     assert [pair.state for pair in again.pairs] == [pair.state for pair in scan.pairs]
@@ -91,7 +92,7 @@ def test_what_is_joined_later_is_in_the_submaps() -> None:
 
 def test_submaps_do_not_grow_for_ever() -> None:
     """On the same surface again and again, some submap holds everything, and those before it are removed."""
-    scan, sizes = Scan(WANTED), []
+    scan, sizes = scan_for(WANTED), []
     for number in range(6):
         submap = taken(scan, POSES[:1], number).close_submap()
         sizes.append(submap.is_whole)
@@ -101,8 +102,8 @@ def test_submaps_do_not_grow_for_ever() -> None:
 
 def test_another_calibration_is_refused() -> None:
     """Submaps of another geometry: a wrong setting, not a pair that failed."""
-    submap = taken(Scan(WANTED), POSES[:1]).close_submap()
-    again = Scan(WANTED)
+    submap = taken(scan_for(WANTED), POSES[:1]).close_submap()
+    again = scan_for(WANTED)
     again.go_on([replace(submap, geometry=replace(GEOMETRY, baseline_m=0.2))])
     with pytest.raises(SettingsError, match="another calibration"):
         again.take("1", 1.0, shown(POSES[1]))
@@ -111,7 +112,7 @@ def test_another_calibration_is_refused() -> None:
 @pytest.mark.parametrize("cut", [0, 5, 30, 2000, -1])
 def test_a_damaged_submap_is_named(cut: int) -> None:
     """Cut anywhere, or with a changed byte: one line with the file's name."""
-    whole = submap_bytes(taken(Scan(WANTED), POSES[:1]).close_submap())
+    whole = submap_bytes(taken(scan_for(WANTED), POSES[:1]).close_submap())
     for damaged in (whole[:cut], whole[:2500] + bytes([whole[2500] ^ 255]) + whole[2501:]):
         with pytest.raises(DataError, match=r"^submap-7.bin is damaged"):
             submap_of(damaged, "submap-7.bin")
@@ -133,9 +134,9 @@ def test_values_are_put_as_far_as_there_is_memory() -> None:
 def test_a_model_that_fills_its_memory_becomes_coarser_and_goes_on() -> None:
     """Nothing is left out, no pair is lost, the report says so, and a scan that goes on from the next submap has the same model; with --voxel it stays fine."""
     box = Box((-0.5, -0.5, 0.2), (0.5, 0.5, 1.5))
-    scan = Scan(ScanWanted(most_bytes=5_000_000, box=box))
+    scan = scan_for(ScanWanted(most_bytes=5_000_000, box=box))
     taken(scan, POSES[:1])
-    begun_m = scan.begun_voxel_m
+    begun_m = scan.poses.begun_voxel_m
     scan.close_submap()
     taken(scan, POSES[1:5], 1)
     assert scan.settings is not None
@@ -146,10 +147,10 @@ def test_a_model_that_fills_its_memory_becomes_coarser_and_goes_on() -> None:
     assert f"its voxels became {distance_text(2 * begun_m)} wide, {distance_text(begun_m)} at first" in remark.text
     whole = scan.close_submap()
     assert whole.is_whole
-    again = Scan(ScanWanted(most_bytes=5_000_000, box=box))
+    again = scan_for(ScanWanted(most_bytes=5_000_000, box=box))
     again.go_on([submap_of(submap_bytes(whole), "a file")])
     assert np.array_equal(triangles(again), triangles(scan))
-    fine = taken(Scan(ScanWanted(most_bytes=5_000_000, voxel_m=begun_m)), POSES[:5])
+    fine = taken(scan_for(ScanWanted(most_bytes=5_000_000, voxel_m=begun_m)), POSES[:5])
     assert fine.settings is not None
     assert fine.volume is not None
     assert fine.volume.left_out > 0
@@ -159,8 +160,8 @@ def test_a_model_that_fills_its_memory_becomes_coarser_and_goes_on() -> None:
 def test_what_was_carved_before_a_resume_counts_in_coarser_cells_too() -> None:
     """A model that becomes coarser after it was gone on with knows what all five views told of its box."""
     wanted = ScanWanted(most_bytes=5_500_000, box=Box((-0.5, -0.5, 0.2), (0.5, 0.5, 1.5)))
-    first = taken(Scan(wanted), POSES[:2]).close_submap()
-    again = Scan(wanted)
+    first = taken(scan_for(wanted), POSES[:2]).close_submap()
+    again = scan_for(wanted)
     again.go_on([submap_of(submap_bytes(first), "a file")])
     last = taken(again, POSES[2:5], 2).close_submap()
     assert last.settings.voxel_m == 2 * first.settings.voxel_m
@@ -172,7 +173,7 @@ def test_what_was_carved_before_a_resume_counts_in_coarser_cells_too() -> None:
 
 def test_files_are_kept_and_removed(tmp_path: Path) -> None:
     """One after 20 fused pairs; a resumed scan writes the next number; what is missing is told; none is left at the end."""
-    scan = Scan(WANTED)
+    scan = scan_for(WANTED)
     kept = KeptSubmaps(tmp_path, scan)
     with pytest.raises(DataError, match="holds no submaps"):
         read_submaps(tmp_path)
@@ -180,7 +181,7 @@ def test_files_are_kept_and_removed(tmp_path: Path) -> None:
         taken(scan, POSES[:1], number)
         kept.after_pair()
     assert sorted(path.name for path in tmp_path.glob("submap*")) == ["submap-0000.bin", "submap-0001.bin"]
-    resumed = KeptSubmaps(tmp_path, again := Scan(WANTED), read_submaps(tmp_path))
+    resumed = KeptSubmaps(tmp_path, again := scan_for(WANTED), read_submaps(tmp_path))
     for number in range(40, 60):
         taken(again, POSES[:1], number)
         resumed.after_pair()
@@ -202,7 +203,7 @@ def test_files_are_kept_and_removed(tmp_path: Path) -> None:
 def test_a_folder_that_vanishes_ends_the_keeping_only(tmp_path: Path) -> None:
     """What cannot be written is told in the report; the scan goes on."""
     (tmp_path / "file").write_text("")
-    scan = Scan(WANTED)
+    scan = scan_for(WANTED)
     kept = KeptSubmaps(tmp_path / "file", scan)
     for number in range(21):
         taken(scan, POSES[:1], number)
@@ -214,11 +215,11 @@ def test_a_folder_that_vanishes_ends_the_keeping_only(tmp_path: Path) -> None:
 def test_what_the_views_told_of_a_box_is_kept() -> None:
     """A scan in a box goes on with the same counts, so its closed model is the same; with another box it is refused."""
     wanted = replace(WANTED, box=Box((-0.3, -0.3, 0.5), (0.3, 0.3, 1.2)))
-    scan = taken(Scan(wanted), POSES[:2])
+    scan = taken(scan_for(wanted), POSES[:2])
     kept = submap_of(submap_bytes(scan.close_submap()), "a file")
-    again = Scan(wanted)
+    again = scan_for(wanted)
     again.go_on([kept])
     assert scan.model().is_closed
     assert np.array_equal(triangles(again), triangles(scan))
     with pytest.raises(SettingsError, match="another box"):
-        Scan(replace(WANTED, box=Box((-0.3, -0.3, 0.5), (0.3, 0.3, 1.5)))).go_on([kept])
+        scan_for(replace(WANTED, box=Box((-0.3, -0.3, 0.5), (0.3, 0.3, 1.5)))).go_on([kept])

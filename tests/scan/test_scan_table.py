@@ -18,14 +18,14 @@ from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.scan.box import Box
+from phone_host.scan.factory import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
+from phone_host.scan.surface import thing_box
 from phone_host.scan.table import Table, find_table
-from phone_host.scan.table_box import thing_box
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.scan.ways import scan_for
 from tests.support.programs import board
 from tests.support.solid_views import Thing, around, thing_view
 from tests.support.table_things import Slope, bare_scene, computed, small_scene, true_camera, write_pictures

@@ -12,8 +12,9 @@ from phone_host.cli import main
 from phone_host.model.unseen import UnseenSurface
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.mat import USUAL_MAT, parse_mat
-from phone_host.scan.table_scan import TableScan
-from phone_host.scan.turntable import TurntableScan
+from phone_host.scan.mat_tracker import MatPoses
+from phone_host.scan.pose_source import TablePoses, VisualPoses
+from phone_host.scan.turntable import TurntablePoses
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.verbs.export.arguments import add_arguments
@@ -44,20 +45,16 @@ def test_unseen_takes_each_choice_and_no_other(add: Callable[[argparse.ArgumentP
 
 
 def test_the_python_api_takes_one_way_and_begins_it() -> None:
-    """What contradicts itself is refused, and so is the class that would pass over what was asked for; `scan_for` begins each."""
+    """What contradicts itself is refused; `scan_for` takes the poses from what was asked for."""
     for wrong in ({"turntable": True, "on_table": True}, {"mat": parse_mat(USUAL_MAT), "turntable": True}):
         with pytest.raises(SettingsError, match="ask for one of"):
             api.ScanWanted(**wrong)
     empty = Volume(VolumeSettings(voxel_m=0.01, far_m=1.0))
     with pytest.raises(SettingsError, match="onto without turntable"):
         api.ScanWanted(onto=field_of(field_bytes(empty), "field.bin"))
-    kinds = []
-    for wanted in (api.ScanWanted(turntable=True), api.ScanWanted(on_table=True)):
-        with pytest.raises(SettingsError, match="scan_for"):
-            api.Scan(wanted)
-        kinds.append(type(api.scan_for(wanted)))
-    assert kinds == [TurntableScan, TableScan]
-    assert type(api.scan_for(api.ScanWanted(mat=parse_mat(USUAL_MAT)))) is api.Scan
+    ways = [api.ScanWanted(), api.ScanWanted(mat=parse_mat(USUAL_MAT)), api.ScanWanted(on_table=True)]
+    kinds = [type(api.scan_for(wanted).poses) for wanted in (*ways, api.ScanWanted(turntable=True))]
+    assert kinds == [VisualPoses, MatPoses, TablePoses, TurntablePoses]
 
 
 @pytest.mark.parametrize(

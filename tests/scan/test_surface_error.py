@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed
+from phone_host.scan.factory import scan_for
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_error import ErrorScope
-from phone_host.scan.ways import scan_for
 from tests.scan.test_scan_mat import WANTED as ON_MAT
 from tests.scan.test_scan_mat import walked
 from tests.support.mats import BALL_M

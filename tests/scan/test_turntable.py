@@ -16,17 +16,19 @@ from phone_host.output.axes import Axes
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.scan.box import Box
 from phone_host.scan.circle_bundle import Circle, Seen, fitted_circle
+from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import KeptField, field_bytes, field_of
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.observation import Observer
+from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_match import Match
 from phone_host.scan.table_cut import points_of, table_height_m
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.turn_axis import TurnAxis, axis_of, unwrapped
 from phone_host.scan.turning_mask import Turning, TurningMask
-from phone_host.scan.turntable import TurntableScan
+from phone_host.scan.turntable import TurntablePoses
 from phone_host.scan.view import View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
@@ -143,28 +145,32 @@ def test_what_turns_is_told_from_what_stands_still(jerky: tuple[list[View], list
         assert np.count_nonzero(found.mask & ~thing) < 0.35 * np.count_nonzero(thing)
 
 
-def scanned(views: list[View], wanted: ScanWanted = WANTED) -> TurntableScan:
+def scanned(views: list[View], wanted: ScanWanted = WANTED) -> Scan:
     """Scan views."""
-    scan = TurntableScan(wanted)
+    scan = scan_for(wanted)
     for number, view in enumerate(views):
         scan.take(str(number), float(number), processed_of(view))
     return scan
 
 
+def poses_of(scan: Scan) -> TurntablePoses:
+    """What tells its poses."""
+    assert isinstance(scan.poses, TurntablePoses)
+    return scan.poses
+
+
 @pytest.fixture(scope="module")
-def whole_turn(jerky: tuple[list[View], list[float]]) -> TurntableScan:
+def whole_turn(jerky: tuple[list[View], list[float]]) -> Scan:
     """The scan of that turn, whose model was made."""
     scan = scanned(jerky[0])
     scan.model()
     return scan
 
 
-def test_a_jerky_turn_is_closed_to_one_surface(
-    jerky: tuple[list[View], list[float]], whole_turn: TurntableScan
-) -> None:
+def test_a_jerky_turn_is_closed_to_one_surface(jerky: tuple[list[View], list[float]], whole_turn: Scan) -> None:
     """All views but one at most are in the model, which lies 0.6 mm off the thing on average, closed down to the table and without it; one thread and two give the same bits."""
     views, angles = jerky
-    scan, model, turn = whole_turn, whole_turn.model(), whole_turn.turn
+    scan, model, turn = whole_turn, whole_turn.model(), poses_of(whole_turn).fit.turn
     assert np.count_nonzero([pair.is_fused for pair in scan.pairs]) >= len(views) - 1
     assert turn is not None
     assert turn.is_closed
@@ -185,7 +191,7 @@ def test_views_that_were_lost_together_do_not_double_the_surface(jerky: tuple[li
     """Turned on by 115 degrees at once and back again, the views between agree with each other only: they stay out; those that show again what is in the model come in, and what is fused lies on the thing."""
     scan = scanned([jerky[0][number] for number in (0, 1, 2, 3, *range(14, -1, -1))])
     points = scan.model().seen_mesh.points_m.astype(np.float64)
-    assert scan.turn is not None
+    assert poses_of(scan).fit.turn is not None
     assert [pair.is_fused for pair in scan.pairs] == [True] * 4 + [False] * 10 + [True] * 5
     assert np.abs(off_thing_m(points)).mean() < 0.0006
 
@@ -211,7 +217,7 @@ def reasons(views: list[View]) -> set[Weakness]:
     """Why none of some views is in the model."""
     scan = scanned(views)
     assert scan.fused == 0
-    assert scan.tracker is None
+    assert scan.volume is None
     assert len(scan.model().mesh.triangles) == 0
     return {pair.weakness for pair in scan.pairs[1:]}
 
@@ -233,7 +239,7 @@ def test_a_pause_is_no_loss(jerky: tuple[list[View], list[float]]) -> None:
     scan = scanned([*views[:3], views[2], views[2], views[3]])
     assert all(pair.is_fused for pair in scan.pairs)
     assert np.array_equal(scan.pairs[4].world_camera.t_m, scan.pairs[2].world_camera.t_m)
-    assert scan.views == 4
+    assert poses_of(scan).views == 4
 
 
 COARSE = replace(WANTED, voxel_m=0.004)
@@ -247,7 +253,7 @@ def test_pairs_that_tell_nothing_leave_the_turn_alone(jerky: tuple[list[View], l
     little = exact_view(turned_scene(angles[2] + math.radians(1.2)), SMALL, 51)
     scan = scanned([*views[:3], little, blind, pushed, views[2], views[3]], COARSE)
     assert [pair.weakness for pair in scan.pairs[4:6]] == [Weakness.NO_DEPTH, Weakness.ALL_TURNS]
-    assert scan.views == 4
+    assert poses_of(scan).views == 4
     assert scan.pairs[-1].is_fused
 
 
@@ -260,9 +266,9 @@ def test_a_box_is_carved_by_the_views_of_the_turn(jerky: tuple[list[View], list[
     assert model.is_closed
     assert (model.mesh.points_m > low - 0.005).all()
     assert (model.mesh.points_m < high + 0.005).all()
-    turn = scan.turn
+    turn = poses_of(scan).fit.turn
     assert np.array_equal(scan.model().mesh.points_m, model.mesh.points_m)
-    assert scan.turn is turn
+    assert poses_of(scan).fit.turn is turn
     lowest = ((model.mesh.points_m - FOOT_M) @ UP).min()
     assert lowest == pytest.approx(0, abs=0.002)  # though the box reaches 50 mm below the table
 
@@ -297,23 +303,25 @@ def test_a_pass_is_laid_onto_an_earlier_one_or_stays_alone(jerky: tuple[list[Vie
     away = SE3.of(np.array([0.3, -0.2, 0.5, 0.1, 0.0, 0.2]))
     empty = scanned(views, replace(COARSE, onto=kept(Volume(VolumeSettings(voxel_m=0.004, far_m=1.0)))))
     alone = empty.model()
-    assert empty.match is not None
-    assert empty.match.match is Match.NONE
+    match = poses_of(empty).fit.match
+    assert match is not None
+    assert match.match is Match.NONE
     assert np.abs(off_thing_m(alone.seen_mesh.points_m.astype(np.float64))).mean() < 0.002
     first = Volume(VolumeSettings(voxel_m=0.004, far_m=1.0))
     assert empty.volume is not None
     first.take_in(empty.volume, away)
     scan = scanned(views, replace(COARSE, onto=kept(first)))
     points = away.inverse().apply(scan.model().seen_mesh.points_m.astype(np.float64))
-    assert scan.match is not None
-    assert scan.match.match is Match.FOUND
+    match = poses_of(scan).fit.match
+    assert match is not None
+    assert match.match is Match.FOUND
     assert np.abs(off_thing_m(points)).mean() < 0.002
     moved = [away @ pair.world_camera for pair in empty.pairs if pair.is_fused]
     for pair, truth in zip([pair for pair in scan.pairs if pair.is_fused], moved, strict=True):
         assert np.linalg.norm(pair.world_camera.t_m - truth.t_m) < 0.004
 
 
-def test_a_pass_turned_over_closes_what_the_first_stood_on(whole_turn: TurntableScan) -> None:
+def test_a_pass_turned_over_closes_what_the_first_stood_on(whole_turn: Scan) -> None:
     """Both passes carve: no edge is open, hardly anything was not seen, the content is right to 4 %, and the second pass saw the thing, as it stood first, from below."""
     first = whole_turn
     assert first.model().unseen_share > 0.1
@@ -321,8 +329,9 @@ def test_a_pass_turned_over_closes_what_the_first_stood_on(whole_turn: Turntable
     over = [exact_view(turned_scene(math.radians(14.4) * number, is_over=True), SMALL, number) for number in range(27)]
     scan = scanned(over, replace(WANTED, onto=field_of(field_bytes(first.volume, first.carved), "field.bin")))
     model = scan.model()
-    assert scan.match is not None
-    assert scan.match.match is Match.FOUND
+    match = poses_of(scan).fit.match
+    assert match is not None
+    assert match.match is Match.FOUND
     assert size_of(model.mesh).border_m == 0
     assert model.unseen_share < 0.02
     points = model.mesh.points_m.astype(np.float64)

@@ -1,12 +1,22 @@
-"""The box around a thing on a table: what the model shows of it above the table, and all that is connected to it. Pure."""
+"""How the surface of a scan is made: of all that was seen, closed in a box, or closed around what stands on a table. Pure.
 
-from typing import Final
+There is one class for each way to make one; that of an object that turns is in `turntable`, and only `factory` knows them all.
+"""
+
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.scan.blocks import ONE, SIDE, Blocks
 from phone_host.scan.box import Box
+from phone_host.scan.cells import Cells
+from phone_host.scan.closing import Floor
+from phone_host.scan.fusion import Fusion
+from phone_host.scan.mat import ABOVE_M
+from phone_host.scan.pose_source import TablePoses
+from phone_host.scan.scan_model import ScanModel, closed_model, open_model
+from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT, VolumeSettings
 
 Mask = NDArray[np.bool_]
@@ -19,6 +29,81 @@ _NEAR: Final = 0.35
 """Of the field's range: a voxel with a smaller value is at the surface."""
 
 _MARGIN_VOXELS: Final = 4.0
+_LEAST_VOXELS: Final = 1.5
+"""Above the table: what is lower may be its surface."""
+
+
+class Surface(Protocol):
+    """Makes the surface of a scan."""
+
+    def cells(self, box: Box | None, voxel_m: float) -> Cells | None:
+        """Return the cells that are carved as the views come.
+
+        Args:
+            box: that was asked for; None: there is none.
+            voxel_m: distance of two values of the field, m.
+        """
+        ...
+
+    def model(self, volume: Volume, fusion: Fusion, box: Box | None) -> ScanModel:
+        """Make the surface.
+
+        Args:
+            volume: of the scan.
+            fusion: what its views tell beside that.
+            box: outside of which nothing belongs to the model, and in which it is closed; None: it is open, unless the class closes it by itself.
+        """
+        ...
+
+
+class BoxSurface:
+    """All that was seen; closed in a box where there is one.
+
+    Args:
+        floor: on which the object stands; None: it is not known.
+    """
+
+    def __init__(self, floor: Floor | None) -> None:
+        self._floor = floor
+
+    def cells(self, box: Box | None, voxel_m: float) -> Cells | None:
+        """See `Surface.cells`."""
+        return None if box is None else Cells.of(box, voxel_m)
+
+    def model(self, volume: Volume, fusion: Fusion, box: Box | None) -> ScanModel:
+        """See `Surface.model`."""
+        if box is None:
+            return open_model(volume)
+        carving = fusion.carving_in(Cells.of(box, volume.settings.voxel_m))
+        return closed_model(volume, carving, box, self._floor)
+
+
+class TableSurface(BoxSurface):
+    """What stands on the table in the room and is connected to the object, closed down to the table; or what is in a box that was asked for.
+
+    Args:
+        poses: which know the room.
+        floor: the table.
+    """
+
+    def __init__(self, poses: TablePoses, floor: Floor | None) -> None:
+        super().__init__(floor)
+        self._poses = poses
+
+    def cells(self, box: Box | None, voxel_m: float) -> Cells | None:
+        """See `Surface.cells`: the room's, without a box."""
+        return self._poses.cells if box is None else super().cells(box, voxel_m)
+
+    def model(self, volume: Volume, fusion: Fusion, box: Box | None) -> ScanModel:
+        """See `Surface.model`."""
+        room, cells = self._poses.room, self._poses.cells
+        if box is not None or room is None or cells is None:
+            return super().model(volume, fusion, box)
+        above_m = max(ABOVE_M, _LEAST_VOXELS * volume.settings.voxel_m)
+        around = thing_box(volume.blocks, volume.settings, room, above_m)
+        if around is None:
+            return ScanModel.empty()
+        return closed_model(volume, fusion.carving_in(cells), around, Floor(skip_m=above_m))
 
 
 def thing_box(blocks: Blocks, settings: VolumeSettings, room: Box, above_m: float) -> Box | None:
