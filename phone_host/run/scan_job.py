@@ -31,7 +31,7 @@ from phone_host.run.stereo_trust import judge_pair
 from phone_host.run.turn_remarks import field_of_turn, turn_remarks
 from phone_host.run.unused_mat import unused_mat
 from phone_host.scan.factory import scan_for
-from phone_host.scan.mat_in_view import MatInView
+from phone_host.scan.mat import MatInView
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.stereo.core import StereoCore

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.blocks import ONE, SIDE, Blocks
+from phone_host.scan.blocks import CORNERS, INSIDE, ONE, SIDE, Blocks
 from phone_host.scan.volume_settings import MOST_WEIGHT
 
 Floats = NDArray[np.float64]
@@ -20,22 +20,12 @@ _AT_ONCE: Final = 64
 _LOOKS: Final = np.linspace(-0.5, SIDE - 0.5, 6)
 """Places along an axis of a block, voxels, that tell which blocks it comes to lie in: at most 1.6 voxels apart."""
 
-_CORNERS: Final = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], np.int64)
-_INSIDE: Final = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
-"""(512, 3) x, y, z of a block's voxels, in the order of its values."""
-
 _NEXT_TO_NOTHING: Final = 1e-4
 """A corner with so little share may be unknown: a motion that moves nothing leaves everything as it was."""
 
 
 def reached(places: NDArray[np.int32], into_of: SE3, voxel_m: float) -> NDArray[np.int32]:
-    """Return the blocks (M, 3) in which moved blocks (N, 3) come to lie, in rising order.
-
-    Args:
-        places: of the blocks, in blocks.
-        into_of: how they move.
-        voxel_m: distance of two voxels, m.
-    """
+    """Return the blocks (M, 3) in which moved blocks (N, 3) come to lie, in rising order."""
     looks = np.stack(np.meshgrid(_LOOKS, _LOOKS, _LOOKS, indexing="ij"), axis=-1).reshape(-1, 3) @ into_of.R.T
     found = [np.zeros((0, 3), np.int32)]
     for first in range(0, len(places), _AT_ONCE):
@@ -60,7 +50,7 @@ def absorbed(into: Blocks, of: Blocks, chosen: NDArray[np.uint8], rows: Floats) 
     changed, numbers = np.zeros_like(chosen), np.flatnonzero(chosen)
     for first in range(0, len(numbers), _AT_ONCE):
         some = numbers[first : first + _AT_ONCE]
-        voxels = (SIDE * into.places[some][:, np.newaxis].astype(np.float64) + _INSIDE).reshape(-1, 3)
+        voxels = (SIDE * into.places[some][:, np.newaxis].astype(np.float64) + INSIDE).reshape(-1, 3)
         at = voxels @ rows[:, :3].T + rows[:, 3]
         field, weight, tint, tinted, known = _sampled(of, at)
         changed[some] = known.reshape(len(some), -1).any(axis=1)
@@ -86,11 +76,9 @@ def _sampled(of: Blocks, at: Floats) -> tuple[Floats, Floats, Floats, Floats, ND
     share, count = at - low, len(at)
     field, weight, tint, tinted = np.zeros(count), np.zeros(count), np.zeros((count, 3)), np.zeros(count)
     known = np.ones(count, np.bool_)
-    for corner in _CORNERS:
+    for corner in CORNERS:
         by = np.where(corner, share, 1 - share).prod(axis=1)
-        there = low + corner
-        numbers = of.find((there >> 3).astype(np.int32))
-        inside = (there & (SIDE - 1)) @ np.array([1, SIDE, SIDE**2])
+        numbers, inside = of.locate(low + corner)
         held = np.where(numbers >= 0, of.weights[numbers, inside], 0)
         known &= (held > 0) | (by < _NEXT_TO_NOTHING)
         by = np.where(held > 0, by, 0)

@@ -4,7 +4,7 @@ Value number x + 8 y + 64 z of a block belongs to the voxel at (8 place + (x, y,
 the same arrays (native/src/volume.h). Memory grows by doubling, up to a limit; what finds no room then is counted, not fused.
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,12 @@ ONE: Final = 32000
 
 BLOCK_BYTES: Final = VOXELS * (2 + 2 + 3) + 12 + 16
 """Memory of a block: field, weight, colour, place, and its share of the table."""
+
+CORNERS: Final = np.array([[n & 1, n >> 1 & 1, n >> 2] for n in range(8)])
+"""(8, 3) of the cube: corner n lies at x = bit 0, y = bit 1, z = bit 2 of n."""
+
+INSIDE: Final = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
+"""(512, 3) x, y, z of a block's voxels, in the order of its values."""
 
 _FIRST_ROOM: Final = 256
 _PRIMES: Final = (73856093, 19349663, 83492791)
@@ -83,6 +89,10 @@ class Blocks:
             open_ = open_[(there >= 0) & ~same]
             slots[open_] = (slots[open_] + 1) & (len(self.slots) - 1)
         return numbers
+
+    def locate(self, voxels: NDArray[np.integer[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the numbers (N,) of the blocks of voxels (N, 3), -1 = there is none, and which of a block's values are theirs (N,)."""
+        return self.find((voxels >> 3).astype(np.int32)), (voxels & (SIDE - 1)) @ np.array([1, SIDE, SIDE**2])
 
     def _hashed(self, places: NDArray[np.int32]) -> NDArray[np.int64]:
         parts = places.astype(np.int64) * np.array(_PRIMES)

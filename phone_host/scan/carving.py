@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan import carving_numpy
-from phone_host.scan.cells import Cells
-from phone_host.scan.jobs import aim, rows_of
+from phone_host.scan.box import Cells
 from phone_host.scan.view import View
+from phone_host.scan.volume import aim, rows_of
 from phone_host.stereo.native.library import Library, Missing, native
 from phone_host.stereo.native.volume_jobs import CarveJob
 
@@ -52,11 +51,6 @@ class Carving:
         counts: (3, Z, Y, X) uint8, 255 = that or more: views that looked through a cell, because they measured something clearly beyond it; those
             from which it is hidden, because they measured something clearly before it; those that have no depth there.
         views: that were seen.
-
-    Args:
-        cells: how the grid lies.
-        threads: that work on it, >= 1; results do not depend on them.
-        library: computes; None: that of this installation.
     """
 
     def __init__(self, cells: Cells, threads: int = 1, library: Library | Missing | None = None) -> None:
@@ -66,18 +60,13 @@ class Carving:
         self.counts = np.zeros((3, *cells.counts[::-1]), np.uint8)
 
     def see(self, view: View, world_camera: SE3) -> None:
-        """Take a view.
-
-        Args:
-            view: its depths count however far they are; infinite: nothing is there.
-            world_camera: where it was taken.
-        """
+        """Take a view; its depths count however far they are; infinite: nothing is there."""
         self.views += 1
         depth = np.ascontiguousarray(view.depth_m, np.float32)
         clear_m = _HALF_DIAGONAL * self.cells.side_m
         if self._library is None:
             pose = np.column_stack([world_camera.inverse().R, world_camera.inverse().t_m]).astype(np.float32)
-            told = carving_numpy.told(self.cells, replace(view, depth_m=depth), pose, _SIGMAS, clear_m)
+            told = _told_by_numpy(self.cells, replace(view, depth_m=depth), pose, _SIGMAS, clear_m)
             self.counts += np.array(told) & (self.counts < 255)
             return
         job = CarveJob(
@@ -136,3 +125,57 @@ class Carving:
     def go_on(self, carved: Carved) -> None:
         """Go on from what another one has counted in the same cells."""
         self.counts[:], self.views = carved.counts, carved.views
+
+
+F: Final = np.float32
+Flags = NDArray[np.bool_]
+
+
+def _told_by_numpy(
+    cells: Cells, view: View, camera_world: NDArray[np.float32], sigmas: float, clear_m: float
+) -> tuple[Flags, Flags, Flags]:
+    """Return the cells that a view looked through, those that it found hidden, and those where it has no depth, (Z, Y, X) each.
+
+    Args:
+        cells: how the grid lies.
+        view: what was seen.
+        camera_world: (3, 4) float32 rows of the pose.
+        sigmas: standard deviations of a depth that make it clear.
+        clear_m: and how far beyond that, m.
+    """
+    wide, deep, tall = cells.counts
+    through, behind, blank = (np.zeros((tall, deep, wide), np.bool_) for _ in range(3))
+    along, across, up = (
+        first + np.arange(count, dtype=F) * F(cells.side_m)
+        for first, count in zip(cells.first_m, cells.counts, strict=True)
+    )
+    for layer in range(tall):
+        through[layer], behind[layer], blank[layer] = _layer(
+            view, camera_world, (along, across, up[layer]), (F(sigmas), F(clear_m))
+        )
+    return through, behind, blank
+
+
+def _layer(
+    view: View,
+    pose: NDArray[np.float32],
+    at: tuple[NDArray[np.float32], NDArray[np.float32], np.float32],
+    limits: tuple[np.float32, np.float32],
+) -> tuple[Flags, Flags, Flags]:
+    along, across, up = at
+    camera = []
+    for row in pose:
+        start = row[1] * across + row[2] * up + row[3]
+        camera.append(start[:, np.newaxis] + row[0] * along)
+    depth, focal = camera[2], F(view.geometry.focal_px)
+    safe = np.maximum(depth, F(1e-3))
+    u = focal * camera[0] / safe + F(view.geometry.cx_px) + F(0.5)
+    v = focal * camera[1] / safe + F(view.geometry.cy_px) + F(0.5)
+    height, width = view.depth_m.shape
+    inside = (depth > F(1e-3)) & (u >= 0) & (v >= 0) & (u < F(width)) & (v < F(height))
+    pixels = np.where(inside, v, 0).astype(np.int64) * width + np.where(inside, u, 0).astype(np.int64)
+    seen = np.where(inside, view.depth_m.ravel()[pixels].astype(F), F(np.nan))
+    sigmas, clear_m = limits
+    with np.errstate(invalid="ignore", over="ignore"):
+        clear = clear_m + sigmas * F(view.noise_per_m) * seen * seen
+        return np.isposinf(seen) | (seen - depth > clear), depth - seen > clear, inside & ~(seen > 0)

@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.scan.blocks import ONE, SIDE, VOXELS, Blocks
+from phone_host.scan.blocks import INSIDE, ONE, SIDE, Blocks
+from phone_host.scan.box import Cells
 from phone_host.scan.carving import Carving
-from phone_host.scan.cells import Cells
 
 Floats = NDArray[np.float32]
 F: Final = np.float32
@@ -37,14 +37,7 @@ class CellField:
     values: Floats
 
     def at(self, voxels: NDArray[np.int64]) -> Floats:
-        """Return the field between cells.
-
-        Args:
-            voxels: (N, 3) numbers of voxels along x, y, z; those outside get the value of the nearest cell.
-
-        Returns:
-            (N,) float32.
-        """
+        """Return the field (N,) float32 at numbers of voxels (N, 3) along x, y, z, between cells; those outside get the value of the nearest cell."""
         size, flat = np.array(self.values.shape[::-1]), self.values.ravel()
         wide = self.cells.voxels
         place = (voxels - (wide - 1) / 2) / wide - np.array(self.cells.low) + 1
@@ -96,8 +89,6 @@ def _seen(cells: Cells, blocks: Blocks, least_weight: int) -> tuple[Floats, NDAr
     wide, deep, tall = cells.counts
     count = wide * deep * tall
     total, near, far = np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.int64)
-    at = np.arange(VOXELS)
-    local = np.column_stack([at % SIDE, at // SIDE % SIDE, at // SIDE**2])
     low = np.array(cells.low) * cells.voxels
     high = low + np.array(cells.counts) * cells.voxels
     first = SIDE * blocks.places[: blocks.count].astype(np.int64)
@@ -106,7 +97,7 @@ def _seen(cells: Cells, blocks: Blocks, least_weight: int) -> tuple[Floats, NDAr
         numbers = inside[begin : begin + _AT_ONCE]
         known = blocks.weights[numbers] >= least_weight
         block, voxel = np.nonzero(known)
-        place = (first[numbers[block]] + local[voxel]) // cells.voxels - np.array(cells.low)
+        place = (first[numbers[block]] + INSIDE[voxel]) // cells.voxels - np.array(cells.low)
         fits = ((place >= 0) & (place < np.array(cells.counts))).all(axis=1)
         cell = place[fits] @ np.array([1, wide, wide * deep])
         field = blocks.field[numbers[block[fits]], voxel[fits]]

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Image, StereoGeometry
-from phone_host.scan.circle_bundle import Seen
-from phone_host.scan.corners import new_corners
-from phone_host.scan.observation import Observer
-from phone_host.scan.turn_axis import TurnAxis
+from phone_host.scan.camera_pose import Observer
+from phone_host.scan.circle_bundle import Seen, TurnAxis
+from phone_host.scan.odometry import flow, new_corners
 from phone_host.scan.view import View
 
 Floats = NDArray[np.float64]
@@ -33,7 +32,6 @@ _NEIGHBOURS: Final = 4
 
 _WINDOW_PX: Final = (17, 17)
 _LEVELS: Final = 2
-_STOP: Final = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01)
 _THERE_AND_BACK_PX: Final = 0.5
 _CONTRAST_PX: Final = 21
 _CONTRAST_FLOOR: Final = 4.0
@@ -135,8 +133,8 @@ def _looked_for(
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Look for corners (N, 2) in another view, whose points (N, 3) are in its camera's axes; return where they are and which were found."""
     start = _projected(points_m, view.geometry)
-    to, found = _flow(here, there, corners, start)
-    back, found_back = _flow(there, here, to, corners.copy())
+    to, found = flow(here, there, corners, start, window_px=_WINDOW_PX, levels=_LEVELS)
+    back, found_back = flow(there, here, to, corners.copy(), window_px=_WINDOW_PX, levels=_LEVELS)
     height, width = there.shape
     inside = (to >= _BORDER_PX).all(axis=1) & (to < (width - _BORDER_PX, height - _BORDER_PX)).all(axis=1)
     near = np.linalg.norm(back - corners, axis=1) < _THERE_AND_BACK_PX
@@ -151,22 +149,6 @@ def _projected(points_m: Floats, geometry: StereoGeometry) -> NDArray[np.float32
     depth = np.maximum(points_m[:, 2:], 1e-3)
     centre = np.array([geometry.cx_px, geometry.cy_px])
     return np.asarray(geometry.focal_px * points_m[:, :2] / depth + centre, np.float32)
-
-
-def _flow(
-    one: Image, other: Image, pixels: NDArray[np.float32], start: NDArray[np.float32]
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    there, found, _ = cv2.calcOpticalFlowPyrLK(
-        one,
-        other,
-        np.ascontiguousarray(pixels),
-        np.ascontiguousarray(start),
-        winSize=_WINDOW_PX,
-        maxLevel=_LEVELS,
-        criteria=_STOP,
-        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-    )
-    return np.asarray(there, np.float32).reshape(-1, 2), np.asarray(found).reshape(-1) > 0
 
 
 def _evened(grey: Image) -> Image:

@@ -6,6 +6,7 @@ it ends nowhere; what is far from it is never made.
 """
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -17,11 +18,33 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.cell_field import CellField, cell_field
 from phone_host.scan.ground import Ground
 from phone_host.scan.volume_settings import LEAST_WEIGHT, VolumeSettings
-from phone_host.scan.windows import windows_of
 
 Floats = NDArray[np.float32]
 Places = NDArray[np.int32]
 F: Final = np.float32
+
+_STEPS: Final = tuple(product((-1, 0, 1), repeat=3))
+
+
+def _with_around(
+    blocks: Blocks, places: NDArray[np.int32], around: int
+) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
+    """Return field and weights of blocks at places (N, 3), which need not be there, with 1..8 voxels more on each side, (N, S, S, S) z, y, x each; weight 0 where there is no block."""
+    size = SIDE + 2 * around
+    field = np.zeros((len(places), size, size, size), np.int16)
+    weights = np.zeros(field.shape, np.uint16)
+    into = {-1: slice(0, around), 0: slice(around, around + SIDE), 1: slice(around + SIDE, size)}
+    out_of = {-1: slice(SIDE - around, SIDE), 0: slice(0, SIDE), 1: slice(0, around)}
+    cube = (-1, SIDE, SIDE, SIDE)
+    for x, y, z in _STEPS:
+        numbers = blocks.find(places + np.array([x, y, z], np.int32))
+        has = np.flatnonzero(numbers >= 0)
+        there = numbers[has]
+        target, source = (has, into[z], into[y], into[x]), (slice(None), out_of[z], out_of[y], out_of[x])
+        field[target] = blocks.field[there].reshape(cube)[source]
+        weights[target] = blocks.weights[there].reshape(cube)[source]
+    return field, weights
+
 
 _AT_ONCE: Final = 512
 _SIZE: Final = SIDE + 2
@@ -98,16 +121,16 @@ class _Closed:
         return _Part(np.where(is_cut, outside, field), np.where(is_cut, np.uint16(_NOT_SEEN), weights))
 
     def _uncut(self, places: Places) -> _Part:
-        found = windows_of(self._blocks, places, 2)
-        near = (found.weights >= LEAST_WEIGHT) & (found.field < ONE)
-        field = found.field.astype(F) / F(ONE)
+        known, weights = _with_around(self._blocks, places, 2)
+        near = (weights >= LEAST_WEIGHT) & (known < ONE)
+        field = known.astype(F) / F(ONE)
         block, z, y, x = np.nonzero(~near)
         voxels = SIDE * places[block].astype(np.int64) + np.column_stack([x, y, z]) - 2
         field[block, z, y, x] = self._cells.at(voxels)
-        trust = np.where(near, np.minimum(found.weights, 64).astype(F), _SOFT)
+        trust = np.where(near, np.minimum(weights, 64).astype(F), _SOFT)
         smooth = _summed(field * trust) / _summed(trust)
         inner = np.s_[:, 1:-1, 1:-1, 1:-1]
-        return _Part(smooth, np.where(near[inner], found.weights[inner], np.uint16(_NOT_SEEN)))
+        return _Part(smooth, np.where(near[inner], weights[inner], np.uint16(_NOT_SEEN)))
 
     def _outside(self, places: Places) -> Floats:
         """Return how far voxels lie outside the box, in truncations; inside it is below 0. (N, 10, 10, 10)."""
@@ -135,23 +158,14 @@ def _summed(values: Floats) -> Floats:
 def closed(
     blocks: Blocks, settings: VolumeSettings, carving: Carving, box: Box, floor: Floor | Ground | None
 ) -> Blocks:
-    """Close a volume's field.
+    """Close a volume's field: return blocks around a surface without holes.
 
-    Args:
-        blocks: of the volume.
-        settings: of the volume.
-        carving: what the views told of the box.
-        box: where the thing is.
-        floor: what it stands on; None: nothing.
-
-    Returns:
-        Blocks around a surface that is closed. Weights are those of the volume where the surface was seen, else 1; there are no colours but
-        where the volume has some.
+    Weights are those of the volume where the surface was seen, else 1; there are no colours but where the volume has some.
     """
     cells = cell_field(carving, blocks, LEAST_WEIGHT, has_floor=isinstance(floor, Floor))
     field = _Closed(blocks, settings, cells, box, floor)
     made, waiting = Blocks(), _begin(blocks, cells, field.low_m, box)
-    steps = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], np.int32)
+    steps = np.array(_STEPS, np.int32)
     while len(waiting):
         active = []
         for first in range(0, len(waiting), _AT_ONCE):

@@ -40,15 +40,7 @@ _RIM_PX: Final = 12
 
 
 def with_exact_depths(view: View, wanted: Depth) -> View:
-    """Make the depths of a view more exact around those that are wanted.
-
-    Args:
-        view: with its right image; one without stays as it is.
-        wanted: (H, W) depths, NaN = not wanted.
-
-    Returns:
-        The view; depths are known where they were known before.
-    """
+    """Make the depths of a view with a right image more exact around those that are wanted, (H, W), NaN = not wanted; known are those that were known before."""
     known = np.isfinite(wanted)
     if view.right is None or not known.any():
         return view
@@ -122,3 +114,31 @@ def _smoothed(disparity: Floats, known: Floats) -> Floats:
 
 def _blurred(values: Floats, side_px: int) -> Floats:
     return np.asarray(cv2.blur(values, (side_px, side_px), borderType=cv2.BORDER_CONSTANT), F)
+
+
+_BRIGHT_PERCENT: Final = 80.0
+"""Of a thing's pixels so many are darker. What is bright of its own, and sure, stays."""
+
+_BRIGHT_RIM_PX: Final = 5
+_SURE: Final = 128
+"""Confidence, of 255: surer depths of a shiny thing are off by more than a pixel at most three times in a hundred, less sure ones eight times and more."""
+
+
+def without_reflections(view: View, wanted: Depth) -> View:
+    """Leave out the depths of a thing that are bright and unsure, where a lamp may be reflected: both cameras see its image, which lies behind the surface.
+
+    What is reflected comes on top of a surface's own light, and lies elsewhere for each camera, so the matcher is not sure of it.
+
+    Args:
+        view: with the matcher's confidence; one without stays as it is.
+        wanted: (H, W) its depths that show the thing, NaN elsewhere.
+    """
+    is_thing = np.isfinite(wanted)
+    if view.confidence is None or not is_thing.any():
+        return view
+    blue, green, red = cv2.split(view.colours)
+    darkest = np.minimum(np.minimum(blue, green), red)  # a lamp's light is white, whatever the colour of the thing
+    is_bright = darkest > np.percentile(darkest[is_thing], _BRIGHT_PERCENT)
+    around = cv2.dilate(is_bright.astype(np.uint8), np.ones((_BRIGHT_RIM_PX, _BRIGHT_RIM_PX), np.uint8)) > 0
+    is_out = is_thing & around & (view.confidence < _SURE)
+    return view.masked(~is_out)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Image
-from phone_host.scan.blocks import ONE, SIDE, Blocks
+from phone_host.scan.blocks import ONE, Blocks
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import LEAST_WEIGHT
 
@@ -24,23 +24,13 @@ _MOST: Final = 2.5
 
 
 def gains_of(view: View, world_camera: SE3, blocks: Blocks, voxel_m: float) -> NDArray[np.float64]:
-    """Return by how much a view's colours are to be multiplied to be the model's.
-
-    Args:
-        view: what the camera saw.
-        world_camera: where it was.
-        blocks: of the volume.
-        voxel_m: distance of two values, m.
-
-    Returns:
-        (3,) blue, green, red: medians over the pixels that show a surface of the model; 1 where too few do.
-    """
+    """Return (3,) by how much a view's blue, green and red are to be multiplied to be the model's: medians over the pixels that show it; 1 where too few do."""
     depth = view.depth_m[::_STEP_PX, ::_STEP_PX].astype(np.float64)
     rows, columns = (_STEP_PX * each for each in np.nonzero(np.isfinite(depth)))
     z, of = view.depth_m[rows, columns].astype(np.float64), view.geometry
     points = np.column_stack([(columns - of.cx_px) * z / of.focal_px, (rows - of.cy_px) * z / of.focal_px, z])
     voxels = np.rint(world_camera.apply(points) / voxel_m).astype(np.int32)
-    numbers, at = blocks.find(voxels >> 3), (voxels & (SIDE - 1)) @ np.array([1, SIDE, SIDE**2])
+    numbers, at = blocks.locate(voxels)
     safe = np.maximum(numbers, 0)
     known = (numbers >= 0) & (blocks.weights[safe, at] >= LEAST_WEIGHT) & (blocks.field[safe, at] < ONE)
     model, seen = blocks.colours[safe, at][known].astype(np.float64), view.colours[rows, columns][known]
@@ -54,11 +44,6 @@ def gains_of(view: View, world_camera: SE3, blocks: Blocks, voxel_m: float) -> N
 
 
 def multiplied(colours: Image, gains: NDArray[np.float64]) -> Image:
-    """Return colours (H, W, 3), multiplied and cut off at 255.
-
-    Args:
-        colours: uint8.
-        gains: (3,).
-    """
+    """Return colours (H, W, 3), multiplied by (3,) gains and cut off at 255."""
     table = np.clip(np.rint(np.arange(256)[:, np.newaxis] * gains), 0, 255).astype(np.uint8)
     return np.asarray(cv2.LUT(colours, table[np.newaxis]), np.uint8)

@@ -5,7 +5,7 @@ This is the only place that knows the classes of `PoseSource` and `Surface` by n
 
 from collections.abc import Callable
 
-from phone_host.scan.mat_in_view import MatInView
+from phone_host.scan.mat import MatInView
 from phone_host.scan.mat_tracker import MatPoses
 from phone_host.scan.pose_source import TablePoses, VisualPoses
 from phone_host.scan.scan import Scan

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.scan.blocks import VOXELS
+from phone_host.scan.box import Cells
 from phone_host.scan.carving import Carved
-from phone_host.scan.cells import Cells
 from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings
 
@@ -65,11 +65,7 @@ class KeptField:
     carved: Carved | None
 
     def volume(self, threads: int) -> Volume:
-        """Return it as a volume.
-
-        Args:
-            threads: that work on it.
-        """
+        """Return it as a volume."""
         made = Volume(self.settings, threads)
         made.put(self.blocks)
         return made
@@ -102,12 +98,7 @@ def field_of(content: bytes, name: str) -> KeptField:
 
 
 def packed(head: bytes, arrays: Arrays) -> bytes:
-    """Return arrays as bytes.
-
-    Args:
-        head: the line that tells what they are, in which version.
-        arrays: by name.
-    """
+    """Return arrays as bytes."""
     file = io.BytesIO()
     np.savez(file, **arrays)  # type: ignore[arg-type]  # none has the name of an argument
     return head + zlib.compress(file.getvalue(), _LEVEL)

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
-from phone_host.scan.circle_bundle import Circle, Seen, fitted_circle, misfits
+from phone_host.scan.camera_pose import Observer
+from phone_host.scan.circle_bundle import Circle, Seen, TurnAxis, axis_of, fitted_circle, misfits, unwrapped
 from phone_host.scan.circle_tracks import tracks_of
-from phone_host.scan.observation import Observer
 from phone_host.scan.registration import RegistrationSettings, registered
-from phone_host.scan.turn_axis import TurnAxis, axis_of, unwrapped
 from phone_host.scan.view import Camera, View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
@@ -87,16 +86,7 @@ class TurnView:
 
 
 def full_turn(given: Sequence[TurnView], settings: VolumeSettings, threads: int) -> FullTurn | None:
-    """Fit a turn.
-
-    Args:
-        given: views in the order in which they were taken.
-        settings: of the model.
-        threads: that compute; results do not depend on them.
-
-    Returns:
-        The turn; None: too few views agree on an axis.
-    """
+    """Fit a turn to views in the order in which they were taken; None: too few agree on an axis."""
     cameras_world = [each.world_camera.inverse() for each in given]
     sure = [pose for pose, each in zip(cameras_world, given, strict=True) if each.is_sure]
     axis = axis_of(

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
+from phone_host.scan.box import Cells
 from phone_host.scan.carving import Carved, Carving
-from phone_host.scan.cells import Cells
 from phone_host.scan.surface_error import FusedDepths, Texture, texture_of
 from phone_host.scan.view import View, narrowed
 
@@ -111,9 +111,6 @@ class Fusion:
     Attributes:
         depths: that are kept of them.
         carving: of the box that was known as they came, or that the surface has carved; None: there is none.
-
-    Args:
-        threads: that carve.
     """
 
     def __init__(self, threads: int) -> None:

@@ -202,11 +202,7 @@ class _Leverage:
     leverages: Floats
 
     def left_out(self, group: Sequence[int]) -> list[float]:
-        """Return by how many standard deviations each loop of a group contradicts the others without that group; next to 0: nothing else connects its parts.
-
-        Args:
-            group: loops that are left out.
-        """
+        """Return by how many standard deviations each loop of a group contradicts the others without that group; next to 0: nothing else connects its parts."""
         rows = (6 * np.array(group)[:, np.newaxis] + np.arange(6)).ravel()
         whole = np.eye(len(rows))
         inverse = solved((1 + _ALONE) * whole - self.leverages[np.ix_(rows, rows)], whole)
@@ -235,16 +231,7 @@ def _leverage(problem: "_Problem", state: tuple[SE3, ...], free: Flags, judged: 
 
 
 def settled(poses: dict[int, SE3], loops: Sequence[Loop], still: int) -> dict[int, SE3]:
-    """Move pieces until the loops agree as well as they can.
-
-    Args:
-        poses: where each piece is believed to be, in the world.
-        loops: between them; others do not count.
-        still: the piece that stays where it is.
-
-    Returns:
-        Where they are; those that no loop connects with `still` as they were.
-    """
+    """Move pieces until the loops agree as well as they can; those that no loop connects with `still` stay as they were."""
     numbered = _problem(poses, loops, still)
     if numbered is None:
         return dict(poses)

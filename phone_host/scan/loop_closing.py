@@ -5,17 +5,129 @@ of that older stretch alone, built again from its kept views: what was fused sin
 put the stretches; each moves as a whole, and the field is built again from the kept views. If in doubt, nothing is moved.
 """
 
-from collections.abc import Sequence
+import zlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.kept_views import KeptViews
+from phone_host.model import StereoGeometry
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.relocalisation import lies_alone, shown_place
 from phone_host.scan.stretches import ClosedLoop, Placed, Stretches, WayCertainty
-from phone_host.scan.view import View
+from phone_host.scan.view import View, narrowed
 from phone_host.stereo.native.library import Library, Missing
+
+_WIDTH_PX: Final = 320
+"""A voxel is some 2.5 px of the matched image for each metre of the distance (`fineness`): half of VGA leaves one depth for each voxel 0.8 m away."""
+
+_QUALITY: Final = 90
+"""Of the colours' JPEG: a tenth of their bytes, and its errors are less than a sensor's noise."""
+
+_LEVEL: Final = 1
+"""Of the depths' deflation: a room's become a quarter in 1 ms."""
+
+_MOST_EVERY: Final = 8
+"""Of so many views one is kept at least: neighbours share more than half of what they show after 8 views of a walk, seldom after 16."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Kept:
+    depth: bytes  # float16, m, deflated
+    shape: tuple[int, ...]
+    colours: NDArray[np.uint8]  # as JPEG
+    geometry: StereoGeometry
+    noise_px: float
+    patch_px: float
+
+    @property
+    def bytes(self) -> int:
+        return len(self.depth) + self.colours.nbytes
+
+    @property
+    def view(self) -> View:
+        depth = np.frombuffer(zlib.decompress(self.depth), np.float16).reshape(self.shape).astype(np.float32)
+        colours = cv2.imdecode(self.colours, cv2.IMREAD_COLOR)
+        return View(
+            grey=np.zeros(depth.shape, np.uint8),
+            colours=np.asarray(colours, np.uint8),
+            depth_m=depth,
+            geometry=self.geometry,
+            noise_px=self.noise_px,
+            patch_px=self.patch_px,
+        )
+
+
+class KeptViews:
+    """Small copies of all views so far, or of every second, fourth or eighth, from which the field can be built again when parts of it have moved.
+
+    When they are too many, every second one goes, and from then on every second view is kept. When so few were kept that a surface may be seen by none of
+    them, none is kept any more.
+    """
+
+    def __init__(self, most_bytes: int) -> None:
+        self._kept: dict[int, _Kept] = {}
+        self._most_bytes, self._bytes = most_bytes, 0
+        self._seen, self._every = 0, 1
+
+    @property
+    def are_enough(self) -> bool:
+        """Whether the field can be built from them."""
+        return self._every <= _MOST_EVERY
+
+    @property
+    def every(self) -> int:
+        """Of how many views one is kept now."""
+        return self._every
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._kept)
+
+    @property
+    def bytes(self) -> int:
+        """What they take."""
+        return self._bytes
+
+    def remember(self, number: int, view: View) -> None:
+        """Keep a view, or pass over it."""
+        self._seen += 1
+        if not self.are_enough or (self._seen - 1) % self._every:
+            return
+        self._kept[number] = _small(view)
+        self._bytes += self._kept[number].bytes
+        self.bound(self._most_bytes)
+
+    def bound(self, most_bytes: int) -> None:
+        """Let every second one go until the others take no more than so many bytes."""
+        while self._bytes > most_bytes and self._kept:
+            self._every *= 2
+            numbers = list(self._kept)[::2] if self.are_enough else []
+            self._kept = {number: self._kept[number] for number in numbers}
+            self._bytes = sum(kept.bytes for kept in self._kept.values())
+
+    def of(self, numbers: Sequence[int], step: int = 1) -> Iterator[tuple[int, View]]:
+        """Give those of some views that are kept, each with its number, as black views with depth and colours; of these every second one with a step of 2, and so on."""
+        for number in [number for number in numbers if number in self._kept][::step]:
+            yield number, self._kept[number].view
+
+
+def _small(view: View) -> _Kept:
+    depth, geometry, step = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
+    _, colours = cv2.imencode(
+        ".jpg", np.ascontiguousarray(view.colours[::step, ::step]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
+    )
+    with np.errstate(over="ignore"):
+        deflated = zlib.compress(depth.astype(np.float16).tobytes(), _LEVEL)
+    return _Kept(
+        deflated, depth.shape, np.asarray(colours, np.uint8), geometry, view.noise_px / step, view.patch_px / step
+    )
+
 
 _ALONE: Final = 3
 """Of the kept views of a stretch and its neighbours every third shows its surface."""
@@ -46,15 +158,7 @@ class LoopSettings:
 
 
 class LoopCloser:
-    """Knows the stretches of a model, and closes loops between them.
-
-    Args:
-        settings: how.
-        model: that is tracked; its field and places change where a loop moves it.
-        threads: that compute, >= 1; results do not depend on them.
-        gate: what is believed.
-        library: computes.
-    """
+    """Knows the stretches of a model, and closes loops between them."""
 
     def __init__(
         self, settings: LoopSettings, model: Piece, threads: int, gate: PoseGate, library: Library | Missing
@@ -81,33 +185,17 @@ class LoopCloser:
         return self._stretches.certainty
 
     def keep(self, number: int, view: View, room_bytes: int) -> None:
-        """Keep a small copy of a view that is in the model, or in a piece that may become part of it.
-
-        Args:
-            number: of the view; it grows.
-            view: with depth.
-            room_bytes: memory that the fields leave.
-        """
+        """Keep a small copy of a view that is in the model, or in a piece that may become part of it."""
         self._kept.remember(number, view)
         self._kept.bound(max(room_bytes, 0))
 
     def joined(self, views: Sequence[Placed]) -> None:
-        """Note that a piece has become part of the model.
-
-        Args:
-            views: of the piece.
-        """
+        """Note that a piece has become part of the model."""
         self._stretches.add_piece(list(views), self._beside(views[0].world_camera))
         self._note_places()
 
     def fused(self, number: int, view: View, world_camera: SE3, *, was_lost: bool) -> tuple[Placed, ...]:
         """Note that a view is in the model; look for a loop, and move the model where loops say so.
-
-        Args:
-            number: of the view.
-            view: with depth.
-            world_camera: where it was taken.
-            was_lost: whether the camera was lost before it.
 
         Returns:
             Where all views of the model were taken, this one last; none: nothing has moved.
@@ -123,11 +211,7 @@ class LoopCloser:
         return self._put(max(1, -(-self._kept.count // self._settings.at_once)))
 
     def settled(self) -> tuple[Placed, ...]:
-        """Move the model to where all loops so far agree best, if it is worth it.
-
-        Returns:
-            Where all views of the model were taken, in order within a stretch; none: nothing has moved.
-        """
+        """Move the model to where all loops so far agree best, if it is worth it; return where all its views were taken, in order within a stretch; none: nothing has moved."""
         return self._put(1) if self._is_open or self._is_coarse else ()
 
     def _put(self, step: int) -> tuple[Placed, ...]:

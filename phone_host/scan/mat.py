@@ -1,4 +1,4 @@
-"""The printed mat that objects are laid on: which one, and where its corners are seen. Pure.
+"""The printed mat that objects are laid on: which one, where its corners are seen, and whether one is in view that nobody uses. Pure.
 
 A mat is a ChArUco sheet. Its axes: the origin in the sheet's middle, x along its rows, y away from its last row, z up, out of the paper.
 """
@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import SettingsError
-from phone_host.calibration.target.board_names import board_name, named_board
+from phone_host.calibration.target.board_names import board_name, family_name, named_board
 from phone_host.calibration.target.corners import Board
-from phone_host.calibration.target.marked import marked_corners
+from phone_host.calibration.target.marked import Charuco, MarkFamily, marked_corners
+from phone_host.calibration.target.marks_seen import find_marks, squares_of
 from phone_host.model import Image
 from phone_host.scan.box import Box
+from phone_host.stereo.images import to_grey
 
 Floats = NDArray[np.float64]
 
@@ -101,13 +103,7 @@ class MatCorners:
 
 
 def mat_corners(left: Image, right: Image, mat: Mat) -> MatCorners:
-    """Find a mat's corners in a rectified pair.
-
-    Args:
-        left: (H, W) uint8 grey.
-        right: the same.
-        mat: what to look for.
-    """
+    """Find a mat's corners in a rectified pair, (H, W) uint8 grey each."""
     return MatCorners(_found(left, mat), _found(right, mat))
 
 
@@ -119,3 +115,75 @@ def _found(grey: Image, mat: Mat) -> Floats:
 
 def _count(corners: Floats) -> int:
     return int(np.isfinite(corners).all(axis=1).sum())
+
+
+_FIRST_PAIRS: Final = 5
+"""These are searched, and then pairs 8, 16, 32 ...: so a long scan costs hardly more than a short one."""
+
+_FAMILIES: Final = (MarkFamily.ARUCO_5X5, MarkFamily.ARUCO_4X4, MarkFamily.ARUCO_6X6)
+"""Of mats, that of `phone-host target mat` first."""
+
+
+@dataclass(frozen=True, slots=True)
+class MatInView:
+    """A printed mat that a pair shows.
+
+    Attributes:
+        columns: squares in a row.
+        rows: squares in a column, as far as they are in view.
+        family: of its marks.
+    """
+
+    columns: int
+    rows: int
+    family: MarkFamily
+
+    @property
+    def option(self) -> str:
+        """The option that uses it; sides that an image does not tell are left to the user."""
+        usual = parse_mat(USUAL_MAT).board
+        assert isinstance(usual.marks, Charuco)
+        if (self.columns, self.family) == (usual.columns + 1, usual.marks.family) and self.rows <= usual.rows + 1:
+            return "--mat"
+        return f"--mat {self.columns}xROWS:SQUARE:MARK:{family_name(self.family).removeprefix('ArUco ')}"
+
+
+class MatDetector:
+    """Looks for a printed mat in the first pairs of a scan."""
+
+    def __init__(self) -> None:
+        self._pairs = 0
+        self._result: MatInView | None = None
+
+    @property
+    def result(self) -> MatInView | None:
+        """The mat that was found; None: none was."""
+        return self._result
+
+    def take(self, left: Image) -> bool:
+        """Look for a mat in the next pair, if it is one of those that are searched.
+
+        Args:
+            left: its left image, (H, W) grey or (H, W, 3) BGR, uint8.
+
+        Returns:
+            Whether a mat was found in this pair, and in none before.
+        """
+        number, self._pairs = self._pairs, self._pairs + 1
+        if self._result is not None or (number >= _FIRST_PAIRS and number & (number - 1)):
+            return False
+        self._result = mat_in_view(to_grey(left))
+        return self._result is not None
+
+
+def mat_in_view(grey: Image) -> MatInView | None:
+    """Find a printed mat of any size in a grey image (H, W): six marks or more that lie as on a ChArUco sheet. None: there is none."""
+    usual = parse_mat(USUAL_MAT).board
+    assert isinstance(usual.marks, Charuco)
+    expected = {usual.marks.family: (usual.columns + 1, usual.rows + 1)}
+    for family in _FAMILIES:
+        seen = find_marks([grey], [family])
+        squares = None if seen is None else squares_of(seen, expected.get(family))
+        if squares is not None:
+            return MatInView(*squares, family)
+    return None

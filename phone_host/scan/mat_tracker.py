@@ -16,23 +16,22 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.box import Box
-from phone_host.scan.exact_depths import with_exact_depths
-from phone_host.scan.fineness import fineness_for, thinner
+from phone_host.scan.exact_depths import with_exact_depths, without_reflections
 from phone_host.scan.mat import ABOVE_M, Mat, mat_corners
 from phone_host.scan.mat_pose import MatPose, MatScale, fit_mat
 from phone_host.scan.odometry import Odometry, OdometrySettings
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.pose_source import PoseSource
-from phone_host.scan.reflections import without_reflections
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap
 from phone_host.scan.surface_error import PoseErrors
-from phone_host.scan.tracker import NOT_MOVED, Tracked, TrackerState, lost
+from phone_host.scan.tracked import NOT_MOVED, Tracked, lost
+from phone_host.scan.tracker import TrackerState
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, Depth, View, narrowed, reduced
 from phone_host.scan.volume import Volume
-from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.scan.volume_settings import VolumeSettings, fineness_for, thinner
 from phone_host.stereo.native.library import Library, Missing, native
 
 _TRUNCATION_SHARE: Final = 1 / 2
@@ -69,9 +68,6 @@ class MatFinder:
     Attributes:
         mat: which one.
         scale: of its squares, as far as is known.
-
-    Args:
-        mat: which one.
     """
 
     def __init__(self, mat: Mat) -> None:
@@ -90,13 +86,7 @@ class MatFinder:
 
 
 class MatPoses(PoseSource):
-    """Poses from a mat, and the model of what stands on it.
-
-    Args:
-        wanted: of the scan; its box is in the mat's axes.
-        mat: which one.
-        library: computes; None: that of this installation.
-    """
+    """Poses from a mat, and the model of what stands on it."""
 
     def __init__(self, wanted: ScanWanted, mat: Mat, library: Library | Missing | None = None) -> None:
         self._found = native() if library is None else library
@@ -226,13 +216,7 @@ def room_of(box: Box, rim_m: float) -> Box:
 
 
 def depths_inside(view: View, world_camera: SE3, box: Box) -> Depth:
-    """Return the depths (H, W) of what lies inside a box, NaN elsewhere.
-
-    Args:
-        view: that shows it.
-        world_camera: where it was taken.
-        box: in the world's axes.
-    """
+    """Return the depths (H, W) of what lies inside a box, NaN elsewhere."""
     of, depth = view.geometry, view.depth_m
     rows, columns = np.indices(depth.shape, np.float32)
     aside = (columns - np.float32(of.cx_px)) * (depth / np.float32(of.focal_px))

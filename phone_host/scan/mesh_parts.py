@@ -75,11 +75,7 @@ def without_crumbs(mesh: Mesh) -> Mesh:
 
 
 def without_loose_bodies(mesh: Mesh) -> Mesh:
-    """Leave out bodies of less than a twentieth of the largest one's content, and hollows inside it.
-
-    Args:
-        mesh: closed.
-    """
+    """Leave out bodies of less than a twentieth of the largest one's content, and hollows inside it."""
     if not len(mesh.triangles):
         return mesh
     piece = pieces_of(mesh)[mesh.triangles[:, 0]]

@@ -54,13 +54,7 @@ class MotionBound:
         return MotionBound(self.shift_m + _FEATURES_M, self.turn + _FEATURES_TURN)
 
     def admits(self, expected: SE3, found: SE3, voxel_m: float) -> bool:
-        """Return whether a pose is near enough to where it is expected.
-
-        Args:
-            expected: by odometry.
-            found: by a place and the surface there.
-            voxel_m: of the field in which it was found, m.
-        """
+        """Return whether a pose is near enough to where it is expected."""
         off = (expected.inverse() @ found).pose()
         shift_m, turn = float(np.linalg.norm(off[3:])), float(np.linalg.norm(off[:3]))
         return shift_m <= self.shift_m + _POSE_VOXELS * voxel_m and turn <= self.turn + _POSE_TURN
@@ -133,12 +127,7 @@ class Belief:
         )
 
     def jumped(self, usual: UsualStep, views: float = 1.0) -> "Belief":
-        """Return the belief after a motion that nobody has followed.
-
-        Args:
-            usual: step of the camera.
-            views: how many such steps the motion may have taken, >= 1.
-        """
+        """Return the belief after a motion that nobody has followed."""
         bound, is_first = self.bound, self.length_m > 0 or self.turned > 0 or not self.is_broken
         lever_m = min(self.at_anchor.turn, math.pi) * float(np.linalg.norm(self.since.t_m))
         more_m = (_JUMP_M if is_first else 0.0) + _SPEEDS * views * usual.length_m
@@ -147,19 +136,9 @@ class Belief:
         return Belief(self.pose, SE3.identity(), grown, is_broken=True, is_open=self.is_open)
 
     def admits(self, found: SE3, voxel_m: float) -> bool:
-        """Return whether the camera can be where a place puts it.
-
-        Args:
-            found: in the field's axes.
-            voxel_m: of the field, m.
-        """
+        """Return whether the camera can be where a place puts it."""
         return self.bound.admits(self.anchor, found @ self.since.inverse(), voxel_m)
 
     def nearly_admits(self, found: SE3, voxel_m: float) -> bool:
-        """Return whether the camera can be where features alone put it.
-
-        Args:
-            found: in the field's axes.
-            voxel_m: of the field, m.
-        """
+        """Return whether the camera can be where features alone put it."""
         return self.bound.for_features.admits(self.anchor, found @ self.since.inverse(), voxel_m)

@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.scan.blocks import SIDE
-from phone_host.scan.cube_cases import CORNERS
+from phone_host.scan.blocks import CORNERS, SIDE
 from phone_host.scan.mesh import Mesh, mesh_of
 from phone_host.scan.mesh_parts import part_of, thinned
 from phone_host.scan.volume import Volume

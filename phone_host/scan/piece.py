@@ -13,7 +13,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.scan.odometry import Moved
 from phone_host.scan.places import Places
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
-from phone_host.scan.tracking_words import Weakness
+from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, narrowed
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
@@ -64,6 +64,15 @@ class PoseGate:
     is_turned_by_others: bool = False
 
 
+_STREET_GATE: Final = PoseGate(most_shift_m=0.25, least_overlap=0.2)
+"""In a street a place tells the pose to some decimetres, and of what a car sees a fifth to a third lies on the model 1.2 m farther on; near 1.00 of it fits."""
+
+
+def pose_gate_for(settings: VolumeSettings) -> PoseGate:
+    """Choose what a pose must fulfil to be believed."""
+    return _STREET_GATE if settings.is_of_street else PoseGate()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Lying:
     """Where a view was taken in a piece's axes, and how it lies there."""
@@ -73,18 +82,12 @@ class Lying:
 
 
 class Piece:
-    """A piece.
+    """A piece. Poses are in its axes, views have depth.
 
     Attributes:
         volume: its field.
         places: that were seen in it.
         usual_off_sigmas: usual distance of a view from the field, by the noise of its depths there; NaN: none was compared yet.
-
-    Args:
-        settings: of the field.
-        threads: that compute, >= 1; results do not depend on them.
-        gate: what is believed.
-        library: computes.
     """
 
     def __init__(self, settings: VolumeSettings, threads: int, gate: PoseGate, library: Library | Missing) -> None:
@@ -93,13 +96,7 @@ class Piece:
         self._threads, self._gate = threads, gate
 
     def laid(self, view: View, believed: SE3, sure_px: float = math.inf) -> Registered:
-        """Lay a view's depth against the field as seen from where the camera is believed to be.
-
-        Args:
-            view: with depth.
-            believed: where the camera is, in the piece's axes.
-            sure_px: standard deviation of the view's pixels there, px; infinite: nothing is known of it.
-        """
+        """Lay a view's depth against the field as seen from where the camera is believed to be; its pixels have a standard deviation there, px; infinite: nothing is known of it."""
         depth, geometry, step = narrowed(view.depth_m, view.geometry, _ALIGNED_PX)
         # Beyond its reach the field has no partners.
         of = self.volume.settings
@@ -120,12 +117,7 @@ class Piece:
         return registered(depth, surface, settings, self._library)
 
     def doubt(self, moved: Moved, fit: Registered) -> Weakness:
-        """Return why a pose is not believed; NONE: it is.
-
-        Args:
-            moved: what odometry says.
-            fit: how the depth lies against the field.
-        """
+        """Return why a pose is not believed; NONE: it is."""
         gate, correction = self._gate, fit.start_now.pose()
         is_sure = moved.is_known and moved.inliers >= gate.weak_inliers
         least = gate.sure_overlap if is_sure else gate.least_overlap
@@ -139,11 +131,7 @@ class Piece:
         return Weakness.NONE
 
     def times_usual(self, fit: Registered) -> float:
-        """Return how many times farther a view lies from the field than the views before did, each by the noise of its own depths; 0: none was compared yet.
-
-        Args:
-            fit: how its depth lies against the field.
-        """
+        """Return how many times farther a view lies from the field than the views before did, each by the noise of its own depths; 0: none was compared yet."""
         usual_m = np.fmax(self.usual_off_sigmas * fit.noise_m, _ROUNDING_VOXELS * self.volume.settings.voxel_m)
         return 0.0 if np.isnan(self.usual_off_sigmas) else float(fit.off_m / usual_m)
 
@@ -151,10 +139,6 @@ class Piece:
         """Lay a view against the field where a place puts it; None: its surface does not lie there.
 
         A place tells the pose to some centimetres: the surface is cast a second time from where the first one puts the view.
-
-        Args:
-            view: with depth.
-            believed: where the place says that it was taken, in the piece's axes.
         """
         first = self.laid(view, believed)
         start = believed @ first.start_now
@@ -170,16 +154,79 @@ class Piece:
         return Lying((start @ fit.start_now).exact(), fit)
 
     def fuse(self, view: View, pose: SE3, fit: Registered | None) -> None:
-        """Take a view in.
-
-        Args:
-            view: with depth.
-            pose: where it was taken, in the piece's axes.
-            fit: how it lay against the field before; None: it is the first one.
-        """
+        """Take a view in."""
         self.volume.fuse(view, pose)
         self.places.remember(view, pose)
         if fit is not None and np.isfinite(fit.off_m / fit.noise_m):
             # Slow, so that one blurred view does not make the next one pass.
             usual, sigmas = self.usual_off_sigmas, fit.off_m / fit.noise_m
             self.usual_off_sigmas = sigmas if np.isnan(usual) else 0.9 * usual + 0.1 * sigmas
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joined:
+    """A view that was lost and has become part of the model.
+
+    Attributes:
+        number: of the view: 1 is the first that was tracked.
+        world_camera: where it was taken.
+        state: how sure that is.
+        weakness: why it is not surer.
+    """
+
+    number: int
+    world_camera: SE3
+    state: Tracking
+    weakness: Weakness
+
+
+@dataclass(frozen=True, slots=True)
+class Joining:
+    """What came of joining a piece to the model.
+
+    Attributes:
+        views: its views, which are part of the model now; none: it stays apart.
+        is_refused: whether the piece's own surface does not fit the model where it would lie, or fits, but does not confirm it.
+    """
+
+    views: tuple[Joined, ...] = ()
+    is_refused: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """A piece to which a view belongs, where it was taken in its axes, and how it lies there."""
+
+    piece: Piece
+    pose: SE3
+    fit: Registered
+
+    @property
+    def weakness(self) -> Weakness:
+        """FLAT if the view could slide along the surface, else NONE."""
+        return Weakness.NONE if self.fit.is_determined else Weakness.FLAT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FragmentView:
+    """A view of a piece: its number, where it was taken in the piece's axes, and why that is not surer."""
+
+    number: int
+    pose: SE3
+    weakness: Weakness
+
+
+class MapFragment:
+    """A piece beside the model, where it is believed to be in the world, and its views.
+
+    Attributes:
+        piece: its field and places.
+        world_piece: takes its points to the world, as far as is known.
+        views: those that were fused in it.
+        unconfirmed: poses, in its axes and in the model's, of views that show the model where it can hardly be.
+    """
+
+    def __init__(self, piece: Piece, world_piece: SE3) -> None:
+        self.piece, self.world_piece = piece, world_piece
+        self.views: list[FragmentView] = []
+        self.unconfirmed: list[tuple[SE3, SE3]] = []

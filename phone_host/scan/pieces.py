@@ -12,13 +12,12 @@ import numpy as np
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.graph import Loop, chained, connected, without_outliers
-from phone_host.scan.map_fragment import Found, FragmentView, Joined, Joining, MapFragment
-from phone_host.scan.model_motion import ModelMotion
 from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
-from phone_host.scan.piece import STANDING, Piece, PoseGate
+from phone_host.scan.piece import STANDING, Found, FragmentView, Joined, Joining, MapFragment, Piece, PoseGate
 from phone_host.scan.registration import Registered
 from phone_host.scan.relocalisation import Evidence, PoseSupport, Sighting, are_independent, pose_support, sighted
+from phone_host.scan.stretches import ModelMotion
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view
 from phone_host.scan.volume_settings import VolumeSettings
@@ -59,7 +58,7 @@ class _Surface:
 
 
 class Pieces:
-    """All pieces of a scan.
+    """All pieces of a scan. Poses are in the axes of the piece that is tracked, unless another one is named; views have depth.
 
     Args:
         settings: of the model.
@@ -108,12 +107,7 @@ class Pieces:
         return pose if self._active == _MODEL else self._apart[self._active].world_piece @ pose
 
     def moved(self, moved: Moved, views: float) -> None:
-        """Note how the camera has moved.
-
-        Args:
-            moved: what odometry says.
-            views: of the usual steps, how many may have passed, >= 1.
-        """
+        """Note how the camera has moved, while so many of the usual steps may have passed, >= 1."""
         self.is_ambiguous = self._is_held = False
         is_followed = moved.is_known and moved.inliers >= self._gate.weak_inliers
         if is_followed:
@@ -125,9 +119,6 @@ class Pieces:
         """Note where the camera is in the piece that is tracked: that tells how it has moved since it was last there, also where odometry does not.
 
         A plain surface that only holds the view tells neither.
-
-        Args:
-            pose: in the piece's axes.
         """
         if self._is_held:
             return
@@ -148,13 +139,7 @@ class Pieces:
         self._beliefs = {_MODEL: replace(Belief.at(pose).jumped(UsualStep()), is_open=True)}
 
     def is_here(self, view: View, believed: SE3, fit: Registered) -> bool:
-        """Return whether a view that fits where it is expected in the piece that is tracked may be taken into it there.
-
-        Args:
-            view: with depth.
-            believed: from where it was laid against the surface, in the piece's axes.
-            fit: how it lies there.
-        """
+        """Return whether a view that fits where it is expected in the piece that is tracked may be taken into it there."""
         belief = self._belief(self._active)
         if not belief.is_broken:
             return True
@@ -164,12 +149,6 @@ class Pieces:
 
     def begin(self, number: int, view: View, believed: SE3, why: Weakness) -> SE3 | None:
         """Begin a piece.
-
-        Args:
-            number: of its first view.
-            view: the first one.
-            believed: where it was taken, in the axes of the piece that is tracked.
-            why: it belongs to no piece.
 
         Returns:
             The pose in the axes of the piece that is tracked now, the new one; None: there is no memory for another, and nothing has changed.
@@ -190,28 +169,14 @@ class Pieces:
         return SE3.identity()
 
     def fuse_apart(self, number: int, view: View, pose: SE3, weakness: Weakness, fit: Registered | None) -> None:
-        """Take a view into the piece that is tracked, which is not the model.
-
-        Args:
-            number: of the view.
-            view: with depth.
-            pose: where it was taken, in the piece's axes.
-            weakness: why that is not surer.
-            fit: how it lay there before; None: it is the first.
-        """
+        """Take a view into the piece that is tracked, which is not the model."""
         of = self._apart[self._active]
         of.piece.fuse(view, pose, fit)
         self._note(pose)
         of.views.append(FragmentView(number, pose, weakness))
 
     def fuse(self, view: View, pose: SE3, fit: Registered | None) -> None:
-        """Take a view into the model, which is tracked. Where it needs the memory of the pieces beside it, they are given up, the one with the fewest views first.
-
-        Args:
-            view: with depth.
-            pose: where it was taken.
-            fit: how it lay there before; None: it is the first.
-        """
+        """Take a view into the model, which is tracked. Where it needs the memory of the pieces beside it, they are given up, the one with the fewest views first."""
         volume, left_out = self.model.volume, self.model.volume.left_out
         self.model.fuse(view, pose, fit)
         self.followed(pose)
@@ -232,9 +197,6 @@ class Pieces:
         """Carry everything that is known in the model's axes along with a model that loops have moved.
 
         Loops between fragments are not in these axes, and none with the model outlasts `join`.
-
-        Args:
-            motion: of the model.
         """
 
         def carried(beliefs: dict[int, Belief]) -> dict[int, Belief]:
@@ -263,10 +225,6 @@ class Pieces:
         """Find where a view of the piece that is tracked belongs in the model.
 
         Where it belongs to another piece, that loop is remembered.
-
-        Args:
-            view: with depth.
-            pose: where it was taken, in the piece's axes.
         """
         found = self._sighted(_MODEL, view)
         if found.lying is not None and (found.evidence is Evidence.BELIEVED or self._is_seen_twice(found, pose)):
@@ -290,11 +248,7 @@ class Pieces:
         return False
 
     def leave(self, number: int) -> None:
-        """Track the model from now on: a view of the piece that was tracked turned out to belong there, and the piece does not.
-
-        Args:
-            number: of the view.
-        """
+        """Track the model from now on: a view of the piece that was tracked turned out to belong there, and the piece does not."""
         of = self._apart.get(self._active)
         if of is not None:
             of.views = [each for each in of.views if each.number != number]

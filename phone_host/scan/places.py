@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.camera_pose import located
-from phone_host.scan.observation import Observer
+from phone_host.scan.camera_pose import Observer, located
 from phone_host.scan.view import View
 
 Floats = NDArray[np.float64]
@@ -121,12 +120,7 @@ class Places:
         return len(self._places)
 
     def remember(self, view: View, world_camera: SE3) -> None:
-        """Remember a view, if it was taken elsewhere than those that are remembered.
-
-        Args:
-            view: fused.
-            world_camera: where it was taken.
-        """
+        """Remember a view, if it was taken elsewhere than those that are remembered."""
         apart_m = _APART_SHARE * _typical_m(view)
         if any(_is_near(place.world_camera, world_camera, apart_m) for place in self._places):
             return
@@ -156,45 +150,23 @@ class Places:
         self._places = [place.moved(motion) for place, motion in zip(self._places, by, strict=True)]
 
     def nearest(self, world_camera: SE3, first: int) -> int:
-        """Return the number of the place, of the first ones, that was seen from nearest by.
-
-        Args:
-            world_camera: from where.
-            first: how many, >= 1.
-        """
+        """Return the number of the place, of the first ones, that was seen from nearest by."""
         away_m = [float(np.linalg.norm(place.world_camera.t_m - world_camera.t_m)) for place in self._places[:first]]
         return int(np.argmin(away_m))
 
     def near(self, world_camera: SE3, within_m: float, within_deg: float) -> list[int]:
-        """Return the numbers of the places that were seen from near a pose.
-
-        Args:
-            world_camera: the pose.
-            within_m: farthest distance, m.
-            within_deg: most that they are turned against it.
-        """
+        """Return the numbers of the places that were seen from near a pose."""
         return [
             number for number in range(self.count) if self._is_seen_from(number, world_camera, within_m, within_deg)
         ]
 
     def recognised(self, view: View, among: Sequence[int] | None = None, most: int = _SHORT) -> Recognised | None:
-        """Find the place on which most of a view's features agree; None: none has enough.
-
-        Args:
-            view: with depth.
-            among: numbers of the places that are asked; None: all.
-            most: of them are compared in full.
-        """
+        """Find the place on which most of a view's features agree; None: none has enough."""
         agreed = self.agreed(view, range(self.count) if among is None else among, most)
         return max(agreed, key=lambda each: each.inliers, default=None)
 
     def rivals(self, view: View, world_camera: SE3) -> list[Recognised]:
-        """Return what other places say of a view, if they explain it about as well as those around a pose do, by another pose.
-
-        Args:
-            view: with depth.
-            world_camera: where it is believed to have been taken.
-        """
+        """Return what other places say of a view, if they explain it about as well as those around a pose do, by another pose."""
         away = [at for at in range(self.count) if not self._is_seen_from(at, world_camera, _AWAY_M, _OTHER_DEG)]
         others = [each for each in self.agreed(view, away) if not are_one_pose(each.world_camera, world_camera)]
         if not others:
@@ -208,25 +180,13 @@ class Places:
         return _is_near(self._places[number].world_camera, world_camera, within_m, within_deg)
 
     def is_by(self, view: View, world_camera: SE3, among: Sequence[int]) -> bool:
-        """Return whether a view was taken near one of some places: it shows it, if they are where they are believed to be.
-
-        Args:
-            view: with depth.
-            world_camera: where it was taken.
-            among: numbers of places.
-        """
+        """Return whether a view was taken near one of some places: it shows it, if they are where they are believed to be."""
         apart_m = _BY_SHARE * _typical_m(view)
         places = [self._places[number].world_camera for number in among]
         return any(_is_near(place, world_camera, apart_m, _BY_DEG) for place in places)
 
     def agreed(self, view: View, among: Sequence[int], most: int = _SHORT) -> list[Recognised]:
-        """Return the places among some on which enough of a view's features agree.
-
-        Args:
-            view: with depth.
-            among: numbers of the places that are asked.
-            most: of them are compared in full: those that most features vote for.
-        """
+        """Return the places among some on which enough of a view's features agree."""
         if not among:
             return []
         seen = _features(view)

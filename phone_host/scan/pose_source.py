@@ -13,20 +13,19 @@ from typing import Final
 import numpy as np
 
 from common.errors import SettingsError
-from phone_host.scan.box import Box
-from phone_host.scan.cells import Cells
-from phone_host.scan.fineness import fineness_for, thinner
+from phone_host.scan.box import Box, Cells
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.stretches import Placed, WayCertainty
 from phone_host.scan.surface_error import FusedDepths, PoseErrors
 from phone_host.scan.table import Table, find_table
-from phone_host.scan.tracker import Tracked, Tracker, TrackerState, lost
+from phone_host.scan.tracked import Tracked, lost
+from phone_host.scan.tracker import Tracker, TrackerState
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume import Volume
-from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.scan.volume_settings import VolumeSettings, fineness_for, thinner
 
 _TABLE_TRUNCATION_SHARE: Final = 2 / 3
 """Of the usual truncation: a rendered figure then lies 0.59 mm off in place of 0.68, and is 3.7 % too large in place of 5.3. Half of it gives 0.56 mm and
@@ -78,29 +77,16 @@ class PoseSource(ABC):
         return ()
 
     def final(self, number: int, pair: ScannedPair) -> ScannedPair:
-        """Return a pair with the pose that it has after `settle`, where that does not come from `Placed`.
-
-        Args:
-            number: of the pair.
-            pair: as it was told.
-        """
+        """Return a pair with the pose that it has after `settle`, where that does not come from `Placed`."""
         del number
         return pair
 
     def fused_views(self, kept: Sequence[FusedDepths]) -> Sequence[FusedDepths] | None:
-        """Return the depths by which the surface's error is judged; None: those of a part of it are missing.
-
-        Args:
-            kept: those of the views that this scan has taken.
-        """
+        """Return the depths by which the surface's error is judged; None: those of a part of it are missing."""
         return kept
 
     def state(self, places_before: int) -> TrackerState:
-        """Return what another scan needs to go on, beside the volume's blocks.
-
-        Args:
-            places_before: how many of the places are known there already.
-        """
+        """Return what another scan needs to go on, beside the volume's blocks."""
         raise NotImplementedError
 
     def go_on(self, submaps: Sequence[Submap]) -> None:
@@ -114,11 +100,7 @@ class PoseSource(ABC):
 
 
 class VisualPoses(PoseSource):
-    """Poses from what the camera sees on its way, and from the model.
-
-    Args:
-        wanted: of the scan.
-    """
+    """Poses from what the camera sees on its way, and from the model."""
 
     def __init__(self, wanted: ScanWanted) -> None:
         self._wanted = wanted

@@ -84,13 +84,7 @@ class Sighting:
 
 
 def sighted(piece: Piece, view: View, belief: Belief) -> Sighting:
-    """Look which place of a field a view shows, of those where the camera can be, and how sure that is.
-
-    Args:
-        piece: with field and places.
-        view: with depth.
-        belief: where the camera can be in the field's axes.
-    """
+    """Look which place of a field a view shows, of those where the camera can be, and how sure that is."""
     places, bound, voxel_m = piece.places, belief.bound, piece.volume.settings.voxel_m
     reach_m = bound.shift_m + bound.turn * float(np.linalg.norm(belief.since.t_m)) + _SIGHT_M
     near = places.near(belief.pose, reach_m, math.degrees(bound.turn) + _SIGHT_DEG)
@@ -121,13 +115,6 @@ def pose_support(piece: Piece, view: View, belief: Belief, pose: SE3, told: int)
     """Judge a view that odometry does not follow, and whose depth lies on the surface where the camera is expected.
 
     Rooms have equal corners and equal walls: the features must show what was seen from there. A view without any goes on there, but it tells nothing of where the camera is.
-
-    Args:
-        piece: with field and places.
-        view: with depth.
-        belief: where the camera can be in the field's axes.
-        pose: at which the view lies on the surface, in these axes.
-        told: directions that the surface tells there.
     """
     voxel_m = piece.volume.settings.voxel_m
     if not np.isfinite(pose.pose()).all() or not (belief.is_open or belief.admits(pose, voxel_m)):
@@ -147,15 +134,7 @@ def pose_support(piece: Piece, view: View, belief: Belief, pose: SE3, told: int)
 def shown_place(
     piece: Piece, view: View, tracked: SE3, limits: Mapping[int, MotionBound], most: int
 ) -> Recognised | None:
-    """Find which of some places a tracked view shows, where tracking can be so far off: what a loop begins with; None: no one.
-
-    Args:
-        piece: whose places they are.
-        view: with depth.
-        tracked: where it was taken, as tracking has it.
-        limits: how far that may be off as seen from each place, by the places' numbers.
-        most: of them are compared in full.
-    """
+    """Find which of some places a tracked view shows, where tracking can be so far off: what a loop begins with; None: no one."""
     reach = max(limits.values(), key=lambda each: each.shift_m, default=MotionBound())
     turn_deg = math.degrees(max((each.turn for each in limits.values()), default=0.0)) + _SIGHT_DEG
     near = [at for at in piece.places.near(tracked, reach.shift_m + _SIGHT_M, turn_deg) if at in limits]

@@ -16,15 +16,15 @@ from phone_host.model import Processed, StereoGeometry
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carved
 from phone_host.scan.fusion import Fusion
-from phone_host.scan.map_fragment import Joined
-from phone_host.scan.mat_in_view import MatDetector, MatInView
+from phone_host.scan.mat import MatDetector, MatInView
+from phone_host.scan.piece import Joined
 from phone_host.scan.pose_source import PoseSource
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap, begun_on_table
 from phone_host.scan.stretches import Placed
 from phone_host.scan.surface import Surface
-from phone_host.scan.taken_view import require_size, view_of
+from phone_host.scan.view import require_size, view_of
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.images import size_px

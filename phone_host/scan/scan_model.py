@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.unseen_surface import apply_unseen, filled_from_border, seen_triangles, unseen_share
 from phone_host.model.unseen import UnseenSurface
-from phone_host.scan.blocks import SIDE, Blocks
+from phone_host.scan.blocks import ONE, SIDE, Blocks
 from phone_host.scan.box import Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.closing import Floor, closed
 from phone_host.scan.ground import Ground
 from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import only, part_of, without_crumbs, without_loose_bodies
-from phone_host.scan.sheet_ink import ink_points, specks
+from phone_host.scan.mesh_parts import Flags, only, part_of, pieces_of, without_crumbs, without_loose_bodies
 from phone_host.scan.surface_error import ErrorScope, FusedDepths, PoseErrors, surface_error
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT, WEIGHT_ONE, VolumeSettings
@@ -81,25 +80,14 @@ class ScanModel:
 
 
 def open_model(volume: Volume) -> ScanModel:
-    """Return the surface that was seen, without crumbs.
-
-    Args:
-        volume: of the scan.
-    """
+    """Return the surface that was seen, without crumbs."""
     mesh = without_crumbs(mesh_of(volume.blocks, volume.settings.voxel_m, LEAST_WEIGHT))
     noise_m = surface_noise_m(mesh.points_m, volume.blocks, volume.settings)
     return ScanModel(mesh, noise_m, np.ones(len(mesh.points_m), np.bool_))
 
 
 def closed_model(volume: Volume, carving: Carving, box: Box, floor: Floor | Ground | None) -> ScanModel:
-    """Return the closed surface of what is in a box, without loose bodies.
-
-    Args:
-        volume: of the scan.
-        carving: what the views told of the box.
-        box: where the thing is.
-        floor: what it stands on; None: nothing.
-    """
+    """Return the closed surface of what is in a box, without loose bodies."""
     voxel_m = volume.settings.voxel_m
     field = closed(volume.blocks, volume.settings, carving, box, floor)
     mesh = without_loose_bodies(mesh_of(field, voxel_m))
@@ -114,21 +102,11 @@ def closed_model(volume: Volume, carving: Carving, box: Box, floor: Floor | Grou
 
 
 def surface_noise_m(points_m: NDArray[np.float32], blocks: Blocks, settings: VolumeSettings) -> NDArray[np.float32]:
-    """Return the standard deviation of the surface, if the views err independently.
+    """Return the standard deviation of points (N, 3) of the surface, (N,) m, if the views err independently; NaN where the volume holds nothing.
 
     A depth's weight is the inverse of its variance (`volume_settings`), so a sum of weights tells that of their mean.
-
-    Args:
-        points_m: (N, 3) points of the surface, m.
-        blocks: of the volume.
-        settings: of the volume.
-
-    Returns:
-        (N,) m; NaN where the volume holds nothing.
     """
-    voxels = np.rint(points_m / settings.voxel_m).astype(np.int32)
-    numbers, inside = blocks.find(voxels >> 3), voxels & (SIDE - 1)
-    at = inside @ np.array([1, SIDE, SIDE**2])
+    numbers, at = blocks.locate(np.rint(points_m / settings.voxel_m).astype(np.int32))
     weights = np.where(numbers >= 0, blocks.weights[np.maximum(numbers, 0), at], 0).astype(np.float64)
     with np.errstate(divide="ignore"):
         noise = settings.sure_m * np.sqrt(WEIGHT_ONE / weights)
@@ -139,8 +117,62 @@ def _weights(points_m: NDArray[np.float32], field: Blocks, voxel_m: float) -> ND
     """Return the lower weight of both ends of the edge that each point lies on, (V,)."""
     places, least = points_m.astype(np.float64) / voxel_m, np.full(len(points_m), np.iinfo(np.uint16).max, np.uint16)
     for aside in (-_ON_A_VOXEL, _ON_A_VOXEL):
-        voxels = (np.floor(places + aside) if aside > 0 else np.ceil(places + aside)).astype(np.int32)
-        numbers = field.find(voxels >> 3)
-        at = (voxels & (SIDE - 1)) @ np.array([1, SIDE, SIDE**2])
+        voxels = np.floor(places + aside) if aside > 0 else np.ceil(places + aside)
+        numbers, at = field.locate(voxels.astype(np.int32))
         least = np.minimum(least, np.where(numbers >= 0, field.weights[np.maximum(numbers, 0), at], np.uint16(0)))
     return least
+
+
+_REACH_M: Final = 0.010
+"""Ink that was fused too high lies below this; measured below caps 9 and 20 mm above the sheet."""
+
+_MARGIN: Final = 0.03
+"""Share of the step from ink to paper by which a point may be brighter than ink. In shadow, ink is darker: of the wrong points 95 % are within it."""
+
+_LEAST_VOXELS: Final = 500
+_LEAST_CONTRAST: Final = 40.0
+"""Grey levels between ink and paper. Sheet that shows less, or fewer voxels, does not tell how dark ink is."""
+
+_SPECK_SHARE: Final = 0.002
+"""Of the triangles of the largest piece that was measured. Smaller pieces amid unseen surface are wrong matches."""
+
+
+def ink_points(mesh: Mesh, weights: NDArray[np.uint16], blocks: Blocks) -> Flags:
+    """Return which points cannot be told from the mat's ink, (V,): low, as dark as ink, and measured less often than half of the surface.
+
+    Ink has no texture. Where an object hangs over it, the matcher takes its depth from the object's edge: the sheet is fused up to 8 mm too high,
+    as a dark curtain below the edge. Few views see in there, so no other view contradicts.
+
+    Args:
+        mesh: the surface in the mat's axes, with the colours of the volume.
+        weights: (V,) of the voxels at its points.
+        blocks: of the volume, with those of the sheet.
+    """
+    level = _ink_level(blocks)
+    if not len(weights) or np.isnan(level):
+        return np.zeros(len(weights), np.bool_)
+    usual = np.median(weights[weights >= LEAST_WEIGHT]) if (weights >= LEAST_WEIGHT).any() else 0.0
+    is_low = mesh.points_m[:, 2] < _REACH_M
+    return np.asarray(is_low & (weights < usual) & (mesh.colours.mean(axis=1) < level), np.bool_)
+
+
+def specks(mesh: Mesh, seen: Flags) -> Flags:
+    """Return which points belong to no piece of measured surface of some size, (V,), by whether a view measured them, (V,)."""
+    whole = mesh.triangles[np.logical_and.reduce(seen[mesh.triangles], axis=1)]
+    if not len(whole):
+        return np.zeros(len(seen), np.bool_)
+    piece = pieces_of(Mesh(mesh.points_m, mesh.colours, whole))
+    sizes = np.bincount(piece[whole[:, 0]], minlength=len(seen))
+    return np.asarray(sizes[piece] < _SPECK_SHARE * sizes.max(), np.bool_)
+
+
+def _ink_level(blocks: Blocks) -> float:
+    """Return the grey level below which a point is as dark as ink; NaN: too little of the sheet was seen."""
+    number = np.flatnonzero(blocks.places[: blocks.count, 2] == 0)
+    lowest = np.s_[: SIDE * SIDE]  # the voxels of a block at z = 0 come first
+    on_sheet = (blocks.weights[number, lowest] >= LEAST_WEIGHT) & (np.abs(blocks.field[number, lowest]) < ONE // 2)
+    greys = blocks.colours[number, lowest][on_sheet].mean(axis=-1)
+    if len(greys) < _LEAST_VOXELS:
+        return float("nan")
+    ink, paper = np.percentile(greys, (10, 90)).tolist()
+    return float(ink + _MARGIN * (paper - ink)) if paper - ink >= _LEAST_CONTRAST else float("nan")

@@ -7,10 +7,12 @@ says where one stretch is as seen from another that was seen long before. All ti
 import heapq
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.graph import Loop, without_outliers
@@ -102,11 +104,7 @@ class _Stretch:
 
 
 class Stretches:
-    """All stretches of a model.
-
-    Args:
-        voxel_m: of the model, m: about as wide as views are off a surface.
-    """
+    """All stretches of a model."""
 
     def __init__(self, voxel_m: float) -> None:
         self._loop_shift_m, self._least_shift_m = _LOOP_VOXELS * voxel_m, _LEAST_VOXELS * voxel_m
@@ -166,12 +164,7 @@ class Stretches:
         of.views.append(Placed(view.number, of.world_stretch.inverse() @ view.world_camera))
 
     def add_piece(self, views: list[Placed], beside: int) -> None:
-        """Take a piece that was joined, as a stretch of its own.
-
-        Args:
-            views: its views, where they were taken in the world.
-            beside: the stretch to which it was joined.
-        """
+        """Take a piece that was joined, as a stretch of its own."""
         self._begin(views[0].world_camera, beside, is_loop=True)
         of = self._all[-1]
         of.views = [Placed(view.number, of.world_stretch.inverse() @ view.world_camera) for view in views]
@@ -203,11 +196,6 @@ class Stretches:
 
     def close(self, here: int, tracked: SE3, found: SE3) -> bool:
         """Note a loop between an older stretch and the last one.
-
-        Args:
-            here: the older one.
-            tracked: where a view of the last one was taken as tracking has it.
-            found: where it was taken as seen from the older one.
 
         Returns:
             Whether it counts now: it is believed, for tracking may be so far off, and another loop of the same stretch or the one before stands beside it.
@@ -298,3 +286,27 @@ class Stretches:
             way = self._way
             self._way = replace(way, length_m=way.length_m + length_m, turned=way.turned + turned)
         self._last = world_camera
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelMotion:
+    """A motion of a model, each part of which moves as a whole.
+
+    Attributes:
+        before_m: (N, 3) where its views were taken before, m.
+        by: of the world, for each of them.
+    """
+
+    before_m: NDArray[np.float64]
+    by: tuple[SE3, ...]
+
+    @staticmethod
+    def of(views: Sequence[Placed]) -> "ModelMotion":
+        """Return the motion after which views are where they are now; there is at least one."""
+        before = [view.by.inverse().apply(view.world_camera.t_m) for view in views]
+        return ModelMotion(np.array(before).reshape(-1, 3), tuple(view.by for view in views))
+
+    def carry(self, pose: SE3) -> SE3:
+        """Move a pose in the model's axes as the view that was taken nearest to it has moved: the last one of several."""
+        away_m = np.linalg.norm(self.before_m - pose.t_m, axis=1)[::-1]
+        return (self.by[len(away_m) - 1 - int(np.argmin(away_m))] @ pose).exact()

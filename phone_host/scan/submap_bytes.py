@@ -25,11 +25,7 @@ _FARTHEST_M: Final = 1e5
 
 
 def submap_bytes(submap: Submap) -> bytes:
-    """Return a submap as bytes.
-
-    Args:
-        submap: any.
-    """
+    """Return a submap as bytes."""
     pairs, places, of = submap.pairs, submap.tracker.places, submap.geometry
     own = {
         "is_whole": np.array(submap.is_whole),

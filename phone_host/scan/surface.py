@@ -8,9 +8,8 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.scan.blocks import ONE, SIDE, Blocks
-from phone_host.scan.box import Box
-from phone_host.scan.cells import Cells
+from phone_host.scan.blocks import INSIDE, ONE, SIDE, Blocks
+from phone_host.scan.box import Box, Cells
 from phone_host.scan.closing import Floor
 from phone_host.scan.fusion import Fusion
 from phone_host.scan.mat import ABOVE_M
@@ -57,11 +56,7 @@ class Surface(Protocol):
 
 
 class BoxSurface:
-    """All that was seen; closed in a box where there is one.
-
-    Args:
-        floor: on which the object stands; None: it is not known.
-    """
+    """All that was seen; closed in a box where there is one."""
 
     def __init__(self, floor: Floor | None) -> None:
         self._floor = floor
@@ -79,12 +74,7 @@ class BoxSurface:
 
 
 class TableSurface(BoxSurface):
-    """What stands on the table in the room and is connected to the object, closed down to the table; or what is in a box that was asked for.
-
-    Args:
-        poses: which know the room.
-        floor: the table.
-    """
+    """What stands on the table in the room and is connected to the object, closed down to the table; or what is in a box that was asked for."""
 
     def __init__(self, poses: TablePoses, floor: Floor | None) -> None:
         super().__init__(floor)
@@ -107,17 +97,7 @@ class TableSurface(BoxSurface):
 
 
 def thing_box(blocks: Blocks, settings: VolumeSettings, room: Box, above_m: float) -> Box | None:
-    """Find the box of the thing that stands nearest to the room's middle.
-
-    Args:
-        blocks: of a volume whose z is up from a table.
-        settings: of the volume.
-        room: where the thing is.
-        above_m: what is lower may be the table.
-
-    Returns:
-        Its box, inside the room and down to `above_m`; None: there is none in the room.
-    """
+    """Return the box of the thing that stands nearest to the room's middle, inside the room and down to `above_m`; None: there is none."""
     low, high = np.array(room.low_m), np.array(room.high_m)
     cell_m = max(float((high - low).max()) / _CELLS, _LEAST_CELL_VOXELS * settings.voxel_m)
     points = _surface_m(blocks, settings, room, above_m)
@@ -142,8 +122,7 @@ def _surface_m(blocks: Blocks, settings: VolumeSettings, room: Box, above_m: flo
     numbers = np.flatnonzero(((places * side_m <= high) & ((places + 1) * side_m >= low)).all(axis=1))
     near = np.abs(blocks.field[numbers].astype(np.int32)) < _NEAR * ONE
     block, voxel = np.nonzero(near & (blocks.weights[numbers] >= LEAST_WEIGHT))
-    inside = np.column_stack([voxel % SIDE, voxel // SIDE % SIDE, voxel // SIDE**2])
-    points = (SIDE * places[numbers[block]].astype(np.int64) + inside) * settings.voxel_m
+    points = (SIDE * places[numbers[block]].astype(np.int64) + INSIDE[voxel]) * settings.voxel_m
     return np.asarray(points[((points >= low) & (points <= high)).all(axis=1)], np.float64)
 
 

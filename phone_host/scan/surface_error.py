@@ -84,12 +84,7 @@ class FusedDepths:
 
     @staticmethod
     def of(view: View, world_camera: SE3) -> "FusedDepths":
-        """Return those of a view, in a size that is quick to compare.
-
-        Args:
-            view: with its images.
-            world_camera: where it was taken.
-        """
+        """Return those of a view, in a size that is quick to compare."""
         depth, geometry, step = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
         small = replace(view, depth_m=depth, geometry=geometry, noise_px=view.noise_px / step)
         return FusedDepths(small, world_camera, texture_of(view.grey, depth.shape))

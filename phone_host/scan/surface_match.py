@@ -99,12 +99,7 @@ class _Surface:
 
 
 def matched_surfaces(first: Volume, second: Volume) -> SurfaceMatch:
-    """Find how the second volume's surface lies on the first's.
-
-    Args:
-        first: of the thing, as it stood first.
-        second: of the same thing, in any other position.
-    """
+    """Find how the second volume's surface lies on the first's."""
     one, other = _surface_of(first), _surface_of(second)
     nothing = SurfaceMatch(match=Match.NONE, first_second=SE3.identity(), share=0.0, off_m=float("nan"))
     if min(len(one.points_m), len(other.points_m)) < _SOME:

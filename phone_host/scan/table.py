@@ -106,14 +106,7 @@ class _Grid:
 
 
 def find_table(view: View) -> Table | Weakness:
-    """Find a table and the thing on it.
-
-    Args:
-        view: the first one.
-
-    Returns:
-        The highest table on which something stands, or why there is none.
-    """
+    """Find the highest table on which something stands in the first view; or why there is none."""
     grid = _grid_of(view)
     planes = _planes(grid)
     found = [(plane, thing) for plane in planes if (thing := _thing_on(plane, grid)) is not None]

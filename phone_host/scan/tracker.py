@@ -16,16 +16,13 @@ import numpy as np
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.loop_closing import LoopCloser, LoopSettings
-from phone_host.scan.map_fragment import Found, Joined, Joining
-from phone_host.scan.mat_pose import MatSaid
-from phone_host.scan.model_motion import ModelMotion
-from phone_host.scan.odometry import Moved, Odometry
-from phone_host.scan.piece import Piece, PoseGate
+from phone_host.scan.odometry import Moved, Odometry, odometry_for
+from phone_host.scan.piece import Found, Joined, Joining, Piece, PoseGate, pose_gate_for
 from phone_host.scan.pieces import Pieces
 from phone_host.scan.places import Place
 from phone_host.scan.registration import Registered
-from phone_host.scan.street_tracking import odometry_for, pose_gate_for
-from phone_host.scan.stretches import ClosedLoop, Placed, WayCertainty
+from phone_host.scan.stretches import ClosedLoop, ModelMotion, Placed, WayCertainty
+from phone_host.scan.tracked import Tracked
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View, reduced
 from phone_host.scan.volume import Volume
@@ -41,70 +38,6 @@ _SKEWED_PX: Final = 0.5
 
 _CONFIRMED: Final = 1
 """Views of a piece that must fit the model where the one that leaves it tells its place by corners alone."""
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Tracked:
-    """What the tracker says of a view.
-
-    Attributes:
-        world_camera: where it was taken; where it is lost, as far as is known. The world's axes are the first view's, if the tracker began in the origin.
-        state: how sure that is.
-        weakness: why it is not surer.
-        moved: what odometry says.
-        fit: how the depth lies against the model; None where it was not compared.
-        joined: earlier views that were lost, and have become part of the model with this one.
-        moved_views: where the views in the model were taken, this one too, if a loop has moved them; else none.
-        mat: what a mat told; None: there is none, or it was not seen.
-        used: the view with the depths that went into the model, or may do so later; None: there are none.
-        is_followed: whether odometry tells the pose of a view that is not fused, without a gap since one that is.
-    """
-
-    world_camera: SE3
-    state: Tracking
-    weakness: Weakness
-    moved: Moved
-    fit: Registered | None
-    joined: tuple[Joined, ...] = ()
-    moved_views: tuple[Placed, ...] = ()
-    mat: MatSaid | None = None
-    used: View | None = None
-    is_followed: bool = False
-
-    @property
-    def is_fused(self) -> bool:
-        """Whether the view became part of the model."""
-        return self.state is not Tracking.LOST
-
-    def unless_flat(self) -> "Tracked":
-        """Return it where something else tells what a flat or round thing does not: the axis of a turn, the corners on a table."""
-        state, weakness = _unless_flat(self.state, self.weakness)
-        joined = []
-        for each in self.joined:
-            its_state, its_weakness = _unless_flat(each.state, each.weakness)
-            joined.append(replace(each, state=its_state, weakness=its_weakness))
-        return replace(self, state=state, weakness=weakness, joined=tuple(joined))
-
-    def unless_restless(self) -> "Tracked":
-        """Return it as weak where something moves against the rest."""
-        if self.state is not Tracking.TRACKING or not self.moved.others:
-            return self
-        return replace(self, state=Tracking.WEAK, weakness=Weakness.RESTLESS)
-
-
-NOT_MOVED: Final = Moved(world_camera=SE3.identity(), before_now=SE3.identity(), is_known=False, followed=0, inliers=0)
-"""What is known of the motion of a view for which odometry was not asked."""
-
-
-def lost(why: Weakness) -> Tracked:
-    """Return what is said of a view of whose place nothing is known."""
-    return Tracked(world_camera=SE3.identity(), state=Tracking.LOST, weakness=why, moved=NOT_MOVED, fit=None)
-
-
-def _unless_flat(state: Tracking, weakness: Weakness) -> tuple[Tracking, Weakness]:
-    if weakness is not Weakness.FLAT:
-        return state, weakness
-    return Tracking.TRACKING if state is Tracking.WEAK else state, Weakness.NONE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,11 +123,7 @@ class Tracker:
         return self._pieces.model
 
     def track(self, view: View) -> Tracked:
-        """Take the next view; all have one size and one geometry.
-
-        Returns:
-            Where it was taken, and how sure that is.
-        """
+        """Return where the next view was taken, and how sure that is; all have one size and one geometry."""
         piece, before = self._pieces.active, self._pose
         tracked = self._track(view)
         if self._pieces.active is piece:
@@ -254,22 +183,14 @@ class Tracker:
             self._waiting = replace(self._waiting, found=replace(found, pose=motion.carry(found.pose)))
 
     def kept(self, places_before: int) -> TrackerState:
-        """Return what a later tracker needs to go on, beside the model's blocks.
-
-        Args:
-            places_before: how many of the places are known there already.
-        """
+        """Return what a later tracker needs to go on, beside the model's blocks."""
         model = self._model
         return TrackerState(
             self._pieces.in_world(self._pose), model.usual_off_sigmas, model.places.since(places_before)
         )
 
     def go_on(self, state: TrackerState) -> None:
-        """Go on where another tracker stood. How the camera has moved since is not known: the next view is looked for like a lost one.
-
-        Args:
-            state: of the other one; its places are added to those that are known.
-        """
+        """Go on where another tracker stood. How the camera has moved since is not known: the next view is looked for like a lost one."""
         self._loops = None  # of what came before there are no copies to build the field again
         self._pose, self._was_lost, self._is_followed = state.pose, True, False
         self._pieces.go_on(state.pose)

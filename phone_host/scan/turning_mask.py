@@ -4,7 +4,8 @@ A pixel is still as long as its grey stays the same from view to view. Still pix
 those that changing ones enclose belong to the thing, however plain it is there. Depth decides between the thing and what comes to light behind it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Image, StereoGeometry
-from phone_host.scan.view import Depth
+from phone_host.scan.view import Depth, View, points_of
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -103,12 +104,7 @@ class TurningMask:
         self._moving: Flags | None = None
 
     def before(self, depth_m: Depth, geometry: StereoGeometry) -> Flags:
-        """Return (H, W), the pixels of the thing in the view before the first in which it had turned.
-
-        Args:
-            depth_m: (H, W) float32 of that view, m.
-            geometry: of the pair.
-        """
+        """Return (H, W), the pixels of the thing in the view before the first in which it had turned, by its depths, (H, W), m."""
         if self._moving is None or self.ball is None:
             return np.zeros(depth_m.shape, np.bool_)
         return self._moving & self.ball.holds(depth_m, geometry)
@@ -147,12 +143,7 @@ class TurningMask:
 
 
 def changes(before: NDArray[np.float32], now: NDArray[np.float32]) -> Flags:
-    """Return where a picture has changed, (H, W), with what lies between.
-
-    Args:
-        before: (H, W) grey levels, blurred.
-        now: those of the next view.
-    """
+    """Return where a picture has changed, (H, W), with what lies between; both are blurred grey levels, (H, W)."""
     step = np.abs(now - before)
     usual = 1.4826 * float(np.median(step))
     changed = (step > max(_LEAST_STEP, min(_SIGMAS * usual, 4 * _LEAST_STEP))).astype(np.uint8)
@@ -183,11 +174,7 @@ def ball_of(depth_m: Depth, changed: Flags, geometry: StereoGeometry) -> Ball | 
     seen = changed & np.isfinite(depth_m)
     if np.count_nonzero(seen) < _FEW:
         return None
-    rows, columns = np.nonzero(seen)
-    z = depth_m[seen].astype(np.float64)
-    points = np.column_stack(
-        [(columns - geometry.cx_px) / geometry.focal_px * z, (rows - geometry.cy_px) / geometry.focal_px * z, z]
-    )
+    points = points_of(np.where(seen, depth_m, np.float32(np.nan)), geometry)
     middle = np.median(points, axis=0)
     radius = float(np.quantile(np.linalg.norm(points[:, :2] - middle[:2], axis=1), 0.9))
     for _ in range(_BALL_ROUNDS):
@@ -201,3 +188,69 @@ def ball_of(depth_m: Depth, changed: Flags, geometry: StereoGeometry) -> Ball | 
 
 def _border(mask: Flags) -> Flags:
     return np.concatenate([mask[:2].ravel(), mask[-2:].ravel(), mask[2:-2, :2].ravel(), mask[2:-2, -2:].ravel()])
+
+
+_SAMPLES: Final = 24
+"""Views that are compared with each other, spread over all."""
+
+_ALIKE: Final = 8.0
+"""Grey levels between two views of the same background, after a blur of 3 px."""
+
+_LEAST_SHOWN: Final = 0.25
+"""Of the views that must show it: the spots of a turning texture are alike by chance in one of ten."""
+
+_DEPTH_SHARE: Final = 0.015
+"""Of the depth, by which two views of the same background differ at most."""
+
+_RIM_PX: Final = 5
+"""Across which the background beside the thing may be the thing."""
+
+
+class Background:
+    """What the cameras see where the thing is not, learnt from all views together: of each pixel the grey that comes back most often.
+
+    In a view, pixels that show it and hang together with the picture's border are background; those inside of the thing are not, even if it is plain there.
+
+    Attributes:
+        depth_m: (H, W) float32, m, NaN = not known.
+
+    Args:
+        greys: (H, W) uint8 of each view.
+        depths_m: (H, W) float32 of each, m, NaN = none.
+    """
+
+    def __init__(self, greys: Sequence[Image], depths_m: Sequence[Depth]) -> None:
+        chosen = np.unique(np.linspace(0, len(greys) - 1, _SAMPLES).round().astype(np.int64))
+        stack = np.array([_blurred(greys[at]) for at in chosen])
+        depths = np.array([depths_m[at] for at in chosen])
+        alike = np.zeros(stack.shape, np.uint8)
+        for number in range(len(chosen)):
+            alike[number] = (np.abs(stack - stack[number]) <= _ALIKE).sum(axis=0)
+        best = alike.argmax(axis=0)[np.newaxis]
+        self._grey = np.take_along_axis(stack, best, axis=0)[0]
+        self._known = np.take_along_axis(alike, best, axis=0)[0] >= max(_LEAST_SHOWN * len(chosen), 3)
+        same = np.abs(stack - self._grey) <= _ALIKE
+        known = np.isfinite(depths) & same
+        # A mean, because medians of so many NaN are slow; what shows the background by chance is cut by `same`.
+        count = known.sum(axis=0)
+        total = np.where(known, depths, np.float32(0)).sum(axis=0)
+        self.depth_m = np.where(self._known & (count > 0), total / np.maximum(count, 1), np.float32(np.nan)).astype(
+            np.float32
+        )
+
+    def is_seen(self, grey: Image, depth_m: Depth) -> Flags:
+        """Return (H, W): which pixels of a view show the background."""
+        alike = self._known & (np.abs(_blurred(grey) - self._grey) <= _ALIKE)
+        nearer = depth_m < self.depth_m * np.float32(1 - _DEPTH_SHARE)  # False without a depth
+        still = cv2.medianBlur((alike & ~nearer).astype(np.uint8), 5) > 0
+        return ~enclosed(~still)
+
+    def opened(self, view: View) -> View:
+        """Return a view with infinite depths where it shows the background: nothing of the thing is there, however near the table is."""
+        still = self.is_seen(view.grey, view.depth_m).astype(np.uint8)
+        sure = cv2.erode(still, np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
+        return replace(view, depth_m=np.where(sure, np.float32(np.inf), view.depth_m))
+
+
+def _blurred(grey: Image) -> NDArray[np.float32]:
+    return np.asarray(cv2.blur(grey, (3, 3)), np.float32)

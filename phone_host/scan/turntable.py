@@ -16,17 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
-from phone_host.scan.box import Box
+from phone_host.scan.box import Box, Cells
 from phone_host.scan.carving import Carving
-from phone_host.scan.cells import Cells
 from phone_host.scan.field_bytes import KeptField
-from phone_host.scan.fineness import fineness_for, thinner
+from phone_host.scan.field_sample import merged
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn, TurnView, full_turn
 from phone_host.scan.fusion import Fusion
-from phone_host.scan.ground import Ground
-from phone_host.scan.map_fragment import Joined
-from phone_host.scan.merged_field import merged
-from phone_host.scan.piece import PoseGate
+from phone_host.scan.ground import Ground, above, ground_of, table_height_m
+from phone_host.scan.piece import Joined, PoseGate
 from phone_host.scan.pose_source import PoseSource
 from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
@@ -34,13 +31,13 @@ from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.stretches import Placed
 from phone_host.scan.surface_error import FusedDepths, PoseErrors
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
-from phone_host.scan.table_cut import above, ground_of, points_of, table_height_m
-from phone_host.scan.tracker import Tracked, Tracker, lost
+from phone_host.scan.tracked import Tracked, lost
+from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
-from phone_host.scan.turning_background import Background
-from phone_host.scan.turning_mask import Turning, TurningMask
-from phone_host.scan.view import View
+from phone_host.scan.turning_mask import Background, Turning, TurningMask
+from phone_host.scan.view import View, points_of
 from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import fineness_for, thinner
 
 _LEAST_TURN: Final = 0.035
 """rad from one kept view to the next, 2 degrees."""
@@ -123,9 +120,6 @@ class TurntablePoses(PoseSource):
 
     Attributes:
         fit: the end of the scan, once the model was asked for.
-
-    Args:
-        wanted: of the scan.
     """
 
     is_resumable = False
@@ -316,12 +310,7 @@ class TurntablePoses(PoseSource):
 
 
 class TurnSurface:
-    """The thing, closed in a box around it and down to what it stands on, carved by all views together once they are known to lie on a circle.
-
-    Args:
-        poses: which keep the views.
-        onto: an earlier pass; None: there is none.
-    """
+    """The thing, closed in a box around it and down to what it stands on, carved by all views together once they are known to lie on a circle."""
 
     def __init__(self, poses: TurntablePoses, onto: KeptField | None) -> None:
         self._poses, self._onto = poses, onto

@@ -7,8 +7,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.errors import DataError
+from common.imagesize.head import size_text
 from phone_host.geometry.se3 import SE3
-from phone_host.model import Confidence, Epipolar, Image, StereoGeometry
+from phone_host.model import Confidence, Epipolar, Image, Processed, StereoGeometry
+from phone_host.scan.mat import Mat
+from phone_host.stereo.images import size_px, to_grey
 
 Depth = NDArray[np.float32]
 
@@ -97,16 +101,16 @@ class Camera:
     world_camera: SE3
 
 
+def points_of(depth_m: Depth, geometry: StereoGeometry) -> NDArray[np.float64]:
+    """Return the points (N, 3), m, in the camera's axes, of all pixels with a depth."""
+    rows, columns = np.nonzero(np.isfinite(depth_m))
+    z = depth_m[rows, columns].astype(np.float64)
+    x, y = (columns - geometry.cx_px) / geometry.focal_px * z, (rows - geometry.cy_px) / geometry.focal_px * z
+    return np.column_stack([x, y, z])
+
+
 def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeometry]:
-    """Take every second depth of every second row, so that none is mixed across an edge.
-
-    Args:
-        depth_m: (H, W) float32, m.
-        geometry: of the pair.
-
-    Returns:
-        ((H + 1) // 2, (W + 1) // 2) depths, packed, and the geometry of their pixels.
-    """
+    """Take every second depth of every second row, packed, so that none is mixed across an edge, and the geometry of their pixels."""
     half = StereoGeometry(
         focal_px=geometry.focal_px / 2,
         baseline_m=geometry.baseline_m,
@@ -118,16 +122,7 @@ def halved(depth_m: Depth, geometry: StereoGeometry) -> tuple[Depth, StereoGeome
 
 
 def narrowed(depth_m: Depth, geometry: StereoGeometry, max_width_px: int) -> tuple[Depth, StereoGeometry, int]:
-    """Halve depths until they are no wider than a limit.
-
-    Args:
-        depth_m: (H, W) float32, m.
-        geometry: of the pair.
-        max_width_px: the limit, > 0.
-
-    Returns:
-        The depths, the geometry of their pixels, and by how much a pixel became wider: 1, 2, 4 ...
-    """
+    """Halve depths until they are no wider than a limit; return them, the geometry of their pixels, and by how much a pixel became wider: 1, 2, 4 ..."""
     step = 1
     while depth_m.shape[1] > max_width_px:
         (depth_m, geometry), step = halved(depth_m, geometry), 2 * step
@@ -154,3 +149,51 @@ def half_view(view: View) -> View:
         noise_px=view.noise_px / 2,
         patch_px=view.patch_px / 2,
     )
+
+
+NOISE_PX: Final = 0.5
+"""Of a matcher's disparity, px of the images that it matched: 0.25 on rendered scenes, 0.7 on a street (decision 0068)."""
+_STEP_PX: Final = 1.5
+"""A rise of the disparity from pixel to pixel: a table 0.3 m below the cameras gives 0.3 px, the outline of a cup 5 px."""
+
+
+def require_size(name: str, view: View, size: tuple[int, int]) -> None:
+    """Refuse a view of another size than those before it.
+
+    Raises:
+        DataError: so it is.
+    """
+    if size_px(view.grey) != size:
+        here, before = (size_text(each) for each in (size_px(view.grey), size))
+        raise DataError(f"{name} is {here} px when rectified, the first pair {before} px", "scan with one size")
+
+
+def view_of(processed: Processed, mat: Mat | None = None) -> View:
+    """Return a pair with disparity and cloud as the tracker takes it, without the depths beside steps; with a mat it holds what is looked at for that."""
+    assert processed.geometry is not None
+    assert processed.cloud is not None
+    left = processed.pair.left
+    scale = 1.0 if processed.search is None else processed.search.scale
+    return View(
+        grey=to_grey(left),
+        colours=left if left.ndim == 3 else np.repeat(left[..., np.newaxis], 3, axis=2),
+        depth_m=without_edges(processed.cloud[..., 2], processed.geometry),
+        geometry=processed.geometry,
+        noise_px=NOISE_PX / scale,
+        right=None if mat is None else to_grey(processed.pair.right),
+        epipolar=processed.pair.epipolar,
+        confidence=None if mat is None else processed.confidence,
+    )
+
+
+def without_edges(depth_m: Depth, geometry: StereoGeometry) -> Depth:
+    """Leave out the depths beside a step, where a matcher's window sees both sides: NaN where a neighbour's disparity is more than 1.5 px away."""
+    with np.errstate(divide="ignore"):
+        disparity = np.float32(geometry.focal_px * geometry.baseline_m) / depth_m
+    known, around = np.isfinite(disparity), np.ones((3, 3), np.uint8)
+    highest = cv2.dilate(np.where(known, disparity, np.float32(-np.inf)), around)
+    lowest = cv2.erode(np.where(known, disparity, np.float32(np.inf)), around)
+    flat = known & (
+        np.maximum(highest - disparity, disparity - lowest, where=known, out=np.zeros_like(disparity)) <= _STEP_PX
+    )
+    return np.where(flat, depth_m, np.float32(np.nan))

@@ -19,11 +19,18 @@ from phone_host.scan import volume_numpy
 from phone_host.scan.absorbed import absorbed, reached
 from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
 from phone_host.scan.exposure import gains_of, multiplied
-from phone_host.scan.jobs import aim, rows_of
 from phone_host.scan.view import Camera, Depth, View
 from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
 from phone_host.stereo.native.library import Library, Missing, native
-from phone_host.stereo.native.volume_jobs import AbsorbJob, CastJob, FuseJob, TouchJob, VolumeArrays
+from phone_host.stereo.native.volume_jobs import (
+    AbsorbJob,
+    CarveJob,
+    CastJob,
+    FuseJob,
+    RegisterJob,
+    TouchJob,
+    VolumeArrays,
+)
 
 _LOOKS_A_BLOCK: Final = 3
 _NEARLY_FULL: Final = 0.9
@@ -73,11 +80,6 @@ class Volume:
         settings: its fineness and limits; coarser ones after `coarsen`.
         blocks: its values.
         left_out: blocks for which there was no memory.
-
-    Args:
-        settings: its fineness and limits.
-        threads: that work on it, >= 1; results do not depend on them.
-        library: computes; None: that of this installation.
     """
 
     def __init__(self, settings: VolumeSettings, threads: int = 1, library: Library | Missing | None = None) -> None:
@@ -154,11 +156,7 @@ class Volume:
         return BlockValues(of.places[numbers], of.field[numbers], of.weights[numbers], of.colours[numbers])
 
     def changed_since(self, fused: int) -> NDArray[np.int64]:
-        """Return the numbers of the blocks that got something since so much went in.
-
-        Args:
-            fused: a value that `fused` had; 0: everything.
-        """
+        """Return the numbers of the blocks that got something since `fused` had a value; 0: everything."""
         return np.flatnonzero(self._changes > fused)
 
     def put(self, values: BlockValues) -> None:
@@ -346,3 +344,17 @@ def _arrays_of(blocks: Blocks, settings: VolumeSettings) -> VolumeArrays:
         voxel_m=settings.voxel_m,
         truncation_m=settings.truncation_m,
     )
+
+
+def rows_of(pose: SE3) -> ctypes.Array[ctypes.c_float]:
+    """Return a pose's three rows of rotation and translation, m."""
+    rows = np.column_stack([pose.R, pose.t_m]).ravel()
+    return (ctypes.c_float * 12)(*rows.tolist())
+
+
+def aim(
+    job: TouchJob | FuseJob | CarveJob | CastJob | RegisterJob, geometry: StereoGeometry, shape: tuple[int, int]
+) -> None:
+    """Tell a job its camera: geometry, and height and width of the image, px."""
+    job.height, job.width = shape
+    job.focal_px, job.cx_px, job.cy_px = geometry.focal_px, geometry.cx_px, geometry.cy_px

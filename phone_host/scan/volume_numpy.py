@@ -128,9 +128,7 @@ class _Field:
 
     def at(self, voxels: NDArray[np.int32]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         """Return the field at voxels (N, 3), whether it is known, and whether there is a block."""
-        blocks, inside = self._blocks, voxels & (SIDE - 1)
-        numbers = blocks.find(voxels >> 3)
-        at = inside[:, 0] + SIDE * inside[:, 1] + SIDE**2 * inside[:, 2]
+        blocks, (numbers, at) = self._blocks, self._blocks.locate(voxels)
         there = numbers >= 0
         safe = np.maximum(numbers, 0)
         return blocks.field[safe, at].astype(F), there & (blocks.weights[safe, at] > 0), there

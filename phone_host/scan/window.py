@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.schur import NormalEquations, minimise
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.scan.observation import Observer, by_motion, huber
+from phone_host.scan.camera_pose import Observer, by_motion, huber
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.int64]

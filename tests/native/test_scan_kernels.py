@@ -5,8 +5,8 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
+from phone_host.scan.box import Cells
 from phone_host.scan.carving import Carving
-from phone_host.scan.cells import Cells
 from phone_host.scan.view import Depth, View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings

@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
+from phone_host import api
 from phone_host.calibration.target.marked import MarkFamily
 from phone_host.cli import main
 from phone_host.model import Image
 from phone_host.output.rig_yaml import write_rig
-from phone_host.scan.mat import parse_mat
-from phone_host.scan.mat_in_view import MatDetector, MatInView, mat_in_view
+from phone_host.scan.mat import MatDetector, MatInView, mat_in_view, parse_mat
 from phone_host.stereo.rectify import rectify_rig
-from tests.scan.test_scan_mat import RIG, pictures
+from tests.scan.test_scan_mat import RIG, pictures, walked
 from tests.support.mat_rigs import rig_of
 from tests.support.mats import MatPainter, looking_at
 from tests.support.table_things import small_scene
@@ -105,3 +105,15 @@ def test_a_scan_without_mat_says_so_first(
     else:
         assert told.err.count(words) == 2
         assert not (tmp_path / "out").exists()
+
+
+def test_a_scan_of_the_python_api_says_so(tmp_path: Path) -> None:
+    """The listener is told once, before the pair is taken, and the saved report begins with it."""
+    told = list[MatInView]()
+    scan = api.scan_for(api.ScanWanted(voxel_m=0.004), told.append)
+    for number in range(2):
+        scan.take(str(number), float(number), walked(0))
+    assert told == [scan.unused_mat] == [MatInView(10, 8, MarkFamily.ARUCO_5X5)]
+    api.save_scan(tmp_path / "out", scan)
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["warnings"][0].startswith("a printed mat is in view, but the scan does not use it: use --mat ")

@@ -13,9 +13,8 @@ from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.ply import PointCloud, write_surface
 from phone_host.scan.blocks import ONE, VOXELS, Blocks
-from phone_host.scan.box import Box
+from phone_host.scan.box import Box, Cells
 from phone_host.scan.carving import Carving
-from phone_host.scan.cells import Cells
 from phone_host.scan.closing import Floor, closed
 from phone_host.scan.fusion import KeptDepths
 from phone_host.scan.mesh import Mesh, mesh_of

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.map_fragment import Found, Joining
-from phone_host.scan.model_motion import ModelMotion
 from phone_host.scan.odometry import Moved
-from phone_host.scan.piece import Piece, PoseGate
+from phone_host.scan.piece import Found, Joining, Piece, PoseGate
 from phone_host.scan.pieces import Pieces
 from phone_host.scan.places import Place, is_bare
-from phone_host.scan.stretches import Placed
+from phone_host.scan.stretches import ModelMotion, Placed
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View

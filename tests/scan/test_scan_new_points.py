@@ -3,8 +3,7 @@
 import numpy as np
 
 from phone_host.model import RectifiedPair
-from phone_host.scan.odometry import Odometry
-from phone_host.scan.street_tracking import odometry_for
+from phone_host.scan.odometry import Odometry, odometry_for
 from phone_host.scan.view import View, reduced
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.stereo.match import MatchSettings, create_matcher

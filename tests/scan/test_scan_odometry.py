@@ -7,10 +7,8 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.scan.camera_pose import LEAST_INLIERS, located, refined
-from phone_host.scan.corners import followed, new_corners
-from phone_host.scan.observation import Observer, by_motion
-from phone_host.scan.odometry import Odometry, OdometrySettings
+from phone_host.scan.camera_pose import LEAST_INLIERS, Observer, by_motion, located, refined
+from phone_host.scan.odometry import Odometry, OdometrySettings, followed, new_corners
 from phone_host.scan.view import halved, reduced
 from phone_host.scan.window import Keyframe, fitted
 from tests.support.plane_films import distance, path, plane_view, texture

@@ -15,15 +15,14 @@ from phone_host.output.ply import PointCloud, write_surface
 from phone_host.output.trajectory_text import Station, tum_text
 from phone_host.scan.box import Box
 from phone_host.scan.factory import scan_for
-from phone_host.scan.fineness import fineness_for
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import NO_SIZE, only, size_of, thinned, without_crumbs
 from phone_host.scan.scan_model import surface_noise_m
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.taken_view import view_of, without_edges
 from phone_host.scan.tracking_words import Tracking, Weakness
+from phone_host.scan.view import view_of, without_edges
 from phone_host.scan.volume import Volume
-from phone_host.scan.volume_settings import VolumeSettings
+from phone_host.scan.volume_settings import VolumeSettings, fineness_for
 from tests.support.plane_films import CORNER, GEOMETRY, plane_view, texture
 
 PICTURE = texture()

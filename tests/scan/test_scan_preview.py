@@ -9,11 +9,10 @@ from rich.console import Console
 
 from phone_host.geometry.se3 import SE3
 from phone_host.live.scan import LiveScan
-from phone_host.live.scan_view import ScanPicture
+from phone_host.live.scan_view import ScanPicture, small_view
 from phone_host.model import Side
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.small_view import small_view
 from tests.support.plane_films import CORNER, plane_view, texture
 from tests.support.screen import Screen
 from tests.support.turning_things import processed_of

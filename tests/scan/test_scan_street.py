@@ -16,14 +16,14 @@ from phone_host.report.scan_json import scan_json
 from phone_host.run.scan_files import trajectory_of
 from phone_host.run.scan_result import report_of
 from phone_host.scan.factory import scan_for
-from phone_host.scan.fineness import fineness_for
-from phone_host.scan.odometry import Odometry, OdometrySettings
+from phone_host.scan.odometry import Odometry, OdometrySettings, odometry_for
+from phone_host.scan.piece import pose_gate_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import PoseOrigin
-from phone_host.scan.street_tracking import odometry_for, pose_gate_for
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.view import View, reduced
+from phone_host.scan.volume_settings import fineness_for
 from tests.bench.trajectory_errors import trajectory_errors
 from tests.support.plane_films import CORNER, path, plane_view, street_view, texture
 from tests.support.turning_things import processed_of

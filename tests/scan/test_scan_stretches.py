@@ -7,7 +7,7 @@ import numpy as np
 
 from phone_host.geometry.se3 import SE3
 from phone_host.run.scan_result import way_remarks
-from phone_host.scan.kept_views import KeptViews
+from phone_host.scan.loop_closing import KeptViews
 from phone_host.scan.stretches import Placed, Stretches
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings

@@ -7,7 +7,8 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.piece import Piece, PoseGate
-from phone_host.scan.tracker import Tracked, Tracker
+from phone_host.scan.tracked import Tracked
+from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings

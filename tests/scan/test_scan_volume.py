@@ -7,8 +7,7 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
-from phone_host.scan.cube_cases import cube_cases
-from phone_host.scan.mesh import Mesh, mesh_of
+from phone_host.scan.mesh import Mesh, cube_cases, mesh_of
 from phone_host.scan.registration import RegistrationSettings, Trial, registered, summed
 from phone_host.scan.view import Camera, View, halved, narrowed
 from phone_host.scan.volume import Volume
@@ -280,11 +279,11 @@ def test_the_mesh_is_open_where_nobody_looked() -> None:
 
 def test_cubes_turned_inside_out_have_as_many_crossings() -> None:
     """Each case's triangles use exactly the edges whose ends differ; the empty and the full cube have none."""
-    table = cube_cases()
-    assert table.counts[0] == table.counts[255] == 0
+    counts, edges = cube_cases()
+    assert counts[0] == counts[255] == 0
     for case in range(256):
         crossed = {n for n in range(12) if _differ(case, n)}
-        assert {int(edge) for edge in table.edges[case].ravel() if edge >= 0} == crossed
+        assert {int(edge) for edge in edges[case].ravel() if edge >= 0} == crossed
 
 
 def _differ(case: int, edge: int) -> bool:

@@ -15,21 +15,20 @@ from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.scan.box import Box
-from phone_host.scan.circle_bundle import Circle, Seen, fitted_circle
+from phone_host.scan.camera_pose import Observer
+from phone_host.scan.circle_bundle import Circle, Seen, TurnAxis, axis_of, fitted_circle, unwrapped
 from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import KeptField, field_bytes, field_of
+from phone_host.scan.ground import table_height_m
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.observation import Observer
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_match import Match
-from phone_host.scan.table_cut import points_of, table_height_m
 from phone_host.scan.tracking_words import Weakness
-from phone_host.scan.turn_axis import TurnAxis, axis_of, unwrapped
 from phone_host.scan.turning_mask import Turning, TurningMask
 from phone_host.scan.turntable import TurntablePoses
-from phone_host.scan.view import View
+from phone_host.scan.view import View, points_of
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from tests.support.turning_things import AXES, FOOT_M, UP, Size, exact_view, off_thing_m, processed_of, turned_scene
