@@ -9,7 +9,6 @@ from traceback import clear_frames
 from common.program.interrupts import answering, is_heard, terminable
 from common.program.out_of_memory import is_out_of_memory
 from common.unfinished import unfinished
-from common.words import counted
 
 
 @contextmanager
@@ -41,19 +40,6 @@ def tell_if_heard(tell: Callable[[str], None], line: str) -> None:
     if is_heard():
         with suppress(OSError):
             tell(line)
-
-
-def tell_of_partial(tell: Callable[[str], None], partial: Path, out: Path, done: int, count: int) -> None:
-    """Tell where the results of a part of the pairs are, and that the earlier results stay.
-
-    Args:
-        tell: takes the line.
-        partial: the folder of the results so far.
-        out: that of the earlier ones.
-        done: pairs so far.
-        count: of how many.
-    """
-    tell_if_heard(tell, f"ended after {done} of {counted(count, 'pair')}: {partial_words(partial, out)}")
 
 
 def partial_words(partial: Path, out: Path) -> str:

@@ -1,7 +1,6 @@
 """Measures the depth of pairs of image files that show a flat wall or board. The root of `quality`.
 
-A pair that cannot be computed ends the work only if it is the only one; of several, it is named and the others go on. One
-that shows no plane is reported as that.
+A pair that cannot be computed ends the work only if it is the only one. One that shows no plane is reported as that.
 """
 
 import math
@@ -12,11 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from common import now
-from common.errors import DataError
-from common.imagesize.head import MOST_PIXELS
-from common.orientation import UPRIGHT, Orientation
-from common.program.out_of_memory import noted_if_out_of_memory
 from phone_host.calibration.solve.board_plane import BoardPlane, find_board_plane
 from phone_host.calibration.target.corners import Board
 from phone_host.measure.depth_error import depth_error_m
@@ -30,16 +24,12 @@ from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import MeasuredPair, QualityReport
 from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
-from phone_host.run.cores import Cores
-from phone_host.run.file_remarks import files_remarks
-from phone_host.run.freed_memory import keep_freed_memory
-from phone_host.run.kept import kept_if_interrupted, tell_of_partial
-from phone_host.run.stereo_job import Watcher
-from phone_host.run.stereo_remarks import turned_remarks
-from phone_host.run.stereo_trust import judge_pair
+from phone_host.run.file_pairs import ComputedPair, FilePairs, PairMatcher, Watcher, compute_pairs
+from phone_host.run.kept import kept_if_interrupted
+from phone_host.run.stereo_remarks import files_remarks, judge_pair, remark_of, turned_remarks
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import crop_inside
-from phone_host.stereo.images import decode_files, open_image, size_px
+from phone_host.stereo.images import size_px
 from phone_host.stereo.plane_quality import (
     KnownPlane,
     NoTruth,
@@ -49,7 +39,6 @@ from phone_host.stereo.plane_quality import (
     middle_of,
     off_plane_px,
 )
-from phone_host.stereo.view_files import ViewFiles
 
 NAMES: Final = r"report\.json|index\.html"
 """The names that `quality` writes into its folder."""
@@ -61,33 +50,19 @@ _RANGE_SIGMAS: Final = 4.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QualityJob:
-    """What to measure, and where to.
+    """What to measure.
 
     Attributes:
-        files: the pairs.
-        out: the results folder.
-        make_core: makes the stereo core, with geometry, for images of this size (width and height of the left one, px).
-        matcher: its name, for the report.
-        matcher_note: what is to be said of the choice of the matcher; empty: nothing.
+        pairs: the files, and where the results go; their core has geometry.
         distances_m: true distances along the left camera's optical axis, m: one for each pair, one for all, or none.
         board: a board that gives the true plane; None: there is none.
         roi: the region that counts, px of the rectified left image; None: the board's outline, or the middle.
-        most_pixels: an image that claims more is refused.
-        mounted: by which turns the left and the right images become upright, after what their EXIF headers say.
-        tell: takes a line that the user should know.
     """
 
-    files: ViewFiles
-    out: Path
-    make_core: Callable[[Size], StereoCore]
-    matcher: str
-    matcher_note: str = ""
+    pairs: FilePairs
     distances_m: tuple[float, ...] = ()
     board: Board | None = None
     roi: Crop | None = None
-    most_pixels: int = MOST_PIXELS
-    mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT)
-    tell: Callable[[str], None] = lambda _: None
 
 
 def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
@@ -106,77 +81,54 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
         UnavailableError: a file in the results folder was not written by this program.
         OSError: the results cannot be written.
     """
-    keep_freed_memory()
-    cores, is_only = Cores(job.make_core), len(job.files.pairs) == 1
-    pairs: list[MeasuredPair | FailedPair] = []
+    pairs, done = job.pairs, list[MeasuredPair | FailedPair]()
+
+    def report() -> QualityReport:
+        return QualityReport(
+            pairs=tuple(done),
+            matcher=pairs.matcher,
+            left_alone=tuple(map(str, pairs.files.left_alone)),
+            right_alone=tuple(map(str, pairs.files.right_alone)),
+            remarks=files_remarks(pairs.files, pairs.matcher_note),
+        )
 
     def write_so_far() -> None:
-        so_far = replace(_report(job, pairs), interrupted_of=len(job.files.pairs))
+        so_far = replace(report(), interrupted_of=len(pairs.files.pairs))
         if so_far.measured:
-            _write(
-                job, so_far, lambda place: tell_of_partial(job.tell, place, job.out, len(pairs), len(job.files.pairs))
-            )
+            _write(pairs.out, so_far, lambda place: pairs.tell_of_partial(place, len(done)))
+
+    def take(pair: ComputedPair) -> MeasuredPair:
+        watcher.say(f"measuring {pair.label}")
+        return _measured(job, pair)
 
     with kept_if_interrupted(write_so_far):
-        for index, (_, left, right) in enumerate(job.files.pairs):
-            try:
-                with noted_if_out_of_memory(f"{left} and {right}"):
-                    pairs.append(_measured(job, cores, index, watcher))
-            except DataError as error:
-                if is_only or cores.has_none:
-                    raise
-                pairs.append(FailedPair.because(error, left.name, str(left), str(right)))
-            watcher()
-    report = _report(job, pairs)
-    if not report.measured:
-        first = report.pairs[0]
-        assert isinstance(first, FailedPair)
-        raise first.none_of(len(pairs))
-    _write(job, report)
-    return report
+        compute_pairs(pairs, PairMatcher(pairs, watcher), done, take, label=lambda _number, _name, left: left.name)
+    whole = report()
+    _write(pairs.out, whole)
+    return whole
 
 
-def _report(job: QualityJob, pairs: list[MeasuredPair | FailedPair]) -> QualityReport:
-    files = job.files
-    return QualityReport(
-        pairs=tuple(pairs),
-        matcher=job.matcher,
-        left_alone=tuple(map(str, files.left_alone)),
-        right_alone=tuple(map(str, files.right_alone)),
-        remarks=files_remarks(files, job.matcher_note),
-    )
-
-
-def _write(job: QualityJob, report: QualityReport, partial: Callable[[Path], None] | None = None) -> None:
+def _write(out: Path, report: QualityReport, partial: Callable[[Path], None] | None = None) -> None:
     texts = json_text(quality_json(report), indent=2) + "\n", quality_page(report)
-    with replacing_results(job.out, NAMES, ALWAYS, command="quality", partial=partial) as place:
+    with replacing_results(out, NAMES, ALWAYS, command="quality", partial=partial) as place:
         for name, text in zip(ALWAYS, texts, strict=True):
             write_text(place / name, text)
 
 
-def _measured(job: QualityJob, cores: Cores, index: int, watcher: Watcher) -> MeasuredPair:
-    """Compute and measure one pair."""
-    _, left, right = job.files.pairs[index]
-    watcher.say(f"reading {left.name}")
-    of_left, of_right = job.mounted
-    opened = open_image(left, job.most_pixels, of_left), open_image(right, job.most_pixels, of_right)
-    core = cores.for_pair(*opened)
-    sizes_px = opened[0].size_px, opened[1].size_px
-    images = decode_files(*opened, core.reductions(*sizes_px))
-    watcher.say(f"matching {left.name}")
-    processed = core.compute(*images, now.monotonic_ns, whole_px=sizes_px)
-    watcher.say(f"measuring {left.name}")
+def _measured(job: QualityJob, pair: ComputedPair) -> MeasuredPair:
+    """Measure one pair."""
+    core, processed = pair.core, pair.processed
     assert processed.geometry is not None
     board = None
     if job.board is not None:
-        board = find_board_plane(processed.pair, job.board, processed.geometry, left.name)
-    quality = _quality(job, core, processed, board, index)
+        board = find_board_plane(processed.pair, job.board, processed.geometry, pair.label)
+    quality = _quality(job, core, processed, board, pair.number)
     range_px = float(f"{max(_LEAST_RANGE_PX, _RANGE_SIGMAS * quality.subpixel_rms_px):.1g}")
-    widest_px = _ONE_WIDE_PX if len(job.files.pairs) == 1 else _MANY_WIDE_PX
+    widest_px = _ONE_WIDE_PX if len(job.pairs.files.pairs) == 1 else _MANY_WIDE_PX
     return MeasuredPair(
-        name=left.name,
-        left=str(left),
-        right=str(right),
+        name=pair.label,
+        left=pair.opened[0].name,
+        right=pair.opened[1].name,
         rectified_px=size_px(processed.pair.left),
         geometry=processed.geometry,
         quality=quality,
@@ -185,7 +137,7 @@ def _measured(job: QualityJob, cores: Cores, index: int, watcher: Watcher) -> Me
         corners_bias_share=math.nan if board is None else board.corners_bias_share,
         picture=_picture(processed, quality, range_px, widest_px),
         picture_range_px=range_px,
-        remarks=(*turned_remarks(*opened), *_doubts(core, processed, job, quality)),
+        remarks=(*turned_remarks(*pair.opened), *_doubts(core, processed, job, quality)),
     )
 
 
@@ -254,8 +206,10 @@ def _doubts(core: StereoCore, processed: Processed, job: QualityJob, quality: Pl
 
     That there is no depth is told already.
     """
-    concerns = [one for one in judge_pair(core, processed, job.mounted).concerns if one.doubt is not Doubt.NO_DEPTH]
+    concerns = [
+        one for one in judge_pair(core, processed, job.pairs.mounted).concerns if one.doubt is not Doubt.NO_DEPTH
+    ]
     told = [one for one in concerns if one.is_certain]
     if not told and quality.seen is not Seen.PLANE:
         told = concerns[:1]
-    return tuple(Remark(one.sentence, one.remedy, is_blocking=one.is_certain) for one in told)
+    return tuple(map(remark_of, told))

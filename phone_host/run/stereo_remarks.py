@@ -1,16 +1,102 @@
-"""What the user of `stereo` must know about a pair's result. Doubts that are found in the images belong here, too."""
+"""What the user must know about pairs of image files: which have no partner, whether the depth of each can be right, and why not."""
 
-from common.orientation import UPRIGHT
-from common.words import distance_text
+from dataclasses import replace
+from typing import Final
+
+from common.orientation import UPRIGHT, Orientation
+from common.words import counted, distance_text
 from phone_host.measure.drift_words import stills_remedy, stills_words
-from phone_host.measure.trust import Doubt
+from phone_host.measure.file_remedies import ImageSource
+from phone_host.measure.headline import answer
+from phone_host.measure.image_doubts import image_doubts
+from phone_host.measure.image_trust import median_figures
+from phone_host.measure.no_depth import no_depth
+from phone_host.measure.orient_words import with_final_options
+from phone_host.measure.trust import REJECTED_RIG, Concern, Doubt, gravest_first
 from phone_host.model import Drift, Processed
 from phone_host.report.cut_words import searched_from_m
+from phone_host.report.depth_data import density
 from phone_host.report.match_words import corrected_words
-from phone_host.report.stereo_report import Remark
+from phone_host.report.stereo_report import Remark, distinct_names
 from phone_host.report.stereo_trust import PairTrust
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.evidence import Examined, has_depth, look_at, maps_of
 from phone_host.stereo.images import EncodedFile
 from phone_host.stereo.reproject import nearest_depth_m
+from phone_host.stereo.view_files import ViewFiles
+
+_MOST_NAMES: Final = 5
+_UNMATCHED: Final = no_depth(None, None)
+_OF_FILES: Final = "check that the scene has texture, and that --calibration or --rectified fits the images"
+
+
+def files_remarks(files: ViewFiles, matcher_note: str = "") -> tuple[Remark, ...]:
+    """Say which images have no partner, if pairs were guessed, and how the matcher was chosen.
+
+    Args:
+        files: of both sides.
+        matcher_note: what is to be said of the choice of the matcher; empty: nothing.
+    """
+    remarks = []
+    for side, paths in (("left", files.left_alone), ("right", files.right_alone)):
+        if paths:
+            alone = list(distinct_names([*map(str, paths)]).values())
+            named = ", ".join(alone[:_MOST_NAMES]) + (", …" if len(alone) > _MOST_NAMES else "")
+            remarks.append(
+                Remark(f"{counted(len(alone), f'{side} image has', f'{side} images have')} no partner: {named}")
+            )
+    are_unequal = bool(files.left_alone or files.right_alone)
+    if not files.by_number and not files.by_name and (len(files.pairs) > 1 or are_unequal):
+        unequal = " though the counts differ" if are_unequal else ""
+        remarks.append(
+            Remark(
+                f"the images were paired in the order of their names{unequal}, because the names share neither numbers nor words",
+                "check that each pair shows one moment, or give the two images of a moment the same number",
+            )
+        )
+    return (*remarks, Remark(matcher_note, is_note=True)) if matcher_note else tuple(remarks)
+
+
+def judge_pair(
+    core: StereoCore,
+    processed: Processed,
+    mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT),
+    look: Examined | None = None,
+) -> PairTrust:
+    """Judge one pair.
+
+    Args:
+        core: the core that processed it.
+        processed: its result.
+        mounted: what the user gave to make the left and the right image upright.
+        look: what was seen in it; None: it is looked at.
+    """
+    evidence = (look or look_at(processed, maps_of(core, processed))).evidence
+    seen = image_doubts(evidence, ImageSource.FILES)
+    found = tuple(with_final_options(concern, mounted, ImageSource.FILES) for concern in seen)
+    if not has_depth(processed) and not any(concern.is_certain for concern in found):
+        why = no_depth(processed.cut, processed.limits, found)
+        # That there are few disparities, too, says nothing more; nor does the cause, once it is named.
+        further = (item for item in found if item.doubt is not Doubt.LOW_DENSITY and item.sentence not in why.sentence)
+        remedy = _OF_FILES if why == _UNMATCHED else why.remedy
+        pixels = "hardly any pixel has" if density(processed) > 0 else "no pixel has"
+        sentence = why.sentence.replace("no pair has", pixels, 1)  # it may be the only pair
+        found = gravest_first((replace(why, sentence=sentence, remedy=remedy), *further))
+    if core.rig is not None and core.rig.is_rejected:
+        found = gravest_first((REJECTED_RIG, *found))
+    figures = median_figures((evidence,))
+    error_px = float("nan") if processed.limits is None else processed.limits.disparity_error_px
+    # The headline counts the pixels that have a point, where metres are known. What the user has cut away is no loss.
+    limits = processed.limits
+    is_own_cut = limits is not None and (not limits.from_rig or limits.near_m > 0)
+    shown = figures if is_own_cut else replace(figures, density=density(processed))
+    return PairTrust(figures, found, answer(shown, found, processed.geometry, error_px, processed.cut))
+
+
+def remark_of(concern: Concern) -> Remark:
+    """Make the remark of a doubt. That one pair of several has no depth is told; only if none has any, the command fails."""
+    blocks = concern.is_certain and concern.doubt is not Doubt.NO_DEPTH
+    return Remark(concern.sentence, concern.remedy, is_blocking=blocks)
 
 
 def pair_remarks(processed: Processed, trust: PairTrust, near_m: float) -> tuple[Remark, ...]:
@@ -24,15 +110,7 @@ def pair_remarks(processed: Processed, trust: PairTrust, near_m: float) -> tuple
     Returns:
         The remarks; doubts come first, gravest first.
     """
-    # That one pair of several has no depth is told; only if none has any, the command fails.
-    remarks = [
-        Remark(
-            concern.sentence,
-            concern.remedy,
-            is_blocking=concern.is_certain and concern.doubt is not Doubt.NO_DEPTH,
-        )
-        for concern in trust.concerns
-    ]
+    remarks = [remark_of(concern) for concern in trust.concerns]
     geometry, search = processed.geometry, processed.search
     from_m = searched_from_m(geometry, search)
     # N is rounded up to what reaches near_m, unless the images' width bounds it. NaN is never greater.

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from common import now
-from phone_host.run.stereo_trust import judge_pair
+from phone_host.run.stereo_remarks import judge_pair
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.depth_limits import DepthWanted

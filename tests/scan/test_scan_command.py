@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from phone_host.cli import main
 from phone_host.report.scan_lines import scan_lines
 from phone_host.report.scan_report import ScanReport
-from phone_host.run.scan_job import ScanJob, run_scan
+from phone_host.run.file_pairs import FilePairs
+from phone_host.run.scan_job import run_scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scene.scene_model import Body, Box, Scene, Texture
@@ -68,9 +69,8 @@ def scan_here(walk: Path, out: Path, until: str = "") -> ScanReport:
     """The same in this process, which saves seconds; Ctrl-C when the words `until` are shown."""
     core = StereoCore(MatchSettings(MatcherName.TANDEM), Rectifier(small_rig()), None, DepthWanted(search_from_m=0.3))
     files = pair_files(str(walk / "left"), str(walk / "right"))
-    return run_scan(
-        ScanJob(files=files, out=out, make_core=lambda _: core, matcher="tandem", wanted=ScanWanted()), _Watcher(until)
-    )
+    pairs = FilePairs(files=files, out=out, make_core=lambda _: core, matcher="tandem")
+    return run_scan(pairs, ScanWanted(), _Watcher(until))
 
 
 def surface_of(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

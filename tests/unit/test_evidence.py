@@ -30,7 +30,7 @@ from phone_host.model import (
     StereoGeometry,
 )
 from phone_host.report import depth_data
-from phone_host.run.stereo_trust import judge_pair
+from phone_host.run.stereo_remarks import judge_pair
 from phone_host.scene.scene import Look, demo_scene, render, rig_poses
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted

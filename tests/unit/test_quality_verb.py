@@ -13,6 +13,7 @@ import pytest
 
 from phone_host.cli import main
 from phone_host.output.rig_yaml import write_rig
+from phone_host.run.file_pairs import FilePairs
 from phone_host.run.quality_job import QualityJob, run_quality
 from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK, plane_scene
 from phone_host.scene.scene_model import Body, Box, Scene, Texture, rig_poses, rotation
@@ -81,20 +82,20 @@ class _Impatient:
 def test_what_was_measured_before_ctrl_c_is_written(room: Path, tmp_path: Path) -> None:
     """Ctrl-C during the second pair: report and page are of the first one, and say so. During the first one nothing is written."""
     core = StereoCore(MatchSettings(MatcherName.SGBM, 96), Rectifier(narrow_rig()))
-    job = QualityJob(
+    pairs = FilePairs(
         files=pair_files(str(room / "left"), str(room / "right")),
         out=tmp_path / "o",
         make_core=lambda _: core,
         matcher="sgbm",
     )
     with pytest.raises(KeyboardInterrupt):
-        run_quality(job, _Impatient("matching 2.png"))
+        run_quality(QualityJob(pairs=pairs), _Impatient("matching 2.png"))
     report = report_of(tmp_path / "o")
     assert (report["interrupted_of"], len(report["pairs"])) == (2, 1)
     assert report["headline"].startswith("Interrupted after 1 of 2 pairs. At ")
     assert "Interrupted after 1 of 2 pairs" in (tmp_path / "o" / "index.html").read_text()
     with pytest.raises(KeyboardInterrupt):
-        run_quality(replace(job, out=tmp_path / "none"), _Impatient("matching 1.png"))
+        run_quality(QualityJob(pairs=replace(pairs, out=tmp_path / "none")), _Impatient("matching 1.png"))
     assert not (tmp_path / "none").exists()
 
 

@@ -16,7 +16,8 @@ from phone_host.model import Image, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pfm import read_pfm, read_xyz
 from phone_host.report.stereo_report import Size
-from phone_host.run.stereo_job import StereoJob, run_stereo
+from phone_host.run.file_pairs import FilePairs
+from phone_host.run.stereo_job import run_stereo
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
@@ -64,9 +65,9 @@ def _core(size_px: Size, far_m: float = math.nan) -> StereoCore:
     return StereoCore(MatchSettings(disparities=16), None, geometry, DepthWanted(far_m=far_m))
 
 
-def _job(photos: Path, make_core: Callable[[Size], StereoCore] = _core, axes: Axes = Axes.CAMERA) -> StereoJob:
+def _job(photos: Path, make_core: Callable[[Size], StereoCore] = _core) -> FilePairs:
     files = pair_files(str(photos / "left"), str(photos / "right"))
-    return StereoJob(files=files, out=photos / "out", make_core=make_core, matcher="sgbm", axes=axes)
+    return FilePairs(files=files, out=photos / "out", make_core=make_core, matcher="sgbm")
 
 
 def test_each_pair_gets_a_folder_with_its_number_and_its_own_depth(photos: Path) -> None:
@@ -178,7 +179,7 @@ def test_points_with_y_up_are_the_same_points_turned_by_half_a_turn_about_x(phot
     """Y and z change their signs, in the report the words follow."""
     run_stereo(_job(photos), _Watch())
     camera = read_xyz(photos / "out" / "pair-000007" / "xyz.pfm")
-    run_stereo(_job(photos, axes=Axes.Y_UP), _Watch())
+    run_stereo(_job(photos), _Watch(), Axes.Y_UP)
     folder = photos / "out" / "pair-000007"
     np.testing.assert_array_equal(read_xyz(folder / "xyz.pfm"), camera * np.array([1, -1, -1], np.float32))
     assert "y up, z backward" in json.loads((folder / "report.json").read_text())["axes"]
@@ -189,7 +190,7 @@ def test_a_white_pair_is_told_once_that_it_needs_texture(tmp_path: Path) -> None
     for side in ("left", "right"):
         cv2.imwrite(str(tmp_path / f"{side}.png"), np.full((64, 120), 255, np.uint8))
     files = pair_files(str(tmp_path / "left.png"), str(tmp_path / "right.png"))
-    job = StereoJob(files=files, out=tmp_path / "out", make_core=_core, matcher="sgbm")
+    job = FilePairs(files=files, out=tmp_path / "out", make_core=_core, matcher="sgbm")
     [pair] = run_stereo(job, _Watch()).computed
     assert [concern.doubt for concern in pair.trust.concerns] == [Doubt.NO_DEPTH]
     assert "texture" in pair.trust.answer.sentence

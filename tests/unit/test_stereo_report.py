@@ -23,7 +23,7 @@ from phone_host.report.stereo_report import (
 )
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.report.stereo_verdict import set_verdict
-from phone_host.run.file_remarks import files_remarks
+from phone_host.run.stereo_remarks import files_remarks
 from phone_host.stereo.view_files import ViewFiles
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.

@@ -16,17 +16,20 @@ from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_number, json_text
-from phone_host.run.one_pair import PairJob
-from phone_host.run.point_job import ELSEWHERE, Measured, measure_points, point_text
 from phone_host.run.progress_bar import step_bar
-from phone_host.run.seen_pair import FoundPoint, MissedPoint, Outcome
-from phone_host.settings import most_pixels
-from phone_host.stereo.default_matcher import default_matcher
+from phone_host.run.seen_pair import (
+    ELSEWHERE,
+    FoundPoint,
+    Measured,
+    MissedPoint,
+    Outcome,
+    measure_points,
+    point_text,
+)
 from phone_host.stereo.measured_point import Within, distance_between
 from phone_host.stereo.rig_errors import Known
-from phone_host.verbs.orientation_arguments import orientations
+from phone_host.verbs.picture_pairs import matching_of
 from phone_host.verbs.stereo_numbers import point_px
-from phone_host.verbs.stereo_options import metric_core
 
 _NOISE: Final = "noise of both images"
 _RIG: Final = "the rig's calibration (covariance)"
@@ -50,16 +53,9 @@ def run(options: argparse.Namespace) -> int:
     for path in (options.left, options.right):
         _require_image(path)
     points = tuple(point_px(text, "--points", "X,Y in px, for example 312,240") for text in options.points)
-    matcher = options.matcher or default_matcher().value
-    job = PairJob(
-        left=Path(options.left),
-        right=Path(options.right),
-        make_core=lambda size_px: metric_core(options, matcher, size_px, Path(options.left)),
-        most_pixels=most_pixels(None, options.max_megapixels),
-        mounted=orientations(options),
-    )
+    left, right = Path(options.left), Path(options.right)
     with step_bar("reading", None) as watcher:
-        found = measure_points(job, points, watcher)
+        found = measure_points(matching_of(options, left), left, right, points, watcher)
     if options.json:
         print(json_text(_report(options, points, found)))
     else:

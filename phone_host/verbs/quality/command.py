@@ -1,7 +1,6 @@
 """phone-host quality: measure how good a rig's depth is, on pairs of images of a flat wall or board."""
 
 import argparse
-import sys
 
 from common.errors import SettingsError
 from common.program.commandline import CHECK_FAILED
@@ -11,17 +10,11 @@ from phone_host.calibration.target.corners import Board, parse_board
 from phone_host.output.json_text import json_text
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_lines import quality_lines
-from phone_host.run.progress_bar import step_bar
 from phone_host.run.quality_job import NAMES, QualityJob, run_quality
-from phone_host.settings import most_pixels
-from phone_host.stereo.default_matcher import default_matcher, default_note
-from phone_host.stereo.view_files import ViewFiles, pair_files
-from phone_host.verbs.given_pictures import given_pictures
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import unwritable
-from phone_host.verbs.result_places import require_place
+from phone_host.stereo.view_files import ViewFiles
+from phone_host.verbs.picture_pairs import file_pairs, reading, require_place
 from phone_host.verbs.stereo_numbers import crop_of
-from phone_host.verbs.stereo_options import metric_core, require_metres
+from phone_host.verbs.stereo_options import require_metres
 from phone_host.verbs.units import limit_mm, square_mm
 
 
@@ -30,31 +23,11 @@ def run(options: argparse.Namespace) -> int:
     require_metres(options)
     board = _board(options)
     roi = None if options.roi is None else crop_of(options.roi, "--roi")
-    matcher = options.matcher or default_matcher().value
-    limit = most_pixels(None, options.max_megapixels)
-    given = given_pictures(options.images, options.out, limit)
-    files = pair_files(given.left, given.right)
-    distances_m = _distances_m(options, files)
-    require_place(options.out, files, NAMES, "quality")
-    job = QualityJob(
-        files=files,
-        out=options.out,
-        make_core=lambda size_px: metric_core(options, matcher, size_px, files.pairs[0][1]),
-        matcher=matcher,
-        matcher_note="" if options.matcher else default_note(),
-        distances_m=distances_m,
-        board=board,
-        roi=roi,
-        most_pixels=limit,
-        mounted=orientations(options),
-        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
-    )
-    count = len(files.pairs)
-    try:
-        with step_bar("reading", count if count > 1 else None) as watcher:
-            report = run_quality(job, watcher)
-    except OSError as error:
-        raise unwritable(options.out, error) from error
+    pairs = file_pairs(options)
+    distances_m = _distances_m(options, pairs.files)
+    require_place(pairs, NAMES, "quality")
+    with reading(pairs) as watcher:
+        report = run_quality(QualityJob(pairs=pairs, distances_m=distances_m, board=board, roi=roi), watcher)
     if options.json:
         print(json_text(quality_json(report)))
     else:

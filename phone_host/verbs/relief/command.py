@@ -11,13 +11,10 @@ from phone_host.output.meshes.decimated import NoLibraryError, decimated
 from phone_host.output.meshes.formats import mesh_bytes
 from phone_host.output.meshes.relief import Relief, Sizes, relief_of
 from phone_host.output.meshes.solid import Solid
-from phone_host.run.one_pair import PairJob, compute_pair
+from phone_host.run.file_pairs import sound_pair
 from phone_host.run.progress_bar import step_bar
-from phone_host.settings import most_pixels
-from phone_host.stereo.default_matcher import default_matcher
-from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import require_alone, require_folder, written_together
-from phone_host.verbs.stereo_options import metric_core
+from phone_host.verbs.picture_pairs import matching_of
 from phone_host.verbs.units import bounded_mm
 
 _NAMES: Final = ("relief.stl", "relief.3mf")
@@ -36,16 +33,9 @@ def run(options: argparse.Namespace) -> int:
     base_m = bounded_mm(options.base, "--base", "2mm", _THICK_MM) / 1000
     sizes = Sizes(width_m=width_m, height_m=height_m, base_m=base_m)
     require_folder(options.out)
-    matcher = options.matcher or default_matcher().value
-    job = PairJob(
-        left=Path(options.left),
-        right=Path(options.right),
-        make_core=lambda size_px: metric_core(options, matcher, size_px, Path(options.left)),
-        most_pixels=most_pixels(None, options.max_megapixels),
-        mounted=orientations(options),
-    )
+    left, right = Path(options.left), Path(options.right)
     with step_bar("reading", None) as watcher:
-        pair = compute_pair(job, watcher)
+        pair, concerns = sound_pair(matching_of(options, left), left, right, watcher)
         processed = pair.processed
         assert processed.cloud is not None
         assert processed.geometry is not None
@@ -56,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     with written_together(options.out, *_NAMES) as place:
         for name in _NAMES:
             write_bytes(place / name, mesh_bytes(solid, name.rpartition(".")[2], None))
-    doubts = [f"{one.sentence}; {one.remedy}" for one in pair.concerns]
+    doubts = [f"{one.sentence}; {one.remedy}" for one in concerns]
     files = [str(options.out / name) for name in _NAMES]
     if options.json:
         told = {

@@ -11,19 +11,12 @@ from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
 from phone_host.report.scan_next import next_lines
 from phone_host.report.scan_report import ScanReport
-from phone_host.run.progress_bar import step_bar
 from phone_host.run.scan_files import NAMES
-from phone_host.run.scan_job import ScanJob, run_scan
-from phone_host.settings import most_pixels
-from phone_host.stereo.default_matcher import default_matcher, default_note
+from phone_host.run.scan_job import run_scan
 from phone_host.stereo.native.library import model_note, native
-from phone_host.stereo.view_files import pair_files
-from phone_host.verbs.given_pictures import given_pictures
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import unwritable
-from phone_host.verbs.result_places import require_place
+from phone_host.verbs.picture_pairs import file_pairs, reading, require_place
 from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
-from phone_host.verbs.stereo_options import metric_core, require_metres
+from phone_host.verbs.stereo_options import require_metres
 
 
 def run(options: argparse.Namespace) -> int:
@@ -50,26 +43,8 @@ def _scan_pictures(options: argparse.Namespace) -> ScanReport:
             raise SettingsError(f"--{name} beside pictures", "give either pictures or cameras")
     require_metres(options)
     wanted = scan_wanted(options)
-    matcher = options.matcher or default_matcher().value
-    limit = most_pixels(None, options.max_megapixels)
-    given = given_pictures(options.images, options.out, limit)
-    files = pair_files(given.left, given.right)
-    require_place(options.out, files, NAMES, "scan")
-    job = ScanJob(
-        files=files,
-        out=options.out,
-        make_core=lambda size_px: metric_core(options, matcher, size_px, files.pairs[0][1]),
-        matcher=matcher,
-        matcher_note="" if options.matcher else default_note(),
-        wanted=wanted,
-        axes=axes_of(options, wanted),
-        most_pixels=limit,
-        mounted=orientations(options),
-        resumed=resumed_of(options),
-        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
-    )
-    try:
-        with step_bar("reading", len(files.pairs)) as watcher:
-            return run_scan(job, watcher)
-    except OSError as error:
-        raise unwritable(options.out, error) from error
+    pairs = file_pairs(options)
+    require_place(pairs, NAMES, "scan")
+    axes, resumed = axes_of(options, wanted), resumed_of(options)
+    with reading(pairs) as watcher:
+        return run_scan(pairs, wanted, watcher, axes, resumed)

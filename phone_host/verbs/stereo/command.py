@@ -15,17 +15,10 @@ from phone_host.output.json_text import json_text
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_lines import pair_lines, set_lines
 from phone_host.report.stereo_report import Size
-from phone_host.run.progress_bar import step_bar
-from phone_host.run.stereo_job import StereoJob, run_stereo
+from phone_host.run.stereo_job import run_stereo
 from phone_host.run.stereo_results import NAMES
-from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.default_matcher import default_matcher, default_note
-from phone_host.stereo.view_files import pair_files
-from phone_host.verbs.given_pictures import given_pictures
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import unwritable
-from phone_host.verbs.result_places import require_place
+from phone_host.verbs.picture_pairs import file_pairs, reading, require_place
 from phone_host.verbs.stereo.next_commands import Typed, next_commands
 from phone_host.verbs.stereo_options import build_core, output_options, overlay_of
 
@@ -37,30 +30,12 @@ def run(options: argparse.Namespace) -> int:
             "neither --calibration nor --rectified is given",
             "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N",
         )
-    matcher = options.matcher or default_matcher().value
-    limit = most_pixels(None, options.max_megapixels)
-    given = given_pictures(options.images, options.out, limit)
-    files = pair_files(given.left, given.right)
-    require_place(options.out, files, NAMES, "stereo")
-    job = StereoJob(
-        files=files,
-        out=options.out,
-        make_core=lambda size_px: _core(options, matcher, size_px, files.pairs[0][1]),
-        matcher=matcher,
-        matcher_note="" if options.matcher else default_note(),
-        axes=output_options(options).axes,
-        most_pixels=limit,
-        mounted=orientations(options),
-        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
-        commands=partial(next_commands, _typed(options)),
-    )
-    count = len(files.pairs)
-    try:
-        with step_bar("reading", count if count > 1 else None) as watcher:
-            report = run_stereo(job, watcher)
-    except OSError as error:
-        raise unwritable(options.out, error) from error
-    if count == 1:
+    pairs = file_pairs(options, _core)
+    require_place(pairs, NAMES, "stereo")
+    commands = partial(next_commands, _typed(options))
+    with reading(pairs) as watcher:
+        report = run_stereo(pairs, watcher, output_options(options).axes, commands)
+    if len(pairs.files.pairs) == 1:
         [only] = report.computed
         _tell(options, pair_json(only), pair_lines(only, str(options.out)))
     else:
