@@ -39,16 +39,6 @@ class FrameSink(Protocol):
         """Let time pass. Called several times a second, even while no frame comes."""
 
 
-class BoardListener(Protocol):
-    """Is told of the board's sessions and frames by the receiver's thread."""
-
-    def session_began(self) -> None:
-        """Take note that a board session has begun. Nothing of the previous one will follow."""
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """Take note of a frame that the sink took: its exposure on the host's clock, and its number in the session."""
-
-
 class NoFrames:
     """The frame sink of a host that only queries the board. The board gets no credit to send frames."""
 

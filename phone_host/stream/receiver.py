@@ -16,7 +16,7 @@ from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.measure.accounts import LinkAccount
 from phone_host.stream.corrections import Corrections
-from phone_host.stream.frame_sink import BoardListener, FrameSink
+from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal
@@ -38,12 +38,9 @@ class Receiver:
         links: open links to one board, the preferred one first; this class closes them.
         host_id: random id of this process.
         sink: takes the frames.
-        listener: is also told of sessions and frames; None: no listener.
     """
 
-    def __init__(
-        self, links: Sequence[Link], host_id: str, sink: FrameSink, listener: BoardListener | None = None
-    ) -> None:
+    def __init__(self, links: Sequence[Link], host_id: str, sink: FrameSink) -> None:
         self._links = tuple(links)
         self._prefixes = tuple(connection_name(number, b"") for number in range(len(links)))
         self._looked_ns = now.monotonic_ns()
@@ -56,7 +53,7 @@ class Receiver:
             )
             for number, link in enumerate(links)
         ]
-        self._reception = Reception(facts, host_id, sink, self._send, listener)
+        self._reception = Reception(facts, host_id, sink, self._send)
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False

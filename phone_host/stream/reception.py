@@ -44,7 +44,7 @@ from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, 
 from phone_host.model import BoardFrame
 from phone_host.stream.board_news import tell_found, tell_refused, tell_stepped
 from phone_host.stream.border import Arrival, Border
-from phone_host.stream.frame_sink import BoardListener, FrameSink
+from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.lock_asking import LockAsking
 from phone_host.stream.refusals import BoardRefusal, Refusals, refusal_text
@@ -68,7 +68,6 @@ class Reception:
         host_id: random id of this process.
         sink: takes the frames.
         send: takes outgoing messages.
-        listener: is also told of sessions and frames; None: no listener.
     """
 
     def __init__(
@@ -77,11 +76,9 @@ class Reception:
         host_id: str,
         sink: FrameSink,
         send: Callable[[Outgoing], None],
-        listener: BoardListener | None = None,
     ) -> None:
         self._links = tuple(links)
         self._sink = sink
-        self._listener = listener
         self._send = send
         self._session = HostSession(host_id, [link.dialled for link in links])
         self._choice = LinkChoice(len(links))
@@ -378,8 +375,6 @@ class Reception:
         else:
             self.account.sessions.append(SessionAccount(hello.session, hello.counts, hello.counts))
             self._locks.begin()
-            if self._listener is not None:
-                self._listener.session_began()
             self._sink.begin(hello.camera)
         self.account.current.rung = hello.rung
         self._sink.change_period(hello.camera.period_ns)
@@ -431,5 +426,3 @@ class Reception:
         self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
         self._border.passed(message)
         self._sink.add_board(frame)
-        if self._listener is not None:
-            self._listener.frame_arrived(marks.exposed_ns, message.sequence)

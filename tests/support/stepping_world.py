@@ -25,6 +25,7 @@ from common.protocol.message import (
 )
 from common.protocol.session import MS, Outgoing, connection_name
 from common.stamp import HOST_CLOCK, Stamp
+from phone_host.model import BoardFrame
 from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import Reception
@@ -82,9 +83,9 @@ class SteppingWorld:
         self._outbox: Frame | None = None
         self._sent = self._grabbed = self._sequence = self._host_sequence = 0
         self._board_shot_ns = self._host_shot_ns = self.true_ns
-        self.queue = PairQueue(FifoSettings(64, Overflow.DROP_OLDEST), None, PERIOD_NS, clock=self.host_clock)
+        self.queue = _WatchedQueue(self)
         facts = [LinkFacts("tcp", dict(_NAMES), self_paced=False)]
-        self.reception = Reception(facts, "host", self.queue, self._host_says, self)
+        self.reception = Reception(facts, "host", self.queue, self._host_says)
         self._new_board()
         self.witness = Witness(self._apart_ns)
 
@@ -216,14 +217,8 @@ class SteppingWorld:
         """The longest time that an answer takes if it waits nowhere."""
         return round(2 * self.latency_ns * (1 + self._jitter / 4)) + 4 * _STEP_NS
 
-    # The listener of the reception.
-
-    def session_began(self) -> None:
-        """See BoardListener."""
-
-    def frame_arrived(self, exposed_ns: int, index: int | None) -> None:
-        """See BoardListener."""
-        del exposed_ns, index
+    def frame_arrived(self) -> None:
+        """Judge the clock's estimate after a frame that the queue took."""
         estimate = self.reception.estimate
         assert estimate is not None
         self.witness.bounded(estimate.bound_at(self.board_clock()))
@@ -370,3 +365,16 @@ class SteppingWorld:
 
 def _lane(connection: bytes) -> Lane:
     return next(lane for lane, name in _NAMES.items() if name == connection)
+
+
+class _WatchedQueue(PairQueue):
+    """The host's pair queue, whose world looks at the clock after each frame."""
+
+    def __init__(self, world: SteppingWorld) -> None:
+        super().__init__(FifoSettings(64, Overflow.DROP_OLDEST), None, PERIOD_NS, clock=world.host_clock)
+        self._world = world
+
+    def add_board(self, frame: BoardFrame) -> None:
+        """See PairQueue."""
+        super().add_board(frame)
+        self._world.frame_arrived()
