@@ -23,7 +23,6 @@ from phone_host.recording.clock_messages import boot_of
 from phone_host.recording.playback import Playback
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.run.course import Course
-from phone_host.run.doubt_log import DoubtLog
 from phone_host.run.drift_keeper import DriftKeeper
 from phone_host.run.file_sink import FileSink
 from phone_host.run.freed_memory import keep_freed_memory
@@ -32,16 +31,15 @@ from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pair_budget import PairBudget
 from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
-from phone_host.run.recording_sink import RecordingSink
+from phone_host.run.recording_sinks import RecordingSink
 from phone_host.run.rig_cameras import RigCameras
 from phone_host.run.sinks import FunctionSink, Sink
-from phone_host.run.sources import streams
-from phone_host.run.trust_sink import PERIOD_NS, TrustSink
+from phone_host.run.sources import RecordedPairQueue, streams
+from phone_host.run.trust_sink import PERIOD_NS, DoubtLog, TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stream.demand_clock import DemandClock
-from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.refusals import refusal_text
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.stills import Stills
@@ -118,7 +116,7 @@ class Host:
         motion = FunctionSink(_MOTION, self._measure_motion)
         recorded = () if recording is None else (RecordingSink(recording),)
         self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *recorded, *sinks)
-        self._queue = PairQueue(
+        self._queue = RecordedPairQueue(
             _UNHURRIED if self._playback is not None and demand.is_timeless else settings.fifo,
             settings.tolerance_ns,
             self._own.period_ns,
@@ -128,7 +126,8 @@ class Host:
             clock=now.monotonic_ns if self._playback is None else self._playback.clock_ns,
             marking=now.monotonic_ns,
         )
-        self._camera, self._receiver = streams(camera, links, self._queue, demand, recording)
+        self._queue.recorder = recording
+        self._camera, self._receiver = streams(camera, links, self._queue, demand)
         rig = None if core is None else core.rig
         self._matcher_is_fastest = core is not None and core.matcher_is_fastest
         self._rig_rejected = rig is not None and rig.is_rejected

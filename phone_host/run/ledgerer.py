@@ -18,21 +18,6 @@ _MOST_GAPS: Final = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class WorkerMarks:
-    """The worker's marks for one pair, CLOCK_MONOTONIC, ns.
-
-    Attributes:
-        dequeued_ns: the worker took the pair.
-        computed_ns: the depth was ready, and the worker began to hand the result over.
-        done_ns: every sink had a place for the result.
-    """
-
-    dequeued_ns: int
-    computed_ns: int
-    done_ns: int
-
-
-@dataclass(frozen=True, slots=True)
 class Books:
     """The totals of a run so far, as copies.
 
@@ -93,13 +78,17 @@ class Ledgerer:
         """The number of pairs that could not be processed because of a spoiled image."""
         return self._spoiled.total()
 
-    def enter(self, pair: FramePair, processed: Processed, marks: WorkerMarks) -> PairLedger:
+    def enter(
+        self, pair: FramePair, processed: Processed, *, dequeued_ns: int, computed_ns: int, done_ns: int
+    ) -> PairLedger:
         """Make a pair's ledger and enter it.
 
         Args:
             pair: its frames.
             processed: the outcome of processing.
-            marks: the worker's marks.
+            dequeued_ns: when the worker took the pair, CLOCK_MONOTONIC, as below.
+            computed_ns: when the depth was ready, and the worker began to hand the result over.
+            done_ns: when every sink had a place for the result.
 
         Returns:
             The ledger. Its delays add up exactly to end-to-end.
@@ -115,10 +104,10 @@ class Ledgerer:
             received_ns=board.received_ns,
             paired_ns=pair.paired_ns,
             queued_ns=pair.queued_ns,
-            dequeued_ns=marks.dequeued_ns,
-            done_ns=marks.done_ns,
+            dequeued_ns=dequeued_ns,
+            done_ns=done_ns,
             previous_done_ns=self.last_done_ns or pair.queued_ns,
-            stages=replace(processed.stages, write=marks.done_ns - marks.computed_ns),
+            stages=replace(processed.stages, write=done_ns - computed_ns),
             time_skew_ns=pair.time_skew_ns,
             offset_ns=board.offset_ns,
             uncertainty_ns=board.uncertainty_ns + pair.host.uncertainty_ns,
@@ -130,14 +119,14 @@ class Ledgerer:
             self._gaps += is_gap
             if is_gap:
                 self._gap_ns += idle_ns
-                self._after_gap_ns.append(marks.done_ns)
+                self._after_gap_ns.append(done_ns)
             self._delays.add(ledger, after_gap=is_gap, timeless=self._is_timeless())
             self._sample.add(ledger)
             self._depth = _with(self._depth, processed)
             self._corrected.add(processed.match_report)
             self.last = processed
-            self.first_done_ns = self.first_done_ns or marks.done_ns
-            self.last_done_ns = marks.done_ns
+            self.first_done_ns = self.first_done_ns or done_ns
+            self.last_done_ns = done_ns
             self.processed += 1
         return ledger
 

@@ -4,7 +4,7 @@ This module alone defines the order of the stages.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from common.errors import DataError
@@ -21,19 +21,6 @@ from phone_host.stereo.raw_images import EncodedImage, decode_frame, decode_fram
 
 T = TypeVar("T")
 Size = tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """How the images of a pair are decoded, the board's and the host's.
-
-    Attributes:
-        whole_px: width and height of both upright images as they are stored, px.
-        reductions: by how much each may be decoded smaller.
-    """
-
-    whole_px: tuple[Size, Size]
-    reductions: tuple[int, int]
 
 
 class Pipeline:
@@ -83,24 +70,27 @@ class Pipeline:
         """
         board, host = _of_board(pair.board), self._of_host(pair.host)
         start_ns = self._clock()
-        planned: list[_Plan] = []
+        whole_px: tuple[Size, Size] = (0, 0), (0, 0)  # of both upright images as they are stored
+        by = WHOLE
 
-        def plan(board_px: Size, host_px: Size) -> tuple[int, int]:
-            planned.append(self._plan(board_px, host_px))
-            return planned[0].reductions
+        def reductions(board_px: Size, host_px: Size) -> tuple[int, int]:
+            """Check both sizes before anything is decoded; return by how much each image may be decoded smaller."""
+            nonlocal whole_px, by
+            whole_px = self._in_sides(board_px, host_px)
+            if self._core is not None:
+                by = self._in_sides(*self._core.reductions(*whole_px))
+            return by
 
-        board_image, host_image = decode_frames(board, host, self._most_pixels, plan)
-        [decoding] = planned
+        board_image, host_image = decode_frames(board, host, self._most_pixels, reductions)
         decoded_ns = self._clock()
-        board_image = self._at_host_time(pair, board_image, decoding.reductions[0])
+        board_image = self._at_host_time(pair, board_image, by[0])
         interpolated_ns = self._clock()
         left, right = self._in_sides(board_image, host_image)
         if self._core is None:
             processed = Processed(RectifiedPair(left, right), None, None, StageTimes())
         else:
-            sizes = self._in_sides(*decoding.whole_px)
-            choice = None if self._budget is None else self._budget.choice(*sizes)
-            processed = self._core.compute(left, right, self._clock, whole_px=sizes, choice=choice)
+            choice = None if self._budget is None else self._budget.choice(*whole_px)
+            processed = self._core.compute(left, right, self._clock, whole_px=whole_px, choice=choice)
         stages = replace(processed.stages, decode=decoded_ns - start_ns, interpolate=interpolated_ns - decoded_ns)
         if self._budget is not None:
             end_ns = self._clock()
@@ -120,13 +110,6 @@ class Pipeline:
     def _in_sides(self, board: T, host: T) -> tuple[T, T]:
         """Return (left, right). Only this function knows which camera is which."""
         return (board, host) if self._board_side is Side.LEFT else (host, board)
-
-    def _plan(self, board_px: Size, host_px: Size) -> "_Plan":
-        """Check both sizes before anything is decoded; return how to decode."""
-        both = board_px, host_px
-        if self._core is None:
-            return _Plan(both, WHOLE)
-        return _Plan(both, self._in_sides(*self._core.reductions(*self._in_sides(*both))))
 
     def _at_host_time(self, pair: FramePair, image: Image, reduction: int) -> Image:
         """Return the board's image as it would look at the host's exposure.

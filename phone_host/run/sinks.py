@@ -171,6 +171,15 @@ class OneQueueSink:
     def __init__(self, queue: SinkQueue[Any]) -> None:
         self._queue = queue
 
+    def await_place(self, number: int) -> None:
+        """See Sink; all results are alike."""
+        del number
+        self._queue.await_place()
+
+    def offer(self, result: Result) -> None:
+        """See Sink."""
+        self._queue.offer(result)
+
     def finish(self) -> None:
         """See Sink."""
         self._queue.finish()
@@ -198,12 +207,3 @@ class FunctionSink(OneQueueSink):
 
     def __init__(self, name: str, take: Callable[[Result], None], *, depth: int = DEPTH, waits: bool = False) -> None:
         super().__init__(SinkQueue(name, take, depth=depth, waits=waits))
-
-    def await_place(self, number: int) -> None:
-        """See Sink."""
-        del number  # all are alike
-        self._queue.await_place()
-
-    def offer(self, result: Result) -> None:
-        """See Sink."""
-        self._queue.offer(result)

@@ -11,7 +11,6 @@ from phone_host.model import BoardFrame
 from phone_host.recording.playback import Playback
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.stream.demand_clock import DemandClock
-from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.receiver import Receiver
@@ -20,11 +19,7 @@ from phone_host.sync.quarantine import Disbelief
 
 
 def streams(
-    camera: Camera | Playback,
-    links: Sequence[Link],
-    queue: PairQueue,
-    demand: DemandClock,
-    recorder: RecordingSwitch | None,
+    camera: Camera | Playback, links: Sequence[Link], queue: PairQueue, demand: DemandClock
 ) -> tuple[OwnStream, BoardStream]:
     """Return both sides of a run, not started.
 
@@ -33,59 +28,35 @@ def streams(
         links: open links to the board; none beside a recording.
         queue: takes the frames.
         demand: says when a demand-paced camera shows an image.
-        recorder: sees every frame; None: nothing is recorded.
     """
     if isinstance(camera, Playback):
         return camera.into(queue)
-    if recorder is None:
-        own = OwnCamera(camera, queue.add_host, demand, queue.own_image_missing)
-        return own, Receiver(links, now.random_id(), queue)
-
-    def seen(frame: Frame) -> None:
-        recorder.own_frame(frame)
-        queue.add_host(frame)
-
-    own = OwnCamera(camera, seen, demand, queue.own_image_missing)
-    return own, Receiver(links, now.random_id(), Tap(queue, recorder))
+    return OwnCamera(camera, queue.add_host, demand, queue.own_image_missing), Receiver(links, now.random_id(), queue)
 
 
-class Tap:
-    """A frame sink with a recorder before it, which sees every frame that is believed, also those that the sink does not want.
+class RecordedPairQueue(PairQueue):
+    """A pair queue with a recorder before it.
 
-    Args:
-        sink: takes the frames as before.
-        recorder: sees them first.
+    Attributes:
+        recorder: sees every frame that is believed, also those that the queue does not want; None: nothing is recorded.
     """
 
-    def __init__(self, sink: FrameSink, recorder: RecordingSwitch) -> None:
-        self._sink, self._recorder = sink, recorder
+    recorder: RecordingSwitch | None = None
 
     def begin(self, camera: CameraDescription) -> None:
         """See FrameSink."""
-        self._recorder.board_camera(camera)
-        self._sink.begin(camera)
-
-    def change_period(self, board_period_ns: int) -> None:
-        """See FrameSink."""
-        self._sink.change_period(board_period_ns)
-
-    def void(self) -> None:
-        """See FrameSink."""
-        self._sink.void()
-
-    def room(self) -> int | None:
-        """See FrameSink."""
-        return self._sink.room()
+        if self.recorder is not None:
+            self.recorder.board_camera(camera)
+        super().begin(camera)
 
     def objection(self, frame: BoardFrame) -> Disbelief | None:
         """See FrameSink."""
-        self._recorder.board_frame(frame)
-        return self._sink.objection(frame)
+        if self.recorder is not None:
+            self.recorder.board_frame(frame)
+        return super().objection(frame)
 
-    def add_board(self, frame: BoardFrame) -> None:
-        """See FrameSink."""
-        self._sink.add_board(frame)
-
-    def tick(self) -> None:
-        """See FrameSink."""
-        self._sink.tick()
+    def add_host(self, frame: Frame) -> None:
+        """Take a frame of the host camera."""
+        if self.recorder is not None:
+            self.recorder.own_frame(frame)
+        super().add_host(frame)

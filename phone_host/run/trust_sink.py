@@ -1,23 +1,30 @@
-"""A sink that judges a run's images, twice a second or stills one by one: are cameras swapped, turned, covered, and how does depth fare?"""
+"""A sink that judges a run's images, twice a second or stills one by one: are cameras swapped, turned, covered, and how does depth fare? What they make doubtful is logged."""
 
+import logging
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from common import now
+from common.program.logs import event
 from phone_host.measure.image_doubts import image_doubts
 from phone_host.measure.image_judge import ImageJudge
 from phone_host.measure.image_trust import ImageTrust
-from phone_host.measure.trust import Doubt
+from phone_host.measure.trust import Concern, Doubt
 from phone_host.model import DepthLimits, Result, StereoGeometry
 from phone_host.run.drift_keeper import DriftKeeper, Moment
 from phone_host.run.sinks import OneQueueSink, SinkQueue
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import has_depth, look_at, maps_of
 
+_LOG = logging.getLogger(__name__)
+
 PERIOD_NS: Final = 500_000_000
 """A mistake must be named within 2 s. Two of three judgements name it: 1 s, and at most one period until the first."""
+
+_LOOK_NS: Final = 1_000_000_000
+"""Nobody acts on a doubt within a second, and judging a run takes time from its pairs."""
 
 _DEPTH: Final = 2
 """A judged pair may still hold its place in the queue when the next one comes. Never more than one waits to be judged."""
@@ -51,10 +58,6 @@ class TrustSink(OneQueueSink):
         self._has_depth = False
         self._limits: DepthLimits | None = None
         self._geometry: StereoGeometry | None = None
-
-    def await_place(self, number: int) -> None:
-        """See Sink."""
-        del number  # it does not wait
 
     def offer(self, result: Result) -> None:
         """See Sink."""
@@ -102,3 +105,33 @@ class TrustSink(OneQueueSink):
         with self._lock:
             self._judge.add(look.evidence, at_s=at_s, pair=result.number)
             self._is_busy = False
+
+
+class DoubtLog:
+    """Logs each reason not to trust the depth of a run when it appears and when it has gone.
+
+    Args:
+        judge: returns the present concerns.
+    """
+
+    def __init__(self, judge: Callable[[], Iterable[Concern]]) -> None:
+        self._judge = judge
+        self._known: frozenset[Doubt] = frozenset()
+        self._due_ns = 0
+
+    def look(self, now_ns: int) -> None:
+        """Log what has changed, at most once a second.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC, ns.
+        """
+        if now_ns < self._due_ns:
+            return
+        self._due_ns = now_ns + _LOOK_NS
+        found = {concern.doubt: concern for concern in self._judge()}
+        for doubt in found.keys() - self._known:
+            concern = found[doubt]
+            _LOG.warning(event("depth_doubtful", doubt=doubt.value, problem=concern.sentence, remedy=concern.remedy))
+        for doubt in self._known - found.keys():
+            _LOG.info(event("depth_trusted", doubt=doubt.value))
+        self._known = frozenset(found)

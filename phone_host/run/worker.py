@@ -11,7 +11,7 @@ from common.frame import SpoiledImageError
 from common.program.logs import event
 from common.program.out_of_memory import noted_if_out_of_memory
 from phone_host.model import FramePair, Result
-from phone_host.run.ledgerer import Ledgerer, WorkerMarks
+from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.sinks import Sink
 from phone_host.stream.pair_queue import PairQueue
@@ -98,8 +98,10 @@ class Worker:
         number = self._ledgerer.processed
         for sink in self._sinks:
             sink.await_place(number)
-        marks = WorkerMarks(dequeued_ns, computed_ns, done_ns=now.monotonic_ns())
-        result = Result(number, pair, processed, self._ledgerer.enter(pair, processed, marks))
+        ledger = self._ledgerer.enter(
+            pair, processed, dequeued_ns=dequeued_ns, computed_ns=computed_ns, done_ns=now.monotonic_ns()
+        )
+        result = Result(number, pair, processed, ledger)
         for sink in self._sinks:
             sink.offer(result)
         if self._most_pairs and number + 1 >= self._most_pairs:

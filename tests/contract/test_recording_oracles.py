@@ -26,7 +26,7 @@ from common.recording.ros_messages import (
     image_type,
 )
 from phone_host.recording.begin import camera_infos
-from phone_host.run.computed_sink import cloud_data
+from phone_host.run.recording_sinks import cloud_data
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.sync.clock import ClockEstimate
 from tests.docs.commands import ROOT

@@ -20,7 +20,7 @@ from common.recording.salvage import Salvage
 from phone_host.model import FramePair, Processed, RectifiedPair, Result, Side
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.switch import RecordingSwitch
-from phone_host.run.computed_sink import Computed, ComputedSink, cloud_data
+from phone_host.run.recording_sinks import Computed, ComputedSink, cloud_data
 from phone_host.verbs.run.prepared import computed_wanted
 from tests.support.programs import until
 from tests.support.recorded import own_frame, payload

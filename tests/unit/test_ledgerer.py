@@ -3,7 +3,7 @@
 from phone_host.measure.absence import Absence
 from phone_host.measure.accounts import LinkAccount
 from phone_host.model import CutCounts, FramePair, Processed, RectifiedPair
-from phone_host.run.ledgerer import Ledgerer, WorkerMarks
+from phone_host.run.ledgerer import Ledgerer
 from tests.support.numbered import draw
 from tests.support.samples import LEDGER
 from tests.unit.test_pair_queue import MS, board_frame, host_frame
@@ -16,7 +16,7 @@ def enter(books: Ledgerer, at_ns: int, cut: CutCounts | None = None) -> None:
     pair = FramePair(
         board=board_frame(0, at_ns), host=host_frame(0, at_ns), time_skew_ns=0, paired_ns=at_ns, queued_ns=at_ns
     )
-    books.enter(pair, processed, WorkerMarks(at_ns, at_ns + 5 * MS, at_ns + 5 * MS))
+    books.enter(pair, processed, dequeued_ns=at_ns, computed_ns=at_ns + 5 * MS, done_ns=at_ns + 5 * MS)
 
 
 def test_a_gap_of_the_board_is_no_starvation() -> None:

@@ -1,6 +1,6 @@
 """When a run's time is over: counted from its first pair, or from the board's coming if no pair follows."""
 
-from phone_host.run.time_limit import TimeLimit
+from phone_host.run.course import TimeLimit
 
 S = 1_000_000_000
 

@@ -19,10 +19,10 @@ from phone_host.report.report_page import delay_series
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
 from phone_host.report.summary import summary
+from phone_host.run.course import patience_s
 from phone_host.run.ledgerer import Ledgerer
-from phone_host.run.time_limit import patience_s
-from phone_host.run.waiting_note import WaitingNote
 from phone_host.svg.plots import Percentiles
+from phone_host.verbs.run.command import WaitingNote
 from tests.support.run_snapshots import run
 from tests.unit.test_ledgerer import enter
 from tests.unit.test_pair_queue import MS

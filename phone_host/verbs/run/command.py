@@ -2,10 +2,11 @@
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from common import now
 from common.errors import SettingsError
 from common.program import logs
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
@@ -15,16 +16,18 @@ from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.measure.run_snapshot import depth_is_wrong
-from phone_host.measure.trouble import trouble_of
+from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.output.json_text import json_text
 from phone_host.report.summary import summary
 from phone_host.run.host_settings import EndReason
 from phone_host.run.terminal_view import LiveTable
-from phone_host.run.waiting_note import WaitingNote
 from phone_host.verbs.run.prepared import Ended, PreparedRun, checked, open_run
 
 if TYPE_CHECKING:
     from phone_host.serve.beside import BesideRun
+
+_SOON_NS: Final = 1_000_000_000
+"""A board that is there is met within a fifth of this; then there is nothing to say."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -108,3 +111,38 @@ def _finish(
 
 def _tell(line: str) -> None:
     say(f"phone-host: {line}", sys.stderr)
+
+
+class WaitingNote:
+    """One line, written if no board has been met after a second, and one as soon as a board refuses this host.
+
+    Args:
+        links: addresses at which the board is looked for.
+        has_met_board: whether a board has said hello.
+        refused: why the board refuses this host; None if it does not.
+        say: takes a line.
+    """
+
+    def __init__(
+        self,
+        links: Sequence[str],
+        has_met_board: Callable[[], bool],
+        refused: Callable[[], Trouble | None],
+        say: Callable[[str], None],
+    ) -> None:
+        self._line = f"phone-host: waiting for a board at {' and '.join(links)}"
+        self._has_met_board, self._refused, self._say = has_met_board, refused, say
+        self._told: Trouble | None = None
+        self._due_ns: int | None = now.monotonic_ns() + _SOON_NS
+
+    def refresh(self) -> None:
+        """Write what is due. Called several times a second."""
+        refused = self._refused()
+        if refused is not None and refused != self._told:
+            self._told, self._due_ns = refused, None
+            self._say(f"phone-host: waiting: {refused.problem}: {refused.remedy}")
+        if self._due_ns is None or now.monotonic_ns() < self._due_ns:
+            return
+        self._due_ns = None
+        if not self._has_met_board():
+            self._say(self._line)

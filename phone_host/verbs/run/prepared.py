@@ -33,12 +33,12 @@ from phone_host.recording.playback import Playback
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page
-from phone_host.run.computed_sink import Computed, ComputedSink
+from phone_host.run.course import patience_s
 from phone_host.run.file_sink import NAMES
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
+from phone_host.run.recording_sinks import Computed, ComputedSink
 from phone_host.run.sinks import Sink
-from phone_host.run.time_limit import patience_s
 from phone_host.settings import check, key_folder, matcher_is_given, resolve_settings
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_note
