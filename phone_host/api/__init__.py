@@ -33,8 +33,8 @@ from phone_host.output.rig_files.imported import Imported, import_rig
 from phone_host.printers.bed import Bed
 from phone_host.printers.door import Wishes
 from phone_host.printers.progress import Ended, Phase, Progress
-from phone_host.run.kept_field import read_field
 from phone_host.run.model_job import check_model, export_model, print_model
+from phone_host.run.scan_files import read_field
 from phone_host.scan.box import Box
 from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import KeptField

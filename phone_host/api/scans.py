@@ -5,10 +5,9 @@ from pathlib import Path
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.output.ply import PointCloud, write_surface
-from phone_host.run.scan_files import FinishedScan
-from phone_host.run.scan_files import write_scan as write_files
-from phone_host.run.scan_result import own_axes, report_of, require_something
-from phone_host.run.turn_remarks import field_of_turn, turn_remarks
+from phone_host.run.scan_files import write_scan
+from phone_host.run.scan_result import own_axes, require_something
+from phone_host.run.scan_work import finished_scan
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 
@@ -26,10 +25,9 @@ def save_scan(folder: str | Path, scan: Scan, *, matcher: str = "unknown") -> No
         UnavailableError: a file in the folder was not written by this program.
         OSError: it cannot be written.
     """
-    model, axes = scan.model(), own_axes(scan.wanted) or Axes.CAMERA
-    report = report_of(scan, model, scan.pairs, turn_remarks(scan), matcher=matcher, axes=axes)
-    require_something(report)
-    write_files(Path(folder), FinishedScan(report, model, field=field_of_turn(scan)))
+    finished = finished_scan(scan, matcher=matcher, axes=own_axes(scan.wanted) or Axes.CAMERA)
+    require_something(finished.report)
+    write_scan(Path(folder), finished)
 
 
 def write_model(path: str | Path, model: ScanModel, unseen: UnseenSurface = UnseenSurface.FILL) -> None:

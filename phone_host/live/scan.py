@@ -14,18 +14,15 @@ from typing import Final
 from common import now
 from common.words import counted
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
-from phone_host.measure.trust import Doubt
 from phone_host.model import Result, Side
 from phone_host.output.axes import Axes
 from phone_host.report.stereo_report import Remark
-from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan
-from phone_host.run.scan_result import own_axes, report_of
+from phone_host.run.scan_result import own_axes, unused_mat
+from phone_host.run.scan_work import ScanWork
 from phone_host.run.sinks import FunctionSink
-from phone_host.run.turn_remarks import field_of_turn, turn_remarks
-from phone_host.run.unused_mat import unused_mat
+from phone_host.run.stereo_remarks import remark_of
 from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
@@ -46,6 +43,7 @@ class LiveScan:
     """Takes the pairs of a run.
 
     Attributes:
+        work: takes them, and is written when the run has ended.
         scan: what has become of them; whole once the run has ended.
         axes: that the model has from mat or table; None: those of the camera.
         patches: its surface, for whoever watches; while the run goes on, `surface_since` asks them.
@@ -70,8 +68,8 @@ class LiveScan:
         waits: bool,
         is_timeless: bool,
     ) -> None:
-        self.scan, self.axes, self._is_timeless = scan_for(wanted), own_axes(wanted), is_timeless
-        self.kept = KeptSubmaps(kept_in, self.scan, resumed)
+        self.work = ScanWork(wanted, kept_in, resumed)
+        self.scan, self.axes, self._is_timeless = self.work.scan, own_axes(wanted), is_timeless
         self._earlier, self._is_replayed = self.scan.pairs, waits
         self.sink = FunctionSink(_SINK, self._take, depth=1, waits=waits)
         self._is_board_left = board_side is Side.LEFT
@@ -148,23 +146,17 @@ class LiveScan:
             axes: of the files.
         """
         self.end()
-        remarks = [
-            Remark(one.sentence, one.remedy, is_blocking=one.is_certain and one.doubt is not Doubt.NO_DEPTH)
-            for one in concerns(snapshot)
-        ]
+        remarks = [remark_of(concern) for concern in concerns(snapshot)]
         missed = sum(account.dropped for account in snapshot.sinks if account.name == _SINK)
         if missed:
             words = f"{counted(missed, 'pair')} came while others were taken into the model, and passed"
             remarks.append(Remark(words, "a larger --voxel is faster", is_note=True))
-        remarks.extend(self.kept.remarks)
-        model = self.scan.model()
+        finished = self.work.finished(remarks, matcher=matcher, axes=axes)
         if self.scan.settings is not None:
             with self._watching:
-                shown = model.with_unseen(self.scan.wanted.unseen)
+                shown = finished.model.with_unseen(self.scan.wanted.unseen)
                 self.patches.become(shown.mesh, self.scan.settings.voxel_m, shown.seen)
-        remarks.extend(turn_remarks(self.scan))
-        report = report_of(self.scan, model, self.scan.pairs, remarks, matcher=matcher, axes=axes)
-        return FinishedScan(report, model, field=field_of_turn(self.scan))
+        return finished
 
     def _take(self, result: Result) -> None:
         ledger = result.ledger
@@ -181,7 +173,7 @@ class LiveScan:
         self._last = self.scan.take(str(number), stamp_s, result.processed, skew_s)
         # Not one more: with a pair, others that were lost may have become part of the model.
         self._counts = self._counts[0] + 1, self.scan.fused
-        self.kept.after_pair()
+        self.work.kept.after_pair()
         now_ns = now.monotonic_ns()
         if now_ns - self._asked_ns < _WATCHED_NS and now_ns - self._renewed_ns >= _RENEW_NS:
             self.renew_surface()

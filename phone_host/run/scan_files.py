@@ -6,6 +6,7 @@ from dataclasses import field as default
 from pathlib import Path
 from typing import Any, Final
 
+from common.errors import DataError
 from phone_host.output.atomic import write_bytes, write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.ply import PointCloud, write_surface
@@ -18,9 +19,12 @@ from phone_host.report.scan_next import next_commands
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS
-from phone_host.run.kept_field import FIELD
+from phone_host.scan.field_bytes import KeptField, field_of
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scanned import PoseOrigin
+
+FIELD: Final = "field.bin"
+"""The field of a turn, to which another pass is added."""
 
 NAMES: Final = r"model\.ply|trajectory\.txt|report\.json|index\.html|field\.bin"
 """The names that `scan` writes into its folder."""
@@ -94,3 +98,21 @@ def trajectory_of(report: ScanReport) -> str:
             signs = report.axes.signs.astype(float)
             stations.append(Station(pair.stamp_s, signs[:, None] * pose.R, signs * pose.t_m))
     return tum_text(stations)
+
+
+def read_field(folder: Path) -> KeptField:
+    """Read the field that a scan has left.
+
+    Args:
+        folder: its results folder.
+
+    Raises:
+        DataError: there is none, or it is damaged.
+        OSError: as the operating system reports it.
+    """
+    path = folder / FIELD
+    if not path.is_file():
+        raise DataError(
+            f"{folder} holds no {FIELD}", "give the --out folder of the first pass, scanned with --turntable"
+        )
+    return field_of(path.read_bytes(), str(path))

@@ -14,15 +14,17 @@ from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair, Remark
-from phone_host.run.turn_remarks import keeps_field
-from phone_host.run.unused_mat import unused_mat
+from phone_host.scan.field_bytes import field_bytes
+from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn
 from phone_host.scan.mesh_parts import size_of
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.stretches import WayCertainty
+from phone_host.scan.surface_match import Match, SurfaceMatch
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
+from phone_host.scan.turntable import TurntablePoses
 
 _EMPTY_BOX = Remark(
     "nothing of what the pairs show lies in the box",
@@ -30,6 +32,9 @@ _EMPTY_BOX = Remark(
 )
 _LEAST_WAY_M: Final = 5.0
 """Around a thing or a table the pairs see each other's surface, which holds them together better than their way does."""
+
+_REMEDY = "turn it all the way round about one axis, by 3 to 15 degrees between the pairs"
+_BOTH = "let both passes show the object's sides, and leave its shape as it is when you turn it over"
 
 
 def own_axes(wanted: ScanWanted) -> Axes | None:
@@ -248,3 +253,82 @@ def way_remarks(certainty: WayCertainty | None) -> Sequence[Remark]:
         return (Remark(f"{way} and {counted(certainty.loops, 'loop')} were closed: {known}", is_note=True),)
     remedy = "come back to where you began, and show it for some pairs from the same side"
     return (Remark(f"{way} and no loop was closed: {known}", remedy, is_note=True),)
+
+
+def turn_remarks(scan: Scan) -> Sequence[Remark]:
+    """Say whether the turn was found, and whether it is closed.
+
+    Args:
+        scan: whose model was made.
+    """
+    poses = scan.poses
+    if not isinstance(poses, TurntablePoses) or not scan.fused:
+        return ()
+    if poses.views < LEAST_VIEWS:
+        few = (
+            f"only {counted(poses.views, 'pair')} of the object as it turns: {LEAST_VIEWS} are needed to find its axis"
+        )
+        return (Remark(few, _REMEDY, is_blocking=True),)
+    turn = poses.fit.turn
+    if turn is None:
+        return (Remark("the pairs do not agree on the axis about which the object turns", _REMEDY, is_blocking=True),)
+    return (*_match_remarks(poses.fit.match), *_closing_remarks(turn))
+
+
+def _match_remarks(match: SurfaceMatch | None) -> Sequence[Remark]:
+    if match is None:
+        return ()
+    if match.match is Match.NONE:
+        return (Remark("this pass does not fit the surface of the earlier one", _BOTH, is_blocking=True),)
+    if match.match is Match.SEVERAL:
+        several = "this pass fits the earlier one in several ways, and the colours do not tell which is right"
+        return (Remark(several, "put a mark on the object, and scan both passes again", is_blocking=True),)
+    fits = f"{match.share:.0%} of this pass lie on the earlier one, {distance_text(match.off_m)} off on average"
+    return (Remark(fits, is_note=True),)
+
+
+def _closing_remarks(turn: FullTurn) -> Sequence[Remark]:
+    degrees = f"{math.degrees(turn.span):.0f} degrees"
+    if turn.is_closed:
+        gap = f"{abs(math.degrees(turn.gap)):.2g} degrees"
+        closed = f"the end met the beginning {gap} off, which was distributed, and lies {distance_text(turn.closed_m)} from it now"
+        return (Remark(f"the turn of {degrees} is closed: {closed}", is_note=True),)
+    if turn.span < 2 * math.pi:
+        return (Remark(f"the object has turned by {degrees} only", "go on until its first side shows again"),)
+    words = "the end of the turn was not recognised as its beginning: the surface may be doubled there"
+    return (Remark(words, "go on turning for a few pairs more, and show more texture"),)
+
+
+def keeps_field(scan: Scan) -> bool:
+    """Whether another pass can be added: there is a turn, and it was put together with the earlier pass if there was one.
+
+    Args:
+        scan: whose model was made.
+    """
+    poses = scan.poses
+    if not isinstance(poses, TurntablePoses) or poses.fit.turn is None:
+        return False
+    return poses.fit.match is None or poses.fit.is_on_earlier_pass
+
+
+def field_of_turn(scan: Scan) -> bytes:
+    """Return the field of a turn, for another pass; empty: none can be added.
+
+    Args:
+        scan: whose model was made.
+    """
+    return field_bytes(scan.volume, scan.carved) if scan.volume is not None and keeps_field(scan) else b""
+
+
+def unused_mat(scan: Scan) -> Remark | None:
+    """Return what must be said of a printed mat that is in view, though none is asked for; None: none was found.
+
+    Args:
+        scan: that looks for it in its pairs.
+    """
+    if scan.unused_mat is None:
+        return None
+    other = "--turntable" if scan.wanted.turntable else "--object" if scan.wanted.on_table else ""
+    in_place = f" in place of {other}" if other else ""
+    remedy = f"use {scan.unused_mat.option}{in_place} to scan the object on it, or take the mat away"
+    return Remark("a printed mat is in view, but the scan does not use it", remedy)

@@ -1,10 +1,13 @@
 """Writes what comes of pairs of image files, each into a folder of its own. The root of `stereo`.
 
 A pair that cannot be computed ends the work only if it is the only one. Wrong settings and a results folder that cannot be written to end it at once.
+The folder holds the files of the only pair, or a folder for each of several. What an earlier run left there stays until all of what replaces it
+is whole (decision 0088). Where there is nothing to replace, the folders of several pairs appear one by one.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -16,7 +19,8 @@ from phone_host.calibration.drift.see import StillsWatch
 from phone_host.output.atomic import write_text
 from phone_host.output.axes import Axes
 from phone_host.output.json_text import json_text
-from phone_host.output.pair_files import STEREO_FILES, available, write_pair
+from phone_host.output.listed import ListedFolder, RunAll
+from phone_host.output.pair_files import STEREO_FILES, STEREO_NAMES, available, write_pair
 from phone_host.report.page_links import NextCommand
 from phone_host.report.report_page import Picture
 from phone_host.report.stereo_json import pair_json, set_json
@@ -26,9 +30,11 @@ from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted
 from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
 from phone_host.run.stereo_remarks import drift_remarks, files_remarks, judge_pair, pair_remarks, turned_remarks
-from phone_host.run.stereo_results import StereoResults
 from phone_host.stereo.evidence import density, look_at, maps_of
 from phone_host.stereo.images import size_px
+
+NAMES: Final = rf"{STEREO_NAMES}|pair-[0-9]{{6,}}"
+"""The names that `stereo` writes into its folder: of the only pair, or a folder for each of several."""
 
 _WRITERS: Final = 2
 """Threads that write one pair's files. Packing and compressing release the interpreter; the disk is one."""
@@ -58,8 +64,15 @@ def run_stereo(
         OSError: the results cannot be written.
     """
     count = len(pairs.files.pairs)
-    with StereoResults(pairs.out, is_one=count == 1) as results:
-        matcher = PairMatcher(pairs, watcher, EACH_STAGE, results.open)
+    with closing(ListedFolder(pairs.out, NAMES, command="stereo")) as results:
+
+        def open_results() -> None:
+            if results.descriptor < 0:
+                results.open()
+                if count == 1 or results.earlier:
+                    results.stage()
+
+        matcher = PairMatcher(pairs, watcher, EACH_STAGE, open_results)
         work = _Writing(pairs, results, watcher, axes, commands)
         if count == 1:
             keep_freed_memory()
@@ -73,8 +86,10 @@ def run_stereo(
             so_far = replace(work.report(), interrupted_of=count)
             if so_far.computed:
                 work.write(so_far)
-                if (partial := results.publish_partial()) is not None:
-                    pairs.tell_of_partial(partial, len(work.done))
+                if results.earlier:
+                    pairs.tell_of_partial(results.keep_staged(), len(work.done))
+                else:
+                    results.publish()
 
         def label(number: int, name: str, _: Path) -> str:
             return f"pair-{int(name) if pairs.files.by_number else number:06d}"
@@ -92,7 +107,7 @@ class _Writing:
     """Writes one pair after the other."""
 
     def __init__(
-        self, pairs: FilePairs, results: StereoResults, watcher: Watcher, axes: Axes, commands: Commands
+        self, pairs: FilePairs, results: ListedFolder, watcher: Watcher, axes: Axes, commands: Commands
     ) -> None:
         self._pairs, self._results, self._watcher, self._axes, self._commands = pairs, results, watcher, axes, commands
         self._rig = StillsWatch()
@@ -115,8 +130,10 @@ class _Writing:
 
     def write(self, report: SetReport) -> None:
         """Write what is told of all pairs together."""
-        self._results.write_text("report.json", json_text(set_json(report), indent=2) + "\n")
-        self._results.write_text("index.html", set_page(report, self._thumbnails, self._commands(report.computed)))
+        page = set_page(report, self._thumbnails, self._commands(report.computed))
+        for name, text in ("report.json", json_text(set_json(report), indent=2) + "\n"), ("index.html", page):
+            self._results.add(name)
+            self._results.write_text(name, text)
 
     def written(self, pair: ComputedPair) -> PairReport:
         """Judge and write a pair. Its label is empty for the only one."""
@@ -136,7 +153,7 @@ class _Writing:
         names = [*(file.value for file in planned), "report.json", "index.html"]
         with (
             ThreadPoolExecutor(_WRITERS) as writers,
-            self._results.folder_of(folder, names, writers.map) as place,
+            self._place_of(folder, names, writers.map) as place,
         ):
             try:
                 written = write_pair(place, processed, planned, self._axes, writers.map)
@@ -180,3 +197,14 @@ class _Writing:
         if folder and (picture := pair_thumbnail(processed)) is not None:
             self._thumbnails[folder] = picture
         return report
+
+    @contextmanager
+    def _place_of(self, folder: str, names: Sequence[str], run_all: RunAll) -> Iterator[Path]:
+        """Give a pair a place for its files: a folder that appears when the block ends; that of all results for the only pair."""
+        if folder:
+            with self._results.new_folder(folder, run_all) as place:
+                yield place
+            self._results.spare_staged()
+        else:
+            self._results.add(*names)
+            yield self._results.place

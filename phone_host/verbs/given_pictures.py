@@ -11,7 +11,7 @@ from phone_host.model import Side
 from phone_host.recording.chosen_views import choose_views
 from phone_host.run.progress_bar import share_bar
 from phone_host.verbs.globs import two_lists
-from phone_host.verbs.output_folders import unwritable
+from phone_host.verbs.output_folders import writing
 
 VIEWS: Final = "views"
 """The folder beside the results for pictures that a command takes or chooses itself."""
@@ -51,9 +51,6 @@ def given_pictures(words: Sequence[str], place: Path, most_pixels: int) -> Given
     if len(words) > 1:
         raise SettingsError(f"{recordings[0]} holds both sides", "give one recording, and nothing beside it")
     folder = place / VIEWS
-    try:
-        with share_bar("reading the recording", then="looking for still pictures") as advance:
-            chosen = choose_views(Path(words[0]), folder, most_pixels, advance)
-    except OSError as error:
-        raise unwritable(folder, error) from error
+    with writing(folder), share_bar("reading the recording", then="looking for still pictures") as advance:
+        chosen = choose_views(Path(words[0]), folder, most_pixels, advance)
     return GivenPictures((str(chosen.left),), (str(chosen.right),), chosen.board_side)

@@ -1,5 +1,6 @@
 """Checks where a verb's results go. Impossible targets are refused before the work; write errors carry a remedy."""
 
+import errno
 import os
 import re
 import sys
@@ -220,6 +221,38 @@ def unwritable(out: Path, error: OSError, option: str = "--out") -> UnavailableE
         f"{named if out in named.parents else out} cannot be written ({error.strerror})",
         f"check that the folder exists, that you may write to it and that the disk has room, or name another {option}",
     )
+
+
+@contextmanager
+def writing(out: Path) -> Iterator[None]:
+    """Name the folder and --out where a block cannot write its results.
+
+    Args:
+        out: the path that the user gave.
+
+    Raises:
+        UnavailableError: they cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise unwritable(out, error) from error
+
+
+def require_writable(out: Path) -> None:
+    """Check before the work that a folder can be made or written to.
+
+    Args:
+        out: the folder; it need not exist.
+
+    Raises:
+        UnavailableError: it cannot.
+    """
+    require_folder(out)
+    with writing(out):
+        there, _ = nearest(out)
+        if not os.access(there, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(there))
 
 
 def _require_folder(folder: Path, out: Path, option: str) -> None:

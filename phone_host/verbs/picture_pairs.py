@@ -12,7 +12,6 @@ from common.program.terminal import say
 from phone_host.report.stereo_report import Size
 from phone_host.run.file_pairs import FilePairs, Matching
 from phone_host.run.progress_bar import StepBar, step_bar
-from phone_host.run.stereo_results import require_writable
 from phone_host.settings import most_pixels
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
@@ -22,9 +21,9 @@ from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import (
     announce_other_report,
     require_alone,
-    require_folder,
+    require_writable,
     spare_inputs,
-    unwritable,
+    writing,
 )
 from phone_host.verbs.stereo_options import metric_core
 
@@ -87,11 +86,7 @@ def require_place(pairs: FilePairs, names: str, command: str) -> None:
         UnavailableError: it cannot be written to, or another program writes there.
     """
     out, files = pairs.out, pairs.files
-    require_folder(out)
-    try:
-        require_writable(out)
-    except OSError as error:
-        raise unwritable(out, error) from error
+    require_writable(out)
     folders = {resolved(path).parent for _, left, right in files.pairs for path in (left, right)}
     if resolved(out) in folders:
         raise SettingsError(
@@ -112,8 +107,5 @@ def reading(pairs: FilePairs) -> Iterator[StepBar]:
         UnavailableError: the results cannot be written.
     """
     count = len(pairs.files.pairs)
-    try:
-        with step_bar("reading", count if count > 1 else None) as watcher:
-            yield watcher
-    except OSError as error:
-        raise unwritable(pairs.out, error) from error
+    with writing(pairs.out), step_bar("reading", count if count > 1 else None) as watcher:
+        yield watcher

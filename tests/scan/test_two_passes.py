@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.cli import main
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.run.kept_field import read_field
+from phone_host.run.scan_files import read_field
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.field_sample import merged
 from phone_host.scan.mesh import Mesh, mesh_of

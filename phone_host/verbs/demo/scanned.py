@@ -130,7 +130,7 @@ def _scanned(
     announce(stage, console)
     with busy_bar(stage, console):
         scan, errors = demo.finished()
-    demo.live.kept.done()
+    demo.live.work.kept.done()
     return replace(with_truth(scan, errors), commands=_by_hand(out)), errors
 
 

@@ -21,17 +21,15 @@ from phone_host.report.scan_report import ScanReport
 from phone_host.run.host_settings import EndReason
 from phone_host.run.kept import partial_words
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
-from phone_host.run.scan_result import require_something
-from phone_host.run.stereo_results import require_writable
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap
 from phone_host.verbs.orientation_arguments import orientations
 from phone_host.verbs.output_folders import (
     announce_other_report,
     require_alone,
-    require_folder,
+    require_writable,
     spare_inputs,
-    unwritable,
+    writing,
 )
 from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run
 from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
@@ -81,12 +79,8 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
         raise
     over = prepared.ended(ended)
     last = finished()
-    require_something(last.report)
-    try:
-        write_scan(options.out, last, tell_of_partial if prepared.is_cut_short(over.snapshot, ended) else None)
-    except OSError as error:
-        raise unwritable(options.out, error) from error
-    live.kept.done()
+    with writing(options.out):
+        live.work.write(last, tell_of_partial if prepared.is_cut_short(over.snapshot, ended) else None)
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     return last.report, INTERRUPTED if signals.interrupted else CHECK_FAILED if too_few else 0
 
@@ -165,11 +159,7 @@ def _no_metres() -> SettingsError:
 
 def _require_place(options: argparse.Namespace) -> None:
     """Refuse a results folder that cannot be written to, or would lose the inputs."""
-    require_folder(options.out)
-    try:
-        require_writable(options.out)
-    except OSError as error:
-        raise unwritable(options.out, error) from error
+    require_writable(options.out)
     inputs = {"--calibration": options.calibration, "--replay": options.replay, "--overlay": options.overlay}
     spare_inputs(options.out, NAMES, {name: path for name, path in inputs.items() if path})
     require_alone(options.out)

@@ -13,8 +13,8 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
-from phone_host.run.kept_field import read_field
 from phone_host.run.kept_submaps import read_submaps, require_no_submaps
+from phone_host.run.scan_files import read_field
 from phone_host.run.scan_result import own_axes
 from phone_host.scan.box import Box
 from phone_host.scan.field_bytes import KeptField

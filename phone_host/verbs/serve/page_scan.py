@@ -21,11 +21,10 @@ from phone_host.report.stereo_report import ALWAYS
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
 from phone_host.run.scan_files import FinishedScan, write_scan
-from phone_host.run.scan_result import require_something
 from phone_host.scan.box import Box
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
-from phone_host.verbs.output_folders import unwritable
+from phone_host.verbs.output_folders import writing
 from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
 from phone_host.verbs.scan.arguments import add_model_arguments, add_turntable_arguments
 from phone_host.verbs.scan.live import live_scan
@@ -62,14 +61,9 @@ class PageScan:
         """See ReadyScan."""
         over = self.prepared.ended(ended)
         finished = self._finished()
-        report = finished.report
-        require_something(report)
-        try:
-            write_scan(self.out, finished)
-        except OSError as error:
-            raise unwritable(self.out, error) from error
-        self.live.kept.done()
-        verdict, words = _verdict(report)
+        with writing(self.out):
+            self.live.work.write(finished)
+        verdict, words = _verdict(finished.report)
         return self._scanned(words, verdict, over.snapshot)
 
     def save(self) -> Scanned | None:

@@ -15,8 +15,7 @@ from phone_host.output.json_text import json_text
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_lines import pair_lines, set_lines
 from phone_host.report.stereo_report import Size
-from phone_host.run.stereo_job import run_stereo
-from phone_host.run.stereo_results import NAMES
+from phone_host.run.stereo_job import NAMES, run_stereo
 from phone_host.stereo.core import StereoCore
 from phone_host.verbs.picture_pairs import file_pairs, reading, require_place
 from phone_host.verbs.stereo.next_commands import Typed, next_commands
