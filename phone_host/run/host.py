@@ -14,7 +14,7 @@ from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import Pacing
 from phone_host.measure.absence import away_of
 from phone_host.measure.image_motion import MotionMeter
-from phone_host.measure.replay_facts import ReplayFacts, replay_facts
+from phone_host.measure.replay_facts import replay_facts
 from phone_host.measure.run_snapshot import RunSnapshot, concerns
 from phone_host.measure.sink_account import SinkAccount
 from phone_host.measure.trouble import Trouble
@@ -80,19 +80,16 @@ class Host:
         *,
         recording: RecordingSwitch | None = None,
     ) -> None:
-        self._settings = settings
-        self._own = camera.description
-        self._playback = camera if isinstance(camera, Playback) else None
-        self.recording = recording
+        self._settings, self.recording, self.started_ns, self._ended_ns = settings, recording, now.monotonic_ns(), 0
+        self._own = own = camera.description
+        played = camera if isinstance(camera, Playback) else None
         files = camera if isinstance(camera, ShowsFiles) else None
         demand = DemandClock(
-            self._own.pacing,
+            own.pacing,
             None if files is None else Stills(files.images, files.numbers),
-            is_timeless=self._playback is not None and self._playback.is_timeless,
+            is_timeless=played is not None and played.is_timeless,
         )
-        self.started_ns = now.monotonic_ns()
-        self._motion = MotionMeter()
-        self._files = FileSink(
+        self._files = FileSink(  # first of all, because it may be refused
             settings.out,
             settings.save_every,
             waits=bool(settings.pairs) or demand.is_timeless,
@@ -100,10 +97,41 @@ class Host:
             axes=settings.axes,
             command=settings.command,
         )
-        self._keeper = (
-            None
-            if core is None or core.rig is None
-            else DriftKeeper(
+
+        # Frames of both cameras, or a recording of them, become pairs.
+        self._queue = RecordedPairQueue(
+            _UNHURRIED if played is not None and demand.is_timeless else settings.fifo,
+            settings.tolerance_ns,
+            own.period_ns,
+            demand=demand,
+            time_offset_ns=settings.time_offset.offset_ns,
+            own_images=None if files is None else files.images,
+            clock=now.monotonic_ns if played is None else played.clock_ns,
+            marking=now.monotonic_ns,
+        )
+        self._queue.recorder = recording
+        self._camera, self._receiver = streams(camera, links, self._queue, demand)
+
+        # Pairs become depth.
+        rig = None if core is None else core.rig
+        self._matcher_is_fastest = core is not None and core.matcher_is_fastest
+        self._rig_rejected = rig is not None and rig.is_rejected
+        self._budget = None if core is None or settings.budget is None else PairBudget(settings.budget, core)
+        pipeline = Pipeline(
+            core,
+            settings.board_side,
+            now.monotonic_ns,
+            Interpolator() if settings.interpolate else None,
+            settings.most_pixels,
+            budget=self._budget,
+            host_orientation=own.orientation,
+        )
+        self._ledgerer = Ledgerer(self._receiver.account.was_away, lambda: demand.is_timeless)
+
+        # Every sink takes the results.
+        self._keeper = None
+        if core is not None and rig is not None:
+            self._keeper = DriftKeeper(
                 core,
                 settings.board_side,
                 corrects=settings.corrects,
@@ -111,53 +139,22 @@ class Host:
                 is_timeless=demand.is_timeless,
                 interpolates=settings.interpolate,
             )
-        )
         self._trust = TrustSink(core, period_ns=0 if demand.is_timeless else PERIOD_NS, keeper=self._keeper)
+        self._motion = MotionMeter()
         motion = FunctionSink(_MOTION, self._measure_motion)
         recorded = () if recording is None else (RecordingSink(recording),)
         self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *recorded, *sinks)
-        self._queue = RecordedPairQueue(
-            _UNHURRIED if self._playback is not None and demand.is_timeless else settings.fifo,
-            settings.tolerance_ns,
-            self._own.period_ns,
-            demand=demand,
-            time_offset_ns=settings.time_offset.offset_ns,
-            own_images=None if files is None else files.images,
-            clock=now.monotonic_ns if self._playback is None else self._playback.clock_ns,
-            marking=now.monotonic_ns,
-        )
-        self._queue.recorder = recording
-        self._camera, self._receiver = streams(camera, links, self._queue, demand)
-        rig = None if core is None else core.rig
-        self._matcher_is_fastest = core is not None and core.matcher_is_fastest
-        self._rig_rejected = rig is not None and rig.is_rejected
-        self._cameras = RigCameras(rig, settings.board_side, self._own, self._camera, self._receiver)
-        interpolator = Interpolator() if settings.interpolate else None
-        wanted = settings.budget
-        self._budget = None if core is None or wanted is None else PairBudget(wanted, core)
-        pipeline = Pipeline(
-            core,
-            settings.board_side,
-            now.monotonic_ns,
-            interpolator,
-            settings.most_pixels,
-            budget=self._budget,
-            host_orientation=self._own.orientation,
-        )
-        self._ledgerer = Ledgerer(self._receiver.account.was_away, lambda: demand.is_timeless)
         self._worker = Worker(
-            self._queue,
-            pipeline,
-            self._ledgerer,
-            self._sinks,
-            most_pairs=settings.pairs,
-            taken=self._receiver.wake,
+            self._queue, pipeline, self._ledgerer, self._sinks, most_pairs=settings.pairs, taken=self._receiver.wake
         )
+
+        # Meanwhile the run's own thread looks after all of it, several times a second.
+        self._cameras = RigCameras(rig, settings.board_side, own, self._camera, self._receiver)
         self._doubts = DoubtLog(lambda: concerns(self.snapshot()))
         self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
         self._course = Course(
             settings,
-            self._own,
+            own,
             (self._camera, self._receiver),
             queue=self._queue,
             worker=self._worker,
@@ -165,10 +162,8 @@ class Host:
             step=self._step,
             raise_failures=self._raise_failures,
         )
-        self._ended_ns = 0
-        self._replay: ReplayFacts | None = None
-        if (played := self._playback) is not None:
-            self._replay = replay_facts(str(played.file), "demand" if played.is_timeless else "clock", played.ledgers())
+        pace = "demand" if demand.is_timeless else "clock"
+        self._replay = None if played is None else replay_facts(str(played.file), pace, played.ledgers())
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
