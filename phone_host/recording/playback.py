@@ -79,7 +79,7 @@ class Playback:
         board = [(each, True) for each in self.recorded.images[topics[self.board_side]]]
         own = [(each, False) for each in self.recorded.images[topics[self.board_side.other]]]
         self.frames = sorted([*board, *own], key=lambda item: item[0].log_ns)
-        self.played: _Player | None = None
+        self.played: PlayedBoard | None = None
 
     @property
     def is_timeless(self) -> bool:
@@ -108,12 +108,17 @@ class Playback:
         Args:
             sink: takes the frames.
         """
-        self.played = _Player(self, sink)
-        return PlayedCamera(self.played), PlayedBoard(self.played)
+        self.played = PlayedBoard(self, sink)
+        return PlayedCamera(self.played), self.played
 
 
-class _Player:
-    """The thread that brings the frames, and what is known of the board of then."""
+class PlayedBoard:
+    """The board of then, see BoardStream; and the thread that brings the frames of both sides.
+
+    Attributes:
+        spoiled: images that are none, of both cameras.
+        now_ns: when the newest frame was due, CLOCK_MONOTONIC.
+    """
 
     def __init__(self, playback: Playback, sink: PlayedSink) -> None:
         self._sink, self._frames, self._pacing = sink, playback.frames, playback.pacing
@@ -134,18 +139,31 @@ class _Player:
         self.now_ns = 0
         self.ended = False
         self.failure: Exception | None = None
+        self.refused: BoardRefusal | None = None
+        self.connected = True
+        self.carrier = LINK
+        self.locks: LockState | None = None
 
     def start(self) -> None:
+        """Let frames come."""
         self._thread.start()
 
     def stop(self) -> None:
+        """Let none come any more."""
         self._stop.set()
         self._changed.set()
         if self._thread.ident is not None:
             self._thread.join()
 
     def wake(self) -> None:
+        """There is room for a frame."""
         self._changed.set()
+
+    def steer(self, later_ns: int) -> None:
+        """Do nothing: it exposed when it did."""
+
+    def hold(self, locks: Locks) -> None:
+        """Do nothing: it was held as it was."""
 
     def _run(self) -> None:
         try:
@@ -286,7 +304,7 @@ class _Player:
 class PlayedCamera:
     """This machine's camera of then; see OwnStream."""
 
-    def __init__(self, player: _Player) -> None:
+    def __init__(self, player: PlayedBoard) -> None:
         self._player = player
         self.health = CameraHealth()
         self.held: Locks = ()
@@ -313,60 +331,6 @@ class PlayedCamera:
 
     def start(self) -> None:
         """Do nothing: the board's side brings both."""
-
-    def stop(self) -> None:
-        """Let none come any more."""
-        self._player.stop()
-
-
-class PlayedBoard:
-    """The board of then; see BoardStream."""
-
-    def __init__(self, player: _Player) -> None:
-        self._player = player
-        self.refused: BoardRefusal | None = None
-        self.connected = True
-        self.carrier = LINK
-        self.locks: LockState | None = None
-
-    @property
-    def account(self) -> LinkAccount:
-        """The account so far."""
-        return self._player.account
-
-    @property
-    def hello(self) -> BoardHello | None:
-        """The board's description of itself."""
-        return self._player.hello
-
-    @property
-    def estimate(self) -> ClockEstimate | None:
-        """The clock estimate of then."""
-        return self._player.estimate
-
-    @property
-    def ended(self) -> bool:
-        """Whether the last frame has come."""
-        return self._player.ended
-
-    @property
-    def failure(self) -> Exception | None:
-        """What ended the replay."""
-        return self._player.failure
-
-    def start(self) -> None:
-        """Let frames come."""
-        self._player.start()
-
-    def wake(self) -> None:
-        """There is room for a frame."""
-        self._player.wake()
-
-    def steer(self, later_ns: int) -> None:
-        """Do nothing: it exposed when it did."""
-
-    def hold(self, locks: Locks) -> None:
-        """Do nothing: it was held as it was."""
 
     def stop(self) -> None:
         """Let none come any more."""
