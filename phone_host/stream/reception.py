@@ -42,7 +42,6 @@ from common.protocol.session import (
 )
 from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
-from phone_host.stream.board_news import tell_found, tell_refused, tell_stepped
 from phone_host.stream.border import Arrival, Border
 from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.link_facts import LinkFacts
@@ -313,7 +312,8 @@ class Reception:
 
     def _tell_refusal(self, link: int, refusal: BoardRefusal) -> None:
         if self._refusals.is_news(link):
-            tell_refused(self.account.links[link].name, refusal)
+            problem, remedy = refusal_text(refusal)
+            _LOG.warning(event("link_refused", link=self.account.links[link].name, problem=problem, remedy=remedy))
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
         """Take note that the board has gone from all links."""
@@ -386,7 +386,17 @@ class Reception:
             _LOG.info(event("link_switched", source=names[before].name, target=tally.name, lost=accepted.lost))
             return
         self.account.connects += 1
-        tell_found(hello, tally.name, resumed=accepted.resumed)
+        camera, size = hello.camera.name, f"{hello.camera.width_px}x{hello.camera.height_px}"
+        _LOG.info(
+            event(
+                "board_found",
+                session=hello.session,
+                resumed=accepted.resumed,
+                link=tally.name,
+                camera=camera,
+                size=size,
+            )
+        )
 
     def _note_rung(self, rung: Rung) -> None:
         """Adopt the new rung of the board's camera."""
@@ -394,7 +404,8 @@ class Reception:
         self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
         self.account.current.rung = rung
         self._sink.change_period(rung.period_ns)
-        tell_stepped(rung)
+        fps = round(1e9 / rung.period_ns, 2)
+        _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
     def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
         """Count a frame of the present session and give it to the border."""
