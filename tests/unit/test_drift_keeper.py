@@ -16,8 +16,8 @@ from phone_host.stereo.departure import corrected_rig
 from phone_host.stereo.evidence import look_at, maps_of
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier
+from tests.support.results import result
 from tests.support.rigs import small_rig
-from tests.unit.test_sinks import result
 
 TURNED = Departure(turn_rad=(math.radians(0.5), 0.0, 0.0))
 

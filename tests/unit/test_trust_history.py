@@ -13,8 +13,8 @@ from phone_host.scene.scene import demo_scene, render, rig_poses
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier
+from tests.support.results import result
 from tests.support.rigs import small_rig
-from tests.unit.test_sinks import result
 
 _PATIENCE_NS = 60_000_000_000
 _SECOND_NS = 1_000_000_000

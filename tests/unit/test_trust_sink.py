@@ -20,8 +20,8 @@ from phone_host.scene.scene import demo_scene, render, rig_poses, unlike_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier
+from tests.support.results import result
 from tests.support.rigs import small_rig, stacked_rig
-from tests.unit.test_sinks import result
 
 _PATIENCE_S: Final = 60.0
 _PERIOD_NS: Final = 500_000_000
