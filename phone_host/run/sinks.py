@@ -8,7 +8,6 @@ time counts as the pair's stage `write`.
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from common import now
@@ -50,12 +49,6 @@ class Sink(Protocol):
         """The account of each of its queues, as copies."""
 
 
-@dataclass(slots=True)
-class _Waiting(Generic[T]):
-    item: T
-    since_ns: int
-
-
 class SinkQueue(Generic[T]):
     """A bounded queue and the thread that empties it.
 
@@ -77,7 +70,7 @@ class SinkQueue(Generic[T]):
         clock: Callable[[], int] = now.monotonic_ns,
     ) -> None:
         self._name, self._take, self._depth, self._waits, self._clock = name, take, depth, waits, clock
-        self._items: deque[_Waiting[T]] = deque()
+        self._items: deque[tuple[T, int]] = deque()  # with the time since which each waits, ns
         self._changed = threading.Condition()
         self._finishing = False
         self._written = self._dropped = self._failed = 0
@@ -102,7 +95,7 @@ class SinkQueue(Generic[T]):
             if len(self._items) >= self._depth or self._failure is not None or self._finishing:
                 self._dropped += 1
                 return False
-            self._items.append(_Waiting(item, self._clock()))
+            self._items.append((item, self._clock()))
             self._changed.notify_all()
             if not self._started:  # a run that never begins leaves no thread
                 self._started = True
@@ -139,10 +132,10 @@ class SinkQueue(Generic[T]):
                 self._changed.wait_for(lambda: bool(self._items) or self._finishing)
                 if not self._items:
                     return
-                waiting = self._items[0]  # it keeps its place until it is done, because the bound limits memory
+                item, since_ns = self._items[0]  # it keeps its place until it is done, because the bound limits memory
             has_failed = False
             try:
-                self._take(waiting.item)
+                self._take(item)
             except NotWrittenError:
                 has_failed = True
             except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
@@ -157,7 +150,7 @@ class SinkQueue(Generic[T]):
                 self._failed += has_failed
                 if not has_failed:
                     self._written += 1
-                    self._delay.add(self._clock() - waiting.since_ns)
+                    self._delay.add(self._clock() - since_ns)
                 self._changed.notify_all()
 
 

@@ -24,11 +24,12 @@ from phone_host.output.pair_files import STEREO_FILES, STEREO_NAMES, available, 
 from phone_host.report.page_links import NextCommand
 from phone_host.report.report_page import Picture
 from phone_host.report.stereo_json import pair_json, set_json
+from phone_host.report.stereo_page import thumbnail
 from phone_host.report.stereo_report import FailedPair, PairReport, SetReport
 from phone_host.run.file_pairs import EACH_STAGE, ComputedPair, FilePairs, PairMatcher, Watcher, compute_pairs
 from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.kept import kept_if_interrupted
-from phone_host.run.stereo_pages import pair_page, pair_thumbnail, set_page
+from phone_host.run.stereo_pages import pair_page, set_page
 from phone_host.run.stereo_remarks import drift_remarks, files_remarks, judge_pair, pair_remarks, turned_remarks
 from phone_host.stereo.evidence import density, look_at, maps_of
 from phone_host.stereo.images import size_px
@@ -194,7 +195,7 @@ class _Writing:
             )
             write_text(place / "report.json", json_text(pair_json(report), indent=2) + "\n")
             write_text(place / "index.html", pair_page(report, processed, self._commands((report,))))
-        if folder and (picture := pair_thumbnail(processed)) is not None:
+        if folder and (picture := thumbnail(processed)) is not None:
             self._thumbnails[folder] = picture
         return report
 

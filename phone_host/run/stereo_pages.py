@@ -16,7 +16,6 @@ from phone_host.report.stereo_page import (
     StereoPageData,
     stereo_index,
     stereo_page,
-    thumbnail,
 )
 from phone_host.report.stereo_report import FailedPair, PairReport, SetReport, depth_png_words, distinct_names
 from phone_host.report.stereo_verdict import pair_verdict, set_verdict
@@ -93,11 +92,6 @@ def set_page(report: SetReport, thumbnails: Mapping[str, Picture], commands: Seq
             notes=tuple(remark.text for remark in report.remarks),
         )
     )
-
-
-def pair_thumbnail(processed: Processed) -> Picture | None:
-    """Make the small picture of a pair."""
-    return thumbnail(processed)
 
 
 def _entry(pair: PairReport | FailedPair, both: str, picture: Picture | None) -> PairEntry:
