@@ -55,7 +55,7 @@ def run_scan(
             is_judged = True
             for concern in judge_pair(pair.core, pair.processed, pairs.mounted).concerns:
                 doubts.setdefault(concern.doubt.value, remark_of(concern))
-        scanned = work.take(name, float(name) if pairs.files.by_number else float(number), pair.processed)
+        scanned = work.scan.take(name, float(name) if pairs.files.by_number else float(number), pair.processed)
         if scanned.weakness.advice:
             watcher.say(f"{name}: {scanned.weakness.advice}")
         return scanned
