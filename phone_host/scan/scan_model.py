@@ -70,8 +70,8 @@ class ScanModel:
 
     def judged(self, volume: Volume, views: Sequence[FusedDepths], pose_errors: PoseErrors) -> "ScanModel":
         """Return the model with the standard deviations that the views' agreement asks for: see `surface_error`."""
-        error = surface_error(volume, views, self.mesh.points_m, self.noise_m, pose_errors)
-        return replace(self, noise_m=self.noise_m * np.float32(error.factor), error_scope=error.scope)
+        noise_m, scope = surface_error(volume, views, self.mesh.points_m, self.noise_m, pose_errors)
+        return replace(self, noise_m=noise_m, error_scope=scope)
 
     @staticmethod
     def empty() -> "ScanModel":

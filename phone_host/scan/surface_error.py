@@ -2,7 +2,7 @@
 
 The noise of single depths tells too little: depths of neighbouring views err together, by the matcher and by the drift of the path. So the path is cut
 into segments that look from different places. Where several of them saw a piece of the surface, the spread of their mean distances from it tells by how
-much their mean is off (batch means). The noise of the points is multiplied by the factor that this asks for.
+much their mean is off (batch means). What the matcher does alike in all views comes on top, as far as it moves the surface along its normal.
 
 Source: J. M. Flegal and G. L. Jones, "Batch means and spectral variance estimators in Markov chain Monte Carlo", 2010.
 """
@@ -10,6 +10,7 @@ Source: J. M. Flegal and G. L. Jones, "Batch means and spectral variance estimat
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from types import MappingProxyType
 from typing import Final
 
 import cv2
@@ -26,6 +27,27 @@ Floats = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Texture = NDArray[np.float16]
 
+
+class ErrorScope(Enum):
+    """What the stated error of a surface covers.
+
+    NOISE: the noise of single pairs; the drift of the camera's path comes on top. DRIFT: noise, matching errors that pairs share, and drift.
+    """
+
+    NOISE = "drift not included"
+    DRIFT = "drift included"
+
+
+class PoseErrors(Enum):
+    """How the errors of a scan's poses are related.
+
+    INDEPENDENT: a mat tells each pose by itself. DRIFT: they add up along the path.
+    """
+
+    INDEPENDENT = "independent"
+    DRIFT = "drift"
+
+
 _SEGMENT: Final = 0.6
 """rad that a segment of the path turns, or moves as seen from the surface: a matcher's errors are others then."""
 
@@ -41,20 +63,21 @@ _LEAST_SHARE: Final = 1 / 3
 _LEAST_COVERED: Final = 0.5
 """Share of the points on pieces that two segments or more have seen."""
 
-_DRIFT: Final = 1.8
-"""Error of the mean of all segments as a multiple of what their spread tells: neighbours err together, too. With it and `_BIAS`, 95 % of the points of
-the rendered sequences in the tests, one of each kind, lie within two standard deviations, which are at most twice as wide as they must be; decision 0132 tells of others."""
+_DRIFT: Final = 1.1
+"""Error of the mean of all segments as a multiple of what their spread tells: neighbours err together, too. This and the next two were fitted together to
+rendered sequences; decision 0140 has them, and others that were only tested."""
 
-_BIAS: Final = 0.17
-"""Error that all views share, as a share of a depth's noise: 0.085 px of a disparity by the matcher, which no spread shows."""
+_BIAS: Final = MappingProxyType({PoseErrors.DRIFT: 0.3, PoseErrors.INDEPENDENT: 0.2})
+"""Error that all views share, by the matcher, which no spread shows, as a share of a depth's noise: 0.15 px of a disparity. On a mat, whose poses are
+independent, both images were laid onto each other again (`exact_depths`): 0.10 px."""
 
 _TEXTURE, _MAX_BLURRED = 4.8, 3.0
-"""Grey levels a pixel: where an image changes by less, the bias grows in proportion, up to so many times."""
+"""Grey levels a pixel: where an image changes by less, the variance of that error grows in proportion, up to so many times. Not on a mat."""
 
 _FLAT: Final = 0.01
 
-_CIRCLE: Final = 1.15
-"""By which a turn's error is larger: all views share the error of its axis, which no spread shows."""
+_UNSHOWN: Final = 2.0
+"""Variance where no two segments saw the surface, as a multiple of the mean elsewhere: errors there were 1.2 times as large or more on rendered things."""
 
 _MAX_VOXELS: Final = 6.0
 """A depth that is farther from the surface belongs to another one."""
@@ -96,43 +119,6 @@ def texture_of(grey: Image, shape: tuple[int, ...]) -> Texture:
     return np.asarray(cv2.resize(slope, (shape[1], shape[0]), interpolation=cv2.INTER_AREA), np.float16)
 
 
-class ErrorScope(Enum):
-    """What the stated error of a surface covers.
-
-    NOISE: the noise of single pairs; the drift of the camera's path comes on top. DRIFT: noise, matching errors that pairs share, and drift.
-    """
-
-    NOISE = "drift not included"
-    DRIFT = "drift included"
-
-
-class PoseErrors(Enum):
-    """How the errors of a scan's poses are related.
-
-    INDEPENDENT: a mat tells each pose by itself. DRIFT: they add up along the path. CIRCLE: all poses lie on one circle about a fitted axis.
-    """
-
-    INDEPENDENT = "independent"
-    DRIFT = "drift"
-    CIRCLE = "circle"
-
-
-@dataclass(frozen=True, slots=True)
-class SurfaceError:
-    """How the noise of a surface's points becomes their expected error.
-
-    Attributes:
-        factor: by which the standard deviations are multiplied.
-        scope: what they cover then.
-    """
-
-    factor: float
-    scope: ErrorScope
-
-
-_NOISE_ALONE: Final = SurfaceError(1.0, ErrorScope.NOISE)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class _Distances:
     """What the segments of a path saw: (M,) numbers of pieces, the mean distance of the depths from the surface there, m, and the mean square of the errors that all views share, m^2."""
@@ -148,8 +134,8 @@ def surface_error(
     points_m: NDArray[np.float32],
     noise_m: NDArray[np.float32],
     pose_errors: PoseErrors,
-) -> SurfaceError:
-    """Judge by how much the noise of a surface's points understates their error.
+) -> tuple[NDArray[np.float32], ErrorScope]:
+    """Judge how far a surface's points may be off.
 
     Args:
         volume: of the model.
@@ -159,30 +145,34 @@ def surface_error(
         pose_errors: how they are related.
 
     Returns:
-        The factor. Where too few segments of the path saw the same, the noise as it is, without drift.
+        (V,) standard deviations, m, NaN where the noise is; and what they cover. Where too few segments of the path saw the same, the noise as it is,
+        without drift.
     """
     views = views[:: max(-(-len(views) // _MAX_VIEWS), 1)]
     segments = _segments(views)
     count = int(segments[-1]) + 1 if len(segments) else 0
     if len(views) < _LEAST_VIEWS or count < _LEAST_SEGMENTS or not len(points_m):
-        return _NOISE_ALONE
-    seen = _distances(volume, views, segments)
+        return noise_m, ErrorScope.NOISE
+    seen = _distances(volume, views, segments, pose_errors)
     pieces, at = np.unique(seen.pieces, return_inverse=True)
     times = np.bincount(at, minlength=len(pieces))
     means, biases = (np.bincount(at, of) / times for of in (seen.means_m, seen.biases_m2))
     spreads = np.bincount(at, (seen.means_m - means[at]) ** 2) / np.maximum(times - 1, 1) / times
-    variances = _DRIFT**2 * spreads + biases
     known = np.isfinite(noise_m)
     of_point = _pieces(points_m[known].astype(np.float64), volume)
     place = np.minimum(np.searchsorted(pieces, of_point), max(len(pieces) - 1, 0))
     covered = (pieces[place] == of_point) & (times[place] > 1) if len(pieces) else np.zeros(len(of_point), np.bool_)
     if not covered.any() or covered.mean() < _LEAST_COVERED:
-        return _NOISE_ALONE
+        return noise_m, ErrorScope.NOISE
     if pose_errors is not PoseErrors.INDEPENDENT and times[place[covered]].mean() < _LEAST_SHARE * count:
-        return _NOISE_ALONE
-    expected, noise = variances[place[covered]].mean(), (noise_m[known][covered].astype(np.float64) ** 2).mean()
-    shared = _CIRCLE if pose_errors is PoseErrors.CIRCLE else 1.0
-    return SurfaceError(shared * float(np.sqrt(expected / noise)), ErrorScope.DRIFT)
+        return noise_m, ErrorScope.NOISE
+    # Few segments tell a spread badly: half of it is the mean of all.
+    spread = (spreads[place] + spreads[place[covered]].mean()) / 2
+    variances = np.where(covered, _DRIFT**2 * spread + biases[place], 0)
+    variances[~covered] = _UNSHOWN * variances[covered].mean()
+    error_m = np.full(noise_m.shape, np.nan, np.float32)
+    error_m[known] = np.sqrt(variances)
+    return error_m, ErrorScope.DRIFT
 
 
 def _segments(views: Sequence[FusedDepths]) -> Numbers:
@@ -198,9 +188,10 @@ def _segments(views: Sequence[FusedDepths]) -> Numbers:
     return np.unique(numbers, return_inverse=True)[1].astype(np.int64)
 
 
-def _distances(volume: Volume, views: Sequence[FusedDepths], segments: Numbers) -> _Distances:
+def _distances(volume: Volume, views: Sequence[FusedDepths], segments: Numbers, pose_errors: PoseErrors) -> _Distances:
     """Compare the depths of views with the surface."""
-    most_m = _MAX_VOXELS * volume.settings.voxel_m
+    most_m, bias = _MAX_VOXELS * volume.settings.voxel_m, _BIAS[pose_errors]
+    most_blurred = 1.0 if pose_errors is PoseErrors.INDEPENDENT else _MAX_BLURRED
     keys, sums = list[Numbers](), list[Floats]()
     for each, segment in zip(views, segments, strict=True):
         view, pose, geometry = each.view, each.world_camera, each.view.geometry
@@ -214,9 +205,11 @@ def _distances(volume: Volume, views: Sequence[FusedDepths], segments: Numbers) 
         near = np.abs(off_m) < most_m  # NaN is not
         key = (_pieces(pose.apply(surface.points_m[near].astype(np.float64)), volume) << 7) | segment
         found, at = np.unique(key, return_inverse=True)
-        blurred = np.clip(_TEXTURE / np.maximum(each.texture[near].astype(np.float64), _FLAT), 1, _MAX_BLURRED)
-        bias_m = _BIAS * blurred * view.noise_per_m * depth[near].astype(np.float64) ** 2
-        of_pixel = np.ones(len(key)), off_m[near], bias_m**2
+        blurred = np.clip(_TEXTURE / np.maximum(each.texture[near].astype(np.float64), _FLAT), 1, most_blurred)
+        # Of a depth's error the part along the normal moves the surface.
+        along = np.abs((seen_m * surface.normals).sum(axis=-1))[near] / geometry.focal_px
+        bias_m = bias * view.noise_per_m * depth[near] * along.astype(np.float64)
+        of_pixel = np.ones(len(key)), off_m[near], blurred * bias_m**2
         keys.append(found)
         sums.append(np.array([np.bincount(at, each, len(found)) for each in of_pixel]))
     every, at = np.unique(np.concatenate(keys), return_inverse=True)

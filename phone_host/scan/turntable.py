@@ -29,7 +29,7 @@ from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.stretches import Placed
-from phone_host.scan.surface_error import FusedDepths, PoseErrors
+from phone_host.scan.surface_error import FusedDepths
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.tracked import Tracked, lost
 from phone_host.scan.tracker import Tracker
@@ -149,11 +149,6 @@ class TurntablePoses(PoseSource):
     def has_size(self) -> bool:
         """Whether there was a view to which others are compared."""
         return self._taken > 0
-
-    @property
-    def pose_errors(self) -> PoseErrors:
-        """The errors of poses on one circle, once it is fitted."""
-        return PoseErrors.DRIFT if self.fit.turn is None else PoseErrors.CIRCLE
 
     @property
     def views(self) -> int:

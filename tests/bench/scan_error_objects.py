@@ -1,11 +1,11 @@
-"""Things on which the stated error of a scan is measured: those of the object benchmark, a plaster bunny and a bottle."""
+"""Things on which the stated error of a scan is measured: those of the object benchmark, a plaster bunny, a bottle and a rock."""
 
 from types import MappingProxyType
 from typing import Final
 
 from phone_host.scene.object_scene import ObjectScene, Setting, mat_body, object_rig
 from phone_host.scene.objects import OBJECTS
-from phone_host.scene.scene_model import Body, Frustum, Sphere, Texture
+from phone_host.scene.scene_model import Body, Box, Frustum, Sphere, Texture, rotation
 from phone_host.scene.solid import Solid
 
 _PLASTER: Final = Texture(
@@ -13,6 +13,9 @@ _PLASTER: Final = Texture(
 )
 _GLASS: Final = Texture(
     seed=81, light_bgr=(0.30, 0.55, 0.35), dark_bgr=(0.18, 0.40, 0.22), contrast=0.4, shortest_m=0.003, longest_m=0.05
+)
+_STONE: Final = Texture(
+    seed=95, light_bgr=(0.6, 0.6, 0.6), dark_bgr=(0.2, 0.2, 0.22), contrast=0.9, shortest_m=0.0012, longest_m=0.03
 )
 _LABEL: Final = Texture(
     seed=82, light_bgr=(0.85, 0.85, 0.85), dark_bgr=(0.3, 0.2, 0.5), contrast=0.8, shortest_m=0.002, longest_m=0.03
@@ -44,7 +47,18 @@ def _bottle() -> Solid:
     )
 
 
-ERROR_OBJECTS: Final = MappingProxyType({**OBJECTS, "bunny": _bunny, "bottle": _bottle})
+def _rock() -> Solid:
+    """Edges, corners and a bulge. No constant was fitted to it."""
+    return Solid(
+        (
+            Body("slab", Box((0.07, 0.05, 0.04)), (0.0, 0.0, 0.02), _STONE, rotation((0.0, 0.0, 1.0), 0.4)),
+            Body("block", Box((0.045, 0.06, 0.05)), (0.012, 0.004, 0.032), _STONE, rotation((0.0, 0.0, 1.0), 1.1)),
+            Body("bulge", Sphere(0.026), (-0.015, -0.01, 0.045), _STONE),
+        )
+    )
+
+
+ERROR_OBJECTS: Final = MappingProxyType({**OBJECTS, "bunny": _bunny, "bottle": _bottle, "rock": _rock})
 
 
 def error_scene(name: str, setting: Setting) -> ObjectScene:
