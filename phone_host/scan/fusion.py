@@ -114,8 +114,8 @@ class Fusion:
     """
 
     def __init__(self, threads: int) -> None:
-        self.depths, self.carving, self._threads = KeptDepths(), None, threads
-        self.carving: Carving | None
+        self.depths, self._threads = KeptDepths(), threads
+        self.carving: Carving | None = None
 
     @property
     def carved(self) -> Carved | None:
