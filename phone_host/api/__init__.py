@@ -18,13 +18,13 @@ This door stays backward compatible. The modules below it may change.
 
 from common.frame import PixelFormat
 from common.recording.opened import open_recorded
+from phone_host.accounts.delays import DELAYS
 from phone_host.api.opening import open_scanner
 from phone_host.api.scanner import Scanner
 from phone_host.api.scans import save_scan, write_model
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.geometry.se3 import SE3
 from phone_host.geometry.triangulate import Intersections, triangulate
-from phone_host.measure.delays import DELAYS
-from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.model import Disparity, Image, RectifiedPair, Result, StereoGeometry
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.meshes.printable import Printer, Problem

@@ -10,10 +10,9 @@ from common import now
 from common.camera.base import Camera
 from common.link.base import Link
 from common.protocol.message import Pacing
-from phone_host.measure.delays import Series
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.sink_account import SinkAccount
-from phone_host.measure.trouble import trouble_of
+from phone_host.accounts.delays import Series, SinkAccount
+from phone_host.diagnostics.concern import trouble_of
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Result
 from phone_host.report.run_json import build
 from phone_host.run.host import Host

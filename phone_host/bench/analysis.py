@@ -7,8 +7,10 @@ from typing import Final
 import numpy as np
 
 from common.ledger import PairLedger
+from phone_host.accounts.delays import DelayStatistics
 from phone_host.bench.cases import Case, Interface
 from phone_host.bench.changes import Change
+from phone_host.bench.delay_fit import DelayFit
 from phone_host.bench.emulate import PROFILES, Profile
 from phone_host.bench.prediction import (
     Cell,
@@ -27,10 +29,7 @@ from phone_host.bench.prediction import (
 )
 from phone_host.bench.queue_model import LinkModel
 from phone_host.bench.runs import CaseResult
-from phone_host.measure.delay_fit import DelayFit
-from phone_host.measure.delays import DelayStatistics
-from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.run_snapshot import figures_of
+from phone_host.diagnostics.throughput import Judgement, figures_of, judge
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 _SELF_PACED: Final = ("serial", "rfcomm")

@@ -18,11 +18,11 @@ from common.errors import UnavailableError
 from common.keys import usual_keys
 from common.link.factory import open_link, parse_link
 from common.protocol.message import Pacing
+from phone_host.accounts.link_account import LinkAccount
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.emulate import NOTHING
 from phone_host.bench.relay import RelayAccount, RelayProcess, relay_process
 from phone_host.children.board_process import BoardAccount, BoardProcess, board_process, free_port
-from phone_host.measure.accounts import LinkAccount
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver

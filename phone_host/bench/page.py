@@ -6,6 +6,7 @@ from html import escape
 from typing import Final
 
 from common.words import counted
+from phone_host.accounts.delays import IDLE_STAGE_NS, STAGES
 from phone_host.bench.analysis import Analysis, InterfaceFit, typical_and_slow
 from phone_host.bench.prediction import Figures, values_of
 from phone_host.bench.report import Conditions, few_pairs_words, grouped, most_compared
@@ -23,7 +24,6 @@ from phone_host.bench.tables import (
     summary_line,
     what_if_rows,
 )
-from phone_host.measure.delays import IDLE_STAGE_NS, STAGES
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.report.report_page import DelaySeries, Headline, delay_series, heading
 from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 from common.ledger import PairLedger
+from phone_host.bench.delay_fit import LIKE_SIZES, DelayFit, Values, fit_delay
 from phone_host.bench.emulate import Profile
 from phone_host.bench.queue_model import LinkModel, Predicted, Setting, predict
-from phone_host.measure.delay_fit import LIKE_SIZES, DelayFit, Values, fit_delay
 from phone_host.sync.fifo import FifoSettings
 
 _FRAMES: Final = 3000

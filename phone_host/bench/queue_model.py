@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.measure.delay_fit import neighbours
+from phone_host.bench.delay_fit import neighbours
 from phone_host.sync.fifo import FifoSettings, Overflow
 
 Values = NDArray[np.float64]

@@ -17,10 +17,10 @@ from common.recording.numbering import pairs_of_two
 from common.recording.recorded import Recorded
 from common.strict_json import strict_json
 from common.words import counted
+from phone_host.accounts.link_account import LinkAccount, SessionAccount
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up
 from phone_host.children.board_process import BoardAccount
-from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.model import PairCounts
 from phone_host.recording.clock_messages import told_clocks
 from phone_host.recording.playback import Playback

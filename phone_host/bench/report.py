@@ -11,12 +11,12 @@ import zmq
 
 from common import now
 from common.words import counted
+from phone_host.accounts.delays import DELAYS, STAGES, Spread
 from phone_host.bench.analysis import Analysis, Checked, Errors, InterfaceFit, WhatIf, regime_of, statistics_of
 from phone_host.bench.cases import BOARD_SETS, Interface
+from phone_host.bench.delay_fit import DelayFit
 from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
-from phone_host.measure.delay_fit import DelayFit
-from phone_host.measure.delays import DELAYS, STAGES, Spread
 from phone_host.output.json_text import json_number
 from phone_host.sync.fifo import FifoSettings
 

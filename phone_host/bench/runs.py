@@ -19,12 +19,12 @@ from common.keys import usual_keys
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
+from phone_host.accounts.link_account import LinkAccount
 from phone_host.bench.cases import Case, Size
 from phone_host.bench.links import Ends, open_ends
 from phone_host.bench.relay import RelayAccount
 from phone_host.children.board_process import BoardAccount
 from phone_host.demo.demonstration import NEAR_M
-from phone_host.measure.accounts import LinkAccount
 from phone_host.model import CameraModel, PairCounts, Result, Rig, StereoGeometry
 from phone_host.run.host import Host
 from phone_host.run.host_settings import HostSettings

@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import Final
 
 from common.words import counted
+from phone_host.accounts.delays import DELAYS, IDLE_STAGE_NS, STAGES, DelayStatistics
 from phone_host.bench.analysis import Analysis, regime_of, statistics_of
+from phone_host.bench.delay_fit import DelayFit
 from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.report import PERCENTILES, few_pairs_words, losses, percentiles
 from phone_host.bench.runs import CaseResult
-from phone_host.measure.delay_fit import DelayFit
-from phone_host.measure.delays import DELAYS, IDLE_STAGE_NS, STAGES, DelayStatistics
 from phone_host.svg.plot_scale import duration_text
 from phone_host.sync.fifo import FifoSettings
 

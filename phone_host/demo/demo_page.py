@@ -6,7 +6,7 @@ from common import now
 from common.ledger import PairLedger
 from common.words import counted
 from phone_host.demo.demonstration import CheckedPair, DepthErrors
-from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Side
 from phone_host.report.page_links import FileLink, NextCommand
 from phone_host.report.report_page import Figure, Headline, PageData, delay_series, page

@@ -13,7 +13,8 @@ from typing import Final
 
 from common import now
 from common.words import counted
-from phone_host.measure.run_snapshot import RunSnapshot, concerns
+from phone_host.diagnostics.run_rules import concerns
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Result, Side
 from phone_host.output.axes import Axes
 from phone_host.report.stereo_report import Remark

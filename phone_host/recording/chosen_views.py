@@ -19,7 +19,7 @@ from common.recording.layout import camera_name
 from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
 from common.recording.recorded import Recorded, Shown, period_ns, size_px
-from phone_host.measure.camera_match import state_of
+from phone_host.diagnostics.run_rules import state_of
 from phone_host.model import Image, Side
 from phone_host.output.cameras_json import CAMERAS_NAME, cameras_text
 from phone_host.recording.both_sides import encoded, topics_of

@@ -27,7 +27,7 @@ from common.recording.layout import DELAYS, camera_name
 from common.recording.opened import open_recorded
 from common.recording.recorded import Shown, size_px
 from common.stamp import HOST_CLOCK, Stamp
-from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
+from phone_host.accounts.link_account import LinkAccount, LinkTally, SessionAccount
 from phone_host.model import BoardFrame, Side
 from phone_host.recording.both_sides import topics_of
 from phone_host.recording.clock_messages import told_clocks

@@ -19,8 +19,8 @@ from common.recording.disk_queue import DiskQueue
 from common.recording.layout import CAPTURE, CLOCK, DELAYS, camera_name, camera_values, image_topic
 from common.recording.recording_file import RecordingFile
 from common.recording.ros_messages import RecordedImage, image_parts, image_type
-from phone_host.measure.recording_account import RecordingAccount
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import BoardFrame, Side
 from phone_host.recording.clock_messages import clock_text
 from phone_host.sync.clock import ClockEstimate

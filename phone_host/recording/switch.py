@@ -8,7 +8,7 @@ from common.errors import SettingsError
 from common.frame import Buffer, Frame
 from common.ledger import PairLedger
 from common.protocol.message import CameraDescription
-from phone_host.measure.recording_account import RecordingAccount
+from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import BoardFrame
 from phone_host.output.cameras_json import CAMERAS_NAME
 from phone_host.recording.recorder import Recorder

@@ -2,7 +2,7 @@
 
 from common.frame import Frame
 from common.protocol.message import CameraDescription
-from phone_host.measure.recording_account import RecordingAccount
+from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import BoardFrame
 from phone_host.recording.recorder import Recorder
 from phone_host.sync.clock import ClockEstimate

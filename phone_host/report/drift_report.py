@@ -2,7 +2,7 @@
 
 import math
 
-from phone_host.measure.drift_words import is_late, turn_words
+from phone_host.diagnostics.drift import is_late, turn_words
 from phone_host.model import Change, ChangeKind, Departure, Drift, Turn
 from phone_host.output.json_text import json_number
 from phone_host.report.report_page import Table

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from common.ledger import PairLedger, StageTimes
 from common.words import counted
-from phone_host.measure.delays import IDLE_STAGE_NS, DelayStatistics
+from phone_host.accounts.delays import IDLE_STAGE_NS, DelayStatistics
 from phone_host.report.chart_view import dots_chart, stacked_chart
 from phone_host.report.page_frame import document, section, table, two_widths
 from phone_host.report.page_links import FileLink, NextCommand, files_section, list_section, next_section

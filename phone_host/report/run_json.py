@@ -5,17 +5,15 @@ from typing import Final
 
 from common.camera.base import CameraHealth, health_values
 from common.versions import REPORT_FORMAT
-from phone_host.measure.accounts import LinkTally, rung_values
-from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, STAGES, Spread
-from phone_host.measure.doubt_history import Episode, saved_pairs, told_past
-from phone_host.measure.headline import headline
-from phone_host.measure.image_trust import ImageFigures
-from phone_host.measure.regime import Judgement, judge
-from phone_host.measure.replay_facts import ReplayFacts
-from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, disbelieved, figures, history
-from phone_host.measure.sink_account import SinkAccount
-from phone_host.measure.trust import Concern
-from phone_host.measure.unused import unused
+from phone_host.accounts.delays import DELAYS, FROM_EXPOSURE, STAGES, ReplayFacts, SinkAccount, Spread
+from phone_host.accounts.link_account import LinkTally, rung_values
+from phone_host.diagnostics.concern import Concern
+from phone_host.diagnostics.headline import headline
+from phone_host.diagnostics.image_judge import Episode, saved_pairs, told_past
+from phone_host.diagnostics.image_rules import ImageFigures
+from phone_host.diagnostics.run_rules import concerns, history
+from phone_host.diagnostics.run_snapshot import TIMELESS, RunSnapshot, disbelieved, unused
+from phone_host.diagnostics.throughput import Judgement, figures, judge
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.output.json_text import json_number
 from phone_host.report.budget_report import budget_values

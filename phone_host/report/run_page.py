@@ -9,16 +9,14 @@ from common import now
 from common.camera.base import CameraHealth
 from common.ledger import PairLedger
 from common.words import counted, times
-from phone_host.measure.absence import away_words
-from phone_host.measure.accounts import rung_lines
-from phone_host.measure.budget_words import budget_lines, missed_words
-from phone_host.measure.doubt_history import saved_pairs
-from phone_host.measure.drift_words import drift_lines
-from phone_host.measure.headline import headline, pixels_text
-from phone_host.measure.numbers import pairing_words
-from phone_host.measure.regime import Regime, judge
-from phone_host.measure.run_snapshot import TIMELESS, RunSnapshot, concerns, figures, history
-from phone_host.measure.unused import unused
+from phone_host.accounts.link_account import away_words, rung_lines
+from phone_host.diagnostics.drift import drift_lines
+from phone_host.diagnostics.headline import headline, pixels_text
+from phone_host.diagnostics.image_judge import saved_pairs
+from phone_host.diagnostics.image_numbers import pairing_words
+from phone_host.diagnostics.run_rules import concerns, history
+from phone_host.diagnostics.run_snapshot import TIMELESS, RunSnapshot, unused
+from phone_host.diagnostics.throughput import Regime, budget_lines, figures, judge, missed_words
 from phone_host.model import Processed, Side
 from phone_host.report.budget_report import budget_tables
 from phone_host.report.cut_words import cut_sentence

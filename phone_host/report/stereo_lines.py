@@ -4,7 +4,7 @@ import math
 
 from common.imagesize.head import size_text
 from common.words import counted, distance_text
-from phone_host.measure.headline import pixels_text
+from phone_host.diagnostics.headline import pixels_text
 from phone_host.report.cut_words import share_text
 from phone_host.report.stereo_report import (
     ALWAYS,

@@ -12,8 +12,7 @@ from typing import Final
 import numpy as np
 
 from common.words import counted, distance_text
-from phone_host.measure.depth_error import depth_error_m
-from phone_host.measure.headline import pixels_text
+from phone_host.diagnostics.headline import depth_error_m, pixels_text
 from phone_host.model import Processed
 from phone_host.output.preview import colour_disparity, colour_range_px
 from phone_host.report import depth_data

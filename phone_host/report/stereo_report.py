@@ -10,7 +10,7 @@ from typing import Final, Self
 
 from common.errors import DataError, TandemError
 from common.words import counted
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
 from phone_host.model import CutCounts, DepthLimits, Drift, MatchReport, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair

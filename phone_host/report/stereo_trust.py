@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from phone_host.measure.headline import Answer
-from phone_host.measure.image_trust import ImageFigures
-from phone_host.measure.trust import Concern
+from phone_host.diagnostics.concern import Concern
+from phone_host.diagnostics.headline import Answer
+from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.report.run_json import concern_values, figure_values
 
 

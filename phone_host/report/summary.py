@@ -5,19 +5,15 @@ from typing import Final
 
 from common.camera.base import CameraHealth, origin_words
 from common.words import counted, times
-from phone_host.measure.absence import away_words
-from phone_host.measure.accounts import LinkAccount, LinkTally, rung_lines
-from phone_host.measure.budget_words import budget_lines, missed_words
-from phone_host.measure.delays import DELAYS
-from phone_host.measure.doubt_history import history_lines
-from phone_host.measure.drift_words import drift_lines
-from phone_host.measure.headline import headline
-from phone_host.measure.image_trust import ImageTrust
-from phone_host.measure.numbers import pairing_words
-from phone_host.measure.regime import judge
-from phone_host.measure.replay_facts import side_by_side
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures, history
-from phone_host.measure.unused import unused
+from phone_host.accounts.delays import DELAYS, side_by_side
+from phone_host.accounts.link_account import LinkAccount, LinkTally, away_words, rung_lines
+from phone_host.diagnostics.drift import drift_lines
+from phone_host.diagnostics.headline import headline
+from phone_host.diagnostics.image_judge import ImageTrust, history_lines
+from phone_host.diagnostics.image_numbers import pairing_words
+from phone_host.diagnostics.run_rules import concerns, history
+from phone_host.diagnostics.run_snapshot import RunSnapshot, unused
+from phone_host.diagnostics.throughput import budget_lines, figures, judge, missed_words
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.report.cut_words import cut_sentence
 from phone_host.report.match_words import run_corrected_words

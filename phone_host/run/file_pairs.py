@@ -14,7 +14,7 @@ from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
 from common.program.out_of_memory import noted_if_out_of_memory
 from common.words import counted
-from phone_host.measure.trust import Concern
+from phone_host.diagnostics.concern import Concern
 from phone_host.model import Processed
 from phone_host.report.stereo_report import FailedPair, Size
 from phone_host.run.freed_memory import keep_freed_memory

@@ -25,7 +25,7 @@ from common import now
 from common.errors import UnavailableError
 from common.ledger import PairLedger
 from common.program.logs import event
-from phone_host.measure.sink_account import SinkAccount
+from phone_host.accounts.delays import SinkAccount
 from phone_host.model import Result, Unwritten
 from phone_host.output.axes import Axes
 from phone_host.output.cameras_json import CAMERAS_NAME

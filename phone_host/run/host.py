@@ -12,12 +12,12 @@ from common.ledger import PairLedger
 from common.link.base import Link
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import Pacing
-from phone_host.measure.absence import away_of
-from phone_host.measure.image_motion import MotionMeter
-from phone_host.measure.replay_facts import replay_facts
-from phone_host.measure.run_snapshot import RunSnapshot, concerns
-from phone_host.measure.sink_account import SinkAccount
-from phone_host.measure.trouble import Trouble
+from phone_host.accounts.delays import SinkAccount, replay_facts
+from phone_host.accounts.image_motion import MotionMeter
+from phone_host.accounts.link_account import away_of
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_rules import concerns
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Processed, Result, Side
 from phone_host.recording.clock_messages import boot_of
 from phone_host.recording.playback import Playback

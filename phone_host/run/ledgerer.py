@@ -8,9 +8,8 @@ from typing import Final
 
 from common.frame import FrameFault, SpoiledImageError
 from common.ledger import HostMarks, PairLedger
-from phone_host.measure.delays import DelayStatistics, Sample
-from phone_host.measure.matched_medians import MatchedMedians
-from phone_host.measure.trouble import Trouble, Troubles
+from phone_host.accounts.delays import DelayStatistics, MatchedMedians, Sample
+from phone_host.diagnostics.concern import Trouble, Troubles
 from phone_host.model import CutCounts, DepthAccount, FramePair, Processed
 
 _MOST_GAPS: Final = 4096

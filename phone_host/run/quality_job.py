@@ -13,8 +13,8 @@ import numpy as np
 
 from phone_host.calibration.solve.board_plane import BoardPlane, find_board_plane
 from phone_host.calibration.target.corners import Board
-from phone_host.measure.depth_error import depth_error_m
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.headline import depth_error_m
 from phone_host.model import Crop, PlaneQuality, Processed, Seen
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text

@@ -9,7 +9,7 @@ import numpy as np
 
 from common.recording.layout import CLOUD, DEPTH
 from common.recording.ros_messages import POINT_BYTES, cloud_parts, depth_parts
-from phone_host.measure.sink_account import SinkAccount
+from phone_host.accounts.delays import SinkAccount
 from phone_host.model import CloudImage, Image, Result, Side
 from phone_host.output.depth_png import depth_mm
 from phone_host.recording.switch import RecordingSwitch

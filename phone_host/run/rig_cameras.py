@@ -5,7 +5,8 @@ import logging
 from common.camera_identity import UNKNOWN_CAMERA, Lock, RememberedCamera
 from common.program.logs import event
 from common.protocol.message import BoardHello, CameraDescription, Locks
-from phone_host.measure.camera_match import LockMiss, misses, require_camera, state_of
+from phone_host.diagnostics.run_rules import misses, require_camera, state_of
+from phone_host.diagnostics.run_snapshot import LockMiss
 from phone_host.model import Rig, Side
 from phone_host.output.cameras_json import cameras_text
 from phone_host.stream.streams import BoardStream, OwnStream

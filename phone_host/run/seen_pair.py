@@ -8,7 +8,7 @@ import numpy as np
 
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
-from phone_host.measure.trust import Concern
+from phone_host.diagnostics.concern import Concern
 from phone_host.model import Disparity, Processed, RectifiedPair, StereoGeometry
 from phone_host.report.stereo_report import Size
 from phone_host.run.file_pairs import Matching, Watcher, sound_pair

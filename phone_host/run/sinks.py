@@ -11,8 +11,7 @@ from collections.abc import Callable
 from typing import Any, Final, Generic, Protocol, TypeVar
 
 from common import now
-from phone_host.measure.delays import Series
-from phone_host.measure.sink_account import SinkAccount
+from phone_host.accounts.delays import Series, SinkAccount
 from phone_host.model import Result
 
 T = TypeVar("T")

@@ -5,14 +5,12 @@ from typing import Final
 
 from common.orientation import UPRIGHT, Orientation
 from common.words import counted, distance_text
-from phone_host.measure.drift_words import stills_remedy, stills_words
-from phone_host.measure.file_remedies import ImageSource
-from phone_host.measure.headline import answer
-from phone_host.measure.image_doubts import image_doubts
-from phone_host.measure.image_trust import median_figures
-from phone_host.measure.no_depth import no_depth
-from phone_host.measure.orient_words import with_final_options
-from phone_host.measure.trust import REJECTED_RIG, Concern, Doubt, gravest_first
+from phone_host.diagnostics.arrangement import ImageSource, with_final_options
+from phone_host.diagnostics.concern import REJECTED_RIG, Concern, Doubt, gravest_first
+from phone_host.diagnostics.drift import stills_remedy, stills_words
+from phone_host.diagnostics.headline import answer
+from phone_host.diagnostics.image_rules import image_doubts, median_figures
+from phone_host.diagnostics.run_rules import no_depth
 from phone_host.model import Drift, Processed
 from phone_host.report.cut_words import searched_from_m
 from phone_host.report.depth_data import density

@@ -10,14 +10,12 @@ from rich.text import Text
 
 from common import now
 from common.words import counted
-from phone_host.measure.absence import away_words
-from phone_host.measure.accounts import rung_lines
-from phone_host.measure.budget_words import budget_lines
-from phone_host.measure.delays import DELAYS, FROM_EXPOSURE, IDLE_STAGE_NS, STAGES, Spread
-from phone_host.measure.headline import headline
-from phone_host.measure.regime import judge
-from phone_host.measure.run_snapshot import RunSnapshot, concerns, figures
-from phone_host.measure.unused import unused
+from phone_host.accounts.delays import DELAYS, FROM_EXPOSURE, IDLE_STAGE_NS, STAGES, Spread
+from phone_host.accounts.link_account import away_words, rung_lines
+from phone_host.diagnostics.headline import headline
+from phone_host.diagnostics.run_rules import concerns
+from phone_host.diagnostics.run_snapshot import RunSnapshot, unused
+from phone_host.diagnostics.throughput import budget_lines, figures, judge
 from phone_host.report.summary import camera_troubles, corrected_lines, depth_lines, phase_lines
 from phone_host.run.redrawn import Part, Redrawn
 

@@ -8,10 +8,9 @@ from typing import Final
 
 from common import now
 from common.program.logs import event
-from phone_host.measure.image_doubts import image_doubts
-from phone_host.measure.image_judge import ImageJudge
-from phone_host.measure.image_trust import ImageTrust
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.image_judge import ImageJudge, ImageTrust
+from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.model import DepthLimits, Result, StereoGeometry
 from phone_host.run.drift_keeper import DriftKeeper, Moment
 from phone_host.run.sinks import OneQueueSink, SinkQueue

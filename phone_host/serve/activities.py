@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from typing import Final
 
 from common.errors import TandemError
-from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.web.source import Activity
 
 _LOG = logging.getLogger(__name__)

@@ -8,8 +8,8 @@ from typing import Final
 
 from common.errors import TandemError
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.diagnostics.concern import Trouble, trouble_of
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.output.axes import Axes
 from phone_host.run.host import Host
 from phone_host.serve.memory import Memory

@@ -7,9 +7,9 @@ from typing import Final
 from common.doctor.finding import Finding, Grade
 from common.doctor.machine_checks import LOG_UNREADABLE
 from common.words import counted
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.doctor.camera_check.words import CHECK_AGAIN
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble
 from phone_host.web.source import Checked
 
 _OF_THE_CHOICE: Final = frozenset(

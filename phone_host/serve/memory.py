@@ -7,8 +7,8 @@ from typing import Final
 
 from common import now
 from phone_host.calibration.guide.snapshot import Ended
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.serve.program import Calibrated, Choices
 from phone_host.serve.steps import Facts, steps
 from phone_host.web.source import Activity, Checked, Choice, PageState, PrintState, ScanState

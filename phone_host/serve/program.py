@@ -10,12 +10,12 @@ from common.keys import KeyFolder
 from phone_host.calibration.guide.gates import View
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.scan import LiveScan
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble
 from phone_host.output.axes import Axes
 from phone_host.printers.door import PrinterDoor
 from phone_host.printers.journal import Journal

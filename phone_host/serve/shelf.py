@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from common.program.logs import event
-from phone_host.measure.sink_account import SinkAccount
+from phone_host.accounts.delays import SinkAccount
 from phone_host.model import Processed, Result
 from phone_host.stereo.core import StereoCore
 from phone_host.web.source import Newest

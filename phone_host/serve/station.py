@@ -19,10 +19,10 @@ from common.words import counted
 from phone_host.boards.enrolment import PairingCall
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.diagnostics.concern import Trouble, trouble_of
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.doctor.host_doctor import examine
 from phone_host.live.calibration_view import SnapshotValues
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.run.freed_memory import give_back_freed_memory
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task

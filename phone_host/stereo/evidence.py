@@ -1,6 +1,6 @@
 """Measures what a pair's images say about its depth: density, consistency, vertical error, brightness, arrangement. Pure.
 
-`phone_host.measure.image_doubts` judges it. All is measured at reduced size, so that a judgement of 640x480 costs about
+`phone_host.diagnostics.image_rules` judges it. All is measured at reduced size, so that a judgement of 640x480 costs about
 50 ms of one core.
 """
 

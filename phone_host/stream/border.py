@@ -12,7 +12,7 @@ from common.program.logs import event
 from common.protocol.message import CameraDescription, FrameMessage, Pacing
 from common.protocol.session import Echo
 from common.value import value
-from phone_host.measure.accounts import LinkAccount, SessionAccount
+from phone_host.accounts.link_account import LinkAccount, SessionAccount
 from phone_host.model import BoardFrame
 from phone_host.sync.clock import ClockEstimate, Heard
 from phone_host.sync.clocks import LinkClocks

@@ -15,7 +15,7 @@ from common import now
 from common.camera.image_numbers import ImageNumbers, numbers_told
 from common.frame import Frame
 from common.protocol.message import CameraDescription, Pacing
-from phone_host.measure.numbers import MOST_NAMED, FilmWatch, ImageEvidence
+from phone_host.diagnostics.image_numbers import MOST_NAMED, FilmWatch, ImageEvidence
 from phone_host.model import BoardFrame, FramePair, PairCounts
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.sync.fifo import Fifo, FifoSettings, Overflow

@@ -14,7 +14,7 @@ from common.link.waiter import Waiter
 from common.protocol.message import BoardHello, Locks, LockState, Ping
 from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
-from phone_host.measure.accounts import LinkAccount
+from phone_host.accounts.link_account import LinkAccount
 from phone_host.stream.corrections import Corrections
 from phone_host.stream.frame_sink import FrameSink
 from phone_host.stream.link_facts import LinkFacts

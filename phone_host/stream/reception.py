@@ -40,7 +40,7 @@ from common.protocol.session import (
     Unbelievable,
     Vanished,
 )
-from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount, link_names
+from phone_host.accounts.link_account import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
 from phone_host.stream.border import Arrival, Border
 from phone_host.stream.frame_sink import FrameSink

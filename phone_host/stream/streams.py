@@ -4,7 +4,7 @@ from typing import Protocol
 
 from common.camera.base import CameraHealth
 from common.protocol.message import BoardHello, Locks, LockState, Steering
-from phone_host.measure.accounts import LinkAccount
+from phone_host.accounts.link_account import LinkAccount
 from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate
 

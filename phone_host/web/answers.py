@@ -10,7 +10,7 @@ from typing import BinaryIO, Final, TypeVar
 
 from aiohttp import web
 
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
 from phone_host.output.json_text import json_text
 from phone_host.web.camera_lines import CameraLines
 from phone_host.web.door import KNOWN, problem

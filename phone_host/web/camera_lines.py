@@ -12,7 +12,7 @@ from typing import Any, Final
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from common import now
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
 from phone_host.output.json_text import json_text
 from phone_host.web.door import KNOWN, problem
 from phone_host.web.gate import Gate, is_loopback

@@ -9,7 +9,7 @@ from aiohttp.typedefs import Handler, Middleware
 
 from common import now
 from common.errors import TandemError
-from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.output.json_text import json_text
 from phone_host.web.connections import Connections
 from phone_host.web.gate import Asked, Gate, Kind, Passed, Refusal

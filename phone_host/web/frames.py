@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.ledger import PairLedger
-from phone_host.measure.delays import DELAYS
+from phone_host.accounts.delays import DELAYS
 from phone_host.model import Disparity, Processed
 from phone_host.output.json_text import json_text
 from phone_host.output.preview import colour_range_px

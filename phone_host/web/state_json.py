@@ -9,11 +9,10 @@ from typing import Final
 
 from common.ledger import PairLedger
 from common.words import counted
-from phone_host.measure.headline import Grade, headline
-from phone_host.measure.recording_account import RecordingAccount
-from phone_host.measure.run_snapshot import RunSnapshot, concerns
-from phone_host.measure.trouble import Trouble
-from phone_host.measure.unused import unused
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.headline import Grade, headline
+from phone_host.diagnostics.run_rules import concerns
+from phone_host.diagnostics.run_snapshot import RecordingAccount, RunSnapshot, unused
 from phone_host.model import DepthAccount, Unwritten
 from phone_host.output.json_text import json_number, json_text
 from phone_host.report.cut_words import cut_sentence

@@ -26,7 +26,7 @@ from rich.table import Table
 
 from phone_host.calibration.drift.rows import values_of
 from phone_host.calibration.drift.watch import START_PX, WINDOW
-from phone_host.measure.drift_words import drift_concerns
+from phone_host.diagnostics.drift import drift_concerns
 from phone_host.model import AS_CALIBRATED, Departure, Drift
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted

@@ -2,7 +2,7 @@
 
 Mistakes are made on given pairs of $SCAN_DATA (rectified ones, and unrectified ones behind rigs) and on rendered rooms
 of random furniture, cameras, sizes, light, noise, blur and JPEG quality. Half of the scenes were never looked at while
-the limits of `phone_host/measure/image_doubts.py` were chosen (`held out`); both halves are shown. A mistake is
+the limits of `phone_host/diagnostics/image_rules.py` were chosen (`held out`); both halves are shown. A mistake is
 recognised if its own name is given and no other blocking one. Good pairs and good runs, several pairs each, must raise
 no doubt at all. Figures to reach: 95 % of each kind of scene and half, every mistake 95 % over all; no false alarm.
 Exit 4 when one is missed, 3 when there is no SCAN_DATA.
@@ -28,8 +28,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common import now
-from phone_host.measure.image_doubts import image_doubts
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import maps_of, measure_evidence
 from tests.bench.depth_scenes import Image

@@ -24,7 +24,7 @@ import zmq
 from common import now
 from common.errors import UnavailableError
 from common.link.factory import open_link, parse_link
-from phone_host.measure.accounts import SessionAccount
+from phone_host.accounts.link_account import SessionAccount
 from phone_host.model import BoardFrame
 from phone_host.stream.receiver import Receiver
 from tests.support.unkept import Unkept

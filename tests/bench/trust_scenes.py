@@ -13,7 +13,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore

@@ -10,7 +10,7 @@ import pytest
 
 from common.errors import DataError
 from common.versions import LEDGER_FORMAT, REPORT_FORMAT, RIG_FORMAT
-from phone_host.measure.delays import DELAYS, STAGES
+from phone_host.accounts.delays import DELAYS, STAGES
 from phone_host.model import Side, TimeOffset
 from phone_host.output.rig_yaml import read_rig, write_rig, write_time_offset
 from phone_host.stereo.rectify import rectify_rig

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 from common.ledger import BoardMarks, HostMarks, PairLedger, StageTimes
 from common.protocol.message import BoardCounts
+from phone_host.accounts.link_account import LinkAccount, SessionAccount
 from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.report import Conditions
 from phone_host.bench.runs import CaseResult, after_warm_up
 from phone_host.children.board_process import BoardAccount
-from phone_host.measure.accounts import LinkAccount, SessionAccount
 from phone_host.model import PairCounts
 from phone_host.sync.fifo import FifoSettings
 from tests.support.samples import LEDGER

@@ -8,8 +8,8 @@ from typing import Final
 
 from common.frame import Frame
 from common.stamp import HOST_CLOCK, Stamp
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import BoardFrame, FramePair, Processed, Result
 from phone_host.scan.patches import Patches
 from phone_host.web.source import (

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 from common.camera.base import CameraHealth, CameraState
 from common.ledger import BoardMarks, HostMarks
-from phone_host.measure.accounts import LinkAccount
-from phone_host.measure.delays import DelayStatistics
-from phone_host.measure.run_snapshot import RunSnapshot
+from phone_host.accounts.delays import DelayStatistics
+from phone_host.accounts.link_account import LinkAccount
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import PairCounts, Unwritten
 from phone_host.sync.fifo import FifoSettings
 from tests.support.samples import LEDGER

@@ -17,8 +17,8 @@ from common.errors import DataError
 from common.link.factory import open_link, parse_link
 from common.orientation import Orientation
 from common.protocol.message import Locks
-from phone_host.measure.run_snapshot import concerns
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.run_rules import concerns
 from phone_host.model import CameraModel, Rig
 from phone_host.output.cameras_json import read_cameras
 from phone_host.output.pfm import read_pfm

@@ -9,8 +9,7 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.measure.regime import Regime, judge
-from phone_host.measure.run_snapshot import figures
+from phone_host.diagnostics.throughput import Regime, figures, judge
 from phone_host.model import Result
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.ledger import BoardMarks
+from phone_host.accounts.delays import DELAYS, STAGES
 from phone_host.bench.analysis import Analysis, WhatIf, analyse
 from phone_host.bench.changes import parse_changes
 from phone_host.bench.page import page
@@ -29,7 +30,6 @@ from phone_host.bench.tables import (
     summary_line,
     what_if_rows,
 )
-from phone_host.measure.delays import DELAYS, STAGES
 from phone_host.model import PairCounts
 from tests.support.bench_results import UNDER, analysed, ledger, result, slower
 

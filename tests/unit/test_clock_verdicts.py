@@ -9,7 +9,7 @@ import pytest
 from common.ledger import BoardMarks
 from common.protocol.message import BoardCounts
 from common.protocol.session import Echo
-from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
+from phone_host.accounts.link_account import LinkAccount, LinkTally, SessionAccount
 from phone_host.stream.border import Admitted, Arrival, Border
 from phone_host.sync.allowed_lines import Spacing, allowed_lines, believe
 from phone_host.sync.clock import ClockEstimator, Heard

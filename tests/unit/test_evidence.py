@@ -11,9 +11,9 @@ import pytest
 
 from common import now
 from common.ledger import StageTimes
-from phone_host.measure.headline import Grade
-from phone_host.measure.image_doubts import image_doubts
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.headline import Grade
+from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.model import (
     Arrangement,
     CameraModel,

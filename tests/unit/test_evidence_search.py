@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.measure.headline import Grade, answer
-from phone_host.measure.image_doubts import image_doubts
-from phone_host.measure.image_trust import median_figures
-from phone_host.measure.no_depth import no_depth
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.headline import Grade, answer
+from phone_host.diagnostics.image_rules import image_doubts, median_figures
+from phone_host.diagnostics.run_rules import no_depth
 from phone_host.model import CameraModel, Crop, Evidence, Image, Rig, StereoGeometry
 from phone_host.scene.scene import Look, demo_scene, render, rig_poses
 from phone_host.stereo.core import StereoCore

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phone_host.measure.delay_fit import fit_delay, neighbours
+from phone_host.bench.delay_fit import fit_delay, neighbours
 
 
 @given(st.floats(1e4, 1e8), st.floats(0.1, 1e5), st.integers(2, 200))

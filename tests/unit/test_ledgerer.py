@@ -1,7 +1,6 @@
 """The books of a run: a time without the board counts neither as starvation nor for the rate."""
 
-from phone_host.measure.absence import Absence
-from phone_host.measure.accounts import LinkAccount
+from phone_host.accounts.link_account import Absence, LinkAccount
 from phone_host.model import CutCounts, FramePair, Processed, RectifiedPair
 from phone_host.run.ledgerer import Ledgerer
 from tests.support.numbered import draw

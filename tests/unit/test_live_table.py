@@ -15,8 +15,8 @@ from rich.console import Console
 
 from common.program import logs
 from common.program.terminal import headed, rows
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.run.terminal_view import LiveTable
 from tests.support.run_snapshots import run
 from tests.support.screen import Screen

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from common.errors import SettingsError
-from phone_host.measure.matched_medians import MatchedMedians
+from phone_host.accounts.delays import MatchedMedians
 from phone_host.model import (
     Crop,
     CutCounts,

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from phone_host.measure.file_remedies import FILE_REMEDIES
-from phone_host.measure.headline import Answer, Grade
-from phone_host.measure.image_trust import ImageFigures
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.diagnostics.arrangement import FILE_REMEDIES
+from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.headline import Answer, Grade
+from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.model import Arrangement
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair

@@ -3,8 +3,8 @@
 import json
 from dataclasses import replace
 
-from phone_host.measure.accounts import LinkAccount, LinkTally
-from phone_host.measure.trouble import Trouble
+from phone_host.accounts.link_account import LinkAccount, LinkTally
+from phone_host.diagnostics.concern import Trouble
 from phone_host.model import CutCounts, DepthAccount, DepthLimits, PairCounts, Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.web.openapi import description

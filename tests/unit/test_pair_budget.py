@@ -13,11 +13,13 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.cli import main
-from phone_host.measure.budget_words import budget_lines, missed_words, narrowed_words, with_budget
-from phone_host.measure.headline import headline
-from phone_host.measure.image_trust import ImageFigures, ImageTrust
-from phone_host.measure.run_snapshot import RunSnapshot, concerns
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.headline import headline
+from phone_host.diagnostics.image_judge import ImageTrust
+from phone_host.diagnostics.image_rules import ImageFigures
+from phone_host.diagnostics.run_rules import concerns
+from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.diagnostics.throughput import budget_lines, missed_words, narrowed_words, with_budget
 from phone_host.model import (
     BudgetAccount,
     BudgetReason,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.ledger import BoardMarks, StageTimes
-from phone_host.measure.delay_fit import fit_delay
+from phone_host.bench.delay_fit import fit_delay
 from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
 from phone_host.svg.plot_parts import point_legend
 from tests.support.samples import LEDGER

@@ -12,8 +12,8 @@ from common.errors import SettingsError
 from common.frame import PixelFormat
 from common.protocol.message import CameraDescription, Pacing
 from common.recording.opened import open_recorded
-from phone_host.measure.recording_account import RecordingAccount
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Side
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.switch import RecordingSwitch

@@ -9,9 +9,9 @@ import pytest
 from common.doctor.finding import exit_code, settings_finding, table
 from common.errors import SettingsError
 from common.ledger import StageTimes
-from phone_host.measure.budget_words import budget_lines
-from phone_host.measure.headline import Answer, Grade
-from phone_host.measure.image_trust import ImageFigures
+from phone_host.diagnostics.headline import Answer, Grade
+from phone_host.diagnostics.image_rules import ImageFigures
+from phone_host.diagnostics.throughput import budget_lines
 from phone_host.model import MatchReport, Processed, RectifiedPair
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair

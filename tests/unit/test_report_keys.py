@@ -10,14 +10,11 @@ import pytest
 from common.camera.base import CameraHealth, CameraState
 from common.frame import FrameFault
 from common.protocol.message import BoardCounts, DropReason
+from phone_host.accounts.delays import SinkAccount, replay_facts
+from phone_host.accounts.link_account import Away, LinkAccount, LinkTally, SessionAccount
 from phone_host.bench.report import as_json
-from phone_host.measure.absence import Away
-from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
-from phone_host.measure.recording_account import RecordingAccount
-from phone_host.measure.replay_facts import replay_facts
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.sink_account import SinkAccount
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RecordingAccount, RunSnapshot
 from phone_host.model import CutCounts, DepthAccount, DepthLimits, Drift, MatchReport, Search
 from phone_host.report.quality_json import quality_json
 from phone_host.report.run_json import build

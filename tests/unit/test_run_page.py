@@ -8,7 +8,7 @@ import pytest
 
 from common.camera.base import CameraHealth, CameraState
 from common.camera.image_numbers import ImageNumbers
-from phone_host.measure.numbers import ImageEvidence, pairing_words
+from phone_host.diagnostics.image_numbers import ImageEvidence, pairing_words
 from phone_host.model import Side
 from phone_host.report.run_page import camera_table, run_page
 from phone_host.report.summary import summary

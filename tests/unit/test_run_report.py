@@ -9,15 +9,15 @@ from common.camera.base import CameraHealth, CameraState
 from common.camera.image_numbers import ImageNumbers
 from common.frame import FrameFault
 from common.protocol.message import BoardCounts, DropReason
-from phone_host.measure.absence import Absence, away_of, away_words
-from phone_host.measure.accounts import LinkAccount, LinkTally, SessionAccount
-from phone_host.measure.delays import DelayStatistics, Series
-from phone_host.measure.headline import headline
-from phone_host.measure.image_trust import ImageFigures, ImageTrust
-from phone_host.measure.numbers import ImageEvidence
-from phone_host.measure.sink_account import SinkAccount
-from phone_host.measure.trouble import Trouble
-from phone_host.measure.unused import Unused, unused
+from phone_host.accounts.delays import DelayStatistics, Series, SinkAccount
+from phone_host.accounts.link_account import Absence, LinkAccount, LinkTally, SessionAccount, away_of, away_words
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.headline import headline
+from phone_host.diagnostics.image_judge import ImageTrust
+from phone_host.diagnostics.image_numbers import ImageEvidence
+from phone_host.diagnostics.image_rules import ImageFigures
+from phone_host.diagnostics.run_rules import nothing_whole
+from phone_host.diagnostics.run_snapshot import Unused, unused
 from phone_host.model import PairCounts, Side, TimeOffset, Unwritten
 from phone_host.report.report_page import delay_series
 from phone_host.report.run_json import age_bound, build
@@ -345,9 +345,9 @@ def test_a_run_without_one_whole_image_says_so() -> None:
     spoiled = BoardCounts(grabbed=10, sent=0, dropped=((DropReason.SPOILED, 10),))
     link = LinkAccount([SessionAccount("s", BoardCounts(), spoiled)])
     assert "because images are not whole (10 from the board's camera)" in summary(replace(run(0), link=link))
-    assert replace(run(0), link=link).spoiled_counts.nothing_whole
-    assert not replace(run(1), link=link).spoiled_counts.nothing_whole
-    assert not replace(run(0), spoiled=9).spoiled_counts.nothing_whole
+    assert nothing_whole(replace(run(0), link=link))
+    assert not nothing_whole(replace(run(1), link=link))
+    assert not nothing_whole(replace(run(0), spoiled=9))
 
 
 def test_images_without_a_partner_do_not_make_the_depth_of_the_pairs_doubtful() -> None:

@@ -15,9 +15,9 @@ from common.errors import DataError, SettingsError, UnavailableError
 from common.ledger import StageTimes
 from common.peers import Peer
 from phone_host.boards.found import Found
+from phone_host.diagnostics.concern import Trouble
 from phone_host.doctor.camera_check.words import stored_finding
 from phone_host.live.scan import LiveScan
-from phone_host.measure.trouble import Trouble
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side
 from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes

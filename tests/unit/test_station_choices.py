@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import SettingsError
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
 from phone_host.serve.station import Station
 from phone_host.verbs.serve.kept_choices import kept
 from phone_host.verbs.serve.program import Commands

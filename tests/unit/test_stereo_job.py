@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError, UnavailableError
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
 from phone_host.model import Image, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pfm import read_pfm, read_xyz

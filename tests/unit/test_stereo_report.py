@@ -6,9 +6,9 @@ from textwrap import wrap
 
 import pytest
 
-from phone_host.measure.headline import Answer, Grade
-from phone_host.measure.image_trust import ImageFigures
-from phone_host.measure.no_depth import no_depth
+from phone_host.diagnostics.headline import Answer, Grade
+from phone_host.diagnostics.image_rules import ImageFigures
+from phone_host.diagnostics.run_rules import no_depth
 from phone_host.model import CutCounts, DepthLimits, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair

@@ -15,9 +15,9 @@ from rich.console import Console
 
 from common.ledger import BoardMarks
 from common.program.terminal import columns, folded
+from phone_host.accounts.link_account import LinkAccount, LinkTally
 from phone_host.bench.tables import narrow_rows
 from phone_host.calibration.target.pairs import Reason, Rejected
-from phone_host.measure.accounts import LinkAccount, LinkTally
 from phone_host.report.summary import summary
 from phone_host.run.terminal_view import LiveTable
 from phone_host.verbs.calibrate.summary import rejections

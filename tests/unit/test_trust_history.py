@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from common import now
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
 from phone_host.model import Processed
 from phone_host.run.trust_sink import TrustSink
 from phone_host.scene.scene import demo_scene, render, rig_poses

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.measure.headline import Grade, answer
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.headline import Grade, answer
 from phone_host.model import Epipolar, Image, Processed, RectifiedPair, Result, Rig, StereoGeometry
 from phone_host.run.sinks import SinkQueue
 from phone_host.run.trust_sink import TrustSink

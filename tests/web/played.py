@@ -12,15 +12,15 @@ import numpy as np
 
 from common import now
 from common.ledger import BoardMarks, HostMarks, StageTimes
+from phone_host.accounts.link_account import LinkAccount, LinkTally
 from phone_host.calibration.guide.coverage import Coverage
 from phone_host.calibration.guide.gates import Gate
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot
 from phone_host.calibration.guide.wants import Want
-from phone_host.measure.accounts import LinkAccount, LinkTally
-from phone_host.measure.image_trust import ImageFigures, ImageTrust
-from phone_host.measure.recording_account import RecordingAccount
-from phone_host.measure.trouble import Trouble
-from phone_host.measure.trust import Concern
+from phone_host.diagnostics.concern import Concern, Trouble
+from phone_host.diagnostics.image_judge import ImageTrust
+from phone_host.diagnostics.image_rules import ImageFigures
+from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Processed, Result
 from phone_host.scan.patches import Patches
 from phone_host.scene.demo_scene import demo_scene, matched_view

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.measure.trouble import Trouble
-from phone_host.measure.trust import Concern, Doubt
+from phone_host.diagnostics.concern import Concern, Doubt, Trouble
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Activity, Answer, Command, Do

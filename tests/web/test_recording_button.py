@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
 from phone_host.web.source import Activity, Answer, Do
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
 from tests.web.played import RECORDING, Played

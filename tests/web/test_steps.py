@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from common.protocol.enrolment_code import read_code
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
 from phone_host.web.source import Activity, Answer, Do, StepName
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
 from tests.web.played import BOARDS, CAMERAS, Played, guide_snapshot

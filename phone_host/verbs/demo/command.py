@@ -19,7 +19,7 @@ from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
-from phone_host.measure.trouble import trouble_of
+from phone_host.diagnostics.concern import trouble_of
 from phone_host.model import Rig
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text

@@ -25,7 +25,7 @@ from common.versions import REPORT_FORMAT
 from phone_host.boards.opened import open_named
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
-from phone_host.measure.recording_account import RecordingAccount
+from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Rig, Side
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig

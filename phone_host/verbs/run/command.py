@@ -15,8 +15,8 @@ from common.program.settings import Resolved, log_level
 from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.measure.run_snapshot import depth_is_wrong
-from phone_host.measure.trouble import Trouble, trouble_of
+from phone_host.diagnostics.concern import Trouble, trouble_of
+from phone_host.diagnostics.run_rules import depth_is_wrong, nothing_whole
 from phone_host.output.json_text import json_text
 from phone_host.report.summary import summary
 from phone_host.run.host_settings import EndReason
@@ -105,7 +105,7 @@ def _finish(
         return INTERRUPTED
     too_few = options.pairs and ended is EndReason.STREAM_ENDED
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
-    is_wrong = not is_stopped and (depth_is_wrong(snapshot) or snapshot.spoiled_counts.nothing_whole)
+    is_wrong = not is_stopped and (depth_is_wrong(snapshot) or nothing_whole(snapshot))
     return CHECK_FAILED if too_few or is_wrong or not written.is_complete else 0
 
 

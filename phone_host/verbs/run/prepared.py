@@ -23,8 +23,8 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.measure.run_snapshot import RunSnapshot
-from phone_host.measure.trouble import Trouble
+from phone_host.diagnostics.concern import Trouble
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Rig, Side, TimeOffset
 from phone_host.output.json_text import json_text
 from phone_host.recording.begin import begin_recording

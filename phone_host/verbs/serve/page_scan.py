@@ -11,8 +11,8 @@ from typing import Final
 from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
 from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.live.scan import LiveScan
-from phone_host.measure.run_snapshot import RunSnapshot
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.report_page import Headline

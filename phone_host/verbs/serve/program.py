@@ -18,12 +18,12 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera, require_replayed
 from phone_host.camera.http_uri import without_password
+from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
-from phone_host.measure.trouble import Trouble, trouble_of
 from phone_host.model import Verdict
 from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import is_calib_txt

@@ -6,7 +6,7 @@ from typing import Final, TextIO
 from common.plain_text import printable
 from common.program.terminal import columns, say
 from common.words import counted
-from phone_host.measure.headline import headline
+from phone_host.diagnostics.headline import headline
 from phone_host.web.source import Activity, PageState
 
 _WORDS: Final = {

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from common.program.invocation import command_line, shell_word
-from phone_host.measure.file_remedies import EXCHANGE, tries_of
+from phone_host.diagnostics.arrangement import EXCHANGE, tries_of
 from phone_host.output.axes import Axes
 from phone_host.report.page_links import NextCommand
 from phone_host.report.report_page import Headline

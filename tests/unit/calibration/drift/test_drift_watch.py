@@ -8,8 +8,8 @@ import pytest
 
 from phone_host.calibration.drift.rows import RowModel, Sighting
 from phone_host.calibration.drift.watch import DriftWatch, Trends
-from phone_host.measure.drift_words import drift_concerns
-from phone_host.measure.trust import Doubt
+from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.drift import drift_concerns
 from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, DriftState
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.scaled_rig import scaled_rig

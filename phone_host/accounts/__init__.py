@@ -1,0 +1,1 @@
+"""Figures of delays, links and images: what was measured, never what it means. Pure, except that image motion tracks corners."""

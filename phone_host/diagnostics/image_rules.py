@@ -1,0 +1,425 @@
+"""Judges from the evidence in the images whether depth can be right, for one pair or over a run. Pure.
+
+`phone_host.stereo.evidence` measures the evidence. Where the images hold too little, nothing is named. `arrangement` knows images
+that lie to each other as they should not. Figures behind the limits: `tests/bench/bench_trust.py` and decision 0029.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from phone_host.diagnostics.arrangement import LEAST_SUPPORT, ImageSource, arrangement_doubts
+from phone_host.diagnostics.concern import Concern, Doubt, gravest_first
+from phone_host.model import Arrangement, Evidence, Exposure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageFigures:
+    """Medians over some judgements; NaN = not measured.
+
+    Attributes:
+        density: share of the left image's pixels that have a disparity.
+        consistency: share of sampled disparities that are confirmed from right to left.
+        vertical_px: distance of features from their rows, px.
+        vertical_offset_px: how far too low the right image lies, px.
+        disparity_px: the middle one of the disparities between the limits of depth, px.
+        scattered_share: share of the disparities that lie in pieces too small for a surface.
+        matched_scale: size of the images that were matched, as a share of the full size in whose px all this is.
+    """
+
+    density: float = math.nan
+    consistency: float = math.nan
+    vertical_px: float = math.nan
+    vertical_offset_px: float = math.nan
+    disparity_px: float = math.nan
+    scattered_share: float = math.nan
+    matched_scale: float = 1.0
+
+
+def median_figures(found: Sequence[Evidence]) -> ImageFigures:
+    """Return the medians of what was measured."""
+
+    def median(name: str) -> float:
+        values = [value for value in (getattr(item, name) for item in found) if not math.isnan(value)]
+        return float(np.median(values)) if values else math.nan
+
+    return ImageFigures(
+        density=median("density"),
+        consistency=median("consistency"),
+        vertical_px=median("vertical_px"),
+        vertical_offset_px=median("vertical_offset_px"),
+        disparity_px=median("disparity_px"),
+        scattered_share=median("scattered_share"),
+        matched_scale=median("matched_scale") if found else 1.0,
+    )
+
+
+_BEHIND_SHARE: Final = 0.05
+"""False matches put fewer points there; a sky may put more, where doffs is large and negative."""
+
+_REMEDY: Final = "give the calib.txt that was published with these images"
+
+
+def off_middle(evidence: Evidence) -> tuple[Concern, ...]:
+    """Say that the principal point is that of other images; empty if it lies where theirs can lie.
+
+    Args:
+        evidence: of the pair.
+    """
+    seen = evidence.off_middle
+    if seen is None:
+        return ()
+    return (
+        Concern(
+            Doubt.GEOMETRY,
+            f"calib.txt or --center may belong to other images: the principal point {seen.cx_px:.0f},{seen.cy_px:.0f}"
+            f" lies far from the middle of {seen.width_px}x{seen.height_px} px, and metres are wrong then",
+            _REMEDY,
+        ),
+    )
+
+
+def behind(evidence: Evidence) -> tuple[Concern, ...]:
+    """Say that doffs is that of other images; empty if hardly a point lies behind infinity.
+
+    Args:
+        evidence: of the pair.
+    """
+    if not evidence.behind_share > _BEHIND_SHARE:
+        return ()
+    return (
+        Concern(
+            Doubt.GEOMETRY,
+            f"{evidence.behind_share:.0%} of the points would lie at infinity or behind it: doffs may be that of other images",
+            f"{_REMEDY}, or --doffs: cx of the right camera minus cx of the left one, px",
+        ),
+    )
+
+
+_FLAT: Final = 2.0
+
+_FLAT_RATIO: Final = 5.0
+"""An image of less structure, grey levels, shows nothing if it is dark or the other one shows five times as much."""
+
+_DARK_MEAN: Final = 25.0
+
+_DARK_BRIGHT: Final = 50.0
+"""An image is dark if its mean and its bright parts are below these levels: a tenth of what a camera's exposure aims at."""
+
+_PLAIN: Final = 5.0
+"""Structure, grey levels, below which an image shows nothing but a plain surface. Bare walls in even and uneven light, with noise and
+JPEG, have up to 2.8; of 90 given pairs and 60 rendered rooms the plainest has 12.6 in its richer image."""
+
+_BLURRED_PX: Final = 2.0
+
+_BLURRED_RATIO: Final = 1.8
+
+_BLURRED_BESIDE_PX: Final = 1.5
+"""Sharp images measure 0.8 to 1.3 px at up to 640 px of width, and 1.8 px if nothing in the scene has a sharp edge."""
+
+
+def covered_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
+    """Say which camera sees nothing at all; empty if both see something."""
+    blind = [
+        name
+        for name, here, there in (("left", left, right), ("right", right, left))
+        if here.structure < _FLAT and (_is_dark(here) or there.structure > max(_FLAT_RATIO * here.structure, _FLAT))
+    ]
+    if not blind:
+        return ()
+    camera_sees = _cameras(blind)
+    return (
+        Concern(Doubt.COVERED, f"{camera_sees} no scene at all", "take off the lens cap, the shutter or the finger"),
+    )
+
+
+def _cameras(names: list[str]) -> str:
+    return "both cameras see" if len(names) == 2 else f"the {names[0]} camera sees"
+
+
+def _is_dark(exposure: Exposure) -> bool:
+    return exposure.mean_level < _DARK_MEAN and exposure.bright_level < _DARK_BRIGHT
+
+
+def dark_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
+    """Say which camera sees almost nothing because it is too dark; empty if neither."""
+    dark = [name for name, exposure in (("left", left), ("right", right)) if _is_dark(exposure)]
+    if not dark:
+        return ()
+    level = min(left.mean_level, right.mean_level)
+    camera_sees = _cameras(dark)
+    return (
+        Concern(
+            Doubt.DARK,
+            f"{camera_sees} almost nothing because it is too dark (mean level {level:.0f} of 255)",
+            "switch on a light, or give the camera a longer exposure",
+        ),
+    )
+
+
+def is_plain(left: Exposure, right: Exposure) -> bool:
+    """Tell whether both images show nothing but a plain surface: what is found in them is noise.
+
+    Args:
+        left: the left image.
+        right: the right image.
+    """
+    return max(left.structure, right.structure) < _PLAIN
+
+
+def unfocused_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
+    """Say which image has no sharp edges; empty if both have."""
+    blurred = [
+        (name, here.blur_px)
+        for name, here, there in (("left", left, right), ("right", right, left))
+        if here.blur_px > _BLURRED_PX
+        or (here.blur_px > _BLURRED_BESIDE_PX and here.blur_px > _BLURRED_RATIO * there.blur_px)
+    ]
+    if not blurred:
+        return ()
+    width = max(blur for _, blur in blurred)
+    camera_sees = _cameras([name for name, _ in blurred])
+    return (
+        Concern(
+            Doubt.UNFOCUSED,
+            f"{camera_sees} blurred edges ({width:.1f} px)",
+            "clean and focus the lens, and switch its autofocus off before you calibrate",
+        ),
+    )
+
+
+_BEYOND_SHARE: Final = 0.05
+
+_MOSTLY_BEYOND: Final = 0.5
+"""Wrong matches put 1 % of the features beyond a search that is wide enough."""
+
+_AMBIGUOUS_SHARE: Final = 0.75
+"""Good pairs of scenes measure 0.2 at most, of chessboards before a wall 0.61; regular stripes and checks 0.9 and more."""
+
+_PATTERN_SHARE: Final = 0.8
+"""Given scenes with any mistake measure 0.41 at most, where depth was found at all."""
+
+_HALF: Final = 0.5
+
+_FEW: Final = 24
+"""A fence before a wall: half of the patches repeat, and fewer features agree with anything. Chessboards have 80 and more."""
+
+
+def is_pattern(evidence: Evidence) -> bool:
+    """Tell whether so much of what the images show repeats that matched features prove nothing.
+
+    Args:
+        evidence: of the pair.
+    """
+    most = max((item.features for item in evidence.supports), default=0)
+    return evidence.ambiguous_share > _PATTERN_SHARE or (evidence.ambiguous_share > _HALF and most < _FEW)
+
+
+def too_short(evidence: Evidence) -> tuple[Concern, ...]:
+    """Say how much of the scene is nearer than was searched; empty if hardly any.
+
+    Args:
+        evidence: of the pair.
+    """
+    share = evidence.beyond_share
+    if not share > _BEYOND_SHARE:
+        return ()
+    remedy = f"give --disparities {evidence.enough_disparities}"
+    if not math.isnan(evidence.enough_from_m):
+        remedy = f"give --near {_rounded_down(evidence.enough_from_m)}m without --disparities, or --disparities {evidence.enough_disparities}"
+    return (
+        Concern(
+            Doubt.SEARCH_TOO_SHORT,
+            f"{share:.0%} of the scene is nearer than was searched, and what is nearer gets a wrong depth",
+            remedy,
+            is_severe=share > _MOSTLY_BEYOND,
+        ),
+    )
+
+
+def _rounded_down(depth_m: float) -> str:
+    """Write a depth with two digits, not farther than it is."""
+    step = 10.0 ** (math.floor(math.log10(depth_m)) - 1)
+    return f"{math.floor(depth_m / step + 1e-9) * step:.6g}"
+
+
+def ambiguous(evidence: Evidence) -> tuple[Concern, ...]:
+    """Say that the pattern repeats within the search; empty if it does not.
+
+    Args:
+        evidence: of the pair.
+    """
+    if not (evidence.ambiguous_share > _AMBIGUOUS_SHARE or is_pattern(evidence)):
+        return ()
+    return (
+        Concern(
+            Doubt.AMBIGUOUS,
+            f"the pattern repeats: {evidence.ambiguous_share:.0%} of the places looked at fit elsewhere as well, and depth may be off by whole repeats",
+            "show a scene with irregular texture, or put irregular things before the pattern",
+        ),
+    )
+
+
+_STRANGERS: Final = 6
+
+_STRANGERS_SHARE: Final = 0.03
+
+_ENOUGH_FEATURES: Final = 100
+
+_STRANGERS_DENSITY: Final = 0.3
+"""Two images show unlike scenes if both have plenty of features, not more than these agree, and matching finds little."""
+
+_LEAST_DENSITY: Final = 0.15
+"""Chessboards before white walls reach 0.23, the hardest textured pairs 0.33; swapped ones mostly stay below 0.1."""
+
+_LEAST_CONSISTENCY: Final = 0.25
+"""Good pairs reach 0.33 and more, the worst of them before white walls."""
+
+_MOST_VERTICAL_PX: Final = 2.0
+"""Matchers correct up to 2 px of common offset; beyond it they lose points. In px of the images that they match."""
+
+_LOST_VERTICAL_PX: Final = 5.0
+
+_LOST_DENSITY: Final = 0.4
+"""With rows off by more and less depth than this, depth is wrong: of 13 given pairs whose right image was lowered by 5 px,
+SGBM found 3 to 22 % of the former depth again, except on two of 463 px of width and less, which kept a density of half and more."""
+
+_MOST_SKEW_PX: Final = 0.9
+"""Given pairs measure 0.78 px (KITTI) and less; a camera turned aside by 1 degree 1.04 px and more on 800 to 1280 px of width."""
+
+_MOVED: Final = "check that both images were taken at the same moment; otherwise the calibration does not fit these cameras: calibrate the rig again"
+
+_NOT_RECTIFIED: Final = "these images are not rectified: calibrate your cameras and give --calibration rig.yaml"
+
+_EDGE_TO_EDGE: Final = 3.5
+"""The full height of a ramp relative to its root mean square."""
+
+_TILTED_SHARE: Final = 0.3
+"""If fewer of the related features than this share their rows, the rectification does not fit the cameras."""
+
+
+def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) -> tuple[Concern, ...]:
+    """Say what the images of one pair make doubtful, gravest first; empty if nothing.
+
+    Args:
+        evidence: of the pair; without supports (an unrectified pair) only brightness is judged.
+        source: where the images come from: remedies name the options of a camera's address, or those for files.
+    """
+    foreign, seen = off_middle(evidence), _seen(evidence, source)
+    if foreign:  # doffs is then that of other images, too: one doubt of a kind is enough
+        seen = (*foreign, *(item for item in seen if item.doubt is not Doubt.GEOMETRY))
+    return gravest_first(seen)
+
+
+def _seen(evidence: Evidence, source: ImageSource) -> tuple[Concern, ...]:
+    """Say what the images themselves make doubtful."""
+    support = {item.arrangement: item.features for item in evidence.supports}
+    sees = max(support.values(), default=0) >= LEAST_SUPPORT
+    covered = () if sees else covered_doubts(evidence.left, evidence.right)
+    if covered:
+        return covered
+    dark = dark_doubts(evidence.left, evidence.right)
+    if not support:
+        return dark
+    light = (*dark, *unfocused_doubts(evidence.left, evidence.right))
+    if not sees and is_plain(evidence.left, evidence.right) and not evidence.density >= _STRANGERS_DENSITY:
+        return light or (_NO_TEXTURE,)  # features of noise agree with nothing: that is no other scene
+    mistake = arrangement_doubts(evidence, source)
+    if is_pattern(evidence) and not any(item.doubt is Doubt.SAME_IMAGE for item in mistake):
+        return *light, *ambiguous(evidence)  # features of a pattern match any repeat: mistakes they show are chance
+    if not mistake and not light and _are_strangers(evidence, support):
+        mistake = (_OTHER_SCENE,)
+    return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))
+
+
+_NO_TEXTURE: Final = Concern(
+    Doubt.NO_TEXTURE,
+    "both images show hardly any texture, as of a bare wall: too little for depth, and to judge whether they belong together",
+    "put patterned things into the scene, or turn both cameras towards some",
+)
+
+_OTHER_SCENE: Final = Concern(
+    Doubt.OTHER_SCENE,
+    "the two images show different scenes: hardly anything in one is found in the other",
+    "turn both cameras towards the same scene, and check that LEFT and RIGHT belong together",
+)
+
+_CROPPED: Final = Concern(
+    Doubt.CROPPED_RIG,
+    "an image is smaller than in the calibration and has another aspect ratio: it is treated as the centre of that one",
+    "use a size with the calibration's aspect ratio; or calibrate at this size, if the camera may crop elsewhere or stretch",
+)
+
+
+def _are_strangers(evidence: Evidence, support: dict[Arrangement, int]) -> bool:
+    fewest = min(evidence.left.features, evidence.right.features)
+    most = max(_STRANGERS, _STRANGERS_SHARE * fewest)
+    return fewest >= _ENOUGH_FEATURES and max(support.values()) <= most and not evidence.density >= _STRANGERS_DENSITY
+
+
+def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Concern, ...]:
+    related, right = support[Arrangement.TILTED], support[Arrangement.RIGHT]
+    is_tilted = related >= 2 * LEAST_SUPPORT and right < _TILTED_SHARE * related
+    plain = figure_doubts(median_figures((evidence,)), is_tilted=is_tilted)
+    rows = tuple(item for item in plain if item.doubt is Doubt.VERTICAL_ERROR) or _skewed(evidence)
+    if not evidence.from_rig:
+        rows = tuple(replace(item, remedy=_NOT_RECTIFIED) for item in rows)
+    short, unsure = too_short(evidence), ambiguous(evidence)
+    sparse = (item for item in plain if item.doubt is not Doubt.VERTICAL_ERROR)
+    cropped = (_CROPPED,) if evidence.is_cropped else ()
+    if evidence.is_cropped:
+        rows = tuple(replace(item, remedy=_CROPPED.remedy) for item in rows)
+    return (*behind(evidence), *rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
+
+
+def _skewed(evidence: Evidence) -> tuple[Concern, ...]:
+    if not evidence.skew_px > _MOST_SKEW_PX:
+        return ()
+    off_px = _EDGE_TO_EDGE * evidence.skew_px
+    sentence = f"the rows of the two images do not agree (one edge is off against the other by {off_px:.1f} px)"
+    return (Concern(Doubt.VERTICAL_ERROR, sentence, _MOVED),)
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if share >= 0.01 or not share else "less than 1%"
+
+
+def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Concern, ...]:
+    """Say which figures are not those of right depth; empty if all may be.
+
+    Args:
+        figures: of one judgement or of some that agree.
+        is_tilted: whether most features share rows only if those are tilted or bent.
+    """
+    found = []
+    is_off = figures.vertical_px * figures.matched_scale > _MOST_VERTICAL_PX
+    if is_tilted or is_off:
+        found.append(
+            Concern(
+                Doubt.VERTICAL_ERROR,
+                "the rows of the two images do not agree" + (f" by {figures.vertical_px:.1f} px" if is_off else ""),
+                _MOVED,
+                is_severe=figures.vertical_px * figures.matched_scale > _LOST_VERTICAL_PX
+                and figures.density < _LOST_DENSITY,
+            )
+        )
+    if figures.density < _LEAST_DENSITY:
+        found.append(
+            Concern(
+                Doubt.LOW_DENSITY,
+                f"only {_percent(figures.density)} of the pixels have depth",
+                "plain walls and tables give none: light the scene well and put patterned things into it; else check that --calibration or --rectified fits the images, and that nothing is nearer than --near",
+            )
+        )
+    elif figures.consistency < _LEAST_CONSISTENCY:
+        found.append(
+            Concern(
+                Doubt.LOW_CONSISTENCY,
+                f"only {figures.consistency:.0%} of the depth is confirmed from right to left",
+                "light the scene well, and give it texture; plain and repeated surfaces mislead the matcher",
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,317 @@
+"""Says what makes the depth of a run wrong or its figures doubtful: other cameras than the rig's, spoiled images, a camera that went away. Pure.
+
+A rig holds for two cameras as they were: another camera, or the same one mounted otherwise, has another geometry, so
+the run is refused. A control that is not as it was (focus and zoom move the image) is a concern. What either side does
+not state is not compared: a rig without cameras, a camera without a serial number, images that come from no device.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+from common.camera.base import CameraState
+from common.camera_identity import CameraIdentity, RememberedCamera
+from common.errors import DataError
+from common.protocol.message import CameraDescription, Locks
+from common.words import counted, distance_text, times
+from phone_host.diagnostics.arrangement import with_final_options
+from phone_host.diagnostics.concern import REJECTED_RIG, Concern, Doubt, gravest_first
+from phone_host.diagnostics.drift import drift_concerns, told_as_a_turn
+from phone_host.diagnostics.image_judge import Episode
+from phone_host.diagnostics.image_numbers import blamed, number_concerns, with_cause
+from phone_host.diagnostics.run_snapshot import (
+    LockMiss,
+    RunSnapshot,
+    disbelieved,
+    spoiled,
+    spoiled_on_board,
+)
+from phone_host.diagnostics.throughput import with_budget
+from phone_host.diagnostics.timing import (
+    NO_DOUBT,
+    Timing,
+    stamp_doubt,
+    timing_concerns,
+)
+from phone_host.model import (
+    CutCounts,
+    DepthLimits,
+    Side,
+)
+from phone_host.sync.quarantine import Disbelief
+
+
+def state_of(camera: CameraDescription, held: Locks) -> RememberedCamera:
+    """Return what is to be remembered of a camera.
+
+    Args:
+        camera: what it says of itself.
+        held: the controls that it is held at.
+    """
+    locks = tuple((lock.value, value) for lock, value in held)
+    return RememberedCamera(camera.identity, camera.width_px, camera.height_px, camera.orientation, locks)
+
+
+def require_camera(
+    side: Side, whose: str, rig: RememberedCamera, present: CameraDescription, other: CameraIdentity
+) -> None:
+    """Check that a camera is the rig's and is mounted as it was.
+
+    Args:
+        side: which of the rig's two cameras it is.
+        whose: whose camera it is, for example `the board's camera`.
+        rig: the camera as the rig states it.
+        present: the camera that is there.
+        other: the rig's camera on the other side; unknown if the rig does not state it.
+
+    Raises:
+        DataError: it is another camera, or has another orientation; names both and what to do.
+    """
+    if not present.identity.is_known:
+        return
+    there = f"{whose} is {present.identity}"
+    if rig.identity.differs_from(present.identity):
+        exchanged = other.is_known and not other.differs_from(present.identity)
+        remedy = "exchange the two cameras" if exchanged else "plug that one in"
+        raise DataError(
+            f"{there}, but the rig's {side.value} camera was {rig.identity}",
+            f"{remedy}, calibrate again with these, or remove {side.value}_camera from the rig's file",
+        )
+    if rig.identity.is_known and rig.orientation != present.orientation:
+        now, then = (str(turn) or "neither rotate= nor flip=" for turn in (present.orientation, rig.orientation))
+        raise DataError(
+            f"{there}, with {now}, but the rig was calibrated with {then}",
+            f"mount it and give its address as before, calibrate again, or remove {side.value}_camera from the rig's file",
+        )
+
+
+def misses(side: Side, rig: RememberedCamera, held: Locks) -> tuple[LockMiss, ...]:
+    """Return the rig's locks that a camera does not have.
+
+    Args:
+        side: which of the rig's two cameras it is.
+        rig: the camera as the rig states it.
+        held: the controls that the camera is held at now.
+    """
+    now = {lock.value: value for lock, value in held}
+    return tuple(
+        LockMiss(side=side, control=name, wanted=wanted, present=now.get(name))
+        for name, wanted in rig.locks
+        if now.get(name) != wanted
+    )
+
+
+def settings_concerns(missed: Sequence[LockMiss]) -> Iterator[Concern]:
+    """Say which controls could not be restored; nothing if all were."""
+    said = ", ".join(
+        f"the {miss.side.value} camera's {miss.control} is "
+        f"{'not held' if miss.present is None else miss.present} instead of {miss.wanted}"
+        for miss in missed
+    )
+    if said:
+        yield Concern(
+            Doubt.CAMERA_SETTINGS,
+            f"{said}, so depth may be wrong",
+            "see which controls the camera has: board-agent cameras; or calibrate again as it is now",
+        )
+
+
+GONE: Final = frozenset({Doubt.BOARD_GONE, Doubt.CAMERA_GONE})
+"""Doubts about when depth came, not whether it is right."""
+
+
+def gone_concerns(run: RunSnapshot) -> Iterator[Concern]:
+    """Say which camera is away; nothing if both are there, or their streams ended as they should."""
+    back = "has not come back" if run.ended == "running" else "did not come back"
+    if run.away and not run.away[-1].is_over and run.ended != "stream_ended":
+        gone = f"the board went away at {run.away[-1].at_s:.0f} s and {back}"
+        yield (
+            Concern(
+                Doubt.BOARD_GONE,
+                f"{gone}: there is no newer depth",
+                "check its power, its cable or network, and that board-agent still runs there",
+            )
+            if run.refused is None
+            else Concern(Doubt.BOARD_GONE, f"{gone}, because {run.refused.problem}", run.refused.remedy)
+        )
+    if run.camera.state is CameraState.GONE:
+        yield Concern(
+            Doubt.CAMERA_GONE,
+            f"this machine's camera went away at about {run.last_s:.0f} s and {back}: there is no newer depth",
+            "check its power, its cable or network, and that no other program has taken it; a phone's app must stay in front",
+        )
+
+
+_ENOUGH: Final = 10
+"""So many spoiled images before the first pair are no single hitch: a third of a second of video."""
+
+
+def _not_whole(run: RunSnapshot) -> dict[str, int]:
+    """Count images that were not whole, by where that was found."""
+    return {
+        "from the board's camera": spoiled_on_board(run.link)[0],
+        "from this machine's camera": run.spoiled,
+        "found when pairs were decoded": sum(count for _, count in run.spoiled_images),
+    }
+
+
+def nothing_whole(run: RunSnapshot) -> bool:
+    """Tell whether there is no pair because images are spoiled: the run goes on, since a cable may be pushed in again."""
+    return not run.processed and sum(_not_whole(run).values()) >= _ENOUGH
+
+
+_OF_THE_CLOCK: Final = frozenset({"clock_in_doubt", "proven_by_no_echo"})
+_STOOD_STILL: Final = "none of them was used; if this goes on, find out what stops one of the two programs or machines"
+_LIES: Final = "none of them was used; if this goes on, update the board's software, check its camera, and check who else uses the link"
+
+
+def arrival_concerns(run: RunSnapshot) -> Iterator[Concern]:
+    """Say which arrivals were not believed and what that means; nothing if everything was believed."""
+    link, images, frames = run.link, spoiled(run), disbelieved(run)
+    if link.clock_steps:
+        suspect = sum(suspects.frames for suspects in link.suspects)
+        yield Concern(
+            Doubt.CLOCK_STEPPED,
+            f"one of the two clocks jumped {times(link.clock_steps)}; up to {counted(suspect, 'pair')} may be wrong because they came before that was noticed"
+            if suspect
+            else f"one of the two clocks jumped {times(link.clock_steps)}",
+            "do not let the board or the host sleep during a run; ignore the suspect pairs, which report.json names",
+        )
+    if images:
+        yield Concern(
+            Doubt.SPOILED_IMAGES,
+            f"{counted(sum(images.values()), 'spoiled image was', 'spoiled images were')} not used ({_reasons(images)})",
+            "check the cable, the camera and its format; one now and then does no harm",
+            spares_depth=True,
+        )
+    if frames:
+        received = sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions)
+        dropped, is_of_clock = sum(frames.values()), _OF_THE_CLOCK.issuperset(frames)
+        yield Concern(
+            Doubt.DISBELIEVED,
+            f"{dropped} of {counted(received, 'frame')} had impossible values and {'was' if dropped == 1 else 'were'} dropped ({_reasons(frames)})",
+            _STOOD_STILL if is_of_clock else _LIES,
+            spares_depth=is_of_clock,
+        )
+
+
+def _reasons(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {reason.replace('_', ' ')}" for reason, count in counts.items())
+
+
+_CUT_SHARE: Final = 0.15
+"""If fewer pixels than this share were matched and then cut, the pairs lack depth because their images do not match."""
+
+_CAUSES: Final = frozenset({Doubt.SEARCH_TOO_SHORT, Doubt.DARK, Doubt.UNFOCUSED, Doubt.NO_TEXTURE})
+"""Doubts that explain it."""
+
+_UNMATCHED: Final = Concern(
+    Doubt.NO_DEPTH,
+    "no pair has depth",
+    "check that --calibration or --rectified fits the cameras, and that both see the same scene",
+)
+
+_AT_ZERO: Final = Concern(
+    Doubt.NO_DEPTH,
+    "no pair has depth: all points are too far to measure",
+    "move nearer or mount the cameras farther apart; check that --calibration or --rectified fits the cameras",
+)
+
+
+def no_depth(cut: CutCounts | None, limits: DepthLimits | None, others: tuple[Concern, ...] = ()) -> Concern:
+    """Return the doubt about pairs of which no pixel has depth.
+
+    Args:
+        cut: what became of their pixels; None: not counted.
+        limits: to which their clouds were cut; None without a cloud.
+        others: the other doubts about them: one of them may say why.
+    """
+    cause = [concern for concern in others if concern.doubt in _CAUSES]
+    if cause:
+        return Concern(Doubt.NO_DEPTH, f"{_UNMATCHED.sentence}: {cause[0].sentence}", cause[0].remedy)
+    return _UNMATCHED if cut is None else _by_cut(cut, limits)
+
+
+def _by_cut(cut: CutCounts, limits: DepthLimits | None) -> Concern:
+    """Say which limit cut the points, if it is that."""
+    most = max(cut.at_zero, cut.too_far, cut.too_near)
+    if most < _CUT_SHARE * cut.inside or not most:
+        return _UNMATCHED
+    if most == cut.at_zero or limits is None:
+        return _AT_ZERO
+    found = cut.at_zero + cut.too_far + cut.too_near
+    who = "all points lie" if most == found else "most points lie"
+    if most == cut.too_near:
+        return Concern(
+            Doubt.NO_DEPTH,
+            f"no pair has depth: {who} nearer than --near {distance_text(limits.near_m)}",
+            "give a smaller --near, or move away",
+        )
+    if limits.from_rig:
+        return Concern(
+            Doubt.NO_DEPTH,
+            f"no pair has depth: {who} farther than {distance_text(limits.far_m)}, where these cameras measure too coarsely",
+            "move nearer or mount the cameras farther apart; --far shows farther points all the same",
+        )
+    return Concern(
+        Doubt.NO_DEPTH,
+        f"no pair has depth: {who} farther than --far {distance_text(limits.far_m)}",
+        "give a larger --far",
+    )
+
+
+def time_and_motion(run: RunSnapshot) -> Timing:
+    """Return time and motion over the pairs to be judged."""
+    last = run.judged_pairs
+    return Timing(
+        time_skew_ns=float("nan") if run.interpolated else run.delays.spread("time_skew", last).p95_ns,
+        uncertainty_ns=run.delays.spread("uncertainty", last).p50_ns,
+        end_to_end_ns=run.delays.spread("end_to_end", last).p50_ns,
+        motion_px_s=run.motion_px_s,
+        width_px=run.width_px,
+        stamps=NO_DOUBT if run.stamps_exact else stamp_doubt(run.time_offset, run.camera),
+    )
+
+
+def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+    """Return what makes the depth of a run wrong or its figures doubtful, most serious first."""
+    numbers, images = with_cause(number_concerns(run.replayed), image_concerns(run), run.replayed)
+    moved = () if run.drift is None else drift_concerns(run.drift)
+    found = [*((REJECTED_RIG,) if run.rig_rejected else ()), *numbers, *told_as_a_turn(images, moved), *moved]
+    if nothing_whole(run):
+        where = ", ".join(f"{count} {place}" for place, count in _not_whole(run).items() if count)
+        found.append(
+            Concern(
+                Doubt.NO_WHOLE_IMAGE,
+                f"no pair so far, because images are not whole ({where})",
+                "check the cable, the camera and its format on that side; phone-host doctor and board-agent doctor look at one image",
+            )
+        )
+    found += settings_concerns(run.missed_locks)
+    if run.processed:
+        found += gone_concerns(run)
+    return gravest_first((*found, *arrival_concerns(run), *timing_concerns(time_and_motion(run))))
+
+
+def history(run: RunSnapshot) -> tuple[Episode, ...]:
+    """Return which doubts about the images stood during a run, and when, in order of beginning."""
+    numbers = number_concerns(run.replayed)
+    return tuple(replace(item, concern=blamed(item.concern, numbers, run.replayed)) for item in run.images.history)
+
+
+def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+    """Return what the images of a run make doubtful, gravest first. While it runs, pairs without depth may yet get some."""
+    found = tuple(
+        with_budget(with_final_options(concern, run.orientations), run.budget) for concern in run.images.concerns
+    )
+    lacks_depth = run.images.wants_depth and not run.images.has_depth
+    if run.ended == "running" or not lacks_depth or not run.processed:
+        return found  # without any pair there is another reason
+    if any(concern.is_certain for concern in found):
+        return found  # which says why there is none
+    return (no_depth(run.depth.cut, run.depth.limits, found), *found)
+
+
+def depth_is_wrong(run: RunSnapshot) -> bool:
+    """Tell whether depth was wanted and cannot be right: a doubt stands that leaves no hope, or no pair has depth."""
+    return run.images.wants_depth and (not run.images.has_depth or any(concern.is_certain for concern in concerns(run)))
