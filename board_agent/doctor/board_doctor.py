@@ -6,10 +6,11 @@ from typing import Final
 from board_agent.doctor.key_checks import check_keys
 from board_agent.doctor.link_probe import examine_link
 from board_agent.settings import BoardSettings, key_folder
+from common.diagnostic import Diagnostic
 from common.doctor import machine
 from common.doctor.access import Account
 from common.doctor.camera_probe import examine_camera
-from common.doctor.finding import Finding, fail
+from common.doctor.finding import fail
 from common.doctor.machine_checks import check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.package_probe import missing_packages
 from common.doctor.unit_check import Unit, check_unit
@@ -24,7 +25,7 @@ _MODULES: Final = ("msgpack", "serial", "zmq")
 _LOG_FOLDERS: Final = (Path("/var/log/journal"), Path("/run/log/journal"))
 
 
-def examine(settings: BoardSettings | None) -> list[Finding]:
+def examine(settings: BoardSettings | None) -> list[Diagnostic]:
     """Check this machine for a run with the given settings.
 
     Args:
@@ -54,16 +55,16 @@ def examine(settings: BoardSettings | None) -> list[Finding]:
     return findings
 
 
-def _examine_camera(settings: BoardSettings, user: Account, unit: Unit) -> list[Finding]:
+def _examine_camera(settings: BoardSettings, user: Account, unit: Unit) -> list[Diagnostic]:
     """Check what the frames come from."""
     if settings.camera:
         return list(examine_camera(settings.camera, user, unit))
     return [fail("camera", "none is configured", "give --camera v4l2:auto, or set camera in the settings file")]
 
 
-def _examine_links(settings: BoardSettings, user: Account, unit: Unit, *, is_service: bool) -> list[Finding]:
+def _examine_links(settings: BoardSettings, user: Account, unit: Unit, *, is_service: bool) -> list[Diagnostic]:
     """Check where the frames go."""
-    findings: list[Finding] = []
+    findings: list[Diagnostic] = []
     for uri in settings.link:
         findings += examine_link(uri, user, unit, listens_by_default=True)
     if any(needs_keys(parse_link(uri, listens_by_default=True)) for uri in settings.link):

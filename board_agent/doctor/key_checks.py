@@ -2,13 +2,14 @@
 
 import stat
 
+from common.diagnostic import Diagnostic
 from common.doctor.access import Account
-from common.doctor.finding import Finding, fail, ok, warn
+from common.doctor.finding import fail, ok, warn
 from common.errors import TandemError
 from common.keys import KeyFolder
 
 
-def check_keys(folder: KeyFolder, account: Account) -> Finding:  # noqa: PLR0911 - one for each state of the folder
+def check_keys(folder: KeyFolder, account: Account) -> Diagnostic:  # noqa: PLR0911 - one for each state of the folder
     """Judge a board's key folder.
 
     Args:

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
+from common.diagnostic import Diagnostic
 from common.doctor.access import Holder
-from common.doctor.finding import Finding, fail, ok, warn
+from common.doctor.finding import fail, ok, warn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +32,7 @@ class LinkReadings:
     taken: bool = False
 
 
-def check_link(link: LinkReadings, service_pid: int) -> Finding:  # noqa: PLR0911 - one for each state of a link
+def check_link(link: LinkReadings, service_pid: int) -> Diagnostic:  # noqa: PLR0911 - one for each state of a link
     """Judge a link.
 
     Args:

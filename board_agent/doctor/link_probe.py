@@ -5,9 +5,9 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from board_agent.doctor.link_checks import LinkReadings, check_link
+from common.diagnostic import Diagnostic, Severity
 from common.doctor import machine
 from common.doctor.access import Account, Holder, check_access
-from common.doctor.finding import Finding, Grade
 from common.doctor.machine_checks import check_bluetooth
 from common.doctor.network_probe import examine_network
 from common.doctor.unit_check import Unit
@@ -15,7 +15,7 @@ from common.errors import TakenError, TandemError
 from common.link.factory import open_link, parse_link
 
 
-def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: bool) -> list[Finding]:
+def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: bool) -> list[Diagnostic]:
     """Check one link.
 
     Args:
@@ -33,7 +33,7 @@ def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: 
     if address.startswith("rfcomm:"):
         adapter = check_bluetooth(machine.read_bluetooth(), wanted=True)
         findings.append(adapter)
-        if adapter.verdict is Grade.FAIL:
+        if adapter.severity is Severity.FAIL:
             return findings
     if address.startswith("serial:") and (node := machine.read_node(Path(address.removeprefix("serial:")))) is not None:
         findings.append(check_access("permission", node, account))

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from common.doctor.finding import Finding, fail, ok
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail, ok
 
 _READ_AND_WRITE = 0o6
 
@@ -76,7 +77,7 @@ def may_open(node: Node, account: Account) -> bool:
     return bits & _READ_AND_WRITE == _READ_AND_WRITE
 
 
-def check_access(what: str, node: Node, account: Account) -> Finding:
+def check_access(what: str, node: Node, account: Account) -> Diagnostic:
     """Judge whether a user may open a device.
 
     Args:

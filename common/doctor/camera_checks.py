@@ -6,8 +6,9 @@ from typing import Final
 
 from common.camera.v4l2_formats import FormatOffer, Rates, Wanted, choose, choose_rate, rate_text
 from common.camera.v4l2_stamps import StampClock, rate_remedy
+from common.diagnostic import Diagnostic
 from common.doctor.access import Holder
-from common.doctor.finding import Finding, fail, ok, warn
+from common.doctor.finding import fail, ok, warn
 from common.errors import TandemError
 from common.frame import raw_bytes
 from common.words import counted
@@ -99,7 +100,7 @@ class Sample:
     exposure_ns: int | None = None
 
 
-def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
+def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Diagnostic:
     """Explain why no camera was found.
 
     Args:
@@ -118,7 +119,7 @@ def check_absence(nodes: int, cameras: tuple[UsbCamera, ...]) -> Finding:
     return fail("camera", "none is plugged in", "plug one in; lsusb lists what the USB bus sees")
 
 
-def check_format(camera: str, offered: Offered, wanted: Wanted) -> Finding:
+def check_format(camera: str, offered: Offered, wanted: Wanted) -> Diagnostic:
     """Judge the request against what the driver offers."""
     try:
         choice = choose(offered.formats, wanted, camera)
@@ -130,7 +131,7 @@ def check_format(camera: str, offered: Offered, wanted: Wanted) -> Finding:
     return ok("format", f"{offer} by the driver; the line `stream` says what the camera gives")
 
 
-def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Finding:
+def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Diagnostic:
     """Judge whether the USB bus can carry a stream.
 
     Args:
@@ -164,7 +165,7 @@ def raw_frame_bytes(offered: Offered, wanted: Wanted) -> int:
     return raw_bytes(choice.pixel_format, *choice.size_px) or 0
 
 
-def check_stream(sample: Sample) -> list[Finding]:
+def check_stream(sample: Sample) -> list[Diagnostic]:
     """Judge the result of streaming: frames, rate, stamps."""
     spoiled = sum(count for _, count in sample.spoiled)
     faults = ", ".join(f"{count} {fault}" for fault, count in sample.spoiled)
@@ -193,7 +194,7 @@ def check_stream(sample: Sample) -> list[Finding]:
     return [finding, _check_stamps(sample), *_check_controls(sample)]
 
 
-def check_taken(holders: tuple[Holder, ...], service_pid: int, status: str, *, all_seen: bool) -> Finding:
+def check_taken(holders: tuple[Holder, ...], service_pid: int, status: str, *, all_seen: bool) -> Diagnostic:
     """Judge a camera from which another process streams.
 
     Args:
@@ -215,7 +216,7 @@ def check_taken(holders: tuple[Holder, ...], service_pid: int, status: str, *, a
     return fail("stream", "in use by a program that cannot be seen", "end it (a container?), or use another camera")
 
 
-def _check_stamps(sample: Sample) -> Finding:
+def _check_stamps(sample: Sample) -> Diagnostic:
     meaning = "first packet of a frame" if sample.driver == "uvcvideo" else "as its flags say"
     match sample.stamps:
         case StampClock.MONOTONIC:
@@ -233,7 +234,7 @@ def _check_stamps(sample: Sample) -> Finding:
     return ok("stamps", f"driver {sample.driver} stamps {named}, {meaning}; all plausible")
 
 
-def _check_controls(sample: Sample) -> list[Finding]:
+def _check_controls(sample: Sample) -> list[Diagnostic]:
     if not sample.refused:
         return []
     return [

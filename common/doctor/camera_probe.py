@@ -13,6 +13,7 @@ from common.camera.v4l2_formats import Wanted, choose
 from common.camera.v4l2_serial import serial_number
 from common.camera.v4l2_stream import Stream, V4l2Settings
 from common.camera.v4l2_tally import Tally
+from common.diagnostic import Diagnostic, Severity
 from common.doctor import machine
 from common.doctor.access import Account, Node, check_access
 from common.doctor.camera_checks import (
@@ -25,7 +26,7 @@ from common.doctor.camera_checks import (
     check_taken,
     raw_frame_bytes,
 )
-from common.doctor.finding import Finding, Grade, fail, ok
+from common.doctor.finding import fail, ok
 from common.doctor.unit_check import Unit
 from common.errors import TakenError, TandemError
 from common.frame import Frame
@@ -41,7 +42,7 @@ _LONGEST_NS: Final = 6_000_000_000
 """Webcams start within 2 s; nine frames at the slowest useful rate take 4 s more."""
 
 
-def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
+def examine_camera(uri: str, account: Account, unit: Unit) -> list[Diagnostic]:
     """Check a camera from its node to its frames.
 
     Args:
@@ -69,7 +70,7 @@ def examine_camera(uri: str, account: Account, unit: Unit) -> list[Finding]:
     return list(_examine(path, settings, _turn_text(parse_orientation(uri)), account, unit))
 
 
-def _opened(uri: str) -> Finding:
+def _opened(uri: str) -> Diagnostic:
     try:
         camera = open_camera(uri, "", now.monotonic_ns())
     except TandemError as error:
@@ -84,15 +85,15 @@ def _turn_text(orientation: Orientation) -> str:
     return f", to be turned ({orientation})" if orientation != UPRIGHT else ""
 
 
-def _denied(nodes: list[Path], account: Account) -> Iterator[Finding]:
+def _denied(nodes: list[Path], account: Account) -> Iterator[Diagnostic]:
     """What prevents access to nodes that gave nothing."""
     for path in nodes:
         node = machine.read_node(path)
-        if node is not None and (finding := check_access("permission", node, account)).verdict is Grade.FAIL:
+        if node is not None and (finding := check_access("permission", node, account)).severity is Severity.FAIL:
             yield finding
 
 
-def _examine(path: Path, settings: V4l2Settings, turn: str, account: Account, unit: Unit) -> Iterator[Finding]:
+def _examine(path: Path, settings: V4l2Settings, turn: str, account: Account, unit: Unit) -> Iterator[Diagnostic]:
     node = machine.read_node(path)
     if node is None:
         yield fail(
@@ -117,11 +118,11 @@ def _examine(path: Path, settings: V4l2Settings, turn: str, account: Account, un
     yield access
     possible = check_format(str(path), offered, settings.wanted)
     yield possible
-    if possible.verdict is not Grade.FAIL:
+    if possible.severity is not Severity.FAIL:
         yield from _streamed(path, node, settings, offered, unit)
 
 
-def _streamed(path: Path, node: Node, settings: V4l2Settings, offered: Offered, unit: Unit) -> Iterator[Finding]:
+def _streamed(path: Path, node: Node, settings: V4l2Settings, offered: Offered, unit: Unit) -> Iterator[Diagnostic]:
     """What streaming shows: it proves that the bus carries what is requested."""
     try:
         sample = _stream(path, settings)

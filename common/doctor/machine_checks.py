@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from common.doctor.finding import Finding, fail, ok, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail, ok, warn
 from common.words import times
 
 LOG_UNREADABLE: Final = "the kernel's log may not be read"
@@ -127,7 +128,7 @@ class Bluetooth:
     blocked: tuple[str, ...] = ()
 
 
-def check_disk(disk: Disk) -> Finding:
+def check_disk(disk: Disk) -> Diagnostic:
     """Judge a file system: space, inodes, and whether it is writable."""
     if disk.read_only:
         return warn(
@@ -150,7 +151,7 @@ def throttled(bits: int, sensor: str) -> Supply:
     return Supply(sensor, bool(bits & _THROTTLED_NOW), bool(bits & _THROTTLED_BEFORE))
 
 
-def check_power(log: KernelLog, supply: Supply) -> Finding:
+def check_power(log: KernelLog, supply: Supply) -> Diagnostic:
     """Judge the power supply from what the firmware says now and what the kernel has logged since the boot."""
     remedy = "a stronger supply and a shorter cable; the camera on a hub with its own supply"
     if supply.low_now:
@@ -167,7 +168,7 @@ def check_power(log: KernelLog, supply: Supply) -> Finding:
     return ok("power", "no under-voltage in the kernel's log" + (f" nor in {supply.sensor}" if supply.sensor else ""))
 
 
-def check_usb_log(log: KernelLog) -> Finding:
+def check_usb_log(log: KernelLog) -> Diagnostic:
     """Judge what the kernel has logged about USB devices since the boot."""
     if not log.readable:
         return _unreadable("usb-log")
@@ -181,7 +182,7 @@ def check_usb_log(log: KernelLog) -> Finding:
     return ok("usb-log", "no USB error since the boot")
 
 
-def check_clocks(clocks: Clocks) -> list[Finding]:
+def check_clocks(clocks: Clocks) -> list[Diagnostic]:
     """Judge the clocks. Only CLOCK_MONOTONIC matters for pairs; a wrong date affects nothing but the dates in the journal."""
     if clocks.resolution_ns > _COARSE_NS:
         step = f"CLOCK_MONOTONIC moves in steps of {clocks.resolution_ns / 1e6:g} ms (clock source {clocks.source})"
@@ -202,7 +203,7 @@ def check_clocks(clocks: Clocks) -> list[Finding]:
     return [steady, date]
 
 
-def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Finding:
+def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Diagnostic:
     """Judge whether links over Bluetooth are possible.
 
     Args:
@@ -221,7 +222,7 @@ def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Finding:
     return fail("bluetooth", text, remedy) if wanted else ok("bluetooth", f"{text}; no link asks for one")
 
 
-def _unreadable(what: str) -> Finding:
+def _unreadable(what: str) -> Diagnostic:
     return warn(what, LOG_UNREADABLE, "ask again as root: sudo")
 
 

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from common.doctor.finding import Finding, fail, ok, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail, ok, warn
 
 CABLE_BOARD: Final = "192.168.7.2"
 """The board's end of its USB cable (deploy/board/usb-gadget, and the BeagleBone's own images)."""
@@ -32,7 +33,7 @@ class Card:
     is_up: bool | None
 
 
-def check_listening(host: str, port: int, cards: Sequence[Card], *, has_device_socket: bool) -> Finding:
+def check_listening(host: str, port: int, cards: Sequence[Card], *, has_device_socket: bool) -> Diagnostic:
     """Judge an address where this side waits: can the other one reach it?
 
     Args:
@@ -62,7 +63,7 @@ def check_listening(host: str, port: int, cards: Sequence[Card], *, has_device_s
     )
 
 
-def check_dialling(host: str, own: str) -> Finding:
+def check_dialling(host: str, own: str) -> Diagnostic:
     """Judge an address that this side dials: is this machine in that network?
 
     Args:

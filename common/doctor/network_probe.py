@@ -4,15 +4,15 @@ import ipaddress
 from contextlib import suppress
 from typing import Final
 
+from common.diagnostic import Diagnostic
 from common.doctor import machine
-from common.doctor.finding import Finding
 from common.doctor.network_checks import check_dialling, check_listening
 from common.link.uri import LinkUri, is_this_machine
 
 _EVERYWHERE: Final = "*"
 
 
-def examine_network(link: LinkUri) -> list[Finding]:
+def examine_network(link: LinkUri) -> list[Diagnostic]:
     """Check the way of a tcp link to another machine; nothing is said of other links.
 
     Args:

@@ -4,12 +4,13 @@ from collections.abc import Iterable
 from importlib.util import find_spec
 
 from common.android import is_android
-from common.doctor.finding import Finding, fail
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail
 from common.errors import UnavailableError
 from common.program.packages import remedy_for
 
 
-def missing_packages(modules: Iterable[str]) -> list[Finding]:
+def missing_packages(modules: Iterable[str]) -> list[Diagnostic]:
     """Look for modules, and return a finding for each that is not installed.
 
     Args:
@@ -18,7 +19,7 @@ def missing_packages(modules: Iterable[str]) -> list[Finding]:
     return [missing_package(module, "is not installed") for module in modules if not _is_installed(module)]
 
 
-def missing_package(module: str, problem: str) -> Finding:
+def missing_package(module: str, problem: str) -> Diagnostic:
     """Return the finding that a package cannot be used.
 
     Args:

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from common.doctor.finding import Finding, fail, ok, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail, ok, warn
 from common.words import times
 
 
@@ -40,7 +41,7 @@ class Unit:
         return self.load == "loaded"
 
 
-def check_unit(unit: Unit) -> Finding:
+def check_unit(unit: Unit) -> Diagnostic:
     """Judge the service's state."""
     if not unit.load:
         return ok("service", "no systemd here: the command runs by itself")

@@ -8,10 +8,10 @@ from typing import Final, Self
 
 from common import now
 from common.camera.base import Camera
+from common.diagnostic import diagnostic_of
 from common.link.base import Link
 from common.protocol.message import Pacing
 from phone_host.accounts.delays import Series, SinkAccount
-from phone_host.diagnostics.concern import trouble_of
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Result
 from phone_host.report.run_json import build
@@ -101,7 +101,7 @@ class Scanner:
     def snapshot(self) -> RunSnapshot:
         """Return delays, accounts, clock, doubts and drops as of now, or as of the end of the run."""
         if self._failure is not None:
-            return self._host.snapshot("failed", trouble_of(self._failure))
+            return self._host.snapshot("failed", diagnostic_of(self._failure))
         return self._host.snapshot("running" if self.ended is None else self.ended.value)
 
     def _run(self) -> None:

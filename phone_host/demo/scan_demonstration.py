@@ -10,6 +10,7 @@ from typing import Final
 
 from common import now
 from common.camera.factory import open_camera
+from common.diagnostic import Diagnostic, Severity
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.children.board_process import board_process
@@ -17,7 +18,6 @@ from phone_host.demo.scan_truth import ModelErrors, model_errors
 from phone_host.live.scan import LiveScan
 from phone_host.model import Side
 from phone_host.output.axes import Axes
-from phone_host.report.stereo_report import Remark
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.scan_files import FinishedScan
@@ -155,5 +155,5 @@ def with_truth(scan: FinishedScan, errors: ModelErrors) -> FinishedScan:
         scan: a finished one.
         errors: what the comparison gave.
     """
-    remarks = (Remark(errors.sentence, is_note=True), *scan.report.remarks)
+    remarks = (Diagnostic(errors.sentence, severity=Severity.NOTE), *scan.report.remarks)
     return replace(scan, report=replace(scan.report, remarks=remarks))

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final, assert_never
 
+from common.diagnostic import Diagnostic
 from common.orientation import UPRIGHT, Flip, Orientation
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, Misplaced, diagnose
 from phone_host.model import Arrangement, Evidence
 
 
@@ -95,49 +96,49 @@ _SAME_SHARE: Final = 0.75
 """Share of the features that have not moved in two images from one place; noise moves some. In a street scene 2 % have not."""
 
 _NAMED: Final = {
-    Arrangement.SWAPPED: Concern(
-        Doubt.SWAPPED,
+    Arrangement.SWAPPED: diagnose(
+        Code.SWAPPED,
         "left and right are exchanged: the scene moves the wrong way from the left image to the right one",
         "swap LEFT and RIGHT or --board-side; if each is where it should be, both cameras are upside down (rotate=180) or both mirror their images (flip=h)",
     ),
-    Arrangement.TURNED: Concern(
-        Doubt.TURNED,
+    Arrangement.TURNED: diagnose(
+        Code.TURNED,
         "one camera is upside down: the two images are turned by 180 degrees to each other",
         "mount it upright, or give that camera rotate=180",
-        arrangement=Arrangement.TURNED,
+        evidence=Misplaced(Arrangement.TURNED),
     ),
-    Arrangement.TURNED_BY_QUARTER: Concern(
-        Doubt.TURNED_BY_QUARTER,
+    Arrangement.TURNED_BY_QUARTER: diagnose(
+        Code.TURNED_BY_QUARTER,
         "one camera lies on its side: the two images are turned by 90 degrees to each other",
         "mount it upright, or give that camera rotate=90 or rotate=270",
-        arrangement=Arrangement.TURNED_BY_QUARTER,
+        evidence=Misplaced(Arrangement.TURNED_BY_QUARTER),
     ),
-    Arrangement.BOTH_TURNED: Concern(
-        Doubt.TURNED,
+    Arrangement.BOTH_TURNED: diagnose(
+        Code.TURNED,
         "both cameras are upside down: their images fit the calibration only when turned by 180 degrees",
         "mount them upright, or give both cameras rotate=180",
-        arrangement=Arrangement.BOTH_TURNED,
+        evidence=Misplaced(Arrangement.BOTH_TURNED),
     ),
-    Arrangement.BOTH_MIRRORED: Concern(
-        Doubt.MIRRORED,
+    Arrangement.BOTH_MIRRORED: diagnose(
+        Code.MIRRORED,
         "both images are mirrored: they fit the calibration only when flipped",
         "switch mirroring off in both cameras, or give both flip=h (flip=v if top and bottom are exchanged)",
-        arrangement=Arrangement.BOTH_MIRRORED,
+        evidence=Misplaced(Arrangement.BOTH_MIRRORED),
     ),
-    Arrangement.BOTH_TURNED_BY_QUARTER: Concern(
-        Doubt.TURNED_BY_QUARTER,
+    Arrangement.BOTH_TURNED_BY_QUARTER: diagnose(
+        Code.TURNED_BY_QUARTER,
         "both cameras lie on their sides: the scene moves up or down from one image to the other",
         "mount them upright, or give both cameras rotate=90 or rotate=270",
-        arrangement=Arrangement.BOTH_TURNED_BY_QUARTER,
+        evidence=Misplaced(Arrangement.BOTH_TURNED_BY_QUARTER),
     ),
-    Arrangement.MIRRORED: Concern(
-        Doubt.MIRRORED,
+    Arrangement.MIRRORED: diagnose(
+        Code.MIRRORED,
         "one of the two images is a mirror image",
         "switch mirroring off in the camera's app, or give that camera flip=h (flip=v if top and bottom are exchanged)",
-        arrangement=Arrangement.MIRRORED,
+        evidence=Misplaced(Arrangement.MIRRORED),
     ),
-    Arrangement.SAME_PLACE: Concern(
-        Doubt.SAME_IMAGE,
+    Arrangement.SAME_PLACE: diagnose(
+        Code.SAME_IMAGE,
         "both images show the scene from the same place: nothing is shifted between them",
         "give two different cameras or files, and keep the cameras apart; if they are, everything is too far away",
     ),
@@ -152,12 +153,7 @@ _OF_BOTH: Final = (
 """Mistakes that leave the features of both images in the same direction; the first wins a tie."""
 
 
-def _named(arrangement: Arrangement, source: ImageSource) -> Concern:
-    concern = _NAMED[arrangement]
-    return concern if source is ImageSource.CAMERAS else replace(concern, remedy=FILE_REMEDIES[arrangement].words)
-
-
-def arrangement_doubts(evidence: Evidence, source: ImageSource) -> tuple[Concern, ...]:
+def arrangement_doubts(evidence: Evidence, source: ImageSource) -> tuple[Diagnostic, ...]:
     """Name the mistake that clearly more features agree with than with the right arrangement; empty if none.
 
     Args:
@@ -165,32 +161,32 @@ def arrangement_doubts(evidence: Evidence, source: ImageSource) -> tuple[Concern
         source: where the images come from: remedies name the options of a camera's address, or those for files.
     """
     support = {item.arrangement: item.features for item in evidence.supports}
-    return tuple(_with_direction(concern, evidence) for concern in _arranged(support, source))
+    found = _arranged(support)
+    if found is None:
+        return ()
+    concern = _NAMED[found]
+    if source is ImageSource.FILES:
+        concern = replace(concern, remedy=FILE_REMEDIES[found].words)
+    if found is Arrangement.TURNED_BY_QUARTER:
+        concern = replace(concern, evidence=Misplaced(found, max(item.quarters for item in evidence.supports)))
+    return (concern,)
 
 
-def _arranged(support: dict[Arrangement, int], source: ImageSource) -> tuple[Concern, ...]:
+def _arranged(support: dict[Arrangement, int]) -> Arrangement | None:
+    """Return how the images lie if clearly not as they should."""
     related = max(support[Arrangement.RIGHT], support[Arrangement.TILTED])
-    same = support[Arrangement.SAME_PLACE]
-    if same >= max(LEAST_SUPPORT, _SAME_SHARE * related):
-        return (_named(Arrangement.SAME_PLACE, source),)
+    if support[Arrangement.SAME_PLACE] >= max(LEAST_SUPPORT, _SAME_SHARE * related):
+        return Arrangement.SAME_PLACE
     # These turn the features themselves: not even tilted rows explain them.
     turned = (Arrangement.TURNED, Arrangement.TURNED_BY_QUARTER, Arrangement.MIRRORED)
     best = max(turned, key=lambda arrangement: support[arrangement])
     if support[best] >= max(LEAST_SUPPORT, _MARGIN * related):
-        return (_named(best, source),)
+        return best
     best = max(_OF_BOTH, key=lambda arrangement: support[arrangement])
     if support[best] < max(LEAST_SUPPORT, _MARGIN * support[Arrangement.RIGHT]):
-        return ()
-    if support[best] < _CLEARLY_MORE * support[Arrangement.SWAPPED]:
-        best = Arrangement.SWAPPED  # without a rig the three cannot be told apart; its remedy names them all
-    return (_named(best, source),)
-
-
-def _with_direction(concern: Concern, evidence: Evidence) -> Concern:
-    """Add by how many quarters one camera is turned against the other, if that is the mistake."""
-    if concern.arrangement is not Arrangement.TURNED_BY_QUARTER:
-        return concern
-    return replace(concern, quarters=max(item.quarters for item in evidence.supports))
+        return None
+    # Without a rig the three cannot be told apart; the remedy of exchanged ones names them all.
+    return Arrangement.SWAPPED if support[best] < _CLEARLY_MORE * support[Arrangement.SWAPPED] else best
 
 
 _SIDES: Final = ("left", "right")
@@ -234,8 +230,8 @@ def mirrored_further(present: Orientation) -> Orientation:
 
 
 def with_final_options(
-    concern: Concern, present: Sequence[Orientation], source: ImageSource = ImageSource.CAMERAS
-) -> Concern:
+    concern: Diagnostic, present: Sequence[Orientation], source: ImageSource = ImageSource.CAMERAS
+) -> Diagnostic:
     """Return a concern whose remedy names the options to be given in the end, if it is mended by turning or mirroring.
 
     Args:
@@ -243,18 +239,19 @@ def with_final_options(
         present: the orientations that the left and the right camera have been given.
         source: where the images come from, and so how the user states them.
     """
-    if concern.arrangement not in _TURNS:
+    seen = concern.evidence
+    if not isinstance(seen, Misplaced) or seen.arrangement not in _TURNS:
         return concern
     is_plain = all(orientation == UPRIGHT for orientation in present)
-    if is_plain and (source is ImageSource.FILES or not concern.quarters):
+    if is_plain and (source is ImageSource.FILES or not seen.quarters):
         return concern  # the options are known by their kind alone
-    both = concern.arrangement in _BOTH_WRONG
-    turns = _TURNS[concern.arrangement]
+    both = seen.arrangement in _BOTH_WRONG
+    turns = _TURNS[seen.arrangement]
     choices = [
         _words(
             side,
             present[side],
-            [_further(present[side], turn) for turn in _of_side(turns, concern.quarters, side)],
+            [_further(present[side], turn) for turn in _of_side(turns, seen.quarters, side)],
             source,
         )
         for side in _by_suspicion(present)

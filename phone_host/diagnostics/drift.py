@@ -3,8 +3,9 @@
 import math
 from typing import Final
 
+from common.diagnostic import Diagnostic
 from common.words import times
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, diagnose
 from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, Drift, DriftState
 
 TOLD_TURN_RAD: Final = math.radians(0.25)
@@ -31,7 +32,7 @@ _HOLD: Final = "switch autofocus off, hold the focus that you scan with, and cal
 
 _TIME: Final = "measure the cameras' time offset: phone-host calibrate-time"
 
-_EXPLAINED: Final = frozenset({Doubt.MIRRORED, Doubt.TURNED, Doubt.TURNED_BY_QUARTER, Doubt.OTHER_SCENE})
+_EXPLAINED: Final = frozenset({Code.MIRRORED, Code.TURNED, Code.TURNED_BY_QUARTER, Code.OTHER_SCENE})
 
 
 def turn_words(departure: Departure) -> str:
@@ -43,7 +44,7 @@ def turn_words(departure: Departure) -> str:
     return ", ".join(parts)
 
 
-def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
+def drift_concerns(drift: Drift) -> tuple[Diagnostic, ...]:
     """Say what of a rig's departure its user must know.
 
     Args:
@@ -52,13 +53,13 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
     found = []
     if drift.state is DriftState.UNKNOWN and _was_knocked(drift):
         problem = f"the cameras turned against each other{_when(drift)}; by how much is not known, because too few features were seen since"
-        found.append(Concern(Doubt.RIG_MOVED, problem, _TIGHTEN))
+        found.append(diagnose(Code.RIG_MOVED, problem, _TIGHTEN))
     departure, is_beyond = drift.departure, drift.state is DriftState.BEYOND
     angle = f"{math.degrees(departure.angle_rad):.2f} degrees"
     if is_beyond and not _is_focus(departure):
         found.append(
-            Concern(
-                Doubt.RIG_MOVED,
+            diagnose(
+                Code.RIG_MOVED,
                 f"the cameras have turned against each other since the calibration ({turn_words(departure)}): too far to be corrected, depth is wrong",
                 _STIFFEN,
             )
@@ -70,24 +71,24 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
         and (_was_knocked(drift) or _is_far(departure))
     ):
         found.append(
-            Concern(
-                Doubt.RIG_MOVED,
+            diagnose(
+                Code.RIG_MOVED,
                 f"the cameras turned by {angle} against each other{_when(drift)}; {_mended(drift)}",
                 _TIGHTEN,
             )
         )
     if _is_focus(departure) or (not is_beyond and abs(departure.focal - 1) >= TOLD_FOCUS):
         found.append(
-            Concern(
-                Doubt.FOCUS_CHANGED,
+            diagnose(
+                Code.FOCUS_CHANGED,
                 f"the cameras' focal lengths changed by {100 * (departure.focal - 1):+.1f} % against each other since the calibration: one has focused anew; {_mended(drift)}",
                 _HOLD,
             )
         )
     if is_late(drift):
         found.append(
-            Concern(
-                Doubt.LATE_IMAGES,
+            diagnose(
+                Code.LATE_IMAGES,
                 f"moving objects are off their row by {drift.late_px:.1f} px: the {'left' if drift.late_ns > 0 else 'right'} images show it"
                 f" {abs(drift.late_ns) / 1e6:.0f} +- {2 * drift.late_sigma_ns / 1e6:.0f} ms later than their stamps say",
                 _TIME,
@@ -96,7 +97,7 @@ def drift_concerns(drift: Drift) -> tuple[Concern, ...]:
     return tuple(found)
 
 
-def told_as_a_turn(images: tuple[Concern, ...], moved: tuple[Concern, ...]) -> tuple[Concern, ...]:
+def told_as_a_turn(images: tuple[Diagnostic, ...], moved: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
     """Return the doubts about images without those that a knocked rig explains.
 
     Features that agree on one turn of a camera are those of one scene, upright and not mirrored; single pairs of a rig
@@ -106,9 +107,9 @@ def told_as_a_turn(images: tuple[Concern, ...], moved: tuple[Concern, ...]) -> t
         images: what single pairs made doubtful.
         moved: what the rig's departure did.
     """
-    if all(concern.doubt is not Doubt.RIG_MOVED for concern in moved):
+    if all(concern.code != Code.RIG_MOVED for concern in moved):
         return images
-    return tuple(concern for concern in images if concern.doubt not in _EXPLAINED)
+    return tuple(concern for concern in images if concern.code not in _EXPLAINED)
 
 
 def is_late(drift: Drift) -> bool:

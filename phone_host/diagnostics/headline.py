@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from phone_host.diagnostics.concern import Concern, Doubt, Trouble
+from common.diagnostic import Diagnostic, Severity
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.image_judge import past, past_seconds
 from phone_host.diagnostics.image_rules import ImageFigures, figure_doubts
 from phone_host.diagnostics.run_rules import GONE, concerns, history
@@ -61,7 +62,7 @@ class Answer:
 
 def answer(
     figures: ImageFigures,
-    found: tuple[Concern, ...],
+    found: tuple[Diagnostic, ...],
     geometry: StereoGeometry | None,
     error_px: float = math.nan,
     cut: CutCounts | None = None,
@@ -105,10 +106,10 @@ def pixels_text(cut: CutCounts | None) -> str:
     return "of the pixels inside the crop" if cut is not None and cut.outside else "of the pixels"
 
 
-def _doubtful(concern: Concern) -> Answer:
-    opening = "Depth is wrong" if concern.is_certain else "Depth may be wrong"
-    grade = Grade.BAD if concern.is_certain else Grade.WARNING
-    return Answer(grade, f"{opening}: {concern.sentence}. Remedy: {concern.remedy}.")
+def _doubtful(concern: Diagnostic) -> Answer:
+    opening = "Depth is wrong" if concern.is_failure else "Depth may be wrong"
+    grade = Grade.BAD if concern.is_failure else Grade.WARNING
+    return Answer(grade, f"{opening}: {concern.message}. Remedy: {concern.remedy}.")
 
 
 def _reach(figures: ImageFigures, geometry: StereoGeometry | None, error_px: float) -> str:
@@ -149,27 +150,27 @@ def headline(run: RunSnapshot) -> Answer:
         )
     found = concerns(run)
     if run.images.wants_depth:
-        gone = [concern for concern in found if concern.doubt in GONE]
-        of_depth = (concern for concern in found if concern.doubt not in GONE and not concern.spares_depth)
+        gone = [concern for concern in found if concern.code in GONE]
+        of_depth = (concern for concern in found if concern.code not in GONE and not concern.is_note)
         said = _with_range(_with_age(_with_lone(_of_images(run, tuple(of_depth)), found), found), run)
         return said if not gone or said.grade is Grade.BAD else _while_it_was_there(gone[0], said)
     if found:
-        sentence = f"{_capital(found[0].sentence)}. Remedy: {found[0].remedy}."
+        sentence = f"{_capital(found[0].message)}. Remedy: {found[0].remedy}."
         return Answer(Grade.WARNING, sentence)
     return Answer(Grade.GOOD, "This run measured pairs and delays only, no depth: no calibration was given.")
 
 
-def _with_lone(said: Answer, found: tuple[Concern, ...]) -> Answer:
+def _with_lone(said: Answer, found: tuple[Diagnostic, ...]) -> Answer:
     """Add to good news which images have no partner of their number."""
-    lone = [item.sentence for item in found if item.doubt is Doubt.IMAGE_NUMBERS and item.spares_depth]
+    lone = [item.message for item in found if item.code == Code.IMAGE_NUMBERS and item.is_note]
     if said.grade is not Grade.GOOD or not lone:
         return said
     return Answer(said.grade, f"{said.sentence} {_capital(lone[0])}.")
 
 
-def _with_age(said: Answer, found: tuple[Concern, ...]) -> Answer:
+def _with_age(said: Answer, found: tuple[Diagnostic, ...]) -> Answer:
     """Warn instead of good news if the results are too old: the depth is right, but not where things are by now."""
-    old = next((item.sentence for item in found if item.doubt is Doubt.AGE), "")
+    old = next((item.message for item in found if item.code == Code.AGE), "")
     if said.grade is not Grade.GOOD or not old:
         return said
     return Answer(Grade.WARNING, f"{said.sentence} But {old}.")
@@ -190,16 +191,16 @@ def _without_pairs(run: RunSnapshot) -> str:
     if run.failed_pairs:
         return f"No pair was processed: {run.failed_pairs[0][0].sentences}"
     if not run.link.sessions:
-        absent = Trouble("no board came", "start board-agent on the board")
+        absent = Diagnostic("no board came", "start board-agent on the board", Severity.FAIL)
         return f"No pair was processed: {(run.refused or absent).sentences}"
     return "No pair was processed: no frames of the two cameras came together."
 
 
-def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
+def _of_images(run: RunSnapshot, found: tuple[Diagnostic, ...]) -> Answer:
     """Answer for the depth of a run, if the two cameras were always there."""
     images, newest = run.images, run.images.newest
     if images.judged and not images.is_settled and run.ended == "running":
-        why = newest[0].sentence if newest else f"the newest pair is free of this: {images.concerns[0].sentence}"
+        why = newest[0].message if newest else f"the newest pair is free of this: {images.concerns[0].message}"
         return Answer(Grade.WARNING, f"Depth is being judged again: {why}.")
     said = answer(
         images.now, found or figure_doubts(images.now), images.geometry, images.disparity_error_px, run.depth.cut
@@ -208,17 +209,17 @@ def _of_images(run: RunSnapshot, found: tuple[Concern, ...]) -> Answer:
         return said
     if newest:
         remedy = f"Remedy: {newest[0].remedy}."
-        return Answer(Grade.WARNING, f"Depth looked right until the last judged pair: {newest[0].sentence}. {remedy}")
+        return Answer(Grade.WARNING, f"Depth looked right until the last judged pair: {newest[0].message}. {remedy}")
     if gone := past(history(run)):
         total_s = past_seconds(history(run))
-        but = f"but for {_seconds(total_s)} of {_seconds(max(total_s, run.seconds))} s it was not: {gone[0].concern.sentence}"
+        but = f"but for {_seconds(total_s)} of {_seconds(max(total_s, run.seconds))} s it was not: {gone[0].concern.message}"
         return Answer(Grade.WARNING, f"{said.sentence.removesuffix('.')}; {but}.")
     return said
 
 
-def _while_it_was_there(gone: Concern, said: Answer) -> Answer:
+def _while_it_was_there(gone: Diagnostic, said: Answer) -> Answer:
     """Put an absence before what can be said of the depth until then."""
-    sentence = f"{_capital(gone.sentence)}. Remedy: {gone.remedy}. Until then: {_lower(said.sentence)}"
+    sentence = f"{_capital(gone.message)}. Remedy: {gone.remedy}. Until then: {_lower(said.sentence)}"
     return Answer(Grade.WARNING, sentence)
 
 

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from common.diagnostic import Diagnostic
 from common.words import counted
-from phone_host.diagnostics.concern import Concern, Doubt, gravest_first
+from phone_host.diagnostics.codes import Code, gravest_first
 from phone_host.diagnostics.image_rules import ImageFigures, image_doubts, median_figures
 from phone_host.model import Evidence, StereoGeometry
 
@@ -46,7 +47,7 @@ class Episode:
         sound: numbers of the judged pairs without the doubt since it was first seen, kept like `judged`.
     """
 
-    concern: Concern
+    concern: Diagnostic
     from_s: float
     to_s: float
     first_pair: int
@@ -62,10 +63,10 @@ class DoubtHistory:
 
     def __init__(self) -> None:
         # Doubts that hold, or have held so recently that they may return.
-        self._open: dict[Doubt, Episode] = {}
+        self._open: dict[str, Episode] = {}
         self._over: deque[Episode] = deque(maxlen=_MOST)
 
-    def add(self, found: Sequence[Concern], standing: frozenset[Doubt], at_s: float, pair: int) -> None:
+    def add(self, found: Sequence[Diagnostic], standing: frozenset[str], at_s: float, pair: int) -> None:
         """Take one judgement.
 
         Args:
@@ -74,7 +75,7 @@ class DoubtHistory:
             at_s: when the pair was done, counted from the start of the run, s.
             pair: its number in the run, from 0.
         """
-        here = {concern.doubt: concern for concern in found}
+        here = {concern.code: concern for concern in found}
         for doubt, concern in here.items():
             self._see(doubt, concern, at_s, pair)
         for doubt, known in tuple(self._open.items()):
@@ -88,7 +89,7 @@ class DoubtHistory:
                 if gone.judgements >= _LEAST_JUDGEMENTS:
                     self._over.append(gone)
 
-    def _see(self, doubt: Doubt, concern: Concern, at_s: float, pair: int) -> None:
+    def _see(self, doubt: str, concern: Diagnostic, at_s: float, pair: int) -> None:
         known = self._open.get(doubt)
         if known is None:
             self._open[doubt] = Episode(
@@ -105,7 +106,7 @@ class DoubtHistory:
             judgements=known.judgements + 1,
         )
 
-    def episodes(self, standing: frozenset[Doubt]) -> tuple[Episode, ...]:
+    def episodes(self, standing: frozenset[str]) -> tuple[Episode, ...]:
         """Return what stood and what stands, in order of beginning.
 
         Args:
@@ -117,7 +118,7 @@ class DoubtHistory:
 
 def past(history: Sequence[Episode]) -> tuple[Episode, ...]:
     """Return what has gone, gravest first."""
-    return tuple(sorted((item for item in history if item.is_over), key=lambda item: not item.concern.is_certain))
+    return tuple(sorted((item for item in history if item.is_over), key=lambda item: not item.concern.is_failure))
 
 
 def past_seconds(history: Sequence[Episode]) -> float:
@@ -129,7 +130,7 @@ def past_seconds(history: Sequence[Episode]) -> float:
     return total
 
 
-def told_past(history: Sequence[Episode], pairs: int, save_every: int) -> list[tuple[Concern, str]]:
+def told_past(history: Sequence[Episode], pairs: int, save_every: int) -> list[tuple[Diagnostic, str]]:
     """Return the gravest of what stood for a while and has gone, each with one line that says so.
 
     Args:
@@ -157,7 +158,7 @@ def history_lines(history: Sequence[Episode], pairs: int, save_every: int) -> li
 
 
 def _line(item: Episode, pairs: int, save_every: int) -> str:
-    verdict = "wrong" if item.concern.is_certain else "doubtful"
+    verdict = "wrong" if item.concern.is_failure else "doubtful"
     sound = sum(number < item.last_pair for number in item.sound)
     between = item.last_pair - item.first_pair + 1 - item.judgements - sound
     unjudged = f", {counted(between, 'pair')} between them not judged" if between else ""
@@ -165,7 +166,7 @@ def _line(item: Episode, pairs: int, save_every: int) -> str:
     parts = (_numbers(saved.judged, verdict), _numbers(saved.between, "not judged"))
     listed = "; ".join(filter(None, parts))
     return (
-        f"from {item.from_s:.1f} s to {item.to_s:.1f} s {item.concern.sentence}:"
+        f"from {item.from_s:.1f} s to {item.to_s:.1f} s {item.concern.message}:"
         f" {item.judgements} judged {'pair' if item.judgements == 1 else 'pairs'} of {pairs} {'is' if item.judgements == 1 else 'are'} {verdict}{unjudged}"
         f"{f' (saved: {listed})' if listed else ''}"
     )
@@ -232,8 +233,8 @@ class ImageTrust:
     has_depth: bool = False
     start: ImageFigures = field(default_factory=ImageFigures)
     now: ImageFigures = field(default_factory=ImageFigures)
-    concerns: tuple[Concern, ...] = ()
-    newest: tuple[Concern, ...] = ()
+    concerns: tuple[Diagnostic, ...] = ()
+    newest: tuple[Diagnostic, ...] = ()
     history: tuple[Episode, ...] = ()
     geometry: StereoGeometry | None = None
     disparity_error_px: float = math.nan
@@ -241,7 +242,7 @@ class ImageTrust:
     @property
     def is_settled(self) -> bool:
         """Whether the newest judged pair has exactly the standing doubts."""
-        return {concern.doubt for concern in self.newest} == {concern.doubt for concern in self.concerns}
+        return {concern.code for concern in self.newest} == {concern.code for concern in self.concerns}
 
 
 _LAST: Final = 3
@@ -250,7 +251,7 @@ _LAST: Final = 3
 _START: Final = 10
 """Figures at the start are medians over this many judgements, five seconds."""
 
-_Judgement = tuple[Evidence, tuple[Concern, ...]]
+_Judgement = tuple[Evidence, tuple[Diagnostic, ...]]
 
 
 class ImageJudge:
@@ -299,13 +300,13 @@ class ImageJudge:
         return median_figures(alike or [evidence for evidence, _ in self._latest][-1:])
 
     @property
-    def concerns(self) -> tuple[Concern, ...]:
+    def concerns(self) -> tuple[Diagnostic, ...]:
         """The doubts that hold in most of the latest judgements, with their latest figures, gravest first."""
-        latest = {concern.doubt: concern for _, found in self._latest for concern in found}
-        return gravest_first(tuple(latest[doubt] for doubt in Doubt if doubt in self._standing))
+        latest = {concern.code: concern for _, found in self._latest for concern in found}
+        return gravest_first(tuple(latest[doubt] for doubt in Code if doubt in self._standing))
 
     @property
-    def newest(self) -> tuple[Concern, ...]:
+    def newest(self) -> tuple[Diagnostic, ...]:
         """The doubts of the newest judgement, gravest first."""
         return gravest_first(self._latest[-1][1]) if self._latest else ()
 
@@ -315,13 +316,13 @@ class ImageJudge:
         return self._history.episodes(self._standing)
 
     @property
-    def _standing(self) -> frozenset[Doubt]:
-        counts = Counter(concern.doubt for _, found in self._latest for concern in found)
+    def _standing(self) -> frozenset[str]:
+        counts = Counter(concern.code for _, found in self._latest for concern in found)
         standing = frozenset(doubt for doubt, count in counts.items() if 2 * count > len(self._latest))
         doubtful = sum(1 for _, found in self._latest if found)
         # Most are doubtful, each for another reason: the newest reason is as good as any.
         return standing or (_doubts(self._latest[-1][1]) if 2 * doubtful > len(self._latest) else frozenset())
 
 
-def _doubts(found: tuple[Concern, ...]) -> frozenset[Doubt]:
-    return frozenset(concern.doubt for concern in found)
+def _doubts(found: tuple[Diagnostic, ...]) -> frozenset[str]:
+    return frozenset(concern.code for concern in found)

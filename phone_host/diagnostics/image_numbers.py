@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
 from common.camera.image_numbers import ImageNumbers
+from common.diagnostic import Diagnostic, Severity
 from common.words import counted
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, Misplaced, diagnose
 from phone_host.model import Arrangement
 from phone_host.sync.stills import PairedBy, WhyOrder
 
@@ -81,7 +82,7 @@ class FilmWatch:
             self.apart += 1
 
 
-def number_concerns(evidence: ImageEvidence) -> tuple[Concern, ...]:
+def number_concerns(evidence: ImageEvidence) -> tuple[Diagnostic, ...]:
     """Say why pairs of two replays may show different moments; empty before the first pair, and if there is no reason."""
     board, own = evidence.board, evidence.own
     if board is None or own is None or not evidence.pairs + evidence.board_alone + evidence.own_alone:
@@ -97,7 +98,7 @@ def number_concerns(evidence: ImageEvidence) -> tuple[Concern, ...]:
             assert_never(evidence.paired_by)
 
 
-def _by_number(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
+def _by_number(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Diagnostic, ...]:
     """Pairs of one number belong together: what has no partner makes none of them doubtful."""
     alike = (board.count, board.first, board.last) == (own.count, own.first, own.last)
     sides = (
@@ -117,11 +118,11 @@ def _by_number(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) 
             f"{alone} {has} no partner of the same number: the board shows {board.words}, this machine {own.words}"
         )
     return (
-        Concern(
-            Doubt.IMAGE_NUMBERS,
+        diagnose(
+            Code.IMAGE_NUMBERS,
             sentence,
             "check that both folders are of one series: the number in the file name says which two images belong together",
-            spares_depth=True,
+            severity=Severity.NOTE,
         ),
     )
 
@@ -137,19 +138,19 @@ def _alone(side: str, images: int, numbers: tuple[int, ...]) -> str:
     return f"{images} images of {side}{f' ({named}{more})' if named else ''}"
 
 
-def _by_order(why: WhyOrder | None, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
+def _by_order(why: WhyOrder | None, board: ImageNumbers, own: ImageNumbers) -> tuple[Diagnostic, ...]:
     if why is WhyOrder.OTHER:
         return (
-            Concern(
-                Doubt.IMAGE_NUMBERS,
+            diagnose(
+                Code.IMAGE_NUMBERS,
                 f"the board shows {board.words}, this machine {own.words}, paired in their order: the numbers in the names of one side are not those of the other",
                 "give the two images of one moment the same number in their names",
             ),
         )
     if why is WhyOrder.LATE:
         return (
-            Concern(
-                Doubt.IMAGE_NUMBERS,
+            diagnose(
+                Code.IMAGE_NUMBERS,
                 f"the board shows {board.words}, this machine {own.words}, paired in their order: numbers are missing on the board, and it had shown its first images before this run",
                 "start board-agent again, so that this run gets its first image",
             ),
@@ -158,8 +159,8 @@ def _by_order(why: WhyOrder | None, board: ImageNumbers, own: ImageNumbers) -> t
         return ()
     untold = own.first is not None and board.first is None
     return (
-        Concern(
-            Doubt.IMAGE_NUMBERS,
+        diagnose(
+            Code.IMAGE_NUMBERS,
             f"the board shows {board.words}, this machine {own.words}, paired in their order: a missing one shifts all that follow",
             "number the files of both sides alike, such as 0012.jpg; if they are, update board-agent: it does not tell the numbers"
             if untold
@@ -190,17 +191,17 @@ def pairing_words(evidence: ImageEvidence) -> str:
     return f"stills, paired in their order: {why}"
 
 
-def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Concern, ...]:
+def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) -> tuple[Diagnostic, ...]:
     there, here = evidence.first_apart
     if evidence.apart:
-        found = Concern(
-            Doubt.IMAGE_NUMBERS,
+        found = diagnose(
+            Code.IMAGE_NUMBERS,
             f"{evidence.apart} of {counted(evidence.pairs, 'pair')} are of different images: first of image {there} of the board"
             f" and image {here} of this machine, counted from 0",
             "give both films loop=1; or, for photographs, leave fps=, loop=, phase_ms= and pace= out on both sides",
         )
         are_most = 2 * evidence.apart > evidence.pairs
-        return (replace(found, doubt=Doubt.IMAGES_APART) if are_most else found,)
+        return (_apart(found) if are_most else found,)
     rates = (evidence.board_period_ns, evidence.own_period_ns)
     if not all(rates) or abs(rates[0] - rates[1]) <= _SAME_RATE * max(rates):
         if board.count == own.count:
@@ -208,8 +209,8 @@ def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) ->
         # The time alone says which image of a loop is shown: equal ones meet while both are in the same round.
         most_apart = board.looped and own.looped and math.lcm(board.count, own.count) > 2 * min(board.count, own.count)
         return (
-            Concern(
-                Doubt.IMAGES_APART if most_apart else Doubt.IMAGE_NUMBERS,
+            diagnose(
+                Code.IMAGES_APART if most_apart else Code.IMAGE_NUMBERS,
                 f"the board shows {board.words}, this machine {own.words}: films of different length drift apart",
                 "give two films of one recording, with as many images",
             ),
@@ -218,23 +219,27 @@ def _by_time(evidence: ImageEvidence, board: ImageNumbers, own: ImageNumbers) ->
         return ()  # the same seconds, filmed at two rates
     shown = [f"{numbers.words} at {1e9 / rate:.3g} /s" for numbers, rate in zip((board, own), rates, strict=True)]
     return (
-        Concern(
-            Doubt.IMAGE_NUMBERS,
+        diagnose(
+            Code.IMAGE_NUMBERS,
             f"the board shows {shown[0]}, this machine {shown[1]}: films of different rate drift apart",
             "give both films the fps= that they were recorded with",
         ),
     )
 
 
-_CONSEQUENCES: Final = frozenset({Doubt.SWAPPED, Doubt.OTHER_SCENE})
+def _apart(found: Diagnostic) -> Diagnostic:
+    return replace(found, code=Code.IMAGES_APART, severity=Severity.FAIL)
+
+
+_CONSEQUENCES: Final = frozenset({Code.SWAPPED, Code.OTHER_SCENE})
 
 _OF_BOTH: Final = frozenset({Arrangement.BOTH_TURNED, Arrangement.BOTH_MIRRORED, Arrangement.BOTH_TURNED_BY_QUARTER})
 """What two images of different moments may look like. One camera turned or mirrored looks so at any moment."""
 
 
 def with_cause(
-    numbers: tuple[Concern, ...], images: tuple[Concern, ...], evidence: ImageEvidence
-) -> tuple[tuple[Concern, ...], tuple[Concern, ...]]:
+    numbers: tuple[Diagnostic, ...], images: tuple[Diagnostic, ...], evidence: ImageEvidence
+) -> tuple[tuple[Diagnostic, ...], tuple[Diagnostic, ...]]:
     """Blame how two films are paired, and not the cameras, for what pairs of different moments look like.
 
     Args:
@@ -248,10 +253,10 @@ def with_cause(
     kept = tuple(concern for concern in images if blamed(concern, numbers, evidence) is concern)
     if len(kept) == len(images):
         return numbers, images
-    return tuple(replace(concern, doubt=Doubt.IMAGES_APART) for concern in numbers), kept
+    return tuple(_apart(concern) for concern in numbers), kept
 
 
-def blamed(concern: Concern, numbers: tuple[Concern, ...], evidence: ImageEvidence) -> Concern:
+def blamed(concern: Diagnostic, numbers: tuple[Diagnostic, ...], evidence: ImageEvidence) -> Diagnostic:
     """Return the cause of what an image shows: the concern itself, or that the pairs are of different moments.
 
     Args:
@@ -259,7 +264,8 @@ def blamed(concern: Concern, numbers: tuple[Concern, ...], evidence: ImageEviden
         numbers: the concerns about the images' numbers.
         evidence: of the numbers. Images paired by their numbers are of one moment, and show what they show.
     """
-    may_be = concern.doubt in _CONSEQUENCES or concern.arrangement in _OF_BOTH
+    seen = concern.evidence
+    may_be = concern.code in _CONSEQUENCES or (isinstance(seen, Misplaced) and seen.arrangement in _OF_BOTH)
     if not may_be or not numbers or evidence.paired_by is PairedBy.NUMBER:
         return concern
-    return replace(numbers[0], doubt=Doubt.IMAGES_APART)
+    return _apart(numbers[0])

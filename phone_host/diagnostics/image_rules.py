@@ -11,8 +11,9 @@ from typing import Final
 
 import numpy as np
 
+from common.diagnostic import Diagnostic, Severity
 from phone_host.diagnostics.arrangement import LEAST_SUPPORT, ImageSource, arrangement_doubts
-from phone_host.diagnostics.concern import Concern, Doubt, gravest_first
+from phone_host.diagnostics.codes import Code, diagnose, gravest_first
 from phone_host.model import Arrangement, Evidence, Exposure
 
 
@@ -63,7 +64,7 @@ _BEHIND_SHARE: Final = 0.05
 _REMEDY: Final = "give the calib.txt that was published with these images"
 
 
-def off_middle(evidence: Evidence) -> tuple[Concern, ...]:
+def off_middle(evidence: Evidence) -> tuple[Diagnostic, ...]:
     """Say that the principal point is that of other images; empty if it lies where theirs can lie.
 
     Args:
@@ -73,8 +74,8 @@ def off_middle(evidence: Evidence) -> tuple[Concern, ...]:
     if seen is None:
         return ()
     return (
-        Concern(
-            Doubt.GEOMETRY,
+        diagnose(
+            Code.GEOMETRY,
             f"calib.txt or --center may belong to other images: the principal point {seen.cx_px:.0f},{seen.cy_px:.0f}"
             f" lies far from the middle of {seen.width_px}x{seen.height_px} px, and metres are wrong then",
             _REMEDY,
@@ -82,7 +83,7 @@ def off_middle(evidence: Evidence) -> tuple[Concern, ...]:
     )
 
 
-def behind(evidence: Evidence) -> tuple[Concern, ...]:
+def behind(evidence: Evidence) -> tuple[Diagnostic, ...]:
     """Say that doffs is that of other images; empty if hardly a point lies behind infinity.
 
     Args:
@@ -91,8 +92,8 @@ def behind(evidence: Evidence) -> tuple[Concern, ...]:
     if not evidence.behind_share > _BEHIND_SHARE:
         return ()
     return (
-        Concern(
-            Doubt.GEOMETRY,
+        diagnose(
+            Code.GEOMETRY,
             f"{evidence.behind_share:.0%} of the points would lie at infinity or behind it: doffs may be that of other images",
             f"{_REMEDY}, or --doffs: cx of the right camera minus cx of the left one, px",
         ),
@@ -121,7 +122,7 @@ _BLURRED_BESIDE_PX: Final = 1.5
 """Sharp images measure 0.8 to 1.3 px at up to 640 px of width, and 1.8 px if nothing in the scene has a sharp edge."""
 
 
-def covered_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
+def covered_doubts(left: Exposure, right: Exposure) -> tuple[Diagnostic, ...]:
     """Say which camera sees nothing at all; empty if both see something."""
     blind = [
         name
@@ -132,7 +133,7 @@ def covered_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
         return ()
     camera_sees = _cameras(blind)
     return (
-        Concern(Doubt.COVERED, f"{camera_sees} no scene at all", "take off the lens cap, the shutter or the finger"),
+        diagnose(Code.COVERED, f"{camera_sees} no scene at all", "take off the lens cap, the shutter or the finger"),
     )
 
 
@@ -144,7 +145,7 @@ def _is_dark(exposure: Exposure) -> bool:
     return exposure.mean_level < _DARK_MEAN and exposure.bright_level < _DARK_BRIGHT
 
 
-def dark_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
+def dark_doubts(left: Exposure, right: Exposure) -> tuple[Diagnostic, ...]:
     """Say which camera sees almost nothing because it is too dark; empty if neither."""
     dark = [name for name, exposure in (("left", left), ("right", right)) if _is_dark(exposure)]
     if not dark:
@@ -152,8 +153,8 @@ def dark_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
     level = min(left.mean_level, right.mean_level)
     camera_sees = _cameras(dark)
     return (
-        Concern(
-            Doubt.DARK,
+        diagnose(
+            Code.DARK,
             f"{camera_sees} almost nothing because it is too dark (mean level {level:.0f} of 255)",
             "switch on a light, or give the camera a longer exposure",
         ),
@@ -170,7 +171,7 @@ def is_plain(left: Exposure, right: Exposure) -> bool:
     return max(left.structure, right.structure) < _PLAIN
 
 
-def unfocused_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
+def unfocused_doubts(left: Exposure, right: Exposure) -> tuple[Diagnostic, ...]:
     """Say which image has no sharp edges; empty if both have."""
     blurred = [
         (name, here.blur_px)
@@ -183,8 +184,8 @@ def unfocused_doubts(left: Exposure, right: Exposure) -> tuple[Concern, ...]:
     width = max(blur for _, blur in blurred)
     camera_sees = _cameras([name for name, _ in blurred])
     return (
-        Concern(
-            Doubt.UNFOCUSED,
+        diagnose(
+            Code.UNFOCUSED,
             f"{camera_sees} blurred edges ({width:.1f} px)",
             "clean and focus the lens, and switch its autofocus off before you calibrate",
         ),
@@ -218,7 +219,7 @@ def is_pattern(evidence: Evidence) -> bool:
     return evidence.ambiguous_share > _PATTERN_SHARE or (evidence.ambiguous_share > _HALF and most < _FEW)
 
 
-def too_short(evidence: Evidence) -> tuple[Concern, ...]:
+def too_short(evidence: Evidence) -> tuple[Diagnostic, ...]:
     """Say how much of the scene is nearer than was searched; empty if hardly any.
 
     Args:
@@ -231,11 +232,11 @@ def too_short(evidence: Evidence) -> tuple[Concern, ...]:
     if not math.isnan(evidence.enough_from_m):
         remedy = f"give --near {_rounded_down(evidence.enough_from_m)}m without --disparities, or --disparities {evidence.enough_disparities}"
     return (
-        Concern(
-            Doubt.SEARCH_TOO_SHORT,
+        diagnose(
+            Code.SEARCH_TOO_SHORT,
             f"{share:.0%} of the scene is nearer than was searched, and what is nearer gets a wrong depth",
             remedy,
-            is_severe=share > _MOSTLY_BEYOND,
+            severity=Severity.FAIL if share > _MOSTLY_BEYOND else None,
         ),
     )
 
@@ -246,7 +247,7 @@ def _rounded_down(depth_m: float) -> str:
     return f"{math.floor(depth_m / step + 1e-9) * step:.6g}"
 
 
-def ambiguous(evidence: Evidence) -> tuple[Concern, ...]:
+def ambiguous(evidence: Evidence) -> tuple[Diagnostic, ...]:
     """Say that the pattern repeats within the search; empty if it does not.
 
     Args:
@@ -255,8 +256,8 @@ def ambiguous(evidence: Evidence) -> tuple[Concern, ...]:
     if not (evidence.ambiguous_share > _AMBIGUOUS_SHARE or is_pattern(evidence)):
         return ()
     return (
-        Concern(
-            Doubt.AMBIGUOUS,
+        diagnose(
+            Code.AMBIGUOUS,
             f"the pattern repeats: {evidence.ambiguous_share:.0%} of the places looked at fit elsewhere as well, and depth may be off by whole repeats",
             "show a scene with irregular texture, or put irregular things before the pattern",
         ),
@@ -301,7 +302,7 @@ _TILTED_SHARE: Final = 0.3
 """If fewer of the related features than this share their rows, the rectification does not fit the cameras."""
 
 
-def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) -> tuple[Concern, ...]:
+def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) -> tuple[Diagnostic, ...]:
     """Say what the images of one pair make doubtful, gravest first; empty if nothing.
 
     Args:
@@ -310,11 +311,11 @@ def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) 
     """
     foreign, seen = off_middle(evidence), _seen(evidence, source)
     if foreign:  # doffs is then that of other images, too: one doubt of a kind is enough
-        seen = (*foreign, *(item for item in seen if item.doubt is not Doubt.GEOMETRY))
+        seen = (*foreign, *(item for item in seen if item.code != Code.GEOMETRY))
     return gravest_first(seen)
 
 
-def _seen(evidence: Evidence, source: ImageSource) -> tuple[Concern, ...]:
+def _seen(evidence: Evidence, source: ImageSource) -> tuple[Diagnostic, ...]:
     """Say what the images themselves make doubtful."""
     support = {item.arrangement: item.features for item in evidence.supports}
     sees = max(support.values(), default=0) >= LEAST_SUPPORT
@@ -328,27 +329,27 @@ def _seen(evidence: Evidence, source: ImageSource) -> tuple[Concern, ...]:
     if not sees and is_plain(evidence.left, evidence.right) and not evidence.density >= _STRANGERS_DENSITY:
         return light or (_NO_TEXTURE,)  # features of noise agree with nothing: that is no other scene
     mistake = arrangement_doubts(evidence, source)
-    if is_pattern(evidence) and not any(item.doubt is Doubt.SAME_IMAGE for item in mistake):
+    if is_pattern(evidence) and not any(item.code == Code.SAME_IMAGE for item in mistake):
         return *light, *ambiguous(evidence)  # features of a pattern match any repeat: mistakes they show are chance
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)
     return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))
 
 
-_NO_TEXTURE: Final = Concern(
-    Doubt.NO_TEXTURE,
+_NO_TEXTURE: Final = diagnose(
+    Code.NO_TEXTURE,
     "both images show hardly any texture, as of a bare wall: too little for depth, and to judge whether they belong together",
     "put patterned things into the scene, or turn both cameras towards some",
 )
 
-_OTHER_SCENE: Final = Concern(
-    Doubt.OTHER_SCENE,
+_OTHER_SCENE: Final = diagnose(
+    Code.OTHER_SCENE,
     "the two images show different scenes: hardly anything in one is found in the other",
     "turn both cameras towards the same scene, and check that LEFT and RIGHT belong together",
 )
 
-_CROPPED: Final = Concern(
-    Doubt.CROPPED_RIG,
+_CROPPED: Final = diagnose(
+    Code.CROPPED_RIG,
     "an image is smaller than in the calibration and has another aspect ratio: it is treated as the centre of that one",
     "use a size with the calibration's aspect ratio; or calibrate at this size, if the camera may crop elsewhere or stretch",
 )
@@ -360,34 +361,34 @@ def _are_strangers(evidence: Evidence, support: dict[Arrangement, int]) -> bool:
     return fewest >= _ENOUGH_FEATURES and max(support.values()) <= most and not evidence.density >= _STRANGERS_DENSITY
 
 
-def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Concern, ...]:
+def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Diagnostic, ...]:
     related, right = support[Arrangement.TILTED], support[Arrangement.RIGHT]
     is_tilted = related >= 2 * LEAST_SUPPORT and right < _TILTED_SHARE * related
     plain = figure_doubts(median_figures((evidence,)), is_tilted=is_tilted)
-    rows = tuple(item for item in plain if item.doubt is Doubt.VERTICAL_ERROR) or _skewed(evidence)
+    rows = tuple(item for item in plain if item.code == Code.VERTICAL_ERROR) or _skewed(evidence)
     if not evidence.from_rig:
         rows = tuple(replace(item, remedy=_NOT_RECTIFIED) for item in rows)
     short, unsure = too_short(evidence), ambiguous(evidence)
-    sparse = (item for item in plain if item.doubt is not Doubt.VERTICAL_ERROR)
+    sparse = (item for item in plain if item.code != Code.VERTICAL_ERROR)
     cropped = (_CROPPED,) if evidence.is_cropped else ()
     if evidence.is_cropped:
         rows = tuple(replace(item, remedy=_CROPPED.remedy) for item in rows)
     return (*behind(evidence), *rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
 
 
-def _skewed(evidence: Evidence) -> tuple[Concern, ...]:
+def _skewed(evidence: Evidence) -> tuple[Diagnostic, ...]:
     if not evidence.skew_px > _MOST_SKEW_PX:
         return ()
     off_px = _EDGE_TO_EDGE * evidence.skew_px
     sentence = f"the rows of the two images do not agree (one edge is off against the other by {off_px:.1f} px)"
-    return (Concern(Doubt.VERTICAL_ERROR, sentence, _MOVED),)
+    return (diagnose(Code.VERTICAL_ERROR, sentence, _MOVED),)
 
 
 def _percent(share: float) -> str:
     return f"{share:.0%}" if share >= 0.01 or not share else "less than 1%"
 
 
-def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Concern, ...]:
+def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Diagnostic, ...]:
     """Say which figures are not those of right depth; empty if all may be.
 
     Args:
@@ -396,28 +397,28 @@ def figure_doubts(figures: ImageFigures, *, is_tilted: bool = False) -> tuple[Co
     """
     found = []
     is_off = figures.vertical_px * figures.matched_scale > _MOST_VERTICAL_PX
+    is_lost = figures.vertical_px * figures.matched_scale > _LOST_VERTICAL_PX and figures.density < _LOST_DENSITY
     if is_tilted or is_off:
         found.append(
-            Concern(
-                Doubt.VERTICAL_ERROR,
+            diagnose(
+                Code.VERTICAL_ERROR,
                 "the rows of the two images do not agree" + (f" by {figures.vertical_px:.1f} px" if is_off else ""),
                 _MOVED,
-                is_severe=figures.vertical_px * figures.matched_scale > _LOST_VERTICAL_PX
-                and figures.density < _LOST_DENSITY,
+                severity=Severity.FAIL if is_lost else None,
             )
         )
     if figures.density < _LEAST_DENSITY:
         found.append(
-            Concern(
-                Doubt.LOW_DENSITY,
+            diagnose(
+                Code.LOW_DENSITY,
                 f"only {_percent(figures.density)} of the pixels have depth",
                 "plain walls and tables give none: light the scene well and put patterned things into it; else check that --calibration or --rectified fits the images, and that nothing is nearer than --near",
             )
         )
     elif figures.consistency < _LEAST_CONSISTENCY:
         found.append(
-            Concern(
-                Doubt.LOW_CONSISTENCY,
+            diagnose(
+                Code.LOW_CONSISTENCY,
                 f"only {figures.consistency:.0%} of the depth is confirmed from right to left",
                 "light the scene well, and give it texture; plain and repeated surfaces mislead the matcher",
             )

@@ -11,11 +11,12 @@ from typing import Final
 
 from common.camera.base import CameraState
 from common.camera_identity import CameraIdentity, RememberedCamera
+from common.diagnostic import Diagnostic, Severity
 from common.errors import DataError
 from common.protocol.message import CameraDescription, Locks
 from common.words import counted, distance_text, times
 from phone_host.diagnostics.arrangement import with_final_options
-from phone_host.diagnostics.concern import REJECTED_RIG, Concern, Doubt, gravest_first
+from phone_host.diagnostics.codes import REJECTED_RIG, Code, diagnose, gravest_first
 from phone_host.diagnostics.drift import drift_concerns, told_as_a_turn
 from phone_host.diagnostics.image_judge import Episode
 from phone_host.diagnostics.image_numbers import blamed, number_concerns, with_cause
@@ -101,7 +102,7 @@ def misses(side: Side, rig: RememberedCamera, held: Locks) -> tuple[LockMiss, ..
     )
 
 
-def settings_concerns(missed: Sequence[LockMiss]) -> Iterator[Concern]:
+def settings_concerns(missed: Sequence[LockMiss]) -> Iterator[Diagnostic]:
     """Say which controls could not be restored; nothing if all were."""
     said = ", ".join(
         f"the {miss.side.value} camera's {miss.control} is "
@@ -109,34 +110,34 @@ def settings_concerns(missed: Sequence[LockMiss]) -> Iterator[Concern]:
         for miss in missed
     )
     if said:
-        yield Concern(
-            Doubt.CAMERA_SETTINGS,
+        yield diagnose(
+            Code.CAMERA_SETTINGS,
             f"{said}, so depth may be wrong",
             "see which controls the camera has: board-agent cameras; or calibrate again as it is now",
         )
 
 
-GONE: Final = frozenset({Doubt.BOARD_GONE, Doubt.CAMERA_GONE})
+GONE: Final = frozenset({Code.BOARD_GONE, Code.CAMERA_GONE})
 """Doubts about when depth came, not whether it is right."""
 
 
-def gone_concerns(run: RunSnapshot) -> Iterator[Concern]:
+def gone_concerns(run: RunSnapshot) -> Iterator[Diagnostic]:
     """Say which camera is away; nothing if both are there, or their streams ended as they should."""
     back = "has not come back" if run.ended == "running" else "did not come back"
     if run.away and not run.away[-1].is_over and run.ended != "stream_ended":
         gone = f"the board went away at {run.away[-1].at_s:.0f} s and {back}"
         yield (
-            Concern(
-                Doubt.BOARD_GONE,
+            diagnose(
+                Code.BOARD_GONE,
                 f"{gone}: there is no newer depth",
                 "check its power, its cable or network, and that board-agent still runs there",
             )
             if run.refused is None
-            else Concern(Doubt.BOARD_GONE, f"{gone}, because {run.refused.problem}", run.refused.remedy)
+            else diagnose(Code.BOARD_GONE, f"{gone}, because {run.refused.message}", run.refused.remedy)
         )
     if run.camera.state is CameraState.GONE:
-        yield Concern(
-            Doubt.CAMERA_GONE,
+        yield diagnose(
+            Code.CAMERA_GONE,
             f"this machine's camera went away at about {run.last_s:.0f} s and {back}: there is no newer depth",
             "check its power, its cable or network, and that no other program has taken it; a phone's app must stay in front",
         )
@@ -165,33 +166,32 @@ _STOOD_STILL: Final = "none of them was used; if this goes on, find out what sto
 _LIES: Final = "none of them was used; if this goes on, update the board's software, check its camera, and check who else uses the link"
 
 
-def arrival_concerns(run: RunSnapshot) -> Iterator[Concern]:
+def arrival_concerns(run: RunSnapshot) -> Iterator[Diagnostic]:
     """Say which arrivals were not believed and what that means; nothing if everything was believed."""
     link, images, frames = run.link, spoiled(run), disbelieved(run)
     if link.clock_steps:
         suspect = sum(suspects.frames for suspects in link.suspects)
-        yield Concern(
-            Doubt.CLOCK_STEPPED,
+        yield diagnose(
+            Code.CLOCK_STEPPED,
             f"one of the two clocks jumped {times(link.clock_steps)}; up to {counted(suspect, 'pair')} may be wrong because they came before that was noticed"
             if suspect
             else f"one of the two clocks jumped {times(link.clock_steps)}",
             "do not let the board or the host sleep during a run; ignore the suspect pairs, which report.json names",
         )
     if images:
-        yield Concern(
-            Doubt.SPOILED_IMAGES,
+        yield diagnose(
+            Code.SPOILED_IMAGES,
             f"{counted(sum(images.values()), 'spoiled image was', 'spoiled images were')} not used ({_reasons(images)})",
             "check the cable, the camera and its format; one now and then does no harm",
-            spares_depth=True,
         )
     if frames:
         received = sum(account.received + account.disbelieved[Disbelief.CREDIT] for account in link.sessions)
         dropped, is_of_clock = sum(frames.values()), _OF_THE_CLOCK.issuperset(frames)
-        yield Concern(
-            Doubt.DISBELIEVED,
+        yield diagnose(
+            Code.DISBELIEVED,
             f"{dropped} of {counted(received, 'frame')} had impossible values and {'was' if dropped == 1 else 'were'} dropped ({_reasons(frames)})",
             _STOOD_STILL if is_of_clock else _LIES,
-            spares_depth=is_of_clock,
+            severity=Severity.NOTE if is_of_clock else None,
         )
 
 
@@ -202,23 +202,23 @@ def _reasons(counts: dict[str, int]) -> str:
 _CUT_SHARE: Final = 0.15
 """If fewer pixels than this share were matched and then cut, the pairs lack depth because their images do not match."""
 
-_CAUSES: Final = frozenset({Doubt.SEARCH_TOO_SHORT, Doubt.DARK, Doubt.UNFOCUSED, Doubt.NO_TEXTURE})
+_CAUSES: Final = frozenset({Code.SEARCH_TOO_SHORT, Code.DARK, Code.UNFOCUSED, Code.NO_TEXTURE})
 """Doubts that explain it."""
 
-_UNMATCHED: Final = Concern(
-    Doubt.NO_DEPTH,
+_UNMATCHED: Final = diagnose(
+    Code.NO_DEPTH,
     "no pair has depth",
     "check that --calibration or --rectified fits the cameras, and that both see the same scene",
 )
 
-_AT_ZERO: Final = Concern(
-    Doubt.NO_DEPTH,
+_AT_ZERO: Final = diagnose(
+    Code.NO_DEPTH,
     "no pair has depth: all points are too far to measure",
     "move nearer or mount the cameras farther apart; check that --calibration or --rectified fits the cameras",
 )
 
 
-def no_depth(cut: CutCounts | None, limits: DepthLimits | None, others: tuple[Concern, ...] = ()) -> Concern:
+def no_depth(cut: CutCounts | None, limits: DepthLimits | None, others: tuple[Diagnostic, ...] = ()) -> Diagnostic:
     """Return the doubt about pairs of which no pixel has depth.
 
     Args:
@@ -226,13 +226,13 @@ def no_depth(cut: CutCounts | None, limits: DepthLimits | None, others: tuple[Co
         limits: to which their clouds were cut; None without a cloud.
         others: the other doubts about them: one of them may say why.
     """
-    cause = [concern for concern in others if concern.doubt in _CAUSES]
+    cause = [concern for concern in others if concern.code in _CAUSES]
     if cause:
-        return Concern(Doubt.NO_DEPTH, f"{_UNMATCHED.sentence}: {cause[0].sentence}", cause[0].remedy)
+        return diagnose(Code.NO_DEPTH, f"{_UNMATCHED.message}: {cause[0].message}", cause[0].remedy)
     return _UNMATCHED if cut is None else _by_cut(cut, limits)
 
 
-def _by_cut(cut: CutCounts, limits: DepthLimits | None) -> Concern:
+def _by_cut(cut: CutCounts, limits: DepthLimits | None) -> Diagnostic:
     """Say which limit cut the points, if it is that."""
     most = max(cut.at_zero, cut.too_far, cut.too_near)
     if most < _CUT_SHARE * cut.inside or not most:
@@ -242,19 +242,19 @@ def _by_cut(cut: CutCounts, limits: DepthLimits | None) -> Concern:
     found = cut.at_zero + cut.too_far + cut.too_near
     who = "all points lie" if most == found else "most points lie"
     if most == cut.too_near:
-        return Concern(
-            Doubt.NO_DEPTH,
+        return diagnose(
+            Code.NO_DEPTH,
             f"no pair has depth: {who} nearer than --near {distance_text(limits.near_m)}",
             "give a smaller --near, or move away",
         )
     if limits.from_rig:
-        return Concern(
-            Doubt.NO_DEPTH,
+        return diagnose(
+            Code.NO_DEPTH,
             f"no pair has depth: {who} farther than {distance_text(limits.far_m)}, where these cameras measure too coarsely",
             "move nearer or mount the cameras farther apart; --far shows farther points all the same",
         )
-    return Concern(
-        Doubt.NO_DEPTH,
+    return diagnose(
+        Code.NO_DEPTH,
         f"no pair has depth: {who} farther than --far {distance_text(limits.far_m)}",
         "give a larger --far",
     )
@@ -273,7 +273,7 @@ def time_and_motion(run: RunSnapshot) -> Timing:
     )
 
 
-def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+def concerns(run: RunSnapshot) -> tuple[Diagnostic, ...]:
     """Return what makes the depth of a run wrong or its figures doubtful, most serious first."""
     numbers, images = with_cause(number_concerns(run.replayed), image_concerns(run), run.replayed)
     moved = () if run.drift is None else drift_concerns(run.drift)
@@ -281,8 +281,8 @@ def concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     if nothing_whole(run):
         where = ", ".join(f"{count} {place}" for place, count in _not_whole(run).items() if count)
         found.append(
-            Concern(
-                Doubt.NO_WHOLE_IMAGE,
+            diagnose(
+                Code.NO_WHOLE_IMAGE,
                 f"no pair so far, because images are not whole ({where})",
                 "check the cable, the camera and its format on that side; phone-host doctor and board-agent doctor look at one image",
             )
@@ -299,7 +299,7 @@ def history(run: RunSnapshot) -> tuple[Episode, ...]:
     return tuple(replace(item, concern=blamed(item.concern, numbers, run.replayed)) for item in run.images.history)
 
 
-def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
+def image_concerns(run: RunSnapshot) -> tuple[Diagnostic, ...]:
     """Return what the images of a run make doubtful, gravest first. While it runs, pairs without depth may yet get some."""
     found = tuple(
         with_budget(with_final_options(concern, run.orientations), run.budget) for concern in run.images.concerns
@@ -307,11 +307,11 @@ def image_concerns(run: RunSnapshot) -> tuple[Concern, ...]:
     lacks_depth = run.images.wants_depth and not run.images.has_depth
     if run.ended == "running" or not lacks_depth or not run.processed:
         return found  # without any pair there is another reason
-    if any(concern.is_certain for concern in found):
+    if any(concern.is_failure for concern in found):
         return found  # which says why there is none
     return (no_depth(run.depth.cut, run.depth.limits, found), *found)
 
 
 def depth_is_wrong(run: RunSnapshot) -> bool:
     """Tell whether depth was wanted and cannot be right: a doubt stands that leaves no hope, or no pair has depth."""
-    return run.images.wants_depth and (not run.images.has_depth or any(concern.is_certain for concern in concerns(run)))
+    return run.images.wants_depth and (not run.images.has_depth or any(concern.is_failure for concern in concerns(run)))

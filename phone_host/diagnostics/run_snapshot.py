@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from common.camera.base import CameraHealth
+from common.diagnostic import Diagnostic
 from common.frame import NOT_AS_SAID
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import DropReason
 from common.words import counted
 from phone_host.accounts.delays import DelayStatistics, ReplayFacts, SinkAccount
 from phone_host.accounts.link_account import Away, LinkAccount
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.image_judge import ImageTrust
 from phone_host.diagnostics.image_numbers import ImageEvidence
 from phone_host.model import BudgetAccount, DepthAccount, Drift, PairCounts, Side, TimeOffset, Unwritten
@@ -45,7 +45,7 @@ class RecordingAccount:
     seconds: float = 0.0
     left_bytes: int | None = None
     is_over: bool = True
-    failure: Trouble | None = None
+    failure: Diagnostic | None = None
 
     @property
     def is_whole(self) -> bool:
@@ -73,7 +73,7 @@ class RecordingAccount:
         told = f"; not in it: {', '.join(missing)}" if missing else ""
         ended = "" if self.frames or self.failure else "; no image came: look at the cameras with phone-host doctor"
         if self.failure is not None:
-            ended = f"; {self.failure.problem}: {self.failure.remedy}"
+            ended = f"; {self.failure.message}: {self.failure.remedy}"
         return f"recorded: {counted(self.frames, 'image')}, {self.size_bytes / 1e6:.1f} MB in {self.file}{told}{ended}"
 
 
@@ -160,9 +160,9 @@ class RunSnapshot:
     interpolated: bool = False
     stamps_exact: bool = False
     spoiled_images: tuple[tuple[str, int], ...] = ()
-    failed_pairs: tuple[tuple[Trouble, int], ...] = ()
-    failure: Trouble | None = None
-    refused: Trouble | None = None
+    failed_pairs: tuple[tuple[Diagnostic, int], ...] = ()
+    failure: Diagnostic | None = None
+    refused: Diagnostic | None = None
     time_offset: TimeOffset = field(default_factory=TimeOffset)
     phase: Phase | None = None
     alignment: Alignment | None = None
@@ -309,7 +309,7 @@ def _on_the_host(run: RunSnapshot) -> Iterator[Unused]:
     for reason, count in run.spoiled_images:
         yield Unused("pairs with a spoiled image", reason, count)
     for trouble, count in run.failed_pairs:
-        yield Unused("pairs that could not be processed", trouble.problem, count)
+        yield Unused("pairs that could not be processed", trouble.message, count)
     if run.ended != "running":
         yield Unused("pairs still waiting at the end", "", run.stopped)
     for sink in run.sinks:

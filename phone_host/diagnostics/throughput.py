@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from common.diagnostic import Diagnostic
 from common.words import counted, distance_text, times
 from phone_host.accounts.delays import DelayStatistics
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.run_snapshot import (
     RunSnapshot,
     spoiled_on_board,
@@ -355,9 +356,9 @@ def narrowed_words(account: BudgetAccount | None) -> str:
     return f"nearest depth is now {distance_text(now.nearest_m)}, not {distance_text(best.nearest_m)}"
 
 
-def with_budget(concern: Concern, account: BudgetAccount | None) -> Concern:
+def with_budget(concern: Diagnostic, account: BudgetAccount | None) -> Diagnostic:
     """Return a doubt; if the budget has narrowed the search that is too short, with the remedy that helps then."""
-    if concern.doubt is not Doubt.SEARCH_TOO_SHORT or account is None or not account.is_narrowed:
+    if concern.code != Code.SEARCH_TOO_SHORT or account is None or not account.is_narrowed:
         return concern
     return replace(concern, remedy="give a longer --budget: it has narrowed the search")
 

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from common.doctor.finding import Finding, fail, ok
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail, ok
 from common.doctor.network_checks import CABLE_BOARD, Card
 
 _CABLE = CABLE_BOARD.rpartition(".")[0] + "."
@@ -26,14 +27,14 @@ class Phone:
     processor: str
 
 
-def check_phone(phone: Phone) -> Finding:
+def check_phone(phone: Phone) -> Diagnostic:
     """Name the phone: whoever reads a pasted report wants to know."""
     android = f"Android {phone.android or '(of a version that it does not say)'}"
     termux = f"Termux {phone.termux}" if phone.termux else "not in Termux"
     return ok("phone", f"{phone.model or 'unnamed'}, {android}, {termux}, {phone.processor}")
 
 
-def check_camera(uri: str = "") -> Finding:
+def check_camera(uri: str = "") -> Diagnostic:
     """Say which camera there is instead of the kernel's, which Android shows to no app.
 
     Args:
@@ -45,7 +46,7 @@ def check_camera(uri: str = "") -> Finding:
     return ok("camera", f"Android shows none to Termux: {stead}")
 
 
-def check_usb(cards: Sequence[Card], serial_links: Sequence[str]) -> Finding:
+def check_usb(cards: Sequence[Card], serial_links: Sequence[str]) -> Diagnostic:
     """Say what a USB cable can carry, and whether one does.
 
     Args:
@@ -61,7 +62,7 @@ def check_usb(cards: Sequence[Card], serial_links: Sequence[str]) -> Finding:
     return ok("usb", f"means Ethernet over USB here (tcp://{CABLE_BOARD}:5555); no board is on a cable now")
 
 
-def check_bluetooth(links: Sequence[str]) -> Finding:
+def check_bluetooth(links: Sequence[str]) -> Diagnostic:
     """Say that Bluetooth needs another host.
 
     Args:

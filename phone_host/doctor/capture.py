@@ -10,7 +10,8 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera, software_of
-from common.doctor.finding import Finding, ok, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import ok, warn
 from common.errors import DataError, TandemError, UnavailableError
 from common.frame import Frame
 from common.protocol.message import CameraDescription
@@ -100,7 +101,7 @@ class CheckedCapture:
     """
 
     report: CaptureReport
-    findings: list[Finding]
+    findings: list[Diagnostic]
 
 
 def check_capture(
@@ -138,7 +139,7 @@ def check_capture(
     return CheckedCapture(report, findings)
 
 
-def _kept(report: CaptureReport, path: Path) -> Finding:
+def _kept(report: CaptureReport, path: Path) -> Diagnostic:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, capture_text(report))

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, assert_never
 
-from common.doctor.finding import Finding, fail, ok, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail, ok, warn
 from common.doctor.package_probe import missing_package
 from common.errors import SettingsError
 from phone_host.stereo.native.library import VARIABLE, Library, Missing
@@ -83,7 +84,7 @@ class BoardReadings:
     remedy: str = "update the older of the two"
 
 
-def check_python(version: tuple[int, int, int], platform: str) -> Finding:
+def check_python(version: tuple[int, int, int], platform: str) -> Diagnostic:
     """Judge the Python version."""
     text = f"Python {'.'.join(map(str, version))} on {platform}"
     if version < (3, 11, 0):
@@ -91,7 +92,7 @@ def check_python(version: tuple[int, int, int], platform: str) -> Finding:
     return ok("python", text)
 
 
-def check_package(package: Package) -> Finding:
+def check_package(package: Package) -> Diagnostic:
     """Judge a package: can it be imported, is its version in range, and is it installed only once?"""
     if len(package.wheels) > 1:
         keep = package.wheels[0]
@@ -108,7 +109,7 @@ def check_package(package: Package) -> Finding:
     return ok(package.name, text)
 
 
-def check_native(library: Library | Missing | SettingsError, wanted: str = "") -> Finding:
+def check_native(library: Library | Missing | SettingsError, wanted: str = "") -> Diagnostic:
     """Judge the native library: without it everything works, but slower.
 
     Args:
@@ -125,7 +126,7 @@ def check_native(library: Library | Missing | SettingsError, wanted: str = "") -
             return fail("native", library.problem, library.remedy)
 
 
-def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one return for each answer
+def check_board(board: BoardReadings) -> Diagnostic:  # noqa: PLR0911 - one return for each answer
     """Judge the board's answer."""
     match board.answer:
         case Answer.BOARD:
@@ -149,7 +150,7 @@ def check_board(board: BoardReadings) -> Finding:  # noqa: PLR0911 - one return 
             assert_never(board.answer)
 
 
-def check_ports(ports: tuple[str, ...], problem: str) -> Finding:
+def check_ports(ports: tuple[str, ...], problem: str) -> Diagnostic:
     """List the serial ports.
 
     Args:
@@ -161,7 +162,7 @@ def check_ports(ports: tuple[str, ...], problem: str) -> Finding:
     return ok("serial", ", ".join(ports) if ports else "no USB or Bluetooth serial port is there now")
 
 
-def check_out(folder: str, obstacle: str) -> list[Finding]:
+def check_out(folder: str, obstacle: str) -> list[Diagnostic]:
     """Judge whether results can be written to a folder. If so, return nothing: the disk's finding names the folder.
 
     Args:

@@ -20,10 +20,11 @@ from common import now
 from common.android import is_android
 from common.camera.base import origin_words
 from common.camera.v4l2_device import capture_nodes
+from common.diagnostic import Diagnostic, Severity
 from common.doctor import machine
 from common.doctor.access import check_access
 from common.doctor.camera_probe import examine_camera
-from common.doctor.finding import Finding, Grade, fail, ok
+from common.doctor.finding import fail, ok
 from common.doctor.machine_checks import check_bluetooth, check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.network_probe import examine_network
 from common.doctor.package_probe import missing_packages
@@ -84,7 +85,7 @@ class Question:
     feed: BrowserFeed | None = None
 
 
-def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
+def examine(question: Question, *, keeps: bool = True) -> Iterator[Diagnostic]:
     """Check this machine for a run.
 
     Args:
@@ -104,7 +105,7 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
     packages = [*map(check_package, _packages()), *missing_packages(_FURTHER_MODULES)]
     yield from packages
     yield native_finding()
-    works = all(finding.verdict is not Grade.FAIL for finding in packages)
+    works = all(finding.severity is not Severity.FAIL for finding in packages)
     if is_http(question.camera) or is_browser(question.camera):
         yield _far_camera(question.camera, question.feed)
     elif question.camera.startswith("v4l2:") and is_android():
@@ -135,7 +136,7 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Finding]:
         yield check_usb_log(log)
 
 
-def native_finding() -> Finding:
+def native_finding() -> Diagnostic:
     """Check the native library, with which the own matcher computes."""
     try:
         return check_native(native(), os.environ.get(VARIABLE, ""))
@@ -143,7 +144,7 @@ def native_finding() -> Finding:
         return check_native(error)
 
 
-def examine_out(out: Path) -> list[Finding]:
+def examine_out(out: Path) -> list[Diagnostic]:
     """Check the folder of the results, or where it would be made, as a run would find it.
 
     Args:
@@ -188,7 +189,7 @@ def _package(name: str, least: str, below: str = "", wheels: tuple[str, ...] = (
     return Package(name=name, version=str(version), problem="", least=least, below=below, wheels=wheels)
 
 
-def _far_camera(uri: str, feed: BrowserFeed | None) -> Finding:
+def _far_camera(uri: str, feed: BrowserFeed | None) -> Diagnostic:
     """Look at a camera whose images come over a network."""
     if is_browser(uri) and feed is None:
         remedy = "start phone-host serve, and press Check on its page"
@@ -214,7 +215,7 @@ def _phone() -> Phone:
     )
 
 
-def _local_links(links: tuple[str, ...]) -> list[Finding]:
+def _local_links(links: tuple[str, ...]) -> list[Diagnostic]:
     """Check what there is besides the network: USB and Bluetooth."""
     wireless = [uri for uri in links if uri.startswith("rfcomm:")]
     if is_android():
@@ -223,7 +224,7 @@ def _local_links(links: tuple[str, ...]) -> list[Finding]:
     return [_ports(), check_bluetooth(machine.read_bluetooth(), wanted=bool(wireless))]
 
 
-def _cameras() -> Finding:
+def _cameras() -> Diagnostic:
     if is_android():
         return check_camera()
     nodes = capture_nodes()
@@ -231,7 +232,7 @@ def _cameras() -> Finding:
     return ok("camera", text)
 
 
-def _ports() -> Finding:
+def _ports() -> Diagnostic:
     try:
         from serial.tools import list_ports  # noqa: PLC0415 - optional, and an ImportError where its platform is unknown
     except ImportError as error:
@@ -240,7 +241,7 @@ def _ports() -> Finding:
     return check_ports(tuple(f"{port.device} ({port.description})" for port in found), "")
 
 
-def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> list[Finding]:
+def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> list[Diagnostic]:
     """Check the way to the board and, if the packages work, ask the board itself."""
     link = parse_link(uri, listens_by_default=False)
     address = link.address
@@ -254,9 +255,9 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
     try:
         board = ask_board(uri, wait_s, keys)
     except TandemError as error:
-        return [*findings, Finding(what="board", verdict=Grade.FAIL, text=error.problem, remedy=error.remedy)]
+        return [*findings, Diagnostic(error.problem, error.remedy, Severity.FAIL, "board")]
     if board.answer is Answer.BOARD:  # whatever way it came
-        findings = [finding for finding in findings if finding.verdict is not Grade.FAIL]
+        findings = [finding for finding in findings if finding.severity is not Severity.FAIL]
     if board.answer is Answer.SILENT:
         board = BoardReadings(uri=board.uri, answer=_way(address), waited_s=board.waited_s)
     return [*findings, check_board(board)]

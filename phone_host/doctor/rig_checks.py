@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Final
 
-from common.doctor.finding import Finding, fail, ok, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import fail, ok, warn
 from phone_host.stereo.scaled_rig import fits_rig, is_scaling
 
 _USABLE_PX: Final = 1.0
@@ -35,7 +36,7 @@ class RigReadings:
     is_rejected: bool = False
 
 
-def check_rig(rig: RigReadings) -> Finding:
+def check_rig(rig: RigReadings) -> Diagnostic:
     """Judge a rig file."""
     if rig.problem:
         return fail("rig", rig.problem, rig.remedy)

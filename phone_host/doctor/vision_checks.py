@@ -11,7 +11,8 @@ import numpy as np
 from common import now
 from common.camera.factory import parse_camera
 from common.camera.v4l2_stream import V4l2Settings
-from common.doctor.finding import Finding, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import warn
 from common.errors import AbsentBoardError, BusyBoardError, DataError, OtherVersionError, TandemError
 from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
@@ -112,7 +113,7 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
     )
 
 
-def check_kept_capture(calibration: str, camera: str, data: Path, feed: BrowserFeed | None) -> list[Finding]:
+def check_kept_capture(calibration: str, camera: str, data: Path, feed: BrowserFeed | None) -> list[Diagnostic]:
     """Look for the check of a camera's images that is kept beside a calibration, else the one from before it, and whether it holds for this camera.
 
     Phones stabilise their images, other cameras hardly: of a camera of this machine nothing is said if it was never checked.

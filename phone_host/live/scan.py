@@ -12,17 +12,17 @@ from pathlib import Path
 from typing import Final
 
 from common import now
+from common.diagnostic import Diagnostic, Severity
 from common.words import counted
+from phone_host.diagnostics.codes import as_remark
 from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Result, Side
 from phone_host.output.axes import Axes
-from phone_host.report.stereo_report import Remark
 from phone_host.run.scan_files import FinishedScan
 from phone_host.run.scan_result import own_axes, unused_mat
 from phone_host.run.scan_work import ScanWork
 from phone_host.run.sinks import FunctionSink
-from phone_host.run.stereo_remarks import remark_of
 from phone_host.scan.box import Box
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan_wanted import ScanWanted
@@ -147,11 +147,11 @@ class LiveScan:
             axes: of the files.
         """
         self.end()
-        remarks = [remark_of(concern) for concern in concerns(snapshot)]
+        remarks = [as_remark(concern) for concern in concerns(snapshot)]
         missed = sum(account.dropped for account in snapshot.sinks if account.name == _SINK)
         if missed:
             words = f"{counted(missed, 'pair')} came while others were taken into the model, and passed"
-            remarks.append(Remark(words, "a larger --voxel is faster", is_note=True))
+            remarks.append(Diagnostic(words, "a larger --voxel is faster", severity=Severity.NOTE))
         finished = self.work.finished(remarks, matcher=matcher, axes=axes)
         if self.scan.settings is not None:
             with self._watching:

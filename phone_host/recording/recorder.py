@@ -10,6 +10,7 @@ from functools import partial
 from typing import Final
 
 from common import now
+from common.diagnostic import Diagnostic, Severity
 from common.frame import Buffer, Frame
 from common.ledger import BoardMarks, PairLedger
 from common.program.logs import event
@@ -19,7 +20,6 @@ from common.recording.disk_queue import DiskQueue
 from common.recording.layout import CAPTURE, CLOCK, DELAYS, camera_name, camera_values, image_topic
 from common.recording.recording_file import RecordingFile
 from common.recording.ros_messages import RecordedImage, image_parts, image_type
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import BoardFrame, Side
 from phone_host.recording.clock_messages import clock_text
@@ -112,7 +112,7 @@ class Recorder:
     def account(self) -> RecordingAccount:
         """What became of the images so far."""
         queued, file = self._queue.account, self._writing.file
-        trouble = Trouble(f"it ended early ({queued.cause})", queued.remedy)
+        trouble = Diagnostic(f"it ended early ({queued.cause})", queued.remedy, Severity.FAIL)
         return RecordingAccount(
             file=str(file.path),
             frames=queued.frames,

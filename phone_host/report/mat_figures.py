@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.report.stereo_report import Remark
+from common.diagnostic import Diagnostic
 from phone_host.scan.mat import Mat
 from phone_host.scan.mat_pose import MatSaid
 
@@ -47,13 +47,13 @@ class MatFigures:
         return abs(self.measured_m - self.square_m) <= _SIGMAS * self.measured_sigma_m
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[Diagnostic, ...]:
         """What must be said of it."""
         if self.is_to_scale:
             return ()
         named, measured = (f"{length * 1e3:.4g} mm" for length in (self.square_m, self.measured_m))
         return (
-            Remark(
+            Diagnostic(
                 f"the mat's squares are {measured} long as the rig measures them, and {named} by its name; the model has the rig's metre",
                 "measure ten squares with a ruler: if the rig is right, give --mat that side or print at 100 %, else calibrate again",
             ),

@@ -45,7 +45,7 @@ def _pair(report: QualityReport, pair: MeasuredPair | FailedPair) -> dict[str, A
         **both,
         "size": size_text(pair.rectified_px),
         "seen": quality.seen.value,
-        "problem": problem.problem if problem else None,
+        "problem": problem.message if problem else None,
         "remedy": problem.remedy if problem else None,
         "roi": _rectangle(quality.roi),
         "pixels": quality.pixels,

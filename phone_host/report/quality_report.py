@@ -10,10 +10,11 @@ from typing import Final, assert_never
 
 import numpy as np
 
+from common.diagnostic import Diagnostic, Severity
 from common.words import counted
 from phone_host.model import PlaneQuality, Seen, StereoGeometry
 from phone_host.report.report_page import Headline
-from phone_host.report.stereo_report import FailedPair, Remark, Size
+from phone_host.report.stereo_report import FailedPair, Size
 
 NO_TRUTH: Final = "give --distance, measured along the left camera's axis, or --board and --square, to learn the bias"
 
@@ -54,7 +55,7 @@ class MeasuredPair:
     corners_bias_share: float
     picture: bytes
     picture_range_px: float
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Diagnostic, ...] = ()
 
     @property
     def is_plane(self) -> bool:
@@ -79,7 +80,7 @@ class QualityReport:
     matcher: str
     left_alone: tuple[str, ...] = ()
     right_alone: tuple[str, ...] = ()
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Diagnostic, ...] = ()
     interrupted_of: int = 0
 
     @property
@@ -116,40 +117,40 @@ class QualityReport:
         return distance_m**2 * self.sigma_px / (geometry.focal_px * geometry.baseline_m)
 
 
-def flaw(quality: PlaneQuality) -> Remark | None:
+def flaw(quality: PlaneQuality) -> Diagnostic | None:
     """Say why the region shows no plane, and what helps; None if it is one."""
     match quality.seen:
         case Seen.PLANE:
             return None
         case Seen.TOO_FEW:
-            return Remark(
+            return Diagnostic(
                 f"no plane can be fitted: only {quality.fill:.1%} of the region has depth",
                 "aim at a wall with texture (posters, newspaper), light it well, and stand no nearer than --near",
-                is_blocking=True,
+                severity=Severity.FAIL,
             )
         case Seen.OFF_PLANE:
-            return Remark(
+            return Diagnostic(
                 f"the region shows no plane: {quality.off_plane:.0%} of the disparities lie far off the best one",
                 "aim at one flat textured wall with nothing before it, or choose a flat part with --roi X,Y,W,H",
-                is_blocking=True,
+                severity=Severity.FAIL,
             )
         case Seen.ENDLESS:
-            return Remark(
+            return Diagnostic(
                 "the plane in view reaches infinity inside the region",
                 "aim at a wall, not along a floor or a table, or choose a nearer part with --roi X,Y,W,H",
-                is_blocking=True,
+                severity=Severity.FAIL,
             )
         case Seen.BENT:
-            return Remark(
+            return Diagnostic(
                 f"the region shows no plane: neighbouring disparities lie off it together, by {quality.bend_px:.2f} px RMS",
                 "aim at one flat wall or board with nothing before it; if it is flat, the calibration's lens model is wrong: calibrate again",
-                is_blocking=True,
+                severity=Severity.FAIL,
             )
         case Seen.SCATTERED:
-            return Remark(
+            return Diagnostic(
                 f"the region shows no plane: disparities scatter by {quality.subpixel_rms_px:.1f} px around the best one",
                 "aim at a textured wall, light it well, and check that the calibration fits these cameras",
-                is_blocking=True,
+                severity=Severity.FAIL,
             )
         case _:
             assert_never(quality.seen)
@@ -168,7 +169,7 @@ def quality_verdict(report: QualityReport) -> tuple[Headline, str]:
             return Headline.BAD, f"No pair was measured. The first: {first.problem}"
         problem = flaw(first.quality)
         assert problem is not None
-        said = problem.problem
+        said = problem.message
         return (
             Headline.BAD,
             f"{said[0].upper()}{said[1:]}" if count == 1 else f"No pair shows a plane. The first: {said}",

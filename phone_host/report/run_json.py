@@ -4,15 +4,15 @@ from dataclasses import asdict
 from typing import Final
 
 from common.camera.base import CameraHealth, health_values
+from common.diagnostic import Diagnostic
 from common.versions import REPORT_FORMAT
 from phone_host.accounts.delays import DELAYS, FROM_EXPOSURE, STAGES, ReplayFacts, SinkAccount, Spread
 from phone_host.accounts.link_account import LinkTally, rung_values
-from phone_host.diagnostics.concern import Concern
 from phone_host.diagnostics.headline import headline
 from phone_host.diagnostics.image_judge import Episode, saved_pairs, told_past
 from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.diagnostics.run_rules import concerns, history
-from phone_host.diagnostics.run_snapshot import TIMELESS, RunSnapshot, disbelieved, unused
+from phone_host.diagnostics.run_snapshot import TIMELESS, RecordingAccount, RunSnapshot, disbelieved, unused
 from phone_host.diagnostics.throughput import Judgement, figures, judge
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.output.json_text import json_number
@@ -35,7 +35,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "format_version": REPORT_FORMAT,
         "command": command,
         "ended": run.ended,
-        "error": None if run.failure is None else asdict(run.failure),
+        "error": problem_values(run.failure),
         "pairs": run.processed,
         "pairs_asked": run.asked_pairs or None,
         "pairs_per_second": json_number(run.pairs_per_second),
@@ -70,7 +70,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "unused": [{"place": item.place, "reason": item.reason, "count": item.count} for item in unused(run)],
         "sinks": {sink.name: _sink(sink) for sink in run.sinks},
         "unwritten": asdict(run.unwritten),
-        "recording": None if run.recording is None else asdict(run.recording),
+        "recording": None if run.recording is None else recording_values(run.recording),
         "replay": None if run.replay is None else _replay(run.replay),
     }
 
@@ -88,10 +88,10 @@ def _replay(replay: ReplayFacts) -> dict[str, object]:
 
 def _warnings(run: RunSnapshot) -> list[dict[str, object]]:
     """Return what terminal and page warn of: what stands at the end, and what stood for a while."""
-    told = [(item.doubt, item.sentence, item.remedy) for item in concerns(run)]
+    told = [(item.code, item.message, item.remedy) for item in concerns(run)]
     gone = told_past(history(run), run.processed, run.save_every)
-    told += [(item.doubt, line, item.remedy) for item, line in gone]
-    return [{"doubt": doubt.value, "sentence": sentence, "remedy": remedy} for doubt, sentence, remedy in told]
+    told += [(item.code, line, item.remedy) for item, line in gone]
+    return [{"doubt": doubt, "sentence": sentence, "remedy": remedy} for doubt, sentence, remedy in told]
 
 
 def _delays(run: RunSnapshot) -> dict[str, object]:
@@ -205,13 +205,23 @@ def _episode(item: Episode, save_every: int) -> dict[str, object]:
     }
 
 
-def concern_values(concern: Concern) -> dict[str, object]:
+def problem_values(found: Diagnostic | None) -> dict[str, object] | None:
+    """Return what is wrong and what helps; None: nothing is."""
+    return None if found is None else {"problem": found.message, "remedy": found.remedy}
+
+
+def recording_values(account: RecordingAccount) -> dict[str, object]:
+    """Return what became of a recording."""
+    return {**asdict(account), "failure": problem_values(account.failure)}
+
+
+def concern_values(concern: Diagnostic) -> dict[str, object]:
     """Return a doubt with its sentence, its remedy, and whether it blocks."""
     return {
-        "doubt": concern.doubt.value,
-        "sentence": concern.sentence,
+        "doubt": concern.code,
+        "sentence": concern.message,
         "remedy": concern.remedy,
-        "blocking": concern.is_certain,
+        "blocking": concern.is_failure,
     }
 
 

@@ -97,7 +97,7 @@ def notes(run: RunSnapshot) -> tuple[str, ...]:
         *(_sentence(remark) for remark in judgement.remedies if judgement.regime in _FINE),
         *([f"Warning: {run.shortfall}."] if run.shortfall else []),
         *([f"Warning: {missed}."] if (missed := missed_words(run.budget)) else []),
-        *(f"Warning: {item.sentence}." for item in concerns(run)),
+        *(f"Warning: {item.message}." for item in concerns(run)),
         *(f"Warning: {line}." for line in past_lines(run)),
         *(_sentence(line) for line in (*corrected_lines(run.depth), *budget_lines(run.budget))),
         *(_sentence(line) for line in drift_lines(run.drift)),
@@ -128,11 +128,11 @@ def doubtful_pairs(run: RunSnapshot) -> dict[int, str]:
         run: the run.
     """
     found: dict[int, str] = {}
-    for item in sorted(history(run), key=lambda item: item.concern.is_certain):
-        verdict, saved = ("wrong" if item.concern.is_certain else "doubtful"), saved_pairs(item, run.save_every)
-        perhaps = f"not judged, between pairs that are {verdict}: {item.concern.sentence}"
+    for item in sorted(history(run), key=lambda item: item.concern.is_failure):
+        verdict, saved = ("wrong" if item.concern.is_failure else "doubtful"), saved_pairs(item, run.save_every)
+        perhaps = f"not judged, between pairs that are {verdict}: {item.concern.message}"
         found = dict.fromkeys(saved.between, perhaps) | found
-        found |= dict.fromkeys(saved.judged, f"{verdict}: {item.concern.sentence}")
+        found |= dict.fromkeys(saved.judged, f"{verdict}: {item.concern.message}")
     return found
 
 

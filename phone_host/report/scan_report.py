@@ -11,13 +11,14 @@ from typing import Final, assert_never
 
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from common.words import counted, two_digits
 from phone_host.model import StereoGeometry
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.mat_figures import MatFigures, mat_figures
 from phone_host.report.report_page import Headline
-from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
+from phone_host.report.stereo_report import ALWAYS, FailedPair, Size
 from phone_host.scan.mat import Mat
 from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
 from phone_host.scan.scanned import ScannedPair
@@ -105,11 +106,11 @@ class ScanReport:
     rectified_px: Size
     matcher: str
     axes: Axes = Axes.CAMERA
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Diagnostic, ...] = ()
     interrupted_of: int = 0
     keeps_field: bool = False
     mat: Mat | None = None
-    unused_mat: Remark | None = None
+    unused_mat: Diagnostic | None = None
     unseen: UnseenSurface = UnseenSurface.FILL
 
     @property
@@ -185,7 +186,7 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
         verdict, sentence = scan_verdict(replace(report, interrupted_of=0))
         stopped = f"Interrupted after {len(report.pairs)} of {counted(report.interrupted_of, 'pair')}. "
         return Headline.WARNING if verdict is Headline.GOOD else verdict, stopped + sentence
-    blocking = next((remark.problem for remark in report.remarks if remark.is_blocking), "")
+    blocking = next((remark.message for remark in report.remarks if remark.is_failure), "")
     fused, count = report.fused, len(report.pairs)
     if blocking:
         return Headline.BAD, f"The model cannot be right: {blocking}."

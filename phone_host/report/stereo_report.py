@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Self
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError, TandemError
 from common.words import counted
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.model import CutCounts, DepthLimits, Drift, MatchReport, Search, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
@@ -24,33 +25,6 @@ _FIGURE: Final = re.compile(r"\d+(?:\.\d+)?")
 
 Size = tuple[int, int]
 """Width and height, px."""
-
-
-@dataclass(frozen=True, slots=True)
-class Remark:
-    """Something that the user must know about a result.
-
-    Attributes:
-        problem: what it is, with figures.
-        remedy: what to do about it; empty: nothing.
-        is_blocking: whether the result must not be taken for right; the command then ends with exit code 4.
-        is_note: whether nothing is wrong: it only tells what was done.
-    """
-
-    problem: str
-    remedy: str = ""
-    is_blocking: bool = False
-    is_note: bool = False
-
-    @property
-    def line(self) -> str:
-        """As a terminal shows it."""
-        return f"{'note' if self.is_note else 'warning'}: {self.text}"
-
-    @property
-    def text(self) -> str:
-        """Problem and remedy on one line."""
-        return f"{self.problem}: {self.remedy}" if self.remedy else self.problem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +68,7 @@ class PairReport:
     written: WrittenPair
     stages_ms: tuple[tuple[str, float], ...]
     trust: PairTrust
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Diagnostic, ...] = ()
     match_report: MatchReport | None = None
 
     @property
@@ -111,15 +85,15 @@ class PairReport:
         return searched_from_m(self.geometry, self.search)
 
     @property
-    def remarks_beside_headline(self) -> tuple[Remark, ...]:
+    def remarks_beside_headline(self) -> tuple[Diagnostic, ...]:
         """The remarks without the one that the headline tells with its remedy."""
-        told = {concern.sentence for concern in self.trust.concerns[:1]}
-        return tuple(remark for remark in self.remarks if remark.problem not in told)
+        told = {concern.message for concern in self.trust.concerns[:1]}
+        return tuple(remark for remark in self.remarks if remark.message not in told)
 
     @property
     def has_depth(self) -> bool:
         """Whether it has depth; without a geometry, a disparity."""
-        if any(concern.doubt is Doubt.NO_DEPTH for concern in self.trust.concerns):
+        if any(concern.code == Code.NO_DEPTH for concern in self.trust.concerns):
             return False
         return self.density > 0 if self.written.points is None else self.written.points > 0
 
@@ -179,7 +153,7 @@ class SetReport:
     by_number: bool
     left_alone: tuple[str, ...] = ()
     right_alone: tuple[str, ...] = ()
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Diagnostic, ...] = ()
     interrupted_of: int = 0
     by_name: bool = False
     drift: Drift | None = None
@@ -199,7 +173,7 @@ class SetReport:
         """Whether nothing failed, nothing blocks and some pixel has a depth. Everything that makes the exit code 4 is here."""
         remarks = [*self.remarks, *(remark for pair in self.computed for remark in pair.remarks)]
         any_depth = any(pair.has_depth for pair in self.computed)
-        return any_depth and not self.failed and not any(remark.is_blocking for remark in remarks)
+        return any_depth and not self.failed and not any(remark.is_failure for remark in remarks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +187,7 @@ class SharedRemark:
         alike: whether all have it word for word.
     """
 
-    remark: Remark
+    remark: Diagnostic
     pairs: int
     first: str
     alike: bool
@@ -226,16 +200,16 @@ def shared_remarks(report: SetReport) -> tuple[SharedRemark, ...]:
         report: of all pairs.
     """
     names = told_names(report)
-    kinds: dict[tuple[str, str], list[tuple[PairReport, Remark]]] = {}
+    kinds: dict[tuple[str, str], list[tuple[PairReport, Diagnostic]]] = {}
     for pair in report.computed:
         for remark in pair.remarks:
-            kinds.setdefault((_FIGURE.sub("0", remark.problem), remark.remedy), []).append((pair, remark))
+            kinds.setdefault((_FIGURE.sub("0", remark.message), remark.remedy), []).append((pair, remark))
     return tuple(
         SharedRemark(
             remark=found[0][1],
             pairs=len({pair.name for pair, _ in found}),
             first=names[found[0][0].name],
-            alike=len({remark.problem for _, remark in found}) == 1,
+            alike=len({remark.message for _, remark in found}) == 1,
         )
         for found in kinds.values()
     )

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from phone_host.diagnostics.concern import Concern
+from common.diagnostic import Diagnostic
 from phone_host.diagnostics.headline import Answer
 from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.report.run_json import concern_values, figure_values
@@ -19,7 +19,7 @@ class PairTrust:
     """
 
     figures: ImageFigures
-    concerns: tuple[Concern, ...]
+    concerns: tuple[Diagnostic, ...]
     answer: Answer
 
 

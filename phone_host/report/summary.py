@@ -54,7 +54,7 @@ def summary(run: RunSnapshot, width: int = 0) -> str:
     lines += [f"  {remedy}" for remedy in judge(figures(run)).remedies]
     lines += [f"warning: {run.shortfall}"] if run.shortfall else []
     lines += [f"warning: {missed}"] if (missed := missed_words(run.budget)) else []
-    lines += [f"warning: {item.sentence}: {item.remedy}" for item in concerns(run)]
+    lines += [f"warning: {item.message}: {item.remedy}" for item in concerns(run)]
     lines += [f"warning: {line}" for line in past_lines(run)]
     lines += depth_lines(run.images)
     lines += cut_lines(run.depth)

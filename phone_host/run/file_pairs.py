@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Final, Protocol, TypeVar
 
 from common import now
+from common.diagnostic import Diagnostic
 from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
 from common.program.out_of_memory import noted_if_out_of_memory
 from common.words import counted
-from phone_host.diagnostics.concern import Concern
+from phone_host.diagnostics.codes import BLOCKING
 from phone_host.model import Processed
 from phone_host.report.stereo_report import FailedPair, Size
 from phone_host.run.freed_memory import keep_freed_memory
@@ -238,7 +239,7 @@ def compute_pairs(
 
 def sound_pair(
     matching: Matching, left: Path, right: Path, watcher: Watcher
-) -> tuple[ComputedPair, tuple[Concern, ...]]:
+) -> tuple[ComputedPair, tuple[Diagnostic, ...]]:
     """Match the only pair of a verb, and refuse one that cannot be right.
 
     Args:
@@ -259,8 +260,8 @@ def sound_pair(
         raise SettingsError("there are no millimetres without focal length and baseline", "give --calibration")
     watcher.say("checking")
     concerns = judge_pair(pair.core, pair.processed, matching.mounted).concerns
-    blocking = next((concern for concern in concerns if concern.doubt.blocks), None)
+    blocking = next((concern for concern in concerns if concern.code in BLOCKING), None)
     if blocking is not None:
-        why = f"these images cannot be measured, because {blocking.sentence} ({blocking.remedy})"
+        why = f"these images cannot be measured, because {blocking.message} ({blocking.remedy})"
         raise DataError(why, "mend that, then try again")
     return pair, concerns

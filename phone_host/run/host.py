@@ -8,6 +8,7 @@ from typing import Final
 from common import now
 from common.camera.base import Camera
 from common.camera.image_numbers import ShowsFiles
+from common.diagnostic import Diagnostic, Severity
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.orientation import UPRIGHT, Orientation
@@ -15,7 +16,6 @@ from common.protocol.message import Pacing
 from phone_host.accounts.delays import SinkAccount, replay_facts
 from phone_host.accounts.image_motion import MotionMeter
 from phone_host.accounts.link_account import away_of
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Processed, Result, Side
@@ -274,15 +274,19 @@ class Host:
         return self._receiver.hello is not None
 
     @property
-    def refused(self) -> Trouble | None:
+    def refused(self) -> Diagnostic | None:
         """Why the board refuses this host, now or at the end of the run; None: it does not, or is silent."""
-        return None if self._course.refusal is None else Trouble(*refusal_text(self._course.refusal))
+        return (
+            None
+            if self._course.refusal is None
+            else Diagnostic(*refusal_text(self._course.refusal), severity=Severity.FAIL)
+        )
 
     def sample(self) -> Sequence[PairLedger]:
         """Return ledgers for plots, in order: those of all pairs, or an evenly spaced sample."""
         return self._ledgerer.sample()
 
-    def snapshot(self, ended: str = "running", failure: Trouble | None = None) -> RunSnapshot:
+    def snapshot(self, ended: str = "running", failure: Diagnostic | None = None) -> RunSnapshot:
         """Return everything that presenters show, as of now.
 
         Args:

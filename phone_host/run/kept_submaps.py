@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from common.diagnostic import Diagnostic, Severity
 from common.errors import DataError, SettingsError
 from phone_host.output.atomic import replacing
 from phone_host.output.listed import ListedFolder
 from phone_host.output.result_files import remove_results
-from phone_host.report.stereo_report import Remark
 from phone_host.scan.scan import Scan
 from phone_host.scan.scanned import Submap
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
@@ -83,12 +83,16 @@ class KeptSubmaps:
             scan.go_on(resumed)
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[Diagnostic, ...]:
         """What must be said of it."""
         if not self._problem:
             return ()
         return (
-            Remark(f"the scan could not have been resumed: {self._problem}", "make room on the disk", is_note=True),
+            Diagnostic(
+                f"the scan could not have been resumed: {self._problem}",
+                "make room on the disk",
+                severity=Severity.NOTE,
+            ),
         )
 
     def after_pair(self) -> None:

@@ -6,11 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.frame import FrameFault, SpoiledImageError
 from common.ledger import HostMarks, PairLedger
 from phone_host.accounts.delays import DelayStatistics, MatchedMedians, Sample
-from phone_host.diagnostics.concern import Trouble, Troubles
 from phone_host.model import CutCounts, DepthAccount, FramePair, Processed
+
+_MOST_REASONS: Final = 16
+"""Reasons may name figures of a single image; beyond this many different ones they are counted together."""
+
+_OTHER_REASONS: Final = Diagnostic("other reasons", "see the log", Severity.FAIL)
 
 _MOST_GAPS: Final = 4096
 """This many pairs after a gap are remembered, the latest: as many as a page can show."""
@@ -37,7 +42,7 @@ class Books:
     processed: int
     undecodable: int
     spoiled_images: tuple[tuple[str, int], ...]
-    failed_pairs: tuple[tuple[Trouble, int], ...]
+    failed_pairs: tuple[tuple[Diagnostic, int], ...]
     first_done_ns: int
     last_done_ns: int
     delays: DelayStatistics
@@ -63,7 +68,7 @@ class Ledgerer:
         self._was_away, self._is_timeless = was_away, is_timeless
         self._gaps = self._gap_ns = 0
         self._after_gap_ns: deque[int] = deque(maxlen=_MOST_GAPS)
-        self._failed = Troubles()
+        self._failed: Counter[Diagnostic] = Counter()
         self._lock = threading.Lock()
         self._delays, self._sample = DelayStatistics(), Sample()
         self._spoiled: Counter[FrameFault] = Counter()
@@ -136,7 +141,10 @@ class Ledgerer:
             if isinstance(error, SpoiledImageError):
                 self._spoiled[error.fault] += 1
             else:
-                self._failed.add(error)
+                why = diagnostic_of(error)
+                if why not in self._failed and len(self._failed) >= _MOST_REASONS:
+                    why = _OTHER_REASONS
+                self._failed[why] += 1
 
     def books(self) -> Books:
         """Return the totals so far."""
@@ -145,7 +153,7 @@ class Ledgerer:
                 processed=self.processed,
                 undecodable=self.undecodable,
                 spoiled_images=tuple((fault.value, count) for fault, count in self._spoiled.items()),
-                failed_pairs=self._failed.counts(),
+                failed_pairs=tuple(self._failed.most_common()),
                 first_done_ns=self.first_done_ns,
                 last_done_ns=self.last_done_ns,
                 delays=self._delays.copy(),

@@ -11,9 +11,10 @@ from typing import Final
 
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from phone_host.calibration.solve.board_plane import BoardPlane, find_board_plane
 from phone_host.calibration.target.corners import Board
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.headline import depth_error_m
 from phone_host.model import Crop, PlaneQuality, Processed, Seen
 from phone_host.output.atomic import write_text
@@ -23,10 +24,10 @@ from phone_host.output.result_files import replacing_results
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import MeasuredPair, QualityReport
-from phone_host.report.stereo_report import ALWAYS, FailedPair, Remark, Size
+from phone_host.report.stereo_report import ALWAYS, FailedPair, Size
 from phone_host.run.file_pairs import ComputedPair, FilePairs, PairMatcher, Watcher, compute_pairs
 from phone_host.run.kept import kept_if_interrupted
-from phone_host.run.stereo_remarks import files_remarks, judge_pair, remark_of, turned_remarks
+from phone_host.run.stereo_remarks import files_remarks, judge_pair, turned_remarks
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import crop_inside
 from phone_host.stereo.images import size_px
@@ -201,15 +202,13 @@ def _calibration_error_m(core: StereoCore, processed: Processed, distance_m: flo
     return depth_error_m(processed.geometry, distance_m, rectifier.rig.zero_sigma_px)
 
 
-def _doubts(core: StereoCore, processed: Processed, job: QualityJob, quality: PlaneQuality) -> tuple[Remark, ...]:
+def _doubts(core: StereoCore, processed: Processed, job: QualityJob, quality: PlaneQuality) -> tuple[Diagnostic, ...]:
     """Return what makes the depth wrong for certain; without a plane, the gravest doubt too: it may be why.
 
     That there is no depth is told already.
     """
-    concerns = [
-        one for one in judge_pair(core, processed, job.pairs.mounted).concerns if one.doubt is not Doubt.NO_DEPTH
-    ]
-    told = [one for one in concerns if one.is_certain]
+    concerns = [one for one in judge_pair(core, processed, job.pairs.mounted).concerns if one.code != Code.NO_DEPTH]
+    told = [one for one in concerns if one.is_failure]
     if not told and quality.seen is not Seen.PLANE:
         told = concerns[:1]
-    return tuple(map(remark_of, told))
+    return tuple(told)

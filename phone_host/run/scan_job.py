@@ -2,16 +2,18 @@
 
 from dataclasses import replace
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
 from common.words import counted
+from phone_host.diagnostics.codes import as_remark
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ScanReport
-from phone_host.report.stereo_report import FailedPair, Remark
+from phone_host.report.stereo_report import FailedPair
 from phone_host.run.file_pairs import ComputedPair, FilePairs, PairMatcher, Watcher, compute_pairs
 from phone_host.run.kept import kept_if_interrupted, tell_if_heard
 from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_work import ScanWork
-from phone_host.run.stereo_remarks import files_remarks, judge_pair, remark_of
+from phone_host.run.stereo_remarks import files_remarks, judge_pair
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
 
@@ -44,7 +46,7 @@ def run_scan(
             "take more of them, each sharing most of what the last one shows; for one pair there is `phone-host stereo`",
         )
     work, done = ScanWork(wanted, pairs.out, resumed, pairs.tell), list[ScannedPair | FailedPair]()
-    doubts: dict[str, Remark] = {}
+    doubts: dict[str, Diagnostic] = {}
     is_judged = False
 
     def take(pair: ComputedPair) -> ScannedPair:
@@ -54,7 +56,7 @@ def run_scan(
         if number & (number - 1) == 0 or not is_judged:
             is_judged = True
             for concern in judge_pair(pair.core, pair.processed, pairs.mounted).concerns:
-                doubts.setdefault(concern.doubt.value, remark_of(concern))
+                doubts.setdefault(concern.code, as_remark(concern))
         scanned = work.scan.take(name, float(name) if pairs.files.by_number else float(number), pair.processed)
         if scanned.weakness.advice:
             watcher.say(f"{name}: {scanned.weakness.advice}")

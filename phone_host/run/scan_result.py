@@ -8,12 +8,13 @@ from typing import Final
 
 import numpy as np
 
+from common.diagnostic import Diagnostic, Severity
 from common.errors import DataError
 from common.words import counted, distance_text, two_digits
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
-from phone_host.report.stereo_report import FailedPair, Remark
+from phone_host.report.stereo_report import FailedPair
 from phone_host.scan.field_bytes import field_bytes
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn
 from phone_host.scan.mesh_parts import size_of
@@ -26,7 +27,7 @@ from phone_host.scan.surface_match import Match, SurfaceMatch
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Weakness
 from phone_host.scan.turntable import TurntablePoses
 
-_EMPTY_BOX = Remark(
+_EMPTY_BOX = Diagnostic(
     "nothing of what the pairs show lies in the box",
     "move or enlarge --box, or leave it out to see where the thing lies",
 )
@@ -52,7 +53,7 @@ def report_of(
     scan: Scan,
     model: ScanModel,
     pairs: Sequence[ScannedPair | FailedPair],
-    remarks: Sequence[Remark],
+    remarks: Sequence[Diagnostic],
     *,
     matcher: str,
     axes: Axes,
@@ -93,19 +94,19 @@ def report_of(
     return report if on_mat is None else replace(report, remarks=(*report.remarks, *on_mat.remarks))
 
 
-def _box_remarks(scan: Scan, model: ScanModel) -> tuple[Remark, ...]:
+def _box_remarks(scan: Scan, model: ScanModel) -> tuple[Diagnostic, ...]:
     """Say that the box that was asked for may be elsewhere, where there is no surface, or none of it was seen: it was closed out of nothing."""
     is_empty = scan.wanted.box is not None and not model.seen.any()
     return (_EMPTY_BOX,) if is_empty else ()
 
 
-def _unseen_remarks(wanted: ScanWanted, model: ScanModel) -> tuple[Remark, ...]:
+def _unseen_remarks(wanted: ScanWanted, model: ScanModel) -> tuple[Diagnostic, ...]:
     """Say that a choice for unseen surface changes nothing, because the surface is open; why a turn's is, its own remarks say."""
     is_open = not model.is_closed and not wanted.turntable and len(model.mesh.triangles) > 0
     if not is_open or wanted.unseen is UnseenSurface.FILL:
         return ()
     problem = f"--unseen {wanted.unseen.value} changes nothing, because the surface is not closed"
-    return (Remark(problem, "give --box, --mat, --object or --turntable", is_note=True),)
+    return (Diagnostic(problem, "give --box, --mat, --object or --turntable", severity=Severity.NOTE),)
 
 
 def require_something(report: ScanReport) -> None:
@@ -136,7 +137,7 @@ def require_something(report: ScanReport) -> None:
             "show more of it, sharp and without glare; if another one lies there, name it, as in --mat 8x6:28mm:20mm:5x5",
         )
     if report.settings is None and report.unused_mat is not None:
-        raise DataError(report.unused_mat.problem, report.unused_mat.remedy)
+        raise DataError(report.unused_mat.message, report.unused_mat.remedy)
     if report.settings is None:
         _require_table(report)
         require_turning(report)
@@ -144,7 +145,7 @@ def require_something(report: ScanReport) -> None:
         which = f"none of the {count} pairs" if count > 1 else "not even the only pair"
         why = next((remark for remark in report.remarks if not remark.is_note), None)
         raise DataError(
-            f"{which} has depth{f': {why.problem}' if why else ''}",
+            f"{which} has depth{f': {why.message}' if why else ''}",
             (why.remedy if why else "")
             or "check that the pictures are sharp and bright, and that --calibration fits them",
         )
@@ -214,24 +215,24 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
     )
 
 
-def memory_remarks(scan: Scan) -> Sequence[Remark]:
+def memory_remarks(scan: Scan) -> Sequence[Diagnostic]:
     """Say whether the model outgrew its memory: it has become coarser, or something is missing from it.
 
     Args:
         scan: that made it.
     """
-    settings, remarks = scan.settings, list[Remark]()
+    settings, remarks = scan.settings, list[Diagnostic]()
     if settings is not None and settings.voxel_m > scan.poses.begun_voxel_m:
         begun, now = (distance_text(each) for each in (scan.poses.begun_voxel_m, settings.voxel_m))
         remarks.append(
-            Remark(
+            Diagnostic(
                 f"the model has filled its memory: its voxels became {now} wide, {begun} at first",
                 "give a larger --memory, or a smaller --far",
             )
         )
     if scan.volume is not None and scan.volume.left_out:
         remarks.append(
-            Remark(
+            Diagnostic(
                 "the model has filled its memory: what was seen later is missing from it",
                 "give a larger --memory or --voxel, or a smaller --far",
             )
@@ -239,7 +240,7 @@ def memory_remarks(scan: Scan) -> Sequence[Remark]:
     return remarks
 
 
-def way_remarks(certainty: WayCertainty | None) -> Sequence[Remark]:
+def way_remarks(certainty: WayCertainty | None) -> Sequence[Diagnostic]:
     """Say how far poses far from the beginning may be off: the noise of the surface knows nothing of that.
 
     Args:
@@ -250,12 +251,14 @@ def way_remarks(certainty: WayCertainty | None) -> Sequence[Remark]:
     known = f"its farthest poses are known to \u00b1 {two_digits(1e3 * certainty.sigma_m)} mm"
     way = f"the camera's way is {distance_text(certainty.length_m)} long"
     if certainty.loops:
-        return (Remark(f"{way} and {counted(certainty.loops, 'loop')} were closed: {known}", is_note=True),)
+        return (
+            Diagnostic(f"{way} and {counted(certainty.loops, 'loop')} were closed: {known}", severity=Severity.NOTE),
+        )
     remedy = "come back to where you began, and show it for some pairs from the same side"
-    return (Remark(f"{way} and no loop was closed: {known}", remedy, is_note=True),)
+    return (Diagnostic(f"{way} and no loop was closed: {known}", remedy, severity=Severity.NOTE),)
 
 
-def turn_remarks(scan: Scan) -> Sequence[Remark]:
+def turn_remarks(scan: Scan) -> Sequence[Diagnostic]:
     """Say whether the turn was found, and whether it is closed.
 
     Args:
@@ -268,35 +271,39 @@ def turn_remarks(scan: Scan) -> Sequence[Remark]:
         few = (
             f"only {counted(poses.views, 'pair')} of the object as it turns: {LEAST_VIEWS} are needed to find its axis"
         )
-        return (Remark(few, _REMEDY, is_blocking=True),)
+        return (Diagnostic(few, _REMEDY, severity=Severity.FAIL),)
     turn = poses.fit.turn
     if turn is None:
-        return (Remark("the pairs do not agree on the axis about which the object turns", _REMEDY, is_blocking=True),)
+        return (
+            Diagnostic(
+                "the pairs do not agree on the axis about which the object turns", _REMEDY, severity=Severity.FAIL
+            ),
+        )
     return (*_match_remarks(poses.fit.match), *_closing_remarks(turn))
 
 
-def _match_remarks(match: SurfaceMatch | None) -> Sequence[Remark]:
+def _match_remarks(match: SurfaceMatch | None) -> Sequence[Diagnostic]:
     if match is None:
         return ()
     if match.match is Match.NONE:
-        return (Remark("this pass does not fit the surface of the earlier one", _BOTH, is_blocking=True),)
+        return (Diagnostic("this pass does not fit the surface of the earlier one", _BOTH, severity=Severity.FAIL),)
     if match.match is Match.SEVERAL:
         several = "this pass fits the earlier one in several ways, and the colours do not tell which is right"
-        return (Remark(several, "put a mark on the object, and scan both passes again", is_blocking=True),)
+        return (Diagnostic(several, "put a mark on the object, and scan both passes again", severity=Severity.FAIL),)
     fits = f"{match.share:.0%} of this pass lie on the earlier one, {distance_text(match.off_m)} off on average"
-    return (Remark(fits, is_note=True),)
+    return (Diagnostic(fits, severity=Severity.NOTE),)
 
 
-def _closing_remarks(turn: FullTurn) -> Sequence[Remark]:
+def _closing_remarks(turn: FullTurn) -> Sequence[Diagnostic]:
     degrees = f"{math.degrees(turn.span):.0f} degrees"
     if turn.is_closed:
         gap = f"{abs(math.degrees(turn.gap)):.2g} degrees"
         closed = f"the end met the beginning {gap} off, which was distributed, and lies {distance_text(turn.closed_m)} from it now"
-        return (Remark(f"the turn of {degrees} is closed: {closed}", is_note=True),)
+        return (Diagnostic(f"the turn of {degrees} is closed: {closed}", severity=Severity.NOTE),)
     if turn.span < 2 * math.pi:
-        return (Remark(f"the object has turned by {degrees} only", "go on until its first side shows again"),)
+        return (Diagnostic(f"the object has turned by {degrees} only", "go on until its first side shows again"),)
     words = "the end of the turn was not recognised as its beginning: the surface may be doubled there"
-    return (Remark(words, "go on turning for a few pairs more, and show more texture"),)
+    return (Diagnostic(words, "go on turning for a few pairs more, and show more texture"),)
 
 
 def keeps_field(scan: Scan) -> bool:
@@ -320,7 +327,7 @@ def field_of_turn(scan: Scan) -> bytes:
     return field_bytes(scan.volume, scan.carved) if scan.volume is not None and keeps_field(scan) else b""
 
 
-def unused_mat(scan: Scan) -> Remark | None:
+def unused_mat(scan: Scan) -> Diagnostic | None:
     """Return what must be said of a printed mat that is in view, though none is asked for; None: none was found.
 
     Args:
@@ -331,4 +338,4 @@ def unused_mat(scan: Scan) -> Remark | None:
     other = "--turntable" if scan.wanted.turntable else "--object" if scan.wanted.on_table else ""
     in_place = f" in place of {other}" if other else ""
     remedy = f"use {scan.unused_mat.option}{in_place} to scan the object on it, or take the mat away"
-    return Remark("a printed mat is in view, but the scan does not use it", remedy)
+    return Diagnostic("a printed mat is in view, but the scan does not use it", remedy)

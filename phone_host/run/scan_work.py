@@ -3,8 +3,9 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from common.diagnostic import Diagnostic
 from phone_host.output.axes import Axes
-from phone_host.report.stereo_report import FailedPair, Remark
+from phone_host.report.stereo_report import FailedPair
 from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.run.scan_result import field_of_turn, report_of, require_something, turn_remarks, unused_mat
@@ -45,7 +46,7 @@ class ScanWork:
 
     def finished(
         self,
-        remarks: Sequence[Remark],
+        remarks: Sequence[Diagnostic],
         pairs: Sequence[ScannedPair | FailedPair] | None = None,
         *,
         matcher: str,
@@ -74,7 +75,7 @@ class ScanWork:
 
 def finished_scan(
     scan: Scan,
-    remarks: Sequence[Remark] = (),
+    remarks: Sequence[Diagnostic] = (),
     pairs: Sequence[ScannedPair | FailedPair] | None = None,
     *,
     matcher: str,

@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
-from phone_host.diagnostics.concern import Concern
 from phone_host.model import Disparity, Processed, RectifiedPair, StereoGeometry
 from phone_host.report.stereo_report import Size
 from phone_host.run.file_pairs import Matching, Watcher, sound_pair
@@ -108,7 +108,7 @@ class Measured:
 
     points: tuple[Outcome, ...]
     known: Known
-    doubts: tuple[Concern, ...]
+    doubts: tuple[Diagnostic, ...]
 
 
 def measure_points(

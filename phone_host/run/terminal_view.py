@@ -125,7 +125,7 @@ def _stages(run: RunSnapshot) -> Text:
 
 def _warnings(run: RunSnapshot) -> list[Text]:
     """Return the concerns; without any, how the depth fares."""
-    warnings = [Text(f"warning: {item.sentence}: {item.remedy}", style="bold red") for item in concerns(run)]
+    warnings = [Text(f"warning: {item.message}: {item.remedy}", style="bold red") for item in concerns(run)]
     if run.images.wants_depth and run.images.judged and not warnings:
         return [Text(headline(run).sentence, style="bold")]
     return warnings
@@ -145,7 +145,7 @@ def _state(run: RunSnapshot) -> Text:
         if estimate
         else "clock unknown"
     )
-    absent = "waiting for the board" if run.refused is None else f"{run.refused.problem}: {run.refused.remedy}"
+    absent = "waiting for the board" if run.refused is None else f"{run.refused.message}: {run.refused.remedy}"
     board = f"board connected over {run.carrier}" if run.carrier else absent
     lost = ", ".join(item.told for item in unused(run)) or "nothing"
     phase = "\n".join(phase_lines(run.phase, run.alignment))

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from common import now
+from common.diagnostic import Diagnostic
 from common.program.logs import event
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.image_judge import ImageJudge, ImageTrust
 from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.model import DepthLimits, Result, StereoGeometry
@@ -94,7 +95,7 @@ class TrustSink(OneQueueSink):
         processed, at_s = result.processed, (done_ns - self._started_ns) / 1e9
         maps = None if self._core is None else maps_of(self._core, processed)
         look = look_at(processed, maps)
-        is_swapped = any(concern.doubt is Doubt.SWAPPED for concern in image_doubts(look.evidence))
+        is_swapped = any(concern.code == Code.SWAPPED for concern in image_doubts(look.evidence))
         if (
             self._keeper is not None and moment is not None and not is_swapped
         ):  # exchanged cameras look like turned ones
@@ -113,9 +114,9 @@ class DoubtLog:
         judge: returns the present concerns.
     """
 
-    def __init__(self, judge: Callable[[], Iterable[Concern]]) -> None:
+    def __init__(self, judge: Callable[[], Iterable[Diagnostic]]) -> None:
         self._judge = judge
-        self._known: frozenset[Doubt] = frozenset()
+        self._known: frozenset[str] = frozenset()
         self._due_ns = 0
 
     def look(self, now_ns: int) -> None:
@@ -127,10 +128,10 @@ class DoubtLog:
         if now_ns < self._due_ns:
             return
         self._due_ns = now_ns + _LOOK_NS
-        found = {concern.doubt: concern for concern in self._judge()}
+        found = {concern.code: concern for concern in self._judge()}
         for doubt in found.keys() - self._known:
             concern = found[doubt]
-            _LOG.warning(event("depth_doubtful", doubt=doubt.value, problem=concern.sentence, remedy=concern.remedy))
+            _LOG.warning(event("depth_doubtful", doubt=doubt, problem=concern.message, remedy=concern.remedy))
         for doubt in self._known - found.keys():
-            _LOG.info(event("depth_trusted", doubt=doubt.value))
+            _LOG.info(event("depth_trusted", doubt=doubt))
         self._known = frozenset(found)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Final
 
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.errors import TandemError
-from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.web.source import Activity
 
 _LOG = logging.getLogger(__name__)
@@ -86,7 +86,7 @@ class Activities:
     """
 
     def __init__(
-        self, begins: Callable[[], None], changed: Callable[[], None], failed: Callable[[Trouble], None]
+        self, begins: Callable[[], None], changed: Callable[[], None], failed: Callable[[Diagnostic], None]
     ) -> None:
         self._begins, self._changed, self._failed = begins, changed, failed
         self._is_closed = False
@@ -102,7 +102,7 @@ class Activities:
             return Activity.IDLE
         return Activity.ENDING if task.stopped() else task.activity
 
-    def begin(self, activity: Activity, work: Callable[[Task], None]) -> Trouble | None:
+    def begin(self, activity: Activity, work: Callable[[Task], None]) -> Diagnostic | None:
         """Begin an activity, unless another one goes on.
 
         Args:
@@ -115,9 +115,9 @@ class Activities:
         task = Task(activity)
         with self._lock:
             if self._task is not None:
-                return Trouble(_WORDS[self.now], "stop it, or wait until it ends")
+                return Diagnostic(_WORDS[self.now], "stop it, or wait until it ends", Severity.FAIL)
             if self._is_closed:
-                return Trouble("the program is ending", "start phone-host serve again")
+                return Diagnostic("the program is ending", "start phone-host serve again", Severity.FAIL)
             self._begins()
             self._task = task
             self._thread = threading.Thread(target=self._work, args=(task, work), name=activity.value, daemon=True)
@@ -173,7 +173,7 @@ class Activities:
             if not isinstance(error, TandemError):
                 _LOG.exception("an activity failed")
             if not task.is_left:
-                self._failed(trouble_of(error))
+                self._failed(diagnostic_of(error))
         finally:
             self._end(task)
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.errors import TandemError
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.output.axes import Axes
 from phone_host.run.host import Host
@@ -21,9 +21,10 @@ from phone_host.serve.snapshots import keep_newest
 from phone_host.stereo.core import StereoCore
 from phone_host.web.source import Activity, Answer, Command, Do, Measured, Newest, PageState, Surface
 
-_NEEDS_SERVE: Final = Trouble(
+_NEEDS_SERVE: Final = Diagnostic(
     "this page only shows a run that was started on the command line",
     "stop it and run `phone-host serve`, where the page sets everything",
+    Severity.FAIL,
 )
 
 
@@ -113,7 +114,7 @@ class BesideRun:
                 case _:
                     return Answer(trouble=_NEEDS_SERVE)
         except TandemError as error:
-            return Answer(trouble=trouble_of(error))
+            return Answer(trouble=diagnostic_of(error))
         finally:
             self._memory.outdate()
 

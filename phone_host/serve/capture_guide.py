@@ -3,9 +3,10 @@
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from common.diagnostic import Diagnostic, Severity
+from common.doctor.finding import ok
 from phone_host.doctor.camera_check.check import ENOUGH, Progress
 from phone_host.doctor.camera_check.words import stage_words
-from phone_host.web.source import Checked
 
 _STEPS: Final = 20
 
@@ -17,12 +18,12 @@ class CaptureGuide:
         show: takes what the page shall show.
     """
 
-    def __init__(self, show: Callable[[Sequence[Checked]], None]) -> None:
+    def __init__(self, show: Callable[[Sequence[Diagnostic]], None]) -> None:
         self._show, self._shown = show, ("", -1, -1)
 
     def wait(self) -> None:
         """Say that the camera is waited for; a phone's may take seconds."""
-        self._show([Checked("film", "ok", "waiting for the camera", "")])
+        self._show([ok("film", "waiting for the camera")])
 
     def tell(self, progress: Progress) -> None:
         """Take the progress; called with each frame."""
@@ -31,4 +32,4 @@ class CaptureGuide:
             return
         self._shown = now
         done = f"{100 * now[1] // _STEPS} % done, {min(progress.told, ENOUGH)} of {ENOUGH} segments were usable"
-        self._show([Checked("film", "ok", now[0], done)])
+        self._show([Diagnostic(now[0], done, Severity.OK, "film")])

@@ -2,15 +2,14 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Final
 
-from common.doctor.finding import Finding, Grade
+from common.diagnostic import Diagnostic, Severity
 from common.doctor.machine_checks import LOG_UNREADABLE
 from common.words import counted
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.doctor.camera_check.words import CHECK_AGAIN
-from phone_host.web.source import Checked
 
 _OF_THE_CHOICE: Final = frozenset(
     {
@@ -34,7 +33,7 @@ _OF_A_LINK: Final = {"serial": "serial:", "bluetooth": "rfcomm:"}
 """Findings that matter only to a link of this scheme."""
 
 
-def relevant(findings: Iterable[Finding], links: str) -> list[Finding]:
+def relevant(findings: Iterable[Diagnostic], links: str) -> list[Diagnostic]:
     """Return the findings that matter to the chosen cameras and links; of the rest of the machine only what is wrong.
 
     Args:
@@ -44,28 +43,25 @@ def relevant(findings: Iterable[Finding], links: str) -> list[Finding]:
     return [each for each in findings if _matters(each, links.split())]
 
 
-def _matters(finding: Finding, links: list[str]) -> bool:
-    scheme = _OF_A_LINK.get(finding.what)
+def _matters(finding: Diagnostic, links: list[str]) -> bool:
+    scheme = _OF_A_LINK.get(finding.code)
     if scheme is not None:
         return any(link.startswith(scheme) for link in links)
-    if finding.verdict is Grade.OK:
-        return finding.what in _OF_THE_CHOICE
-    return finding.text != LOG_UNREADABLE  # a page cannot ask as root
+    if finding.severity is Severity.OK:
+        return finding.code in _OF_THE_CHOICE
+    return finding.message != LOG_UNREADABLE  # a page cannot ask as root
 
 
-def checked(findings: Iterable[Finding]) -> list[Checked]:
-    """Return findings as the page shows them."""
-    return [Checked(each.what, each.verdict.value, each.text, _remedy(each)) for each in findings]
+def checked(findings: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return findings as the page shows them: it has a button for what the command line has an option for."""
+    remedy = "press \u201cCheck for image stabilisation\u201d"
+    return [replace(each, remedy=remedy) if each.remedy == CHECK_AGAIN else each for each in findings]
 
 
-def _remedy(finding: Finding) -> str:
-    return "press \u201cCheck for image stabilisation\u201d" if finding.remedy == CHECK_AGAIN else finding.remedy
-
-
-def obstacle(findings: list[Finding]) -> Trouble | None:
+def obstacle(findings: list[Diagnostic]) -> Diagnostic | None:
     """Return the first finding that nothing works with; None: there is none."""
-    failed = next((each for each in findings if each.verdict is Grade.FAIL), None)
-    return None if failed is None else Trouble(f"{failed.what}: {failed.text}", failed.remedy)
+    failed = next((each for each in findings if each.severity is Severity.FAIL), None)
+    return None if failed is None else Diagnostic(f"{failed.code}: {failed.message}", failed.remedy, Severity.FAIL)
 
 
 def seen(snapshot: RunSnapshot) -> str:
@@ -82,7 +78,7 @@ def seen(snapshot: RunSnapshot) -> str:
     return f"both cameras work: {counted(snapshot.processed, 'pair')}{speed}, time skew {skew_ms:.1f} ms"
 
 
-def unseen(snapshot: RunSnapshot) -> Trouble:
+def unseen(snapshot: RunSnapshot) -> Diagnostic:
     """Return why the trial run saw no pair.
 
     Args:
@@ -90,9 +86,15 @@ def unseen(snapshot: RunSnapshot) -> Trouble:
     """
     received, own = snapshot.counts.received, snapshot.counts.host_frames
     if not received:
-        return Trouble("no image came from the board", "see what board-agent says there, or run board-agent doctor")
+        return Diagnostic(
+            "no image came from the board", "see what board-agent says there, or run board-agent doctor", Severity.FAIL
+        )
     if not own:
-        return Trouble("no image came from this machine's camera", "check whether another program uses it")
-    return Trouble(
-        "images came from both cameras, but none match in time", "give a greater tolerance, or the same frame rate"
+        return Diagnostic(
+            "no image came from this machine's camera", "check whether another program uses it", Severity.FAIL
+        )
+    return Diagnostic(
+        "images came from both cameras, but none match in time",
+        "give a greater tolerance, or the same frame rate",
+        Severity.FAIL,
     )

@@ -6,12 +6,12 @@ from contextlib import contextmanager
 from typing import Final
 
 from common import now
+from common.diagnostic import Diagnostic
 from phone_host.calibration.guide.snapshot import Ended
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.serve.program import Calibrated, Choices
 from phone_host.serve.steps import Facts, steps
-from phone_host.web.source import Activity, Checked, Choice, PageState, PrintState, ScanState
+from phone_host.web.source import Activity, Choice, PageState, PrintState, ScanState
 
 _FRESH_NS: Final = 150_000_000
 """A snapshot of a run serves so long: however often the state is asked for, the run is read a few times a second."""
@@ -29,11 +29,11 @@ class Memory:
         self._choices: Choices = dict(choices)
         self._boards: tuple[Choice, ...] | None = None
         self._cameras: tuple[Choice, ...] | None = None
-        self._checks: tuple[Checked, ...] = ()
+        self._checks: tuple[Diagnostic, ...] = ()
         self._checked: tuple[Choices, str] = ({}, "")
         self._pairs = 0
         self._begun = 0
-        self._trouble: Trouble | None = None
+        self._trouble: Diagnostic | None = None
         self._guide: Mapping[str, object] | None = None
         self._ask: Callable[[], RunSnapshot] | None = None
         self._run: RunSnapshot | None = None
@@ -53,7 +53,7 @@ class Memory:
         return self._begun
 
     @property
-    def trouble(self) -> Trouble | None:
+    def trouble(self) -> Diagnostic | None:
         """What went wrong last."""
         return self._trouble
 
@@ -71,7 +71,7 @@ class Memory:
         others = tuple(board for board in self._boards or () if board.uri != link)
         self._boards = (Choice(uri=link, name=name), *others)
 
-    def checking(self, checks: Sequence[Checked]) -> None:
+    def checking(self, checks: Sequence[Diagnostic]) -> None:
         """Take what a check has found so far."""
         self._checks = tuple(checks)
 
@@ -96,7 +96,7 @@ class Memory:
         """Take in one sentence how far a live calibration came that was stopped: its verdict so far is not that of a rig."""
         self._guide = {**(self._guide or {}), "result": words, "state": Ended.STOPPED.value}
 
-    def fail(self, trouble: Trouble) -> None:
+    def fail(self, trouble: Diagnostic) -> None:
         """Something went wrong."""
         self._trouble = trouble
 

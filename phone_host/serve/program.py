@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from common.doctor.finding import Finding
+from common.diagnostic import Diagnostic
 from common.keys import KeyFolder
 from phone_host.calibration.guide.gates import View
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.host_doctor import Question
@@ -55,7 +54,7 @@ class ReadyRun(Protocol):
     def ended(self, ended: EndReason) -> Over:
         """Write the report of a run that has ended."""
 
-    def failed(self, failure: Trouble) -> Over:
+    def failed(self, failure: Diagnostic) -> Over:
         """Write the report of a run that an error ended."""
 
 
@@ -78,7 +77,7 @@ class Calibrated:
 
     words: str
     rig: Path | None
-    trouble: Trouble | None
+    trouble: Diagnostic | None
 
 
 class ReadyCalibration(Protocol):
@@ -199,7 +198,7 @@ class Program(Protocol):
 
     def capture(
         self, choices: Choices, stopped: Callable[[], bool], tell: Callable[[Progress], None]
-    ) -> Sequence[Finding]:
+    ) -> Sequence[Diagnostic]:
         """Film for a minute with the own camera, and return what its film is worth; kept beside the chosen calibration.
 
         Args:

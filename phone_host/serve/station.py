@@ -11,6 +11,7 @@ from dataclasses import replace
 from threading import Lock
 from typing import Final, TypeVar
 
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.errors import SettingsError, TandemError
 from common.link.enrolment_door import pairing_address
 from common.link.factory import parse_link
@@ -19,7 +20,6 @@ from common.words import counted
 from phone_host.boards.enrolment import PairingCall
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.doctor.host_doctor import examine
 from phone_host.live.calibration_view import SnapshotValues
@@ -39,7 +39,6 @@ from phone_host.stereo.core import StereoCore
 from phone_host.web.source import (
     Activity,
     Answer,
-    Checked,
     Command,
     Do,
     Measured,
@@ -102,7 +101,7 @@ class Station:
         try:
             program.changed(kept, kept)
         except TandemError as error:  # somebody else has changed the file, or what it names has gone
-            self._memory.fail(trouble_of(error))
+            self._memory.fail(diagnostic_of(error))
 
     @property
     def feed(self) -> BrowserFeed:
@@ -143,7 +142,7 @@ class Station:
         try:
             return self._do[command.do](command.values)
         except TandemError as error:
-            return Answer(trouble=trouble_of(error))
+            return Answer(trouble=diagnostic_of(error))
         finally:
             self._memory.outdate()
             self._shelf.tell()
@@ -276,7 +275,7 @@ class Station:
             raise SettingsError("no camera of this machine is chosen", "find one, or type its address")
 
         def work(task: Task) -> None:
-            guide, found = CaptureGuide(self._show_checks), list[Checked]()
+            guide, found = CaptureGuide(self._show_checks), list[Diagnostic]()
             guide.wait()
             try:
                 with task.held():
@@ -287,7 +286,7 @@ class Station:
 
         return self._begun(Activity.CHECKING, work, "hold the camera still")
 
-    def _show_checks(self, checks: Sequence[Checked]) -> None:
+    def _show_checks(self, checks: Sequence[Diagnostic]) -> None:
         self._memory.checking(checks)
         self._shelf.tell()
 
@@ -357,14 +356,14 @@ class Station:
                 ended = ready.host.run(task.stopped)
             except Exception as error:
                 with suppress(Exception):  # tell what ended the run, not what followed
-                    self._memory.last(ready.failed(trouble_of(error)).snapshot)
+                    self._memory.last(ready.failed(diagnostic_of(error)).snapshot)
                 raise
             over = ready.ended(ended)
         give_back_freed_memory()
         self._memory.last(over.snapshot)
         self._memory.gave_up(ready.host.has_given_up)
         if over.missing:
-            self._memory.fail(Trouble(f"not written: {over.missing}", "make room and run again"))
+            self._memory.fail(Diagnostic(f"not written: {over.missing}", "make room and run again", Severity.FAIL))
         return over.snapshot
 
     def _stop(self, values: Choices) -> Answer:

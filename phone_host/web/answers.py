@@ -10,7 +10,7 @@ from typing import BinaryIO, Final, TypeVar
 
 from aiohttp import web
 
-from phone_host.diagnostics.concern import Trouble
+from common.diagnostic import Diagnostic, Severity
 from phone_host.output.json_text import json_text
 from phone_host.web.camera_lines import CameraLines
 from phone_host.web.door import KNOWN, problem
@@ -48,14 +48,14 @@ _KINDS: Final = {
     ".png": "image/png",
     ".jpg": "image/jpeg",
 }
-_NOT_YET: Final = Trouble("there is nothing here yet", "start a run and wait for its first pair")
-_NO_DEPTH: Final = Trouble("this run has no depth", "give it a calibration")
-_NOT_SAVED: Final = Trouble("this file was not saved", "see /api/pairs; save pairs with --save-every")
-_NO_SCAN: Final = Trouble("there is no scan yet", "begin one on the page, or with the command scan")
-_NO_NUMBER: Final = Trouble("since is no number", "give that of the last answer, or 0")
-_NO_COMMAND: Final = Trouble("this is no command", "send JSON as /api/openapi.json describes it")
-_NO_POINTS: Final = Trouble("these are no points", "send JSON as /api/openapi.json describes it")
-_NO_AUTHORITY: Final = Trouble("this page has no certificate", "start it with --lan")
+_NOT_YET: Final = Diagnostic("there is nothing here yet", "start a run and wait for its first pair", Severity.FAIL)
+_NO_DEPTH: Final = Diagnostic("this run has no depth", "give it a calibration", Severity.FAIL)
+_NOT_SAVED: Final = Diagnostic("this file was not saved", "see /api/pairs; save pairs with --save-every", Severity.FAIL)
+_NO_SCAN: Final = Diagnostic("there is no scan yet", "begin one on the page, or with the command scan", Severity.FAIL)
+_NO_NUMBER: Final = Diagnostic("since is no number", "give that of the last answer, or 0", Severity.FAIL)
+_NO_COMMAND: Final = Diagnostic("this is no command", "send JSON as /api/openapi.json describes it", Severity.FAIL)
+_NO_POINTS: Final = Diagnostic("these are no points", "send JSON as /api/openapi.json describes it", Severity.FAIL)
+_NO_AUTHORITY: Final = Diagnostic("this page has no certificate", "start it with --lan", Severity.FAIL)
 
 
 class Answers:

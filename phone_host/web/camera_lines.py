@@ -12,20 +12,21 @@ from typing import Any, Final
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from common import now
-from phone_host.diagnostics.concern import Trouble
+from common.diagnostic import Diagnostic, Severity
 from phone_host.output.json_text import json_text
 from phone_host.web.door import KNOWN, problem
 from phone_host.web.gate import Gate, is_loopback
 from phone_host.web.rates import Rate
 from phone_host.web.settings import Limits
 from phone_host.web.source import Feed, Hearer
-from phone_host.web.state_json import trouble_values
 from phone_host.web.wishes import token_in
 
-_NO_FEED: Final = Trouble(
-    "nothing here takes a browser's camera", "start phone-host serve, or run --serve --camera browser:"
+_NO_FEED: Final = Diagnostic(
+    "nothing here takes a browser's camera", "start phone-host serve, or run --serve --camera browser:", Severity.FAIL
 )
-_NO_TOKEN: Final = Trouble("this needs the token of the first address", "open the address that phone-host printed")
+_NO_TOKEN: Final = Diagnostic(
+    "this needs the token of the first address", "open the address that phone-host printed", Severity.FAIL
+)
 
 _ALIVE_S: Final = 5.0
 """A browser that has gone without a word, as when its Wi-Fi is lost, is noticed within this time and half of it again."""
@@ -91,7 +92,7 @@ class CameraLines:
         def begun(line: SocketLine, hello: str) -> Hearer | None:
             if self._gate.is_token(token_in(hello)):
                 return feed.camera(line, hello)
-            line.say(json_text({"kind": "refused"} | trouble_values(_NO_TOKEN)))
+            line.say(json_text({"kind": "refused", "problem": _NO_TOKEN.message, "remedy": _NO_TOKEN.remedy}))
             line.close()
             return None
 

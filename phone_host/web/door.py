@@ -8,48 +8,52 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
 from common import now
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.errors import TandemError
-from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.output.json_text import json_text
+from phone_host.report.run_json import problem_values
 from phone_host.web.connections import Connections
 from phone_host.web.gate import Asked, Gate, Kind, Passed, Refusal
 from phone_host.web.rates import Rate, Rates
 from phone_host.web.settings import SECURITY_HEADERS, Limits
-from phone_host.web.state_json import trouble_values
 
 _LOG: Final = logging.getLogger(__name__)
 
 KNOWN: Final = web.RequestKey("known", bool)
 """Whether a request is one of the user's own: it carries the token or the cookie."""
 
-_REFUSALS: Final[Mapping[Refusal, tuple[int, Trouble]]] = {
+_REFUSALS: Final[Mapping[Refusal, tuple[int, Diagnostic]]] = {
     Refusal.HOST: (
         421,
-        Trouble("this page is not known by that name", "open the address that phone-host printed"),
+        Diagnostic("this page is not known by that name", "open the address that phone-host printed", Severity.FAIL),
     ),
     Refusal.ORIGIN: (
         403,
-        Trouble("another site may not ask this page for anything", "open the address that phone-host printed"),
+        Diagnostic(
+            "another site may not ask this page for anything", "open the address that phone-host printed", Severity.FAIL
+        ),
     ),
     Refusal.TOKEN: (
         401,
-        Trouble("this needs the token of the first address", "open the address that phone-host printed"),
+        Diagnostic(
+            "this needs the token of the first address", "open the address that phone-host printed", Severity.FAIL
+        ),
     ),
 }
-_TOO_OFTEN: Final = Trouble("too many requests", "wait a second")
-_TROUBLES: Final[Mapping[int, Trouble]] = {
-    404: Trouble("there is nothing at this address", "see /api/openapi.json"),
-    405: Trouble("this address is not asked in this way", "see /api/openapi.json"),
-    408: Trouble("the request took too long", "send it faster"),
-    413: Trouble("the request is too long", "send less"),
-    503: Trouble("too much is asked for at once", "try again in a moment"),
+_TOO_OFTEN: Final = Diagnostic("too many requests", "wait a second", Severity.FAIL)
+_TROUBLES: Final[Mapping[int, Diagnostic]] = {
+    404: Diagnostic("there is nothing at this address", "see /api/openapi.json", Severity.FAIL),
+    405: Diagnostic("this address is not asked in this way", "see /api/openapi.json", Severity.FAIL),
+    408: Diagnostic("the request took too long", "send it faster", Severity.FAIL),
+    413: Diagnostic("the request is too long", "send less", Severity.FAIL),
+    503: Diagnostic("too much is asked for at once", "try again in a moment", Severity.FAIL),
 }
 _TOLD_ALONG: Final = ("Allow", "Retry-After")
-_BAD: Final = Trouble("the request could not be read", "see /api/openapi.json")
-_OURS: Final = Trouble("the program itself failed", "see its log")
+_BAD: Final = Diagnostic("the request could not be read", "see /api/openapi.json", Severity.FAIL)
+_OURS: Final = Diagnostic("the program itself failed", "see its log", Severity.FAIL)
 
 
-def problem(status: int, trouble: Trouble, headers: Mapping[str, str] | None = None) -> web.Response:
+def problem(status: int, trouble: Diagnostic, headers: Mapping[str, str] | None = None) -> web.Response:
     """Make an answer that says what is wrong and what to do.
 
     Args:
@@ -59,7 +63,7 @@ def problem(status: int, trouble: Trouble, headers: Mapping[str, str] | None = N
     """
     return web.Response(
         status=status,
-        text=json_text(trouble_values(trouble)),
+        text=json_text(problem_values(trouble)),
         content_type="application/json",
         headers={"Cache-Control": "no-store", **(headers or {})},
     )
@@ -120,7 +124,7 @@ class Door:
             headers = {name: error.headers[name] for name in _TOLD_ALONG if name in error.headers}
             return problem(error.status, _TROUBLES.get(error.status, _BAD), headers)
         except TandemError as error:
-            return problem(409, trouble_of(error))
+            return problem(409, diagnostic_of(error))
         except (ConnectionError, TimeoutError):
             raise  # the peer is gone
         except Exception:  # noqa: BLE001 - one answer fails, the server lives on

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.diagnostics.concern import Trouble
+from common.diagnostic import Diagnostic
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Result
 
@@ -67,23 +67,6 @@ class Choice:
     uri: str
     name: str
     note: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Checked:
-    """One thing that a check has looked at.
-
-    Attributes:
-        what: the thing.
-        grade: ok, warn or fail.
-        words: what was found.
-        remedy: what to do about it; empty: nothing.
-    """
-
-    what: str
-    grade: str
-    words: str
-    remedy: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,8 +213,8 @@ class PageState:
     guide: Mapping[str, object] | None = None
     scan: ScanState | None = None
     printing: PrintState | None = None
-    checks: tuple[Checked, ...] = ()
-    trouble: Trouble | None = None
+    checks: tuple[Diagnostic, ...] = ()
+    trouble: Diagnostic | None = None
     changed: int = 0
     begun: int = 0
 
@@ -286,7 +269,7 @@ class Answer:
     """
 
     words: str = ""
-    trouble: Trouble | None = None
+    trouble: Diagnostic | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Final
 
+from common.diagnostic import Diagnostic, Severity
 from common.ledger import PairLedger
 from common.words import counted
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.headline import Grade, headline
 from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RecordingAccount, RunSnapshot, unused
 from phone_host.model import DepthAccount, Unwritten
 from phone_host.output.json_text import json_number, json_text
 from phone_host.report.cut_words import cut_sentence
-from phone_host.report.run_json import concern_values
+from phone_host.report.run_json import concern_values, problem_values, recording_values
 from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
 
 MOST_SAMPLES: Final = 120
@@ -103,14 +103,14 @@ def state_text(state: PageState, samples: Sequence[Sample], now_ns: int) -> Stat
         "cameras": _choices(state.cameras),
         "stranger": state.stranger,
         "checks": [
-            {"what": each.what, "grade": each.grade, "words": each.words, "remedy": each.remedy}
+            {"what": each.code, "grade": each.severity.value, "words": each.message, "remedy": each.remedy}
             for each in state.checks
         ],
         "matchers": list(state.matchers),
         "guide": None if state.guide is None else dict(state.guide),
         "scan": None if state.scan is None else asdict(state.scan),
         "printing": None if state.printing is None else asdict(state.printing) | {"stage": state.printing.stage.value},
-        "trouble": None if state.trouble is None else trouble_values(state.trouble),
+        "trouble": problem_values(state.trouble),
         "changed": state.changed,
         "begun": state.begun,
     }
@@ -133,14 +133,9 @@ def whole_text(state: StateText, samples: Sequence[Sample], report: str = "null"
     return f'{state.before}{rows}{state.after}, "report": {report}}}'
 
 
-def trouble_values(trouble: Trouble) -> dict[str, object]:
-    """Return problem and remedy."""
-    return {"problem": trouble.problem, "remedy": trouble.remedy}
-
-
 def answer_values(answer: Answer) -> dict[str, object]:
     """Return what became of a command."""
-    return {"words": answer.words} if answer.trouble is None else trouble_values(answer.trouble)
+    return problem_values(answer.trouble) or {"words": answer.words}
 
 
 def measured_values(measured: Measured) -> dict[str, object]:
@@ -196,12 +191,13 @@ def _unsaved(unwritten: Unwritten) -> dict[str, object] | None:
     if not unwritten.cause:
         return None
     lost = f"{counted(unwritten.pairs, 'pair')} could not be saved" if unwritten.pairs else "delays could not be saved"
-    return trouble_values(Trouble(f"{lost} ({unwritten.cause})", "make room, or end the run and give another folder"))
+    return problem_values(
+        Diagnostic(f"{lost} ({unwritten.cause})", "make room, or end the run and give another folder", Severity.FAIL)
+    )
 
 
 def _recording(account: RecordingAccount) -> dict[str, object]:
-    failure = None if account.failure is None else trouble_values(account.failure)
-    return {**asdict(account), "failure": failure, "words": account.words}
+    return recording_values(account) | {"words": account.words}
 
 
 def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
@@ -214,14 +210,14 @@ def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
     return {
         "level": said.grade.value,
         "headline": said.sentence,
-        "concerns": [concern_values(item) | {"problem": item.sentence} for item in concerns(run)],
+        "concerns": [concern_values(item) | {"problem": item.message} for item in concerns(run)],
     }
 
 
 def _no_pair(run: RunSnapshot) -> str:
     """Say that there is no pair yet, and why if that is known."""
     if run.refused is not None:
-        return f"No pair yet: {run.refused.problem}. Then: {run.refused.remedy}."
+        return f"No pair yet: {run.refused.message}. Then: {run.refused.remedy}."
     if _link(run)["up"]:
         return "No pair has been processed yet."
     return "No pair yet: no board answers. Start board-agent there, and check its power, its network and its address."

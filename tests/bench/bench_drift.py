@@ -95,7 +95,7 @@ def _watched(play: Play) -> tuple[Row, Watched]:
             worst = max(worst, watched.left_px(play.departure_at(t_s)))
         if play.departure_at(t_s) == play.departure_at(t_s - _TOLD_S):
             settled = max(settled, watched.left_px(play.departure_at(t_s)))
-    alarms = (*told(drift.changes), *(concern.doubt.value for concern in drift_concerns(drift)))
+    alarms = (*told(drift.changes), *(concern.code for concern in drift_concerns(drift)))
     row = Row(
         play.name,
         told_s,
@@ -216,7 +216,7 @@ def _looped(family: str, pairs: Sequence[GivenPair]) -> Row:
         for pair in pairs:
             drift = watched.look(_PERIOD_S * count, pair.left, pair.right, None, float("nan"))
             count += 1
-    alarms = (*told(drift.changes), *(concern.doubt.value for concern in drift_concerns(drift)))
+    alarms = (*told(drift.changes), *(concern.code for concern in drift_concerns(drift)))
     return Row(
         f"{family}, {count} pairs ({drift.state.value})",
         float("nan"),

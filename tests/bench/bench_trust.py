@@ -28,7 +28,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from common import now
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import BLOCKING, Code
 from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.evidence import maps_of, measure_evidence
@@ -100,12 +100,12 @@ class Row:
     size_px: tuple[int, int]
 
 
-def _judge(core: StereoCore, left: Image, right: Image) -> tuple[frozenset[Doubt], float]:
+def _judge(core: StereoCore, left: Image, right: Image) -> tuple[frozenset[str], float]:
     processed = core.compute(left, right, now.monotonic_ns)
     began = time.process_time()
     evidence = measure_evidence(processed, maps_of(core, processed))
     took_ms = (time.process_time() - began) * 1e3
-    return frozenset(concern.doubt for concern in image_doubts(evidence)), took_ms
+    return frozenset(concern.code for concern in image_doubts(evidence)), took_ms
 
 
 def _good(scene: _Scene, left: Image, right: Image) -> Row:
@@ -113,9 +113,9 @@ def _good(scene: _Scene, left: Image, right: Image) -> Row:
     return _row(scene, "", "alarm" if found else "right", found, took_ms)
 
 
-def _row(scene: _Scene, mistake: str, outcome: str, found: frozenset[Doubt], took_ms: float) -> Row:
+def _row(scene: _Scene, mistake: str, outcome: str, found: frozenset[str], took_ms: float) -> Row:
     size_px = (scene.left.shape[1], scene.left.shape[0])
-    names = tuple(sorted(doubt.value for doubt in found))
+    names = tuple(sorted(doubt for doubt in found))
     return Row(scene.name, scene.kind, scene.half, mistake, outcome, names, took_ms, size_px)
 
 
@@ -128,11 +128,11 @@ def _mistaken(scene: _Scene, foreign: Image) -> Iterator[Row]:
         yield _row(scene, name, _outcome(found, right_names), found, took_ms)
     as_large = cv2.resize(foreign, (scene.right.shape[1], scene.right.shape[0]), interpolation=cv2.INTER_AREA)
     found, took_ms = _judge(scene.core, *other_scene(scene.left, np.asarray(as_large, np.uint8)))
-    yield _row(scene, OTHER_SCENE, _outcome(found, frozenset({Doubt.OTHER_SCENE})), found, took_ms)
+    yield _row(scene, OTHER_SCENE, _outcome(found, frozenset({Code.OTHER_SCENE})), found, took_ms)
 
 
-def _outcome(found: frozenset[Doubt], right_names: frozenset[Doubt]) -> str:
-    if found & right_names and not any(doubt.blocks for doubt in found - right_names):
+def _outcome(found: frozenset[str], right_names: frozenset[str]) -> str:
+    if found & right_names and not BLOCKING & (found - right_names):
         return "right"
     return "other" if found else "missed"
 
@@ -178,7 +178,7 @@ def given_rows(job: GivenJob) -> list[Row]:
     rows += _mistaken(scene, job.foreign)
     if pair.rig is None:
         found, took_ms = _judge(short_core(pair), pair.left, pair.right)
-        outcome = _outcome(found, frozenset({Doubt.SEARCH_TOO_SHORT}))
+        outcome = _outcome(found, frozenset({Code.SEARCH_TOO_SHORT}))
         rows.append(_row(scene, SHORT_SEARCH, outcome, found, took_ms))
     return rows
 

@@ -13,7 +13,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.core import StereoCore
@@ -236,20 +236,20 @@ def pattern(image: Image, shift_px: int) -> Image:
     return noisy(np.asarray(np.dstack([checks] * 3), np.uint8), 3.0)
 
 
-_EXCHANGED: Final = frozenset({Doubt.SWAPPED})
-_TURNED: Final = frozenset({Doubt.TURNED})
-_QUARTER: Final = frozenset({Doubt.TURNED_BY_QUARTER})
-_MIRRORED: Final = frozenset({Doubt.MIRRORED})
-_SAME: Final = frozenset({Doubt.SAME_IMAGE})
-_COVERED: Final = frozenset({Doubt.COVERED})
-_DARK: Final = frozenset({Doubt.DARK})
-_ROWS: Final = frozenset({Doubt.VERTICAL_ERROR})
-_REPEATED: Final = frozenset({Doubt.AMBIGUOUS})
-_UNFOCUSED: Final = frozenset({Doubt.UNFOCUSED})
+_EXCHANGED: Final = frozenset({Code.SWAPPED})
+_TURNED: Final = frozenset({Code.TURNED})
+_QUARTER: Final = frozenset({Code.TURNED_BY_QUARTER})
+_MIRRORED: Final = frozenset({Code.MIRRORED})
+_SAME: Final = frozenset({Code.SAME_IMAGE})
+_COVERED: Final = frozenset({Code.COVERED})
+_DARK: Final = frozenset({Code.DARK})
+_ROWS: Final = frozenset({Code.VERTICAL_ERROR})
+_REPEATED: Final = frozenset({Code.AMBIGUOUS})
+_UNFOCUSED: Final = frozenset({Code.UNFOCUSED})
 
 PATTERN: Final = "repeated pattern"
 
-MISTAKES: Final[dict[str, tuple[frozenset[Doubt], Callable[[Image, Image], Pair]]]] = {
+MISTAKES: Final[dict[str, tuple[frozenset[Code], Callable[[Image, Image], Pair]]]] = {
     "swapped": (_EXCHANGED, lambda left, right: (right, left)),
     "both on their heads": (_EXCHANGED | _TURNED, _both(lambda image: turned(image, 2))),
     "both mirrored": (_EXCHANGED | _MIRRORED, _both(lambda image: _flip(image, 1))),

@@ -98,8 +98,8 @@ def messages(code: Code) -> Iterator[tuple[Place, list[str], list[str]]]:
     """Every place that makes an error, with the possible texts of its problem and its remedy."""
     for place in code.calls(list(code.errors)):
         match place.call.args:
-            case [ast.Attribute(attr="problem"), _]:
-                continue  # rewords another of our errors, which is listed where it is made
+            case [ast.Attribute(attr="problem" | "message"), _]:
+                continue  # rewords another of our errors or diagnostics, which is listed where it is made
             case [ast.Starred(value=ast.Call() as pair)]:
                 for problem, remedy in code.returned(called(pair)):
                     yield place, code.texts(place, problem), code.texts(place, remedy)
@@ -127,17 +127,16 @@ def page(code: Code) -> str:
                 *(f"{row}\n" for row in sorted(rows)),
             ]
     parts.append(_CONCERNS)
-    for place in code.calls(["StampDoubt", "Concern"]):
-        kind, sentence, remedy = (*place.call.args, *(keyword.value for keyword in place.call.keywords))[:3]
-        name = (
-            kind.attr.lower().replace("_", " ") if isinstance(kind, ast.Attribute) and kind.attr.isupper() else "stamps"
-        )
-        is_listed = isinstance(kind, ast.Attribute) and kind.attr == "STAMPS"  # one by one, as StampDoubt
-        told = [] if is_listed else code.texts(place, sentence)
-        rows = [
-            f"| {name} | {_cell(text)} | {_cell(' / '.join(code.texts(place, remedy)))} |\n" for text in told if text
-        ]
-        parts += [row for row in rows if row not in parts]
+    for place in code.calls(["diagnose", "_stamp_doubt"]):
+        kind, message, remedy = place.call.args[:3]
+        name = kind.attr if isinstance(kind, ast.Attribute) and kind.attr.isupper() else ""
+        if name == "STAMPS":
+            continue  # one by one, as _stamp_doubt
+        usual = "stamps" if called(place.call) == "_stamp_doubt" else "images apart"
+        name = name.lower().replace("_", " ") or usual
+        helps = _cell(" / ".join(code.texts(place, remedy)))
+        rows_of_code = [f"| {name} | {_cell(text)} | {helps} |\n" for text in code.texts(place, message) if text]
+        parts += [row for row in rows_of_code if row not in parts]
     return "".join(parts)
 
 

@@ -129,7 +129,7 @@ def test_a_library_of_an_older_build_is_told_and_not_used(native_library: Librar
     assert found == Missing(
         reason="of an older build, without tandem_absorb", remedy="reinstall; in a checkout: make native"
     )
-    assert "of an older build, without tandem_absorb" in check_native(found).text
+    assert "of an older build, without tandem_absorb" in check_native(found).message
     for note in (model_note(found), fallback_note(found)):
         assert "of an older build, without tandem_absorb; " in note
         assert note.endswith("make native")

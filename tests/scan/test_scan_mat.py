@@ -316,7 +316,7 @@ def test_a_mat_that_was_printed_too_small_is_told() -> None:
     seen = MatSaid((30, 31), 0.03, 0.0001, MatScale(0.97, 0.0002))
     told = mat_figures(MAT, [seen])
     assert not told.is_to_scale
-    assert "24.25 mm" in told.remarks[0].problem
+    assert "24.25 mm" in told.remarks[0].message
     assert mat_figures(MAT, [replace(seen, scale=MatScale(1.004, 0.0002))]).remarks == ()
 
 

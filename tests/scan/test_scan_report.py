@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic, Severity
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.report.model_view import MOST_TRIANGLES, ShownModel, model_view
@@ -18,7 +19,7 @@ from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import area_text, scan_lines
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import ModelFigures, ScanReport, scan_verdict, stretches
-from phone_host.report.stereo_report import FailedPair, Remark
+from phone_host.report.stereo_report import FailedPair
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.mesh_parts import MeshSize
 from phone_host.scan.scanned import ScannedPair
@@ -91,7 +92,7 @@ LOST = report(*(pair(number, L, Weakness.TOO_FAST) if number in {2, 3} else pair
         (replace(GOOD, model=replace(MODEL, noise_m=math.nan)), Headline.GOOD, "All 5 pairs are in the model."),
         (replace(GOOD, model=replace(MODEL, unseen_share=0.25)), Headline.GOOD,
          "All 5 pairs are in the model. Expected surface error: ±1.2 mm (drift included). 25 % was never in view and is filled in."),
-        (replace(GOOD, remarks=(Remark("left and right are exchanged", "x", is_blocking=True),)), Headline.BAD,
+        (replace(GOOD, remarks=(Diagnostic("left and right are exchanged", "x", severity=Severity.FAIL),)), Headline.BAD,
          "The model cannot be right: left and right are exchanged."),
         (replace(GOOD, interrupted_of=9), Headline.WARNING, "Interrupted after 5 of 9 pairs. All 5 pairs"),
         (replace(GOOD, model=ModelFigures(), interrupted_of=9), Headline.BAD, "Interrupted after 5 of 9 pairs. There"),
@@ -179,7 +180,7 @@ def test_the_report_is_json_without_times() -> None:
 def test_the_page_shows_the_model_and_what_went_wrong() -> None:
     """One verdict, the figures, a model to turn, links to the files; without a surface no model and no script for it."""
     shown = ShownModel(MESH, np.array([0.001, 0.002, np.nan], np.float32), 0.004)
-    text = scan_page(replace(report(*LOST.pairs, BROKEN), remarks=(Remark("dim", "give light"),)), shown)
+    text = scan_page(replace(report(*LOST.pairs, BROKEN), remarks=(Diagnostic("dim", "give light"),)), shown)
     page = Page(text)
     assert page.open == []
     assert "3 of 6 pairs are in the model" in page.words

@@ -172,6 +172,6 @@ def test_it_is_said_how_sure_a_long_way_is() -> None:
     assert 0 < after.sigma_m < before.sigma_m
     assert way_remarks(None) == way_remarks(before) == ()
     (open_way,), (closed_way,) = (way_remarks(replace(each, length_m=20.0)) for each in (before, after))
-    assert "no loop was closed" in open_way.problem
+    assert "no loop was closed" in open_way.message
     assert open_way.remedy
-    assert "3 loops were closed" in closed_way.problem
+    assert "3 loops were closed" in closed_way.message

@@ -208,7 +208,7 @@ def test_a_folder_that_vanishes_ends_the_keeping_only(tmp_path: Path) -> None:
     for number in range(21):
         taken(scan, POSES[:1], number)
         kept.after_pair()
-    assert "could not have been resumed" in kept.remarks[0].problem
+    assert "could not have been resumed" in kept.remarks[0].message
     kept.done()
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from common.diagnostic import Diagnostic, Severity
 from common.frame import Frame
 from common.stamp import HOST_CLOCK, Stamp
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import BoardFrame, FramePair, Processed, Result
 from phone_host.scan.patches import Patches
@@ -30,7 +30,7 @@ from tests.support.run_snapshots import run
 from tests.support.samples import FRAME, LEDGER
 from tests.support.stereo_pages import processed
 
-REFUSED: Final = Trouble("no board is chosen", "choose one first")
+REFUSED: Final = Diagnostic("no board is chosen", "choose one first", Severity.FAIL)
 
 
 class PageSource:

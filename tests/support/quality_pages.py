@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from phone_host.model import Crop, PlaneQuality, StereoGeometry
 from phone_host.output.residual_view import residual_jpeg
 from phone_host.report.quality_report import MeasuredPair, QualityReport
-from phone_host.report.stereo_report import FailedPair, Remark
+from phone_host.report.stereo_report import FailedPair
 from phone_host.stereo.plane_quality import NoTruth, StatedDistance, measure_plane
 
 GEOMETRY = StereoGeometry(focal_px=400.0, baseline_m=0.1, cx_px=79.5, cy_px=59.5)
@@ -28,7 +29,7 @@ def quality(distance_m: float, stated_m: float = math.nan, bulge_px: float = 0.0
     return measure_plane(disparity.astype(np.float32), GEOMETRY, counts, area=WHOLE, truth=truth)
 
 
-def pair(name: str, found: PlaneQuality, *remarks: Remark) -> MeasuredPair:
+def pair(name: str, found: PlaneQuality, *remarks: Diagnostic) -> MeasuredPair:
     """A pair with these figures."""
     return MeasuredPair(
         name=name,

@@ -17,7 +17,7 @@ from common.errors import DataError
 from common.link.factory import open_link, parse_link
 from common.orientation import Orientation
 from common.protocol.message import Locks
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.run_rules import concerns
 from phone_host.model import CameraModel, Rig
 from phone_host.output.cameras_json import read_cameras
@@ -134,9 +134,9 @@ def test_a_run_restores_what_the_rig_was_calibrated_with(tmp_path: Path) -> None
 
     running, ended = studio_run(tmp_path, core, answered)
     assert ended is EndReason.STOPPED
-    (concern,) = [each for each in concerns(running.snapshot("stopped")) if each.doubt is Doubt.CAMERA_SETTINGS]
-    assert "the left camera's zoom is 300 instead of 400" in concern.sentence
-    assert "the right camera's exposure_us is not held instead of 8000" in concern.sentence
+    (concern,) = [each for each in concerns(running.snapshot("stopped")) if each.code == Code.CAMERA_SETTINGS]
+    assert "the left camera's zoom is 300 instead of 400" in concern.message
+    assert "the right camera's exposure_us is not held instead of 8000" in concern.message
     left, right = read_cameras(tmp_path / "out" / "cameras.json")
     assert left == state(LEFT, Orientation(180), focus=20, zoom=300)
     assert right == state(RIGHT, focus=30)

@@ -13,6 +13,7 @@ from board_agent.doctor.key_checks import check_keys
 from board_agent.doctor.link_checks import LinkReadings, check_link
 from common.camera.v4l2_formats import FormatOffer, Rates, Wanted
 from common.camera.v4l2_stamps import StampClock, rate_remedy
+from common.diagnostic import Diagnostic, Severity
 from common.doctor.access import Account, Holder, Node, check_access, may_open
 from common.doctor.camera_checks import (
     Offered,
@@ -25,13 +26,13 @@ from common.doctor.camera_checks import (
     check_stream,
     check_taken,
 )
-from common.doctor.finding import Finding, Grade, exit_code, fail, ok, table, values, warn
+from common.doctor.finding import CHECK_FAILED, exit_code, fail, ok, table, values, warn
 from common.doctor.unit_check import Unit, check_unit
 from common.frame import PixelFormat
 from common.keys import KeyFolder
 from common.peers import Peer
 
-OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
+OK, WARN, FAIL = Severity.OK, Severity.WARN, Severity.FAIL
 SERVICE = Account("tandemscan", 995, frozenset({995, 44, 20}), is_me=False)
 ME = Account("me", 1000, frozenset({1000}), is_me=True)
 VIDEO = Node(path="/dev/video0", uid=0, gid=44, group="video", mode=0o660, open_to_me=False)
@@ -84,7 +85,7 @@ def test_every_finding_is_one_line_and_the_exit_code_follows_the_worst() -> None
 def test_access_follows_owner_group_and_mode(node: Node, account: Account, *, may: bool) -> None:
     """Who may read and write a node is judged as the kernel would judge it; for the user who asks, the kernel itself was asked."""
     assert may_open(node, account) is may
-    assert check_access("permission", node, account).verdict is (OK if may else FAIL)
+    assert check_access("permission", node, account).severity is (OK if may else FAIL)
 
 
 def test_a_user_outside_the_group_is_told_to_join_and_a_changed_mode_is_named() -> None:
@@ -101,8 +102,8 @@ def test_an_absent_camera_is_told_from_one_without_driver() -> None:
     """A camera that the USB bus sees without a driver needs the driver; no camera at all means that one must be plugged in."""
     assert "plug one in" in check_absence(0, ()).remedy
     driverless = check_absence(0, (UsbCamera("HD Cam", has_driver=False),))
-    assert (driverless.verdict, "HD Cam" in driverless.text, "modprobe" in driverless.remedy) == (FAIL, True, True)
-    assert check_absence(2, (UsbCamera("HD Cam", has_driver=True),)).verdict is FAIL
+    assert (driverless.severity, "HD Cam" in driverless.message, "modprobe" in driverless.remedy) == (FAIL, True, True)
+    assert check_absence(2, (UsbCamera("HD Cam", has_driver=True),)).severity is FAIL
 
 
 @pytest.mark.parametrize(
@@ -115,11 +116,11 @@ def test_an_absent_camera_is_told_from_one_without_driver() -> None:
         (Wanted(pixel_format=PixelFormat.YUYV), FAIL, "MJPG"),
     ],
 )
-def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Grade, word: str) -> None:
+def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Severity, word: str) -> None:
     """An offered format is named; for one that is not offered the finding lists those that are."""
     finding = check_format("/dev/video0", OFFERED, wanted)
-    assert finding.verdict is verdict
-    assert word in finding.text + finding.remedy
+    assert finding.severity is verdict
+    assert word in finding.message + finding.remedy
 
 
 @pytest.mark.parametrize(
@@ -134,9 +135,11 @@ def test_what_is_asked_is_held_against_the_offer(wanted: Wanted, verdict: Grade,
         (5000, 2, 1920 * 1080 * 2, OK),
     ],
 )
-def test_the_bus_is_judged_by_bytes_a_second(megabits: float, cameras: int, frame_bytes: int, verdict: Grade) -> None:
+def test_the_bus_is_judged_by_bytes_a_second(
+    megabits: float, cameras: int, frame_bytes: int, verdict: Severity
+) -> None:
     """30 frames a second against what USB 2.0 (5.6.3) gives one endpoint: 24.576 MB/s at high, 1.023 MB/s at full speed."""
-    assert check_bus(UsbBus("1-1", megabits, cameras), frame_bytes, 30.0).verdict is verdict
+    assert check_bus(UsbBus("1-1", megabits, cameras), frame_bytes, 30.0).severity is verdict
 
 
 @pytest.mark.parametrize(
@@ -151,11 +154,11 @@ def test_the_bus_is_judged_by_bytes_a_second(megabits: float, cameras: int, fram
         (replace(SOUND, frames=3, period_ns=None, missed=1), OK, "too few to tell"),
     ],
 )
-def test_a_second_of_frames_is_judged(sample: Sample, verdict: Grade, word: str) -> None:
+def test_a_second_of_frames_is_judged(sample: Sample, verdict: Severity, word: str) -> None:
     """No sound frame fails; spoiled, missed or slow ones warn; the rate is the measured one."""
     finding = check_stream(sample)[0]
-    assert finding.verdict is verdict
-    assert word in finding.text
+    assert finding.severity is verdict
+    assert word in finding.message
     assert bool(finding.remedy) is (verdict is not OK)
 
 
@@ -172,20 +175,20 @@ def test_a_camera_slower_than_offered_has_a_remedy_with_figures(
 ) -> None:
     """10 of 30 frames a second: the offer is the driver's, what comes is said beside it, and the longest exposure for that rate is named."""
     slow = check_stream(replace(SOUND, period_ns=period_ns, exposure_ns=exposure_ns))[0]
-    assert "10.0 of 30 a second" in slow.text
-    assert "slower than the driver offers" in slow.text
+    assert "10.0 of 30 a second" in slow.message
+    assert "slower than the driver offers" in slow.message
     assert remedy in slow.remedy
-    assert "is offered by the driver" in check_format("/dev/video0", OFFERED, Wanted()).text
+    assert "is offered by the driver" in check_format("/dev/video0", OFFERED, Wanted()).message
     assert rate_remedy(20_000_000, 33_333_333, None) == "ask for the rate that it gives: fps=50"
 
 
 def test_stamps_and_refused_controls_have_lines_of_their_own() -> None:
     """Impossible stamps and refused controls are warnings; a camera without frames has neither line."""
-    assert [item.what for item in check_stream(SOUND)] == ["stream", "stamps"]
+    assert [item.code for item in check_stream(SOUND)] == ["stream", "stamps"]
     doubtful = check_stream(replace(SOUND, distrusted=30, stamps=StampClock.UNKNOWN, driver="vivid", refused=2))
-    assert [(item.what, item.verdict) for item in doubtful] == [("stream", OK), ("stamps", WARN), ("controls", WARN)]
-    assert "unnamed clock" in doubtful[1].text
-    assert "a copied clock" in check_stream(replace(SOUND, stamps=StampClock.COPY))[1].text
+    assert [(item.code, item.severity) for item in doubtful] == [("stream", OK), ("stamps", WARN), ("controls", WARN)]
+    assert "unnamed clock" in doubtful[1].message
+    assert "a copied clock" in check_stream(replace(SOUND, stamps=StampClock.COPY))[1].message
     assert len(check_stream(replace(SOUND, frames=0))) == 1
 
 
@@ -203,12 +206,12 @@ AGENT, OTHER = Holder(412, "board-agent"), Holder(77, "motion")
     ],
 )
 def test_a_taken_camera_is_judged_by_who_has_it(
-    holders: tuple[Holder, ...], status: str, verdict: Grade, word: str, *, all_seen: bool
+    holders: tuple[Holder, ...], status: str, verdict: Severity, word: str, *, all_seen: bool
 ) -> None:
     """Our own service may hold the camera if it streams; another program is named; what only root may see is reported as such."""
     finding = check_taken(holders, AGENT.pid, status, all_seen=all_seen)
-    assert finding.verdict is verdict
-    assert word in finding.text
+    assert finding.severity is verdict
+    assert word in finding.message
 
 
 @pytest.mark.parametrize(
@@ -225,11 +228,11 @@ def test_a_taken_camera_is_judged_by_who_has_it(
         (LinkReadings(uri="serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
     ],
 )
-def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Grade, word: str) -> None:
+def test_a_link_is_judged_by_who_has_it(link: LinkReadings, verdict: Severity, word: str) -> None:
     """Free, ours, another's, a getty's, the console's, or unavailable: each is reported, and each fault has its remedy."""
     finding = check_link(link, AGENT.pid)
-    assert finding.verdict is verdict
-    assert word in finding.text + finding.remedy
+    assert finding.severity is verdict
+    assert word in finding.message + finding.remedy
 
 
 def unit(**fields: object) -> Unit:
@@ -258,17 +261,17 @@ def unit(**fields: object) -> Unit:
         (Unit("board-agent"), OK, "no systemd"),
     ],
 )
-def test_the_service_is_judged_by_its_state(state: Unit, verdict: Grade, word: str) -> None:
+def test_the_service_is_judged_by_its_state(state: Unit, verdict: Severity, word: str) -> None:
     """A failing service fails and says how to find the reason, a stopped one warns, none at all is fine."""
     finding = check_unit(state)
-    assert finding.verdict is verdict
-    assert word in finding.text + finding.remedy
+    assert finding.severity is verdict
+    assert word in finding.message + finding.remedy
 
 
-@given(st.lists(st.tuples(st.sampled_from(Grade), st.text(max_size=5))))
-def test_exit_code_and_counts_agree(drawn: list[tuple[Grade, str]]) -> None:
+@given(st.lists(st.tuples(st.sampled_from(Severity), st.text(max_size=5))))
+def test_exit_code_and_counts_agree(drawn: list[tuple[Severity, str]]) -> None:
     """Exit 4 exactly when the object counts a failed check."""
-    findings = [Finding(what="x", verdict=verdict, text=text) for verdict, text in drawn]
+    findings = [Diagnostic(text, "", verdict, "x", CHECK_FAILED) for verdict, text in drawn]
     assert (exit_code(findings) == 4) is (values(findings)["failed"] > 0)
 
 
@@ -276,20 +279,20 @@ def test_keys_are_judged_without_making_any(tmp_path: Path) -> None:
     """No folder and no host warn, a host is named, other people's and open files fail; looking does not create an absent key."""
     me = Account("me", os.geteuid(), frozenset(), is_me=True)
     folder = KeyFolder(tmp_path / "keys")
-    assert check_keys(folder, me).verdict is Grade.WARN
+    assert check_keys(folder, me).severity is Severity.WARN
     assert not folder.path.exists()
     folder.path.mkdir(mode=0o700)
-    assert check_keys(folder, me).verdict is Grade.WARN
+    assert check_keys(folder, me).severity is Severity.WARN
     assert not list(folder.path.iterdir())
     own = folder.own()
     folder.add(Peer(name="phone", key=own.public, added=""))
     known = check_keys(folder, me)
-    assert known.verdict is Grade.OK
-    assert "phone" in known.text
+    assert known.severity is Severity.OK
+    assert "phone" in known.message
     stranger = check_keys(folder, replace(me, name="tandemscan", uid=os.geteuid() + 1))
-    assert stranger.verdict is Grade.FAIL
+    assert stranger.severity is Severity.FAIL
     assert "chown -R tandemscan" in stranger.remedy
     (folder.path / "key").chmod(0o644)
     opened = check_keys(folder, me)
-    assert opened.verdict is Grade.FAIL
+    assert opened.severity is Severity.FAIL
     assert "chmod 600" in opened.remedy

@@ -11,7 +11,7 @@ import pytest
 
 from common import now
 from common.ledger import StageTimes
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import BLOCKING, Code
 from phone_host.diagnostics.headline import Grade
 from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.model import (
@@ -98,8 +98,8 @@ def _evidence(core: StereoCore, left: Image, right: Image) -> Evidence:
     return measure_evidence(processed, maps_of(core, processed))
 
 
-def _doubts(core: StereoCore, left: Image, right: Image) -> list[Doubt]:
-    return [concern.doubt for concern in image_doubts(_evidence(core, left, right))]
+def _doubts(core: StereoCore, left: Image, right: Image) -> list[str]:
+    return [concern.code for concern in image_doubts(_evidence(core, left, right))]
 
 
 def _turn(image: Image, code: int) -> Image:
@@ -131,28 +131,28 @@ def _both(change: Callable[[Image], Image]) -> Callable[[Image, Image], Pair]:
 
 
 HALF, QUARTER = cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE
-MISTAKES: Final[dict[str, tuple[Doubt, Callable[[Image, Image], Pair]]]] = {
-    "swapped": (Doubt.SWAPPED, lambda left, right: (right, left)),
-    "right on its head": (Doubt.TURNED, lambda left, right: (left, _turn(right, HALF))),
-    "left on its head": (Doubt.TURNED, lambda left, right: (_turn(left, HALF), right)),
-    "right turned by a quarter": (Doubt.TURNED_BY_QUARTER, lambda a, b: (_square(a), _turn(_square(b), QUARTER))),
-    "left turned by a quarter": (Doubt.TURNED_BY_QUARTER, lambda a, b: (_turn(_square(a), QUARTER), _square(b))),
-    "both turned by a quarter": (Doubt.TURNED_BY_QUARTER, _both(lambda image: _turn(_square(image), QUARTER))),
-    "right mirrored": (Doubt.MIRRORED, lambda left, right: (left, _flip(right, 1))),
-    "left mirrored top to bottom": (Doubt.MIRRORED, lambda left, right: (_flip(left, 0), right)),
-    "same image": (Doubt.SAME_IMAGE, lambda left, _: (left, left)),
+MISTAKES: Final[dict[str, tuple[Code, Callable[[Image, Image], Pair]]]] = {
+    "swapped": (Code.SWAPPED, lambda left, right: (right, left)),
+    "right on its head": (Code.TURNED, lambda left, right: (left, _turn(right, HALF))),
+    "left on its head": (Code.TURNED, lambda left, right: (_turn(left, HALF), right)),
+    "right turned by a quarter": (Code.TURNED_BY_QUARTER, lambda a, b: (_square(a), _turn(_square(b), QUARTER))),
+    "left turned by a quarter": (Code.TURNED_BY_QUARTER, lambda a, b: (_turn(_square(a), QUARTER), _square(b))),
+    "both turned by a quarter": (Code.TURNED_BY_QUARTER, _both(lambda image: _turn(_square(image), QUARTER))),
+    "right mirrored": (Code.MIRRORED, lambda left, right: (left, _flip(right, 1))),
+    "left mirrored top to bottom": (Code.MIRRORED, lambda left, right: (_flip(left, 0), right)),
+    "same image": (Code.SAME_IMAGE, lambda left, _: (left, left)),
     "same image, darker and blurred": (
-        Doubt.SAME_IMAGE,
+        Code.SAME_IMAGE,
         lambda left, _: (left, np.asarray(cv2.GaussianBlur(left * 0.8, (0, 0), 0.6), np.uint8)),
     ),
-    "right covered": (Doubt.COVERED, lambda left, right: (left, _noise(right, 3, 1))),
-    "left covered by a finger": (Doubt.COVERED, lambda left, right: (_noise(left, 80, 1), right)),
-    "both covered": (Doubt.COVERED, lambda left, right: (_noise(left, 3, 1), _noise(right, 3, 2))),
-    "right dark": (Doubt.DARK, lambda left, right: (left, _dark(right))),
-    "both dark": (Doubt.DARK, _both(_dark)),
-    "left unfocused": (Doubt.UNFOCUSED, lambda left, right: (_blur(left), right)),
-    "both unfocused": (Doubt.UNFOCUSED, _both(_blur)),
-    "another scene": (Doubt.OTHER_SCENE, lambda left, right: (left, _texture(right.shape))),
+    "right covered": (Code.COVERED, lambda left, right: (left, _noise(right, 3, 1))),
+    "left covered by a finger": (Code.COVERED, lambda left, right: (_noise(left, 80, 1), right)),
+    "both covered": (Code.COVERED, lambda left, right: (_noise(left, 3, 1), _noise(right, 3, 2))),
+    "right dark": (Code.DARK, lambda left, right: (left, _dark(right))),
+    "both dark": (Code.DARK, _both(_dark)),
+    "left unfocused": (Code.UNFOCUSED, lambda left, right: (_blur(left), right)),
+    "both unfocused": (Code.UNFOCUSED, _both(_blur)),
+    "another scene": (Code.OTHER_SCENE, lambda left, right: (left, _texture(right.shape))),
 }
 
 
@@ -167,7 +167,7 @@ def test_a_mistake_is_named_and_no_other_one(good: Pair, mistake: str) -> None:
     doubt, change = MISTAKES[mistake]
     found = _doubts(FLAT, *change(*good))
     assert found[:1] == [doubt]
-    assert not [other for other in found[1:] if other.blocks]
+    assert not [other for other in found[1:] if other in BLOCKING]
 
 
 def test_a_good_pair_raises_no_doubt(good: Pair) -> None:
@@ -188,9 +188,9 @@ def test_the_vertical_error_is_measured(good: Pair, lower_px: float) -> None:
     evidence = _evidence(FLAT, good[0], lower)
     assert evidence.vertical_offset_px == pytest.approx(lower_px, abs=0.15)
     assert evidence.vertical_px == pytest.approx(abs(lower_px), abs=0.15)
-    doubts = [concern.doubt for concern in image_doubts(evidence)]
-    assert (Doubt.VERTICAL_ERROR in doubts) == (abs(lower_px) > 2)
-    assert not any(doubt.blocks for doubt in doubts)
+    doubts = [concern.code for concern in image_doubts(evidence)]
+    assert (Code.VERTICAL_ERROR in doubts) == (abs(lower_px) > 2)
+    assert not BLOCKING & set(doubts)
 
 
 def test_behind_a_rig_mistakes_are_made_in_the_cameras_own_images(turned_rig: Rig, raw: Pair) -> None:
@@ -198,12 +198,12 @@ def test_behind_a_rig_mistakes_are_made_in_the_cameras_own_images(turned_rig: Ri
     core = StereoCore(SGBM, Rectifier(turned_rig))
     left, right = raw
     assert _doubts(core, left, right) == []
-    assert _doubts(core, right, left)[0] is Doubt.SWAPPED
-    assert _doubts(core, left, left)[0] is Doubt.SAME_IMAGE
-    assert _doubts(core, left, _turn(right, HALF))[0] is Doubt.TURNED
-    assert _doubts(core, _turn(left, HALF), _turn(right, HALF))[0] is Doubt.TURNED
-    assert _doubts(core, _flip(left, 1), _flip(right, 1))[0] is Doubt.MIRRORED
-    assert _doubts(core, left, _flip(right, 1))[0] is Doubt.MIRRORED
+    assert _doubts(core, right, left)[0] is Code.SWAPPED
+    assert _doubts(core, left, left)[0] is Code.SAME_IMAGE
+    assert _doubts(core, left, _turn(right, HALF))[0] is Code.TURNED
+    assert _doubts(core, _turn(left, HALF), _turn(right, HALF))[0] is Code.TURNED
+    assert _doubts(core, _flip(left, 1), _flip(right, 1))[0] is Code.MIRRORED
+    assert _doubts(core, left, _flip(right, 1))[0] is Code.MIRRORED
 
 
 def test_points_go_to_the_cameras_image_and_back() -> None:
@@ -235,7 +235,7 @@ def test_without_a_rig_only_brightness_is_judged(good: Pair) -> None:
     swapped = Processed(RectifiedPair(good[1], good[0]), None, None, StageTimes())
     assert image_doubts(measure_evidence(swapped, None)) == ()
     blind = replace(swapped, pair=RectifiedPair(good[0], _noise(good[1], 3, 1)))
-    assert [concern.doubt for concern in image_doubts(measure_evidence(blind, None))] == [Doubt.COVERED]
+    assert [concern.code for concern in image_doubts(measure_evidence(blind, None))] == [Code.COVERED]
 
 
 def test_images_without_anything_in_them_are_measured_too() -> None:
@@ -244,7 +244,7 @@ def test_images_without_anything_in_them_are_measured_too() -> None:
         plain = np.full((*size, 3), 128, np.uint8)
         evidence = _evidence(FLAT, plain, plain)
         assert max(support.features for support in evidence.supports) == 0
-        assert not [concern for concern in image_doubts(evidence) if concern.doubt.blocks]
+        assert not [concern for concern in image_doubts(evidence) if concern.code in BLOCKING]
 
 
 def test_depth_is_what_is_left_after_the_cut() -> None:
@@ -281,7 +281,7 @@ def test_a_doffs_of_other_images_is_told(good: Pair) -> None:
         geometry = StereoGeometry(focal_px=260.0, baseline_m=0.1, cx_px=159.5, cy_px=119.5, doffs_px=doffs_px)
         core = StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, 64)), geometry=geometry)
         found = image_doubts(_evidence(core, *good))
-        assert [concern.doubt for concern in found] == ([Doubt.GEOMETRY] if told else [])
+        assert [concern.code for concern in found] == ([Code.GEOMETRY] if told else [])
 
 
 def test_a_principal_point_of_other_images_is_told(good: Pair) -> None:
@@ -292,8 +292,8 @@ def test_a_principal_point_of_other_images_is_told(good: Pair) -> None:
         processed = core.compute(*good, lambda: 0)
         live = image_doubts(measure_evidence(processed, maps_of(core, processed)))
         assert live == judge_pair(core, processed).concerns
-        said = [concern for concern in live if "the principal point 35,120 lies far" in concern.sentence]
-        assert [concern.doubt for concern in said] == ([Doubt.GEOMETRY] if told else [])
+        said = [concern for concern in live if "the principal point 35,120 lies far" in concern.message]
+        assert [concern.code for concern in said] == ([Code.GEOMETRY] if told else [])
         assert len(live) == len(said)
         rig = measure_evidence(processed, ThroughRig(_rig(), Rectifier(_rig()).rectification))
         assert rig.off_middle is None
@@ -350,7 +350,7 @@ def test_stacked_cameras_are_judged_along_their_columns(epipolar: Epipolar) -> N
 def test_exchanged_stacked_cameras_are_named(epipolar: Epipolar) -> None:
     """Upper and lower images exchanged are as wrong as left and right ones."""
     rig = stacked_rig(epipolar)
-    assert _doubts(StereoCore(SGBM, Rectifier(rig)), *_render(rig)[::-1])[0] is Doubt.SWAPPED
+    assert _doubts(StereoCore(SGBM, Rectifier(rig)), *_render(rig)[::-1])[0] is Code.SWAPPED
 
 
 def test_evidence_of_a_photograph_takes_less_memory_than_its_disparities() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.diagnostics.concern import Concern, Doubt
+from common.diagnostic import Diagnostic
+from phone_host.diagnostics.codes import BLOCKING, Code, diagnose
 from phone_host.diagnostics.headline import Grade, answer
 from phone_host.diagnostics.image_rules import image_doubts, median_figures
 from phone_host.diagnostics.run_rules import no_depth
@@ -71,7 +72,7 @@ def _evidence(core: StereoCore, left: Image, right: Image) -> Evidence:
     return measure_evidence(processed, maps_of(core, processed))
 
 
-def _found(core: StereoCore, left: Image, right: Image) -> tuple[Concern, ...]:
+def _found(core: StereoCore, left: Image, right: Image) -> tuple[Diagnostic, ...]:
     return image_doubts(_evidence(core, left, right))
 
 
@@ -79,7 +80,7 @@ def test_a_search_that_leaves_out_most_of_the_scene_is_called_wrong_with_a_numbe
     """With N = 8 all is nearer; the remedy's N, given in its place, leaves no doubt."""
     evidence = _evidence(_core(8), *good)
     found = image_doubts(evidence)
-    assert [concern.doubt for concern in found] == [Doubt.SEARCH_TOO_SHORT]
+    assert [concern.code for concern in found] == [Code.SEARCH_TOO_SHORT]
     assert evidence.beyond_share > 0.9
     said = answer(median_figures((evidence,)), found, None)
     assert said.grade is Grade.BAD
@@ -92,7 +93,7 @@ def test_a_near_limit_that_is_too_far_is_told_in_metres(good: Pair) -> None:
     """The nearest things are 26 m px / 37 px = 0.7 m away: a search from 1.6 m, N = 16, is told to begin there."""
     evidence = _evidence(_core(64, GEOMETRY, DepthWanted(search_from_m=1.7)), *good)
     [concern] = image_doubts(evidence)
-    assert concern.doubt is Doubt.SEARCH_TOO_SHORT
+    assert concern.code == Code.SEARCH_TOO_SHORT
     assert 0.4 <= evidence.enough_from_m <= 0.75
     assert concern.remedy.startswith(f"give --near {math.floor(evidence.enough_from_m * 100) / 100:g}m")
 
@@ -161,11 +162,11 @@ def test_false_matches_are_no_roll() -> None:
 
 def test_no_depth_because_of_a_short_search_is_told_with_its_remedy() -> None:
     """The remedy of missing depth is that of the search."""
-    short = Concern(Doubt.SEARCH_TOO_SHORT, "all of the scene is nearer", "give --near 1m")
+    short = diagnose(Code.SEARCH_TOO_SHORT, "all of the scene is nearer", "give --near 1m")
     assert no_depth(None, None, (short,)).remedy == "give --near 1m"
-    assert no_depth(None, None).doubt is Doubt.NO_DEPTH
-    dark = Concern(Doubt.DARK, "the right camera sees almost nothing", "switch on a light")
-    assert no_depth(None, None, (dark,)).sentence == "no pair has depth: the right camera sees almost nothing"
+    assert no_depth(None, None).code == Code.NO_DEPTH
+    dark = diagnose(Code.DARK, "the right camera sees almost nothing", "switch on a light")
+    assert no_depth(None, None, (dark,)).message == "no pair has depth: the right camera sees almost nothing"
 
 
 def _pattern(kind: str, shift_px: int) -> Image:
@@ -179,7 +180,7 @@ def _pattern(kind: str, shift_px: int) -> Image:
 def test_a_repeated_pattern_is_told(kind: str) -> None:
     """A period of 16 px fits four places of a search of 64 px."""
     found = _found(_core(64), _pattern(kind, 0), _pattern(kind, 21))
-    assert [concern.doubt for concern in found] == [Doubt.AMBIGUOUS]
+    assert [concern.code for concern in found] == [Code.AMBIGUOUS]
 
 
 def test_a_search_that_was_narrowed_to_one_repeat_is_ambiguous_all_the_same() -> None:
@@ -206,11 +207,11 @@ def test_uneven_rows_are_measured_and_told(good: Pair, angle_deg: float, zoom: f
     right = np.asarray(cv2.warpAffine(good[1], move, (320, 240), borderMode=cv2.BORDER_REPLICATE), np.uint8)
     evidence = _evidence(_core(64), good[0], right)
     assert evidence.skew_px == pytest.approx(skew_px, abs=0.25)
-    found = [concern for concern in image_doubts(evidence) if concern.doubt is Doubt.VERTICAL_ERROR]
+    found = [concern for concern in image_doubts(evidence) if concern.code == Code.VERTICAL_ERROR]
     assert bool(found) == (skew_px > 1)
     assert all("not rectified" in concern.remedy for concern in found)
     behind = image_doubts(_evidence(_core(64, rig=_rig()), good[0], right))
-    assert all("calibrate the rig again" in c.remedy for c in behind if c.doubt is Doubt.VERTICAL_ERROR)
+    assert all("calibrate the rig again" in c.remedy for c in behind if c.code == Code.VERTICAL_ERROR)
 
 
 def test_a_common_offset_is_no_skew() -> None:
@@ -224,6 +225,6 @@ def test_unrectified_photographs_are_not_called_turned() -> None:
     """Cameras that look 1.5 degrees aside and up: rows differ by 7 px, and the remedy is a calibration."""
     left, right = _render(_rig((0.026, 0.02, 0.02)))
     found = _found(_core(64), left, right)
-    assert not [concern for concern in found if concern.doubt.blocks]
-    [rows] = [concern for concern in found if concern.doubt is Doubt.VERTICAL_ERROR]
+    assert not [concern for concern in found if concern.code in BLOCKING]
+    [rows] = [concern for concern in found if concern.code == Code.VERTICAL_ERROR]
     assert "give --calibration rig.yaml" in rows.remedy

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from common.doctor.finding import Grade
+from common.diagnostic import Severity
 from common.errors import SettingsError
 from phone_host.doctor.host_checks import (
     Answer,
@@ -26,13 +26,13 @@ from phone_host.stereo.native.library import Missing, native
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 
-OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
+OK, WARN, FAIL = Severity.OK, Severity.WARN, Severity.FAIL
 
 
 @pytest.mark.parametrize(("version", "verdict"), [((3, 11, 0), OK), ((3, 14, 1), OK), ((3, 10, 12), FAIL)])
-def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Grade) -> None:
+def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Severity) -> None:
     """Older interpreters fail."""
-    assert check_python(version, "linux").verdict is verdict
+    assert check_python(version, "linux").severity is verdict
 
 
 @pytest.mark.parametrize(
@@ -67,11 +67,11 @@ def test_python_must_be_3_11(version: tuple[int, int, int], verdict: Grade) -> N
         (Package(name="numpy", version="1.26.4", problem="", least="1.24"), OK, "1.26.4"),
     ],
 )
-def test_packages_are_judged_by_version_and_company(package: Package, verdict: Grade, word: str) -> None:
+def test_packages_are_judged_by_version_and_company(package: Package, verdict: Severity, word: str) -> None:
     """In range is fine, out of range warns, broken or installed twice fails; the remedy keeps the headless wheel."""
     finding = check_package(package)
-    assert finding.verdict is verdict
-    assert word in finding.text + finding.remedy
+    assert finding.severity is verdict
+    assert word in finding.message + finding.remedy
 
 
 @pytest.mark.parametrize(
@@ -93,11 +93,11 @@ def test_packages_are_judged_by_version_and_company(package: Package, verdict: G
         (RigReadings("rig.yaml", "rig.yaml: T is 80 m long", "T is in metres"), FAIL, "metres"),
     ],
 )
-def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Grade, word: str) -> None:
+def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Severity, word: str) -> None:
     """A good rig names its baseline; a bad file, another image size or a large error is reported with the remedy."""
     finding = check_rig(rig)
-    assert finding.verdict is verdict
-    assert word in finding.text + finding.remedy
+    assert finding.severity is verdict
+    assert word in finding.message + finding.remedy
 
 
 @pytest.mark.parametrize("answer", Answer)
@@ -113,16 +113,16 @@ def test_every_answer_of_a_board_is_judged(answer: Answer) -> None:
             uncertainty_ns=20_000,
         )
     )
-    assert finding.verdict is {Answer.BOARD: OK, Answer.BUSY: WARN}.get(answer, FAIL)
+    assert finding.severity is {Answer.BOARD: OK, Answer.BUSY: WARN}.get(answer, FAIL)
     assert bool(finding.remedy) is (answer is not Answer.BOARD)
 
 
 def test_ports_and_folder() -> None:
     """No serial port is no fault, a missing pyserial fails, as does a folder that is not writable."""
-    assert check_ports((), "").verdict is OK
-    assert check_ports((), "No module named 'serial'").verdict is FAIL
+    assert check_ports((), "").severity is OK
+    assert check_ports((), "No module named 'serial'").severity is FAIL
     assert check_out("scan", "") == []
-    assert check_out("/proc", "Permission denied")[0].verdict is FAIL
+    assert check_out("/proc", "Permission denied")[0].severity is FAIL
 
 
 def test_a_rig_files_verdict_reaches_the_doctor(tmp_path: Path) -> None:
@@ -131,20 +131,20 @@ def test_a_rig_files_verdict_reaches_the_doctor(tmp_path: Path) -> None:
     for verdict, grade in ((Verdict.REJECT, WARN), (Verdict.GOOD, OK)):
         judged = replace(rig, verdict=verdict)
         write_rig(tmp_path / "rig.yaml", judged, rectify_rig(judged))
-        assert check_rig(read_rig_readings(str(tmp_path / "rig.yaml"), "")).verdict is grade
+        assert check_rig(read_rig_readings(str(tmp_path / "rig.yaml"), "")).severity is grade
 
 
 def test_a_missing_native_library_is_a_warning_with_its_reason() -> None:
     """Everything works without it; a wrong TANDEMSCAN_SIMD stops every command, so that fails; the library's instructions are named."""
     missing = check_native(Missing(reason="not built: no C compiler", remedy="install gcc"))
-    assert (missing.verdict, missing.remedy) == (WARN, "install gcc")
-    assert missing.text == "own matcher not built: no C compiler; sgbm is used, six times the work for each pair"
+    assert (missing.severity, missing.remedy) == (WARN, "install gcc")
+    assert missing.message == "own matcher not built: no C compiler; sgbm is used, six times the work for each pair"
     idle = check_native(Missing(reason="not built", remedy="install gcc"), "avx2")
     assert (
-        idle.text
+        idle.message
         == "own matcher not built; sgbm is used, six times the work for each pair; TANDEMSCAN_SIMD=avx2 has no effect"
     )
-    assert check_native(SettingsError("TANDEMSCAN_SIMD=mmx is no instruction set", "give scalar")).verdict is FAIL
+    assert check_native(SettingsError("TANDEMSCAN_SIMD=mmx is no instruction set", "give scalar")).severity is FAIL
     found = check_native(native())
-    assert found.verdict is OK
-    assert found.text.startswith("own matcher: ")
+    assert found.severity is OK
+    assert found.message.startswith("own matcher: ")

@@ -15,8 +15,8 @@ import pytest
 import zmq
 
 from board_agent.doctor.link_probe import examine_link
+from common.diagnostic import Severity
 from common.doctor.access import Account
-from common.doctor.finding import Grade
 from common.doctor.unit_check import Unit
 from common.errors import SettingsError, TakenError, UnavailableError
 from common.link.base import Incoming, Link
@@ -254,7 +254,7 @@ def test_the_doctor_asks_as_the_user_who_serves(shared: Path) -> None:
     account = Account("nobody", NOBODY, frozenset({NOBODY}), is_me=False)
     unit = Unit("board-agent.service")
     findings = examine_link(f"ipc://{place}/link", account, unit, listens_by_default=True)
-    assert [finding.verdict for finding in findings] == [Grade.OK]
+    assert [finding.severity for finding in findings] == [Severity.OK]
 
 
 @needs_root

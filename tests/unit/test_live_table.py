@@ -13,9 +13,9 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from common.diagnostic import Diagnostic, Severity
 from common.program import logs
 from common.program.terminal import headed, rows
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.run.terminal_view import LiveTable
 from tests.support.run_snapshots import run
@@ -156,7 +156,9 @@ def test_a_summary_higher_than_the_terminal_says_its_headline_again() -> None:
 def test_a_limited_runs_bar_waits_for_the_first_pair_and_a_busy_board_is_named() -> None:
     """Its seconds count from the first pair: without one the bar stays empty, and the line below says who has the board."""
     drawn = io.StringIO()
-    busy = replace(run(0), refused=Trouble("the board is busy with another host", "stop that one first"))
+    busy = replace(
+        run(0), refused=Diagnostic("the board is busy with another host", "stop that one first", Severity.FAIL)
+    )
     console = Console(file=drawn, width=100, height=40, force_terminal=True)
     with LiveTable(lambda: busy, console, seconds=5.0, refresh_s=0.0) as live:
         for _ in range(3):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from common.doctor.finding import Grade
+from common.diagnostic import Severity
 from common.doctor.machine_checks import (
     Bluetooth,
     Clocks,
@@ -18,7 +18,7 @@ from common.doctor.machine_checks import (
     throttled,
 )
 
-OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
+OK, WARN, FAIL = Severity.OK, Severity.WARN, Severity.FAIL
 
 
 def log(*texts: str) -> KernelLog:
@@ -36,9 +36,9 @@ def log(*texts: str) -> KernelLog:
         (Disk("/", 10**9, 1000, counts_files=True, read_only=True), WARN),
     ],
 )
-def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Grade) -> None:
+def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Severity) -> None:
     """Frames need no disk, so nothing here fails; the finding names what is short."""
-    assert check_disk(disk).verdict is verdict
+    assert check_disk(disk).severity is verdict
 
 
 @pytest.mark.parametrize(
@@ -60,12 +60,12 @@ def test_a_full_or_read_only_disk_warns(disk: Disk, verdict: Grade) -> None:
     ],
 )
 def test_power_is_judged_by_firmware_and_kernel_log(
-    kernel: KernelLog, supply: Supply, verdict: Grade, word: str
+    kernel: KernelLog, supply: Supply, verdict: Severity, word: str
 ) -> None:
     """Too low now fails; too low earlier warns with how often and when; what may not be read is reported as such."""
     finding = check_power(kernel, supply)
-    assert finding.verdict is verdict
-    assert word in finding.text
+    assert finding.severity is verdict
+    assert word in finding.message
 
 
 @pytest.mark.parametrize(
@@ -79,9 +79,9 @@ def test_power_is_judged_by_firmware_and_kernel_log(
         ("eth0: link up", OK),
     ],
 )
-def test_usb_trouble_in_the_kernel_log_warns(text: str, verdict: Grade) -> None:
+def test_usb_trouble_in_the_kernel_log_warns(text: str, verdict: Severity) -> None:
     """Resets and errors warn; unplugging a device is nobody's fault."""
-    assert check_usb_log(log(text)).verdict is verdict
+    assert check_usb_log(log(text)).severity is verdict
 
 
 def test_an_unplugged_device_is_told_beside_errors() -> None:
@@ -91,19 +91,19 @@ def test_an_unplugged_device_is_told_beside_errors() -> None:
         LogLine(8, "usb 1-1: device not accepting address 10, error -71"),
     )
     finding = check_usb_log(KernelLog(readable=True, lines=(away, error)))
-    assert finding.verdict is WARN
-    assert finding.text.endswith("error -71; a device was unplugged once, 9 s ago")
+    assert finding.severity is WARN
+    assert finding.message.endswith("error -71; a device was unplugged once, 9 s ago")
 
 
 def test_clocks() -> None:
     """A coarse clock fails, a date before that of the program's own files warns, an unsynchronised clock is no fault."""
     good = Clocks(2e9, 1.7e9, synchronised=False, source="tsc", resolution_ns=1)
-    assert [item.verdict for item in check_clocks(good)] == [OK, OK]
-    assert "not synchronised" in check_clocks(good)[1].text
+    assert [item.severity for item in check_clocks(good)] == [OK, OK]
+    assert "not synchronised" in check_clocks(good)[1].message
     early = Clocks(3600.0, 1.7e9, synchronised=False, source="dmtimer", resolution_ns=42)
-    assert [item.verdict for item in check_clocks(early)] == [OK, WARN]
+    assert [item.severity for item in check_clocks(early)] == [OK, WARN]
     coarse = Clocks(2e9, 1.7e9, synchronised=True, source="jiffies", resolution_ns=4_000_000)
-    assert [item.verdict for item in check_clocks(coarse)] == [FAIL, OK]
+    assert [item.severity for item in check_clocks(coarse)] == [FAIL, OK]
 
 
 @pytest.mark.parametrize(
@@ -117,15 +117,17 @@ def test_clocks() -> None:
         (Bluetooth(in_python=False, adapters=("hci0",)), False, OK),
     ],
 )
-def test_bluetooth_fails_only_where_a_link_asks_for_it(bluetooth: Bluetooth, verdict: Grade, *, wanted: bool) -> None:
+def test_bluetooth_fails_only_where_a_link_asks_for_it(
+    bluetooth: Bluetooth, verdict: Severity, *, wanted: bool
+) -> None:
     """Python's sockets, an adapter, and whether it is switched on."""
-    assert check_bluetooth(bluetooth, wanted=wanted).verdict is verdict
+    assert check_bluetooth(bluetooth, wanted=wanted).severity is verdict
 
 
 def test_a_log_that_may_not_be_read_is_no_all_clear() -> None:
     """Where only root may read the kernel's log, the USB check warns and says how to ask again."""
     finding = check_usb_log(KernelLog(readable=False))
-    assert (finding.verdict, finding.remedy) == (WARN, "ask again as root: sudo")
+    assert (finding.severity, finding.remedy) == (WARN, "ask again as root: sudo")
 
 
 @pytest.mark.parametrize(
@@ -134,4 +136,4 @@ def test_a_log_that_may_not_be_read_is_no_all_clear() -> None:
 def test_the_age_of_trouble_is_told_in_a_unit_that_people_read(age_s: float, told: str) -> None:
     """Seconds below two minutes, minutes below two hours, then hours."""
     trouble = LogLine(age_s, "usb 1-1: device descriptor read/64, error -71")
-    assert f"once, {told}" in check_usb_log(KernelLog(readable=True, lines=(trouble,))).text
+    assert f"once, {told}" in check_usb_log(KernelLog(readable=True, lines=(trouble,))).message

@@ -4,15 +4,15 @@ import sys
 
 import pytest
 
+from common.diagnostic import Severity
 from common.doctor import machine
-from common.doctor.finding import Grade
 from common.doctor.network_checks import ACCESS_POINT, CABLE_BOARD, Card, check_dialling, check_listening
 from common.doctor.network_probe import examine_network
 from common.groups import group_name, group_of_one
 from common.link.uri import parse_link
 from phone_host.doctor.android_checks import Phone, check_bluetooth, check_camera, check_phone, check_usb
 
-OK, WARN, FAIL = Grade.OK, Grade.WARN, Grade.FAIL
+OK, WARN, FAIL = Severity.OK, Severity.WARN, Severity.FAIL
 CABLE = Card("usb0", CABLE_BOARD, is_up=True)
 PULLED = Card("usb0", CABLE_BOARD, is_up=False)
 WIFI = Card("wlan0", "192.168.43.17", is_up=None)
@@ -32,12 +32,12 @@ WIFI = Card("wlan0", "192.168.43.17", is_up=None)
     ],
 )
 def test_where_the_other_side_may_come(
-    host: str, cards: tuple[Card, ...], *, socket: bool, verdict: Grade, word: str
+    host: str, cards: tuple[Card, ...], *, socket: bool, verdict: Severity, word: str
 ) -> None:
     """Addresses of living cards are named to dial; a dead or missing one has the remedy of its way."""
     finding = check_listening(host, 5555, cards, has_device_socket=socket)
-    assert finding.verdict is verdict
-    assert word in finding.text + finding.remedy
+    assert finding.severity is verdict
+    assert word in finding.message + finding.remedy
 
 
 @pytest.mark.parametrize(
@@ -53,11 +53,11 @@ def test_where_the_other_side_may_come(
         ("10.9.8.7", "192.168.1.4", OK, "router"),
     ],
 )
-def test_where_this_side_goes(host: str, own: str, verdict: Grade, word: str) -> None:
+def test_where_this_side_goes(host: str, own: str, verdict: Severity, word: str) -> None:
     """The cable and the board's Wi-Fi must be networks of this machine; others may lie behind a router."""
     finding = check_dialling(host, own)
-    assert finding.verdict is verdict
-    assert word in finding.text + finding.remedy
+    assert finding.severity is verdict
+    assert word in finding.message + finding.remedy
 
 
 def test_only_tcp_to_other_machines_is_looked_at() -> None:
@@ -66,7 +66,7 @@ def test_only_tcp_to_other_machines_is_looked_at() -> None:
     for uri in silent:
         assert examine_network(parse_link(uri, listens_by_default=True)) == []
     for uri in ("tcp://*:5555", "tcp://192.0.2.77:5555"):
-        assert [item.what for item in examine_network(parse_link(uri, listens_by_default=True))] == ["network"]
+        assert [item.code for item in examine_network(parse_link(uri, listens_by_default=True))] == ["network"]
     assert len(examine_network(parse_link("tcp://192.0.2.77:5555", listens_by_default=False))) == 1
 
 
@@ -81,16 +81,16 @@ def test_every_card_with_an_address_is_read() -> None:
 
 def test_a_phone_is_told_what_android_keeps_from_it() -> None:
     """USB is Ethernet, Bluetooth is a laptop's, the camera is the browser's; links that cannot be fail with another way."""
-    named = check_phone(Phone(model="Acme One", android="15", termux="0.119 F_DROID", processor="aarch64")).text
+    named = check_phone(Phone(model="Acme One", android="15", termux="0.119 F_DROID", processor="aarch64")).message
     assert named == "Acme One, Android 15, Termux 0.119 F_DROID, aarch64"
-    assert "not in Termux" in check_phone(Phone(model="", android="", termux="", processor="armv8l")).text
-    assert "browser" in check_camera().text
-    assert check_camera("v4l2:auto").verdict is FAIL
-    assert "Ethernet over USB" in check_usb((), ()).text
-    assert "usb0 is 192.168.7.1" in check_usb((Card("usb0", "192.168.7.1", is_up=None),), ()).text
-    assert check_usb((), ("serial:/dev/ttyACM0",)).verdict is FAIL
-    assert (check_bluetooth(()).verdict, check_bluetooth(("rfcomm://x",)).verdict) == (OK, FAIL)
-    assert "needs a laptop" in check_bluetooth(()).text
+    assert "not in Termux" in check_phone(Phone(model="", android="", termux="", processor="armv8l")).message
+    assert "browser" in check_camera().message
+    assert check_camera("v4l2:auto").severity is FAIL
+    assert "Ethernet over USB" in check_usb((), ()).message
+    assert "usb0 is 192.168.7.1" in check_usb((Card("usb0", "192.168.7.1", is_up=None),), ()).message
+    assert check_usb((), ("serial:/dev/ttyACM0",)).severity is FAIL
+    assert (check_bluetooth(()).severity, check_bluetooth(("rfcomm://x",)).severity) == (OK, FAIL)
+    assert "needs a laptop" in check_bluetooth(()).message
 
 
 def test_groups_without_names(monkeypatch: pytest.MonkeyPatch) -> None:

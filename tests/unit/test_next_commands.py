@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from phone_host.diagnostics.arrangement import FILE_REMEDIES
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, diagnose
 from phone_host.diagnostics.headline import Answer, Grade
 from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.model import Arrangement
@@ -45,7 +45,7 @@ _PAIR = PairReport(
 
 
 def _wrong(remedy: str) -> PairReport:
-    concern = Concern(Doubt.SWAPPED, "something is wrong", remedy)
+    concern = diagnose(Code.SWAPPED, "something is wrong", remedy)
     return replace(_PAIR, trust=PairTrust(ImageFigures(), (concern,), Answer(Grade.BAD, "Wrong.")))
 
 

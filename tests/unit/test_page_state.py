@@ -3,8 +3,8 @@
 import json
 from dataclasses import replace
 
+from common.diagnostic import Diagnostic, Severity
 from phone_host.accounts.link_account import LinkAccount, LinkTally
-from phone_host.diagnostics.concern import Trouble
 from phone_host.model import CutCounts, DepthAccount, DepthLimits, PairCounts, Unwritten
 from phone_host.sync.clock import ClockEstimate
 from phone_host.web.openapi import description
@@ -92,7 +92,7 @@ def test_why_there_is_no_pair_and_what_was_not_saved_are_told() -> None:
     """A board that is silent or refuses stands in the headline, a full disk beside it."""
     waiting = replace(run(0), ended="running")
     up = replace(waiting, link=LinkAccount([], links=(LinkTally("tcp", is_up=True),)))
-    refused = replace(waiting, refused=Trouble("another host has the board", "stop it"))
+    refused = replace(waiting, refused=Diagnostic("another host has the board", "stop it", Severity.FAIL))
     for state, words in (
         (waiting, "no board answers"),
         (up, "No pair has been"),
@@ -175,7 +175,7 @@ def test_links_clock_and_drops() -> None:
 def test_answers() -> None:
     """What happened, or why it did not; places with None where there is no depth."""
     assert answer_values(Answer(words="Done.")) == {"words": "Done."}
-    assert answer_values(Answer(trouble=Trouble("p", "r"))) == {"problem": "p", "remedy": "r"}
+    assert answer_values(Answer(trouble=Diagnostic("p", "r", Severity.FAIL))) == {"problem": "p", "remedy": "r"}
     measured = Measured(
         places_m=((1, 2, 3), None), distances_m=(3.7, None), place_sigmas_m=(0.1, None), words="no depth"
     )

@@ -13,7 +13,7 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.cli import main
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, diagnose
 from phone_host.diagnostics.headline import headline
 from phone_host.diagnostics.image_judge import ImageTrust
 from phone_host.diagnostics.image_rules import ImageFigures
@@ -186,13 +186,13 @@ def test_the_headline_says_that_near_things_are_lost() -> None:
 
 def test_a_search_that_the_budget_has_narrowed_asks_for_a_longer_budget() -> None:
     """--disparities would be the wrong remedy then; of other doubts and other searches the remedy stays."""
-    short = Concern(Doubt.SEARCH_TOO_SHORT, "s", "give --disparities 96")
+    short = diagnose(Code.SEARCH_TOO_SHORT, "s", "give --disparities 96")
     assert with_budget(short, replace(ACCOUNT, now=SMALL)) == short
     seen = with_account(ACCOUNT)
     seen = replace(seen, images=replace(seen.images, concerns=(short,), newest=(short,)))
-    [told] = [item for item in concerns(seen) if item.doubt is Doubt.SEARCH_TOO_SHORT]
+    [told] = [item for item in concerns(seen) if item.code == Code.SEARCH_TOO_SHORT]
     assert "--budget" in told.remedy
-    assert with_budget(replace(short, doubt=Doubt.DARK), ACCOUNT).remedy == short.remedy
+    assert with_budget(replace(short, code=Code.DARK), ACCOUNT).remedy == short.remedy
 
 
 def test_a_missed_budget_is_a_warning() -> None:

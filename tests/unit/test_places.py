@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from common.camera.replay import find_images
-from common.doctor.finding import Grade
+from common.diagnostic import Severity
 from common.errors import DataError, TandemError, UnavailableError
 from common.places import Kind, kind_of, make_folder, nearest, resolved
 from phone_host.cli import main
@@ -112,13 +112,13 @@ def test_impossible_results_are_refused_before_the_work(path: str, require: Call
     with pytest.raises(TandemError) as caught:
         require(Path(path))
     assert caught.value.exit_code == UnavailableError.exit_code
-    assert [finding.verdict for finding in examine_out(Path(path))] == [Grade.FAIL]
+    assert [finding.severity for finding in examine_out(Path(path))] == [Severity.FAIL]
 
 
 def test_the_doctor_finds_room_where_a_folder_can_be_made(room: Path) -> None:
     """A folder that is there, or can be made, is fine; a file is not, though its disk has room."""
-    assert Grade.FAIL not in [finding.verdict for path in (room, room / "x") for finding in examine_out(path)]
-    assert [finding.verdict for finding in examine_out(room / "file")] == [Grade.FAIL]
+    assert Severity.FAIL not in [finding.severity for path in (room, room / "x") for finding in examine_out(path)]
+    assert [finding.severity for finding in examine_out(room / "file")] == [Severity.FAIL]
 
 
 @pytest.mark.usefixtures("room")

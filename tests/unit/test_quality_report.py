@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import pytest
 
+from common.diagnostic import Diagnostic
 from phone_host.model import Seen
 from phone_host.report.quality_lines import quality_lines
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import bias_words, flaw, quality_verdict
 from phone_host.report.report_page import Headline
-from phone_host.report.stereo_report import Remark
 from tests.support.html import Page
 from tests.support.quality_pages import SIGMA_PX, pair, quality, report
 
@@ -84,7 +84,7 @@ def test_pages_are_whole_and_show_maps() -> None:
     assert len(page.every("img")) == 1
     assert len(page.every("svg")) == 3
     assert "+1.01" in page.words
-    walls = [pair(f"{z}.png", quality(z, z * 1.01), Remark("it was turned")) for z in (0.5, 1.0, 2.0)]
+    walls = [pair(f"{z}.png", quality(z, z * 1.01), Diagnostic("it was turned")) for z in (0.5, 1.0, 2.0)]
     several = Page(quality_page(report(*walls, pair("empty.png", quality(1.0, known=0.05)), failed=True)))
     assert several.open == []
     labels = [one.get("aria-label") for one in several.every("svg")]

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from common import now
+from common.diagnostic import Diagnostic, Severity
 from common.errors import SettingsError
 from common.frame import PixelFormat
 from common.protocol.message import CameraDescription, Pacing
 from common.recording.opened import open_recorded
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Side
 from phone_host.recording.begin import begin_recording
@@ -112,6 +112,11 @@ def test_what_is_said_while_it_grows_and_then() -> None:
     assert slow.words == "recording: 0:00, 90 images, 0 MB, 7 dropped: the disk is too slow"
     assert not slow.is_whole
     failed = RecordingAccount(
-        file="s", frames=1, dropped=0, lost=3, size_bytes=9, failure=Trouble("it is full", "make room")
+        file="s",
+        frames=1,
+        dropped=0,
+        lost=3,
+        size_bytes=9,
+        failure=Diagnostic("it is full", "make room", Severity.FAIL),
     )
     assert failed.words == "recorded: 1 image, 0.0 MB in s; not in it: 3 came after its end; it is full: make room"

@@ -8,12 +8,12 @@ from typing import Final
 import pytest
 
 from common.camera.base import CameraHealth, CameraState
+from common.diagnostic import Diagnostic, Severity
 from common.frame import FrameFault
 from common.protocol.message import BoardCounts, DropReason
 from phone_host.accounts.delays import SinkAccount, replay_facts
 from phone_host.accounts.link_account import Away, LinkAccount, LinkTally, SessionAccount
 from phone_host.bench.report import as_json
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RecordingAccount, RunSnapshot
 from phone_host.model import CutCounts, DepthAccount, DepthLimits, Drift, MatchReport, Search
 from phone_host.report.quality_json import quality_json
@@ -79,7 +79,9 @@ def _eventful_run() -> RunSnapshot:
             ),
         ),
         own_future=4,
-        recording=RecordingAccount(file="s.mcap", frames=9, dropped=1, lost=0, size_bytes=7, failure=Trouble("p", "r")),
+        recording=RecordingAccount(
+            file="s.mcap", frames=9, dropped=1, lost=0, size_bytes=7, failure=Diagnostic("p", "r", Severity.FAIL)
+        ),
         replay=replay_facts("s.mcap", "clock", []),
         budget=budget_accounts.ACCOUNT,
         depth=DepthAccount(

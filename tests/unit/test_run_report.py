@@ -7,11 +7,11 @@ import pytest
 
 from common.camera.base import CameraHealth, CameraState
 from common.camera.image_numbers import ImageNumbers
+from common.diagnostic import Diagnostic, Severity
 from common.frame import FrameFault
 from common.protocol.message import BoardCounts, DropReason
 from phone_host.accounts.delays import DelayStatistics, Series, SinkAccount
 from phone_host.accounts.link_account import Absence, LinkAccount, LinkTally, SessionAccount, away_of, away_words
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.headline import headline
 from phone_host.diagnostics.image_judge import ImageTrust
 from phone_host.diagnostics.image_numbers import ImageEvidence
@@ -156,7 +156,7 @@ def test_everything_that_a_run_knows_is_told() -> None:
         camera=health,
         unwritten=Unwritten(4, 6, "disk full"),
         undecodable=2,
-        failed_pairs=((Trouble("this pair_1 lies on its side", "turn it"), 2),),
+        failed_pairs=((Diagnostic("this pair_1 lies on its side", "turn it", Severity.FAIL), 2),),
         counts=PairCounts(received=31, paired=40, taken=33, dropped=3, board_orphans=(("no_partner", 9),)),
     )
     told: Any = build(seen)
@@ -242,7 +242,7 @@ def test_what_was_not_used_is_told_once_each() -> None:
         run(2),
         link=LinkAccount([account], garbage=6, no_clock=7),
         counts=PairCounts(paired=20, dropped=8, board_orphans=(("no_partner", 9),), host_orphans=(("too_late", 10),)),
-        undecodable=3, spoiled_images=(("corrupt", 1),), failed_pairs=((Trouble("other sizes", "calibrate"), 2),),
+        undecodable=3, spoiled_images=(("corrupt", 1),), failed_pairs=((Diagnostic("other sizes", "calibrate", Severity.FAIL), 2),),
         spoiled=12, skipped=13,
         sinks=(SinkAccount(name="pairs", written=1, dropped=14, failed=15, waiting=0, delay=Series().spread()),),
     )  # fmt: skip

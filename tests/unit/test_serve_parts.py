@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from common.camera_identity import CameraIdentity
+from common.diagnostic import Diagnostic, Severity
 from common.doctor.finding import fail, ok, warn
 from common.doctor.machine_checks import LOG_UNREADABLE
 from common.errors import DataError, SettingsError, UnavailableError
 from common.ledger import StageTimes
 from common.peers import Peer
 from phone_host.boards.found import Found
-from phone_host.diagnostics.concern import Trouble
 from phone_host.doctor.camera_check.words import stored_finding
 from phone_host.live.scan import LiveScan
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side
@@ -125,7 +125,7 @@ class _Watched:
 
     def __init__(self) -> None:
         self.begun = self.changes = 0
-        self.failures: list[Trouble] = []
+        self.failures: list[Diagnostic] = []
         self.all = Activities(self._begin, self._change, self.failures.append)
 
     @property
@@ -160,14 +160,14 @@ def test_one_activity_at_a_time_stopped_at_any_moment() -> None:
     assert seen.now == "running"
     refused = seen.all.begin(Activity.CHECKING, work)
     assert refused is not None
-    assert refused.problem == "a run is active"
+    assert refused.message == "a run is active"
     assert seen.all.stop(60)
     assert seen.now == "idle"
     assert (seen.begun, seen.failures) == (1, [])
     seen.all.close(60)
     late = seen.all.begin(Activity.RUNNING, work)
     assert late is not None
-    assert "ending" in late.problem
+    assert "ending" in late.message
 
 
 def test_what_waits_for_a_device_is_left_and_its_failure_concerns_nobody() -> None:
@@ -209,8 +209,8 @@ def test_a_failure_is_told_with_its_remedy() -> None:
 
         assert seen.all.begin(Activity.CHECKING, work) is None
         seen.all.wait(60)
-    assert seen.failures[0] == Trouble("bad", "mend it")
-    assert "the program itself failed" in seen.failures[1].problem
+    assert seen.failures[0] == Diagnostic("bad", "mend it", Severity.FAIL)
+    assert "the program itself failed" in seen.failures[1].message
 
 
 def test_the_steps_lead_from_nothing_to_a_run_and_a_scan() -> None:
@@ -258,7 +258,9 @@ def test_a_check_lists_only_what_matters_to_the_chosen_cameras() -> None:
 def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
     """Pairs, rate and skew; or which camera sent nothing; or the finding that stops everything."""
     assert check.obstacle([ok("python", "there")]) is None
-    assert check.obstacle([ok("a", "b"), fail("camera", "gone", "plug it in")]) == Trouble("camera: gone", "plug it in")
+    assert check.obstacle([ok("a", "b"), fail("camera", "gone", "plug it in")]) == Diagnostic(
+        "camera: gone", "plug it in", Severity.FAIL
+    )
     phone = CaptureSource(camera=CameraIdentity("browser", "back"), width_px=640, height_px=480)
     never = stored_finding(None, phone, has_lens=True)
     assert [each.remedy for each in check.checked([never, ok("a", "b")])] == [
@@ -268,9 +270,9 @@ def test_a_check_says_what_it_saw_or_what_is_missing() -> None:
     assert check.seen(run(21)) == "both cameras work: 21 pairs, 20 pairs/s, time skew 0.0 ms"
     assert check.seen(run(0)) == ""
     nothing = run(0)
-    assert "board" in check.unseen(nothing).problem
-    assert "this machine" in check.unseen(replace(nothing, counts=PairCounts(received=3))).problem
-    assert "match in time" in check.unseen(replace(nothing, counts=PairCounts(received=3, host_frames=3))).problem
+    assert "board" in check.unseen(nothing).message
+    assert "this machine" in check.unseen(replace(nothing, counts=PairCounts(received=3))).message
+    assert "match in time" in check.unseen(replace(nothing, counts=PairCounts(received=3, host_frames=3))).message
 
 
 def test_a_calibration_that_was_stopped_is_told_from_one_that_was_computed() -> None:
@@ -290,7 +292,7 @@ def test_the_memory_tells_a_change_once() -> None:
         return memory.state(Activity.IDLE, memory.choices, "")
 
     assert state().changed == state().changed == 1
-    memory.fail(Trouble("a", "b"))
+    memory.fail(Diagnostic("a", "b", Severity.FAIL))
     assert state().changed == 2
 
     def ask() -> object:
@@ -319,7 +321,7 @@ def test_the_terminal_tells_what_goes_on() -> None:
         "phone-host: running: 3 pairs",
         "phone-host: ready",
     ]
-    assert told(replace(ready, trouble=Trouble("no rig", "calibrate"))) == "ready; no rig: calibrate"
+    assert told(replace(ready, trouble=Diagnostic("no rig", "calibrate", Severity.FAIL))) == "ready; no rig: calibrate"
 
 
 def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from common.diagnostic import Diagnostic, Severity
 from common.errors import SettingsError
-from phone_host.diagnostics.concern import Trouble
 from phone_host.serve.station import Station
 from phone_host.verbs.serve.kept_choices import kept
 from phone_host.verbs.serve.program import Commands
@@ -22,14 +22,14 @@ def test_what_the_file_says_is_checked_at_the_start(tmp_path: Path) -> None:
         Commands(file, keys, lambda _: None)
     file.write_text('camera = "replay:"\n')
     station = Station(Commands(file, keys, lambda _: None))
-    assert station.state().trouble == Trouble(
-        "camera 'replay:' names no folder", "name one with images, for example replay:frames?fps=30"
+    assert station.state().trouble == Diagnostic(
+        "camera 'replay:' names no folder", "name one with images, for example replay:frames?fps=30", Severity.FAIL
     )
     refused = station.command(Command(do=Do.SET, values={"pairs": "3"})).trouble
     assert refused == station.state().trouble
     missing = station.command(Command(do=Do.SET, values={"camera": f"replay:{tmp_path}/nope"})).trouble
-    assert missing == Trouble(
-        f"replay '{tmp_path}/nope' does not exist", "give a folder of images, an image or a quoted glob"
+    assert missing == Diagnostic(
+        f"replay '{tmp_path}/nope' does not exist", "give a folder of images, an image or a quoted glob", Severity.FAIL
     )
     (tmp_path / "frames").mkdir()
     (tmp_path / "frames" / "0.jpg").write_bytes(jpeg(32, 24, seed=1))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError, UnavailableError
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.model import Image, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.pfm import read_pfm, read_xyz
@@ -192,7 +192,7 @@ def test_a_white_pair_is_told_once_that_it_needs_texture(tmp_path: Path) -> None
     files = pair_files(str(tmp_path / "left.png"), str(tmp_path / "right.png"))
     job = FilePairs(files=files, out=tmp_path / "out", make_core=_core, matcher="sgbm")
     [pair] = run_stereo(job, _Watch()).computed
-    assert [concern.doubt for concern in pair.trust.concerns] == [Doubt.NO_DEPTH]
+    assert [concern.code for concern in pair.trust.concerns] == [Code.NO_DEPTH]
     assert "texture" in pair.trust.answer.sentence
     assert pair.remarks_beside_headline == ()
 

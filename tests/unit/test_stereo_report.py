@@ -6,6 +6,7 @@ from textwrap import wrap
 
 import pytest
 
+from common.diagnostic import Diagnostic, Severity
 from phone_host.diagnostics.headline import Answer, Grade
 from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.diagnostics.run_rules import no_depth
@@ -18,7 +19,6 @@ from phone_host.report.stereo_lines import cut_lines, pair_lines, set_lines
 from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
-    Remark,
     SetReport,
 )
 from phone_host.report.stereo_trust import PairTrust
@@ -99,7 +99,7 @@ def _alike(count: int, *problems: str) -> SetReport:
                 _PAIR,
                 name=f"pair-{number:06d}",
                 left=f"photos/Piano{number}L.png",
-                remarks=(Remark(problems[number % len(problems)], "check the rig"),),
+                remarks=(Diagnostic(problems[number % len(problems)], "check the rig"),),
             )
             for number in range(count)
         ),
@@ -135,7 +135,7 @@ def test_pairs_without_numbers_of_their_own_are_told_with_a_file() -> None:
 
 def test_what_the_headline_tells_is_no_warning_beside_it() -> None:
     """A doubt is told once, by the headline with its remedy; report.json lists it all the same."""
-    remarks = (Remark(_BAD.concerns[0].sentence, _BAD.concerns[0].remedy), Remark("something else"))
+    remarks = (Diagnostic(_BAD.concerns[0].message, _BAD.concerns[0].remedy), Diagnostic("something else"))
     bad = replace(_PAIR, trust=_BAD, remarks=remarks)
     assert [line for line in pair_lines(bad, "scan") if line.startswith("warning")] == ["warning: something else"]
     assert len(pair_json(bad)["warnings"]) == 2
@@ -168,8 +168,13 @@ def test_pixels_outside_the_crop_do_not_lower_the_share() -> None:
     ("report", "sound"),
     [
         (SetReport(pairs=(_PAIR,), by_number=True), True),
-        (SetReport(pairs=(_PAIR,), by_number=True, remarks=(Remark("2 left images have no partner"),)), True),
-        (SetReport(pairs=(replace(_PAIR, remarks=(Remark("same image", is_blocking=True),)),), by_number=True), False),
+        (SetReport(pairs=(_PAIR,), by_number=True, remarks=(Diagnostic("2 left images have no partner"),)), True),
+        (
+            SetReport(
+                pairs=(replace(_PAIR, remarks=(Diagnostic("same image", severity=Severity.FAIL),)),), by_number=True
+            ),
+            False,
+        ),
         (
             SetReport(
                 pairs=(_PAIR, FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")), by_number=True
@@ -199,10 +204,10 @@ def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_to
     [one] = files_remarks(_files(4, [], ["r9.png"], by_number=True))
     assert one.text == "1 right image has no partner: r9.png"
     many, order = files_remarks(_files(4, [f"{n}.png" for n in range(7)], [], by_number=False))
-    assert many.problem == "7 left images have no partner: 0.png, 1.png, 2.png, 3.png, 4.png, …"
-    assert "order of their names though the counts differ" in order.problem
+    assert many.message == "7 left images have no partner: 0.png, 1.png, 2.png, 3.png, 4.png, …"
+    assert "order of their names though the counts differ" in order.message
     assert files_remarks(_files(1, [], [], by_number=False)) == ()
-    assert files_remarks(_files(1, [], [], by_number=False), "sgbm") == (Remark("sgbm", is_note=True),)
+    assert files_remarks(_files(1, [], [], by_number=False), "sgbm") == (Diagnostic("sgbm", severity=Severity.NOTE),)
 
 
 def test_the_verdict_of_several_pairs_counts_them() -> None:

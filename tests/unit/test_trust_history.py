@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from common import now
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.model import Processed
 from phone_host.run.trust_sink import TrustSink
 from phone_host.scene.scene import demo_scene, render, rig_poses
@@ -38,7 +38,7 @@ def test_the_pairs_of_a_cover_are_known_by_number_and_second() -> None:
     sink.finish()
     trust = sink.trust
     (past,) = trust.history
-    assert past.concern.doubt is Doubt.COVERED
+    assert past.concern.code == Code.COVERED
     assert (past.from_s, past.to_s, past.first_pair, past.last_pair) == (2.0, 5.0, 20, 40)
     assert trust.concerns == trust.newest == ()
     assert trust.now.density > 0.5

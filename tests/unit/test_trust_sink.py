@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import BLOCKING, Code
 from phone_host.diagnostics.headline import Grade, answer
 from phone_host.model import Epipolar, Image, Processed, RectifiedPair, Result, Rig, StereoGeometry
 from phone_host.run.sinks import SinkQueue
@@ -100,8 +100,8 @@ def test_a_run_of_rectified_images_says_that_its_geometry_is_foreign(good: Proce
     run = _Run(StereoCore(MatchSettings(disparities=48), geometry=geometry))
     run.pair(replace(good, geometry=geometry), 0)
     run.sink.finish()
-    [told] = [concern for concern in run.sink.trust.concerns if concern.doubt is Doubt.GEOMETRY]
-    assert "602,183 lies far from the middle of 287x209 px" in told.sentence
+    [told] = [concern for concern in run.sink.trust.concerns if concern.code == Code.GEOMETRY]
+    assert "602,183 lies far from the middle of 287x209 px" in told.message
 
 
 class _Gated(StereoCore):
@@ -141,8 +141,8 @@ def test_a_mistake_stands_after_two_judgements_and_falls_after_two(
     for number, processed in enumerate([good, swapped, swapped, good, good]):
         run.pair(processed, number * _PERIOD_NS)
         run.await_judged(number + 1)
-        told.append([concern.doubt for concern in run.sink.trust.concerns if concern.doubt.blocks])
-    assert told == [[], [], [Doubt.SWAPPED], [Doubt.SWAPPED], []]
+        told.append([concern.code for concern in run.sink.trust.concerns if concern.code in BLOCKING])
+    assert told == [[], [], [Code.SWAPPED], [Code.SWAPPED], []]
 
 
 def test_judging_goes_on_however_fast_a_judgement_is() -> None:

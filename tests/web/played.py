@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from common import now
+from common.diagnostic import Diagnostic
 from common.ledger import BoardMarks, HostMarks, StageTimes
 from phone_host.accounts.link_account import LinkAccount, LinkTally
 from phone_host.calibration.guide.coverage import Coverage
 from phone_host.calibration.guide.gates import Gate
 from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot
 from phone_host.calibration.guide.wants import Want
-from phone_host.diagnostics.concern import Concern, Trouble
 from phone_host.diagnostics.image_judge import ImageTrust
 from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.diagnostics.run_snapshot import RecordingAccount
@@ -110,8 +110,8 @@ class Played:
     stranger: str = BOARDS[0].uri
     steps: tuple[StepName, ...] = tuple(StepName)
     guide: GuideSnapshot | None = None
-    trouble: Trouble | None = None
-    concerns: tuple[Concern, ...] = ()
+    trouble: Diagnostic | None = None
+    concerns: tuple[Diagnostic, ...] = ()
     motion_px_s: float = math.nan
     recording: RecordingAccount | None = None
     folder: str = ""

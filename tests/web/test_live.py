@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.diagnostics.concern import Concern, Doubt, Trouble
+from common.diagnostic import Diagnostic, Severity
+from phone_host.diagnostics.codes import Code, diagnose
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Activity, Answer, Command, Do
@@ -238,8 +239,8 @@ def test_doubts_stand_on_top_in_words_with_what_to_do(running: Played, opened: O
     """A doubt comes and goes: its sentence and remedy are on top while it stands, once: in the headline or below it."""
     page = opened("run")
     page.wait_for_selector("#trust[data-level=good]")
-    swapped = Concern(Doubt.SWAPPED, "the cameras seem to be swapped", "swap them")
-    dark = Concern(Doubt.DARK, "the left image is dark", "light the scene; check --calibration or --rectified")
+    swapped = diagnose(Code.SWAPPED, "the cameras seem to be swapped", "swap them")
+    dark = diagnose(Code.DARK, "the left image is dark", "light the scene; check --calibration or --rectified")
     running.change(concerns=(swapped, dark))
     page.wait_for_selector("#trust[data-level=bad]")
     assert "the cameras seem to be swapped. Remedy: swap them." in page.text_content("#headline")
@@ -291,7 +292,9 @@ def test_what_is_refused_stays_to_be_mended(running: Played, opened: Opener) -> 
     """The field keeps what was typed and is marked, and the reason stays while others are set; once it is right, both go. Escape ends the drawing of a crop."""
     page = opened("run")
     shows(page, 0)
-    running.answers[Do.SET] = Answer(trouble=Trouble("--near '1 mile' is no length", "give mm, cm or m"))
+    running.answers[Do.SET] = Answer(
+        trouble=Diagnostic("--near '1 mile' is no length", "give mm, cm or m", Severity.FAIL)
+    )
     page.fill("#near", "1 mile")
     page.keyboard.press("Enter")
     page.wait_for_selector("#near[aria-invalid=true]")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from phone_host.diagnostics.concern import Trouble
+from common.diagnostic import Diagnostic, Severity
 from phone_host.web.source import Activity, Answer, Do
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
 from tests.web.played import RECORDING, Played
@@ -32,11 +32,15 @@ def test_a_recording_is_begun_watched_and_ended(
     assert "36.9 MB in /home/me" in page.text_content("#recording")
     assert page.text_content("#record") == "Record"
     assert [command.do for command in program.commands] == [Do.RECORD, Do.END_RECORDING]
-    full = Trouble("the recording s.mcap ended early (No space left on device)", "make room; what is in it can be used")
+    full = Diagnostic(
+        "the recording s.mcap ended early (No space left on device)",
+        "make room; what is in it can be used",
+        Severity.FAIL,
+    )
     program.change(recording=replace(RECORDING, is_over=True, failure=full))
     page.wait_for_selector("#recording.bad")
     assert "No space left on device" in page.text_content("#recording")
-    program.answers[Do.RECORD] = Answer(trouble=Trouble("the cameras have no clock", "give one"))
+    program.answers[Do.RECORD] = Answer(trouble=Diagnostic("the cameras have no clock", "give one", Severity.FAIL))
     page.click("#record")
     page.wait_for_selector("#run-answer.bad")
     assert page.text_content("#run-answer") == "The cameras have no clock. Give one."

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from common.diagnostic import Diagnostic, Severity
 from common.protocol.enrolment_code import read_code
-from phone_host.diagnostics.concern import Trouble
 from phone_host.web.source import Activity, Answer, Do, StepName
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
 from tests.web.played import BOARDS, CAMERAS, Played, guide_snapshot
@@ -82,12 +82,14 @@ def test_the_page_leads_from_nothing_to_a_run(program: Played, opened: Opener, c
 
 def test_what_went_wrong_is_said_with_what_to_do(program: Played, opened: Opener) -> None:
     """A refused command is answered beside its button, trouble of the program stands on top; both in words with a remedy."""
-    program.answers[Do.CHECK] = Answer(trouble=Trouble("the board is silent", "see whether its lamp blinks"))
+    program.answers[Do.CHECK] = Answer(
+        trouble=Diagnostic("the board is silent", "see whether its lamp blinks", Severity.FAIL)
+    )
     page = opened("check")
     page.click("#check-go")
     page.wait_for_selector("#check-answer.bad")
     assert page.text_content("#check-answer") == "The board is silent. See whether its lamp blinks."
-    program.change(trouble=Trouble("the camera has gone", "plug it in again"))
+    program.change(trouble=Diagnostic("the camera has gone", "plug it in again", Severity.FAIL))
     page.wait_for_selector("#trouble:not([hidden])")
     assert page.text_content("#trouble") == "The camera has gone. Plug it in again."
 
@@ -105,7 +107,7 @@ def test_nothing_is_claimed_that_nobody_looked_for(program: Played, opened: Open
     assert page.text_content("#camera-none") == "Press Find to search for cameras."
     program.change(boards=())
     page.wait_for_selector("#camera-none:has-text('None found on this machine. ')")
-    program.change(trouble=Trouble("tcp://10.0.0.9:5555 does not answer", "see /etc/hosts"))
+    program.change(trouble=Diagnostic("tcp://10.0.0.9:5555 does not answer", "see /etc/hosts", Severity.FAIL))
     page.wait_for_selector("#trouble:not([hidden])")
     assert page.text_content("#trouble") == "tcp://10.0.0.9:5555 does not answer. See /etc/hosts"
 

@@ -3,7 +3,8 @@
 import math
 from typing import Final, assert_never
 
-from common.doctor.finding import Finding, ok, warn
+from common.diagnostic import Diagnostic
+from common.doctor.finding import ok, warn
 from common.words import counted
 from phone_host.doctor.camera_check.check import Progress, Stage
 from phone_host.model.capture import CaptureReport, CaptureSource, Pace, Rigidity, Unseen, Warping
@@ -28,7 +29,7 @@ CHECK_AGAIN: Final = "phone-host doctor --capture with this --camera and --calib
 """The remedy on the command line; the page has a button."""
 
 
-def findings_of(report: CaptureReport) -> list[Finding]:
+def findings_of(report: CaptureReport) -> list[Diagnostic]:
     """Judge a report.
 
     Args:
@@ -47,7 +48,7 @@ def findings_of(report: CaptureReport) -> list[Finding]:
     ]
 
 
-def _rate(pace: Pace) -> Finding:
+def _rate(pace: Pace) -> Diagnostic:
     asked = f", {pace.asked_hz:.3g} asked for" if math.isfinite(pace.asked_hz) else ""
     gaps = f", {counted(pace.missing, 'frame')} missing" if pace.missing else ""
     text = f"{pace.rate_hz:.3g} frames/s{asked}{gaps}"
@@ -63,7 +64,7 @@ def _rate(pace: Pace) -> Finding:
     return warn("rate", text, "ask for a smaller image, or for this rate")
 
 
-def _stamps(pace: Pace) -> Finding:
+def _stamps(pace: Pace) -> Diagnostic:
     period_ms = 1e3 / pace.usual_hz
     delay = f"{pace.delay_ms:.0f} ms from stamp to arrival" if math.isfinite(pace.delay_ms) else "arrival unknown"
     text = f"jitter {pace.jitter_ms:.1f} ms, {delay} (95 % within {pace.delay_jitter_ms:.0f} ms more)"
@@ -79,7 +80,7 @@ def _stamps(pace: Pace) -> Finding:
     return ok("stamps", text)
 
 
-def _exposure(pace: Pace) -> Finding:
+def _exposure(pace: Pace) -> Diagnostic:
     if not math.isfinite(pace.exposure_ms):
         return ok("exposure", f"not reported by the camera; mean brightness {pace.brightness:.0f} of 255")
     text = f"{pace.exposure_ms:.1f} ms, at most {pace.longest_exposure_ms:.1f} ms; mean brightness {pace.brightness:.0f} of 255"
@@ -88,7 +89,7 @@ def _exposure(pace: Pace) -> Finding:
     return ok("exposure", text)
 
 
-def _shutter(rigidity: Rigidity) -> Finding:
+def _shutter(rigidity: Rigidity) -> Diagnostic:
     if not math.isfinite(rigidity.readout_ms):
         return ok("shutter", "cannot be determined from these images")
     text = f"rows are read within {rigidity.readout_ms:.1f} +- {max(rigidity.readout_sigma_ms, 0.1):.1f} ms"
@@ -98,7 +99,7 @@ def _shutter(rigidity: Rigidity) -> Finding:
     )
 
 
-def _heat(pace: Pace) -> Finding:
+def _heat(pace: Pace) -> Diagnostic:
     text = f"{pace.first_hz:.3g} frames/s at first, {pace.last_hz:.3g} at the end of {pace.seconds:.0f} s"
     if pace.last_hz < _SLOWER * pace.first_hz:
         return warn(
@@ -129,7 +130,7 @@ _REASONS: Final = {
 _UNCALIBRATED: Final = "; without its calibration a crop is not seen: check again once the lens is calibrated"
 
 
-def warp_finding(rigidity: Rigidity) -> Finding:
+def warp_finding(rigidity: Rigidity) -> Diagnostic:
     """Say whether the camera's software warps its images."""
     of = f"{rigidity.warped} of {counted(rigidity.windows, 'stretch', 'stretches')} of film"
     match rigidity.warping:
@@ -169,7 +170,7 @@ def stage_words(progress: Progress) -> str:
     return f"{': '.join(_REASONS[progress.last])}{go_on}"
 
 
-def stored_finding(kept: CaptureReport | None, source: CaptureSource, *, has_lens: bool) -> Finding:
+def stored_finding(kept: CaptureReport | None, source: CaptureSource, *, has_lens: bool) -> Diagnostic:
     """Judge the report of an earlier check: does it hold for this camera?
 
     Args:
@@ -186,7 +187,7 @@ def stored_finding(kept: CaptureReport | None, source: CaptureSource, *, has_len
         return warn(
             "capture", "this camera's images were checked before it was calibrated: a crop was not seen", CHECK_AGAIN
         )
-    return Finding(what="capture", verdict=found.verdict, text=f"checked: {found.text}", remedy=found.remedy)
+    return Diagnostic(f"checked: {found.message}", found.remedy, found.severity, "capture")
 
 
 def holds_for(checked: CaptureSource, source: CaptureSource) -> bool:

@@ -127,7 +127,7 @@ class PreparedViews:
         """What keeps views from coming; empty: nothing."""
         host = self.live.host
         if host.refused is not None:
-            return f"waiting: {host.refused.problem}: {host.refused.remedy}"
+            return f"waiting: {host.refused.message}: {host.refused.remedy}"
         if not host.has_met_board:
             waits = now.monotonic_ns() - host.started_ns > _WAITED_NS
             return f"waiting for a board at {' and '.join(self.named)}" if waits else ""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from common.diagnostic import diagnostic_of
 from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
@@ -19,7 +20,6 @@ from common.words import counted
 from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
-from phone_host.diagnostics.concern import trouble_of
 from phone_host.model import Rig
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
                 with live or nullcontext():
                     demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
             except BaseException as error:
-                failed = build(demo.host.snapshot("failed", trouble_of(error)), "demo")
+                failed = build(demo.host.snapshot("failed", diagnostic_of(error)), "demo")
                 demo.host.write_report(failed, replaces_earlier=False)
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")

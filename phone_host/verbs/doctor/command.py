@@ -3,7 +3,8 @@
 import argparse
 import math
 
-from common.doctor.finding import Grade, exit_code, settings_finding, table, values
+from common.diagnostic import Severity
+from common.doctor.finding import exit_code, settings_finding, table, values
 from common.errors import SettingsError
 from common.program.terminal import fitted
 from phone_host.camera.examples import EXAMPLE
@@ -38,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
         _require_capture(options.capture, question)
     findings = [settings_finding(str(options.config or ""), wrong), *examine(question, keeps=options.capture is None)]
     found = values(findings)
-    if options.capture is not None and all(each.verdict is not Grade.FAIL for each in findings):
+    if options.capture is not None and all(each.severity is not Severity.FAIL for each in findings):
         from phone_host.output.capture_json import capture_values  # noqa: PLC0415 - numpy and OpenCV, seen to work
         from phone_host.verbs.doctor.capture import guided_capture  # noqa: PLC0415 - the same
 

@@ -101,7 +101,7 @@ def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], .
             for number, length in enumerate(_path(found.points), start=1)
         ],
         "uncertainty": {"level": 0.95, "includes": included, "leaves_out": left_out},
-        "doubts": [{"sentence": concern.sentence, "remedy": concern.remedy} for concern in found.doubts],
+        "doubts": [{"sentence": concern.message, "remedy": concern.remedy} for concern in found.doubts],
     }
 
 
@@ -145,7 +145,7 @@ def _lines(options: argparse.Namespace, points_px: tuple[tuple[float, float], ..
     ]
     if any(isinstance(each, MissedPoint) for each in found.points):
         lines.append(f"remedy   {ELSEWHERE}")
-    lines += [f"doubt    {concern.sentence} {concern.remedy}" for concern in found.doubts]
+    lines += [f"doubt    {concern.message} {concern.remedy}" for concern in found.doubts]
     lines.append(f"95 % of the cases lie between these limits; they include {' and '.join(included)}")
     lines.append(f"not included: {', '.join(left_out)}")
     return lines

@@ -5,7 +5,6 @@ import math
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
@@ -32,6 +31,7 @@ from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.filming import take_alone, take_frames
 from phone_host.recording.unpaired import UnpairedFrames
+from phone_host.report.run_json import recording_values
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.verbs.output_folders import require_alone
@@ -105,7 +105,7 @@ def _film(
 
 def _tell(account: RecordingAccount, *, as_json: bool, is_interrupted: bool) -> int:
     if as_json:
-        print(json_text({"format_version": REPORT_FORMAT, "command": "record", **asdict(account)}))
+        print(json_text({"format_version": REPORT_FORMAT, "command": "record", **recording_values(account)}))
     else:
         print(fitted(account.words))
     if is_interrupted:

@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     with written_together(options.out, *_NAMES) as place:
         for name in _NAMES:
             write_bytes(place / name, mesh_bytes(solid, name.rpartition(".")[2], None))
-    doubts = [f"{one.sentence}; {one.remedy}" for one in concerns]
+    doubts = [f"{one.message}; {one.remedy}" for one in concerns]
     files = [str(options.out / name) for name in _NAMES]
     if options.json:
         told = {

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, nullcontext, suppress
 from typing import TYPE_CHECKING, Final
 
 from common import now
+from common.diagnostic import Diagnostic, diagnostic_of
 from common.errors import SettingsError
 from common.program import logs
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
@@ -15,7 +16,6 @@ from common.program.settings import Resolved, log_level
 from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.diagnostics.run_rules import depth_is_wrong, nothing_whole
 from phone_host.output.json_text import json_text
 from phone_host.report.summary import summary
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
             ended = _watched(options, prepared, stopped)
         except BaseException as error:
             with suppress(Exception):  # tell what ended the run, not what followed
-                failed = prepared.failed(trouble_of(error))
+                failed = prepared.failed(diagnostic_of(error))
                 if options.json:
                     print(json_text(failed.report))
             raise
@@ -127,12 +127,12 @@ class WaitingNote:
         self,
         links: Sequence[str],
         has_met_board: Callable[[], bool],
-        refused: Callable[[], Trouble | None],
+        refused: Callable[[], Diagnostic | None],
         say: Callable[[str], None],
     ) -> None:
         self._line = f"phone-host: waiting for a board at {' and '.join(links)}"
         self._has_met_board, self._refused, self._say = has_met_board, refused, say
-        self._told: Trouble | None = None
+        self._told: Diagnostic | None = None
         self._due_ns: int | None = now.monotonic_ns() + _SOON_NS
 
     def refresh(self) -> None:
@@ -140,7 +140,7 @@ class WaitingNote:
         refused = self._refused()
         if refused is not None and refused != self._told:
             self._told, self._due_ns = refused, None
-            self._say(f"phone-host: waiting: {refused.problem}: {refused.remedy}")
+            self._say(f"phone-host: waiting: {refused.message}: {refused.remedy}")
         if self._due_ns is None or now.monotonic_ns() < self._due_ns:
             return
         self._due_ns = None

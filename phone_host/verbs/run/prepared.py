@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from common import now
 from common.camera.base import Camera, upright_px
+from common.diagnostic import Diagnostic
 from common.errors import SettingsError
 from common.link.base import Link
 from common.places import Kind, kind_of, resolved
@@ -23,7 +24,6 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.diagnostics.concern import Trouble
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Rig, Side, TimeOffset
 from phone_host.output.json_text import json_text
@@ -183,7 +183,7 @@ class PreparedRun:
         """
         return snapshot.processed < self.pairs or (self.is_replay and ended is EndReason.STOPPED)
 
-    def failed(self, failure: Trouble) -> Ended:
+    def failed(self, failure: Diagnostic) -> Ended:
         """Write the report of a run that an error ended.
 
         Args:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from common import now
-from common.doctor.finding import Finding
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.errors import DataError, SettingsError
 from common.keys import KeyFolder
 from common.program.extensions import registered_names
@@ -18,7 +18,6 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera, require_replayed
 from phone_host.camera.http_uri import without_password
-from phone_host.diagnostics.concern import Trouble, trouble_of
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
@@ -168,7 +167,7 @@ class Commands:
 
     def capture(
         self, choices: Choices, stopped: Callable[[], bool], tell: Callable[[Progress], None]
-    ) -> Sequence[Finding]:
+    ) -> Sequence[Diagnostic]:
         """See Program."""
         question = self.question(choices)
         camera = open_camera(question.camera, HOST_CLOCK, now.monotonic_ns(), feed=self.feed)
@@ -244,11 +243,13 @@ class Calibration:
         """See ReadyCalibration."""
         report = calibrate_pictures(self.options, self.asked, self.views.taken(_Nobody()), may_write).report
         if isinstance(report.result, DataError):
-            trouble = trouble_of(report.result)
-            return Calibrated(words=f"no calibration: {trouble.problem}", rig=None, trouble=trouble)
+            trouble = diagnostic_of(report.result)
+            return Calibrated(words=f"no calibration: {trouble.message}", rig=None, trouble=trouble)
         words = f"verdict {report.verdict.value}: {self.options.out}"
         if report.verdict is Verdict.REJECT:
-            return Calibrated(words=words, rig=None, trouble=Trouble("the calibration is rejected", report.remedy))
+            return Calibrated(
+                words=words, rig=None, trouble=Diagnostic("the calibration is rejected", report.remedy, Severity.FAIL)
+            )
         return Calibrated(words=words, rig=self.options.out.absolute(), trouble=None)
 
 

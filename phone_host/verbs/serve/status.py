@@ -31,7 +31,7 @@ def told(state: PageState) -> str:
     if state.activity is Activity.SCANNING and state.scan is not None:
         words += f": {state.scan.words}"
     if state.trouble is not None and state.activity is Activity.IDLE:
-        words += f"; {state.trouble.problem}: {state.trouble.remedy}"
+        words += f"; {state.trouble.message}: {state.trouble.remedy}"
     return printable(words)
 
 

@@ -7,7 +7,7 @@ from common.errors import DataError
 from common.frame import PixelFormat
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import CameraDescription, Pacing
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.run_rules import misses, require_camera, settings_concerns, state_of
 from phone_host.model import Side
 
@@ -89,9 +89,9 @@ def test_only_controls_that_differ_are_doubted() -> None:
         ("tilt", 3, None),
     ]
     (concern,) = settings_concerns(missed)
-    assert concern.doubt is Doubt.CAMERA_SETTINGS
-    assert "the right camera's zoom is not held instead of 100" in concern.sentence
-    assert "exposure_us is 9900 instead of 10000" in concern.sentence
+    assert concern.code == Code.CAMERA_SETTINGS
+    assert "the right camera's zoom is not held instead of 100" in concern.message
+    assert "exposure_us is 9900 instead of 10000" in concern.message
     assert not [*settings_concerns(misses(Side.LEFT, RememberedCamera(C920, 640, 480, locks=(("focus", 20),)), held))]
 
 

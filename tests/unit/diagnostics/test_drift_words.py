@@ -9,7 +9,7 @@ import cv2
 import pytest
 
 from common.errors import DataError
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, diagnose
 from phone_host.diagnostics.drift import drift_concerns, drift_lines, stills_remedy, stills_words, told_as_a_turn
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Trend
 from phone_host.output.overlay_yaml import fingerprint, overlay_text, read_overlay
@@ -54,8 +54,8 @@ def test_what_is_unknown_since_a_knock_is_said_so() -> None:
     """Too few features since: a concern, and a line that does not deny the correction in use."""
     drift = Drift(state=DriftState.UNKNOWN, judged=9, changes=(KNOCK,))
     [concern] = drift_concerns(drift)
-    assert concern.doubt is Doubt.RIG_MOVED
-    assert "at once 12 s after the start; by how much is not known" in concern.sentence
+    assert concern.code == Code.RIG_MOVED
+    assert "at once 12 s after the start; by how much is not known" in concern.message
     assert drift_lines(drift)[0].endswith("nothing was corrected")
     assert drift_lines(replace(drift, overlay=PITCHED))[0].endswith("the earlier correction is kept")
 
@@ -71,32 +71,32 @@ def test_a_camera_that_was_away_is_told() -> None:
 @pytest.mark.parametrize(
     ("drift", "doubt", "words", "remedy"),
     [
-        (corrected(PITCHED, KNOCK), Doubt.RIG_MOVED, "by 0.10 degrees against each other, at once 12 s after", "bar"),
-        (corrected(FAR), Doubt.RIG_MOVED, "by 0.32 degrees against each other since the calibration", "--pose-only"),
+        (corrected(PITCHED, KNOCK), Code.RIG_MOVED, "by 0.10 degrees against each other, at once 12 s after", "bar"),
+        (corrected(FAR), Code.RIG_MOVED, "by 0.32 degrees against each other since the calibration", "--pose-only"),
         (
             replace(corrected(FAR), state=DriftState.DEPARTED, overlay=AS_CALIBRATED),
-            Doubt.RIG_MOVED,
+            Code.RIG_MOVED,
             "rows are off by 1.0 px",
             "tighten",
         ),
-        (replace(corrected(FAR), state=DriftState.BEYOND), Doubt.RIG_MOVED, "too far to be corrected", "stiff bar"),
-        (corrected(ZOOMED), Doubt.FOCUS_CHANGED, "changed by +1.0 % against each other", "autofocus off"),
+        (replace(corrected(FAR), state=DriftState.BEYOND), Code.RIG_MOVED, "too far to be corrected", "stiff bar"),
+        (corrected(ZOOMED), Code.FOCUS_CHANGED, "changed by +1.0 % against each other", "autofocus off"),
         (
             replace(KNOWN, late_ns=2e7, late_px=1.5),
-            Doubt.LATE_IMAGES,
+            Code.LATE_IMAGES,
             "left images show it 20 +- 2 ms",
             "calibrate-time",
         ),
-        (replace(KNOWN, late_ns=-2e7, late_px=1.5), Doubt.LATE_IMAGES, "the right images show it 20", "calibrate-time"),
+        (replace(KNOWN, late_ns=-2e7, late_px=1.5), Code.LATE_IMAGES, "the right images show it 20", "calibrate-time"),
     ],
 )
-def test_what_the_user_must_know_is_one_concern(drift: Drift, doubt: Doubt, words: str, remedy: str) -> None:
+def test_what_the_user_must_know_is_one_concern(drift: Drift, doubt: Code, words: str, remedy: str) -> None:
     """Each is named once, with its figure and a remedy; none of them ends a run as failed."""
     [concern] = drift_concerns(drift)
-    assert concern.doubt is doubt
-    assert words in concern.sentence
+    assert concern.code == doubt
+    assert words in concern.message
     assert remedy in concern.remedy
-    assert not concern.is_certain
+    assert not concern.is_failure
 
 
 def test_what_is_over_or_not_proven_is_no_concern() -> None:
@@ -224,7 +224,7 @@ def test_the_report_of_stills_counts_pairs() -> None:
 
 def test_a_knocked_rig_explains_what_single_pairs_look_like() -> None:
     """With a proven turn neither `mirrored` nor `other scene` is told; a swap, and everything without a turn, is."""
-    images = tuple(Concern(doubt, "s", "r") for doubt in (Doubt.SWAPPED, Doubt.MIRRORED, Doubt.OTHER_SCENE))
+    images = tuple(diagnose(doubt, "s", "r") for doubt in (Code.SWAPPED, Code.MIRRORED, Code.OTHER_SCENE))
     moved = drift_concerns(corrected(FAR))
     assert told_as_a_turn(images, ()) == images
     assert told_as_a_turn(images, moved) == images[:1]

@@ -9,7 +9,7 @@ from typing import Any, Final
 import pytest
 
 from phone_host.diagnostics.arrangement import EXCHANGE, ImageSource, tries_of
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import BLOCKING, Code, diagnose
 from phone_host.diagnostics.headline import Grade, answer, depth_error_m, headline
 from phone_host.diagnostics.image_judge import ImageJudge, ImageTrust
 from phone_host.diagnostics.image_rules import ImageFigures, image_doubts, median_figures
@@ -45,9 +45,9 @@ def evidence(**counts: int) -> Evidence:
     )  # fmt: skip
 
 
-def doubts(found: Evidence) -> list[Doubt]:
+def doubts(found: Evidence) -> list[str]:
     """What is doubtful about it."""
-    return [concern.doubt for concern in image_doubts(found)]
+    return [concern.code for concern in image_doubts(found)]
 
 
 COVERED: Final = Exposure(mean_level=3, bright_level=5, structure=0.3, blur_px=math.nan)
@@ -64,55 +64,55 @@ BLIND: Final = replace(evidence(right=0, tilted=0), right=COVERED)
     ("found", "named"),
     [
         (GOOD, []),
-        (SWAPPED, [Doubt.SWAPPED]),
+        (SWAPPED, [Code.SWAPPED]),
         (evidence(right=60, swapped=119), []),  # less than twice as many
-        (evidence(right=60, swapped=120), [Doubt.SWAPPED]),
+        (evidence(right=60, swapped=120), [Code.SWAPPED]),
         (evidence(right=0, tilted=4, swapped=11), []),  # too few to name anything
-        (evidence(right=20, swapped=100, both_turned=150), [Doubt.TURNED]),
-        (evidence(right=20, swapped=100, both_mirrored=150), [Doubt.MIRRORED]),
-        (evidence(right=0, both_turned_by_quarter=150), [Doubt.TURNED_BY_QUARTER]),
-        (evidence(right=3, tilted=5, turned=90), [Doubt.TURNED]),
-        (evidence(right=3, tilted=5, turned_by_quarter=90), [Doubt.TURNED_BY_QUARTER]),
-        (evidence(right=3, tilted=5, mirrored=90), [Doubt.MIRRORED]),
-        (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.9), [Doubt.AMBIGUOUS]),  # a regular pattern
-        (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.5), [Doubt.MIRRORED]),
-        (replace(SWAPPED, ambiguous_share=math.nan), [Doubt.SWAPPED]),
-        (replace(GOOD, ambiguous_share=0.78), [Doubt.AMBIGUOUS]),
+        (evidence(right=20, swapped=100, both_turned=150), [Code.TURNED]),
+        (evidence(right=20, swapped=100, both_mirrored=150), [Code.MIRRORED]),
+        (evidence(right=0, both_turned_by_quarter=150), [Code.TURNED_BY_QUARTER]),
+        (evidence(right=3, tilted=5, turned=90), [Code.TURNED]),
+        (evidence(right=3, tilted=5, turned_by_quarter=90), [Code.TURNED_BY_QUARTER]),
+        (evidence(right=3, tilted=5, mirrored=90), [Code.MIRRORED]),
+        (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.9), [Code.AMBIGUOUS]),  # a regular pattern
+        (replace(evidence(right=0, tilted=5, mirrored=90), ambiguous_share=0.5), [Code.MIRRORED]),
+        (replace(SWAPPED, ambiguous_share=math.nan), [Code.SWAPPED]),
+        (replace(GOOD, ambiguous_share=0.78), [Code.AMBIGUOUS]),
         (replace(GOOD, ambiguous_share=0.61), []),
-        (replace(GOOD, beyond_share=0.06, enough_disparities=80, density=0.1), [Doubt.SEARCH_TOO_SHORT]),
+        (replace(GOOD, beyond_share=0.06, enough_disparities=80, density=0.1), [Code.SEARCH_TOO_SHORT]),
         (replace(GOOD, beyond_share=0.04), []),
-        (replace(GOOD, skew_px=0.95), [Doubt.VERTICAL_ERROR]),
+        (replace(GOOD, skew_px=0.95), [Code.VERTICAL_ERROR]),
         (replace(GOOD, skew_px=0.7), []),
         (evidence(mirrored=90), []),  # a chessboard looks like its mirror image
-        (evidence(same_place=160), [Doubt.SAME_IMAGE]),
+        (evidence(same_place=160), [Code.SAME_IMAGE]),
         (evidence(same_place=140), []),  # a street whose far end does not move
-        (BLIND, [Doubt.COVERED]),
-        (replace(GOOD, right=replace(SHARP, mean_level=10, bright_level=20)), [Doubt.DARK]),
-        (replace(GOOD, right=replace(SHARP, blur_px=2.5)), [Doubt.UNFOCUSED]),
-        (replace(GOOD, left=replace(SHARP, blur_px=1.6), right=replace(SHARP, blur_px=0.8)), [Doubt.UNFOCUSED]),
+        (BLIND, [Code.COVERED]),
+        (replace(GOOD, right=replace(SHARP, mean_level=10, bright_level=20)), [Code.DARK]),
+        (replace(GOOD, right=replace(SHARP, blur_px=2.5)), [Code.UNFOCUSED]),
+        (replace(GOOD, left=replace(SHARP, blur_px=1.6), right=replace(SHARP, blur_px=0.8)), [Code.UNFOCUSED]),
         (replace(GOOD, left=replace(SHARP, blur_px=1.4), right=replace(SHARP, blur_px=0.7)), []),
-        (replace(evidence(right=2, tilted=3), density=0.05), [Doubt.OTHER_SCENE]),
+        (replace(evidence(right=2, tilted=3), density=0.05), [Code.OTHER_SCENE]),
         (replace(evidence(right=2, tilted=3), density=0.5), []),  # the matcher finds what features do not
-        (PLAIN, [Doubt.NO_TEXTURE]),  # two pictures of one bare wall
-        (replace(PLAIN, left=SHARP), [Doubt.OTHER_SCENE]),  # a wall and something else
+        (PLAIN, [Code.NO_TEXTURE]),  # two pictures of one bare wall
+        (replace(PLAIN, left=SHARP), [Code.OTHER_SCENE]),  # a wall and something else
         (replace(PLAIN, density=0.5), []),  # its grain is enough for the matcher
-        (replace(PLAIN, supports=GOOD.supports), [Doubt.LOW_DENSITY]),  # some things before it
-        (replace(GOOD, density=0.1), [Doubt.LOW_DENSITY]),
-        (replace(GOOD, consistency=0.2), [Doubt.LOW_CONSISTENCY]),
-        (replace(GOOD, vertical_px=2.1), [Doubt.VERTICAL_ERROR]),
+        (replace(PLAIN, supports=GOOD.supports), [Code.LOW_DENSITY]),  # some things before it
+        (replace(GOOD, density=0.1), [Code.LOW_DENSITY]),
+        (replace(GOOD, consistency=0.2), [Code.LOW_CONSISTENCY]),
+        (replace(GOOD, vertical_px=2.1), [Code.VERTICAL_ERROR]),
         (replace(GOOD, vertical_px=4.2, matched_scale=0.22), []),  # 48 megapixels: 0.9 px where they are matched
-        (replace(GOOD, vertical_px=9.5, matched_scale=0.22), [Doubt.VERTICAL_ERROR]),
-        (replace(evidence(), is_cropped=True), [Doubt.CROPPED_RIG]),
-        (replace(GOOD, behind_share=0.1), [Doubt.GEOMETRY]),
-        (replace(GOOD, behind_share=0.1, off_middle=FOREIGN), [Doubt.GEOMETRY]),
-        (replace(BLIND, off_middle=FOREIGN), [Doubt.COVERED, Doubt.GEOMETRY]),  # what blocks comes first
-        (evidence(right=50), [Doubt.VERTICAL_ERROR]),  # most features are on tilted rows
+        (replace(GOOD, vertical_px=9.5, matched_scale=0.22), [Code.VERTICAL_ERROR]),
+        (replace(evidence(), is_cropped=True), [Code.CROPPED_RIG]),
+        (replace(GOOD, behind_share=0.1), [Code.GEOMETRY]),
+        (replace(GOOD, behind_share=0.1, off_middle=FOREIGN), [Code.GEOMETRY]),
+        (replace(BLIND, off_middle=FOREIGN), [Code.COVERED, Code.GEOMETRY]),  # what blocks comes first
+        (evidence(right=50), [Code.VERTICAL_ERROR]),  # most features are on tilted rows
     ],
 )  # fmt: skip
-def test_a_doubt_needs_clear_evidence(found: Evidence, named: list[Doubt]) -> None:
+def test_a_doubt_needs_clear_evidence(found: Evidence, named: list[Code]) -> None:
     """Exactly the named doubts follow; each has a sentence and a remedy without NaN."""
     assert doubts(found) == named
-    assert all(concern.sentence and concern.remedy and "nan" not in concern.sentence for concern in image_doubts(found))
+    assert all(concern.message and concern.remedy and "nan" not in concern.message for concern in image_doubts(found))
 
 
 @pytest.mark.parametrize(
@@ -144,20 +144,20 @@ def test_remedies_for_files_name_what_stereo_takes(found: Evidence, words: str) 
 
 def test_both_cameras_are_named_together() -> None:
     """One covered camera is named by its side, two together."""
-    assert "the right camera sees" in image_doubts(BLIND)[0].sentence
-    assert "both cameras see" in image_doubts(replace(BLIND, left=COVERED))[0].sentence
+    assert "the right camera sees" in image_doubts(BLIND)[0].message
+    assert "both cameras see" in image_doubts(replace(BLIND, left=COVERED))[0].message
     dark = replace(SHARP, mean_level=10.0, bright_level=20.0)
-    assert "both cameras see" in image_doubts(replace(GOOD, left=dark, right=dark))[0].sentence
+    assert "both cameras see" in image_doubts(replace(GOOD, left=dark, right=dark))[0].message
 
 
 def test_a_doubt_stands_while_most_of_the_latest_three_judgements_have_it() -> None:
     """One judgement of three is not enough, two are; it goes when two of three are free of it."""
     judge = ImageJudge()
-    stands: list[list[Doubt]] = []
+    stands: list[list[str]] = []
     for number, found in enumerate((GOOD, SWAPPED, GOOD, SWAPPED, SWAPPED, GOOD, GOOD)):
         judge.add(found, at_s=number / 2, pair=number)
-        stands.append([concern.doubt for concern in judge.concerns])
-    named = [Doubt.SWAPPED]
+        stands.append([concern.code for concern in judge.concerns])
+    named = [Code.SWAPPED]
     assert stands == [[], [], [], named, named, named, []]
 
 
@@ -166,7 +166,7 @@ def test_a_run_of_one_pair_is_judged_by_it() -> None:
     judge = ImageJudge()
     assert judge.judged == 0
     judge.add(SWAPPED, at_s=0.0, pair=0)
-    assert [concern.doubt for concern in judge.concerns] == [Doubt.SWAPPED]
+    assert [concern.code for concern in judge.concerns] == [Code.SWAPPED]
     assert judge.judged == 1
 
 
@@ -202,10 +202,10 @@ def test_the_headline_of_a_good_run_says_how_far_to_trust_it() -> None:
 def test_depth_that_is_right_but_old_is_no_good_news() -> None:
     """Results that lag behind a moving scene by a twentieth of its width make the headline a warning that says so, wherever it is shown."""
     fast = replace(with_images(), motion_px_s=5000.0, width_px=640, stamps_exact=True)
-    lag = next(concern for concern in concerns(fast) if concern.doubt is Doubt.AGE)
+    lag = next(concern for concern in concerns(fast) if concern.code == Code.AGE)
     said = headline(fast)
     assert said.grade is Grade.WARNING
-    assert said.sentence == f"{headline(with_images()).sentence} But {lag.sentence}."
+    assert said.sentence == f"{headline(with_images()).sentence} But {lag.message}."
 
 
 def test_a_far_scene_is_answered_for_at_its_own_depth() -> None:
@@ -227,7 +227,7 @@ def test_a_blocking_doubt_is_the_headline() -> None:
     assert said.sentence.startswith("Depth is wrong: left and right are exchanged")
     assert "swap LEFT and RIGHT" in said.sentence
     fast = replace(swapped, motion_px_s=1e6, width_px=640)
-    assert concerns(fast)[0].doubt is Doubt.SWAPPED
+    assert concerns(fast)[0].code == Code.SWAPPED
     assert len(concerns(fast)) > 1
     unsharp = headline(with_images(concerns=image_doubts(replace(GOOD, right=replace(SHARP, blur_px=2.5)))))
     assert (unsharp.grade, unsharp.sentence.split(":")[0]) == (Grade.WARNING, "Depth may be wrong")
@@ -236,12 +236,12 @@ def test_a_blocking_doubt_is_the_headline() -> None:
 def test_a_run_that_wanted_depth_and_found_none_has_a_doubt() -> None:
     """At the end only, and only if no graver doubt says why; without a rig nothing is wanted."""
     none = with_images(has_depth=False)
-    assert [concern.doubt for concern in concerns(none)] == [Doubt.NO_DEPTH]
+    assert [concern.code for concern in concerns(none)] == [Code.NO_DEPTH]
     assert depth_is_wrong(none)
     assert not depth_is_wrong(with_images())
     assert concerns(replace(none, ended="running")) == ()
-    assert [concern.doubt for concern in concerns(with_images(has_depth=False, concerns=image_doubts(SWAPPED)))] == [
-        Doubt.SWAPPED
+    assert [concern.code for concern in concerns(with_images(has_depth=False, concerns=image_doubts(SWAPPED)))] == [
+        Code.SWAPPED
     ]
     assert concerns(with_images(has_depth=False, wants_depth=False)) == ()
 
@@ -267,8 +267,8 @@ def test_what_became_of_the_pixels_says_why_there_is_no_depth(
     """The limit that cut the points is named with its option, and the remedy is to move it; where hardly anything was matched, images and calibration do not fit."""
     none = replace(with_images(has_depth=False), depth=DepthAccount(cut=cut, limits=limits))
     [concern] = concerns(none)
-    assert concern.doubt is Doubt.NO_DEPTH
-    assert sentence in concern.sentence
+    assert concern.code == Code.NO_DEPTH
+    assert sentence in concern.message
     assert remedy in concern.remedy
 
 
@@ -305,12 +305,11 @@ def test_the_report_holds_the_answer_and_every_doubt() -> None:
 
 def test_which_doubts_block() -> None:
     """Timing, dark, unfocused and low figures warn; what makes depth impossible blocks."""
-    blocking = {doubt.value for doubt in Doubt if doubt.blocks}
-    assert blocking == {
+    assert {
         "swapped", "turned", "turned_by_quarter", "mirrored", "same_image", "other_scene", "covered", "no_depth",
         "no_whole_image", "images_apart",
-    }  # fmt: skip
-    assert not Concern(Doubt.TIME_SKEW, "", "").doubt.blocks
+    } == BLOCKING  # fmt: skip
+    assert all(diagnose(code, "", "").is_failure is (code in BLOCKING) for code in Code)
 
 
 def test_depth_with_specks_is_not_called_right_without_reserve() -> None:

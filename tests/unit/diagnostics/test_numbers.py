@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from common.camera.image_numbers import ImageNumbers
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, Misplaced, diagnose
 from phone_host.diagnostics.image_numbers import FilmWatch, ImageEvidence, number_concerns, pairing_words, with_cause
 from phone_host.model import Arrangement
 from phone_host.sync.stills import PairedBy, WhyOrder
@@ -18,9 +18,9 @@ SHORT = ImageNumbers(count=10)
 def said(evidence: ImageEvidence) -> str:
     """The one doubt's sentence; empty if there is none."""
     found = number_concerns(evidence)
-    of_numbers = {Doubt.IMAGE_NUMBERS, Doubt.IMAGES_APART}
-    assert all(concern.doubt in of_numbers and concern.remedy for concern in found)
-    return "".join(concern.sentence for concern in found)
+    of_numbers = {Code.IMAGE_NUMBERS, Code.IMAGES_APART}
+    assert all(concern.code in of_numbers and concern.remedy for concern in found)
+    return "".join(concern.message for concern in found)
 
 
 def test_one_series_is_not_doubted() -> None:
@@ -54,7 +54,7 @@ def test_a_number_that_only_one_side_has_is_a_doubt() -> None:
     """Even if both begin and end alike; the pairs are of one number each, so their depth is not doubted."""
     alike = ImageEvidence(paired_by=PairedBy.NUMBER, board=SERIES, own=SERIES, pairs=3, own_alone=1)
     assert "1 image of this machine has no partner" in said(alike)
-    assert all(concern.spares_depth for concern in number_concerns(alike))
+    assert all(concern.is_note for concern in number_concerns(alike))
 
 
 def test_different_counts_are_a_doubt_where_order_or_time_pairs() -> None:
@@ -68,9 +68,9 @@ def test_numbers_that_say_nothing_of_the_pairs_are_a_doubt_even_of_equal_counts(
     """Both sides are numbered, but the order pairs: the headline must doubt the depth from the first pair on."""
     evidence = ImageEvidence(paired_by=PairedBy.ORDER, why_order=why, board=SERIES, own=SERIES, pairs=1)
     (concern,) = number_concerns(evidence)
-    assert "paired in their order" in concern.sentence
-    assert concern.doubt is Doubt.IMAGE_NUMBERS
-    assert not concern.spares_depth
+    assert "paired in their order" in concern.message
+    assert concern.code == Code.IMAGE_NUMBERS
+    assert not concern.is_note
 
 
 def test_a_board_that_does_not_tell_its_numbers_is_named_where_counts_differ() -> None:
@@ -126,9 +126,9 @@ def test_where_the_place_in_a_film_is_not_known_nothing_is_compared() -> None:
 
 def test_most_pairs_apart_make_depth_impossible_a_few_make_it_doubtful() -> None:
     """18 of 35 pairs of different images block, 17 of 35 warn."""
-    for apart, doubt in ((18, Doubt.IMAGES_APART), (17, Doubt.IMAGE_NUMBERS)):
+    for apart, doubt in ((18, Code.IMAGES_APART), (17, Code.IMAGE_NUMBERS)):
         evidence = ImageEvidence(board=SERIES, own=SERIES, pairs=35, apart=apart)
-        assert [concern.doubt for concern in number_concerns(evidence)] == [doubt]
+        assert [concern.code for concern in number_concerns(evidence)] == [doubt]
 
 
 def test_films_of_different_rate_drift_apart_unless_they_last_equally_long() -> None:
@@ -143,15 +143,15 @@ def test_films_of_different_rate_drift_apart_unless_they_last_equally_long() -> 
 
 def test_films_that_drift_apart_are_blamed_and_not_the_cameras() -> None:
     """What pairs of two moments look like is left out, and the cause blocks in its place; images paired by number are believed."""
-    swapped, covered = Concern(Doubt.SWAPPED, "s", "r"), Concern(Doubt.COVERED, "c", "r")
+    swapped, covered = diagnose(Code.SWAPPED, "s", "r"), diagnose(Code.COVERED, "c", "r")
     by_time = ImageEvidence(board=SERIES, own=SHORT, pairs=5)
     numbers, images = with_cause(number_concerns(by_time), (swapped, covered), by_time)
-    assert [concern.doubt for concern in (*numbers, *images)] == [Doubt.IMAGES_APART, Doubt.COVERED]
-    assert "drift apart" in numbers[0].sentence
+    assert [concern.code for concern in (*numbers, *images)] == [Code.IMAGES_APART, Code.COVERED]
+    assert "drift apart" in numbers[0].message
     by_number = replace(by_time, paired_by=PairedBy.NUMBER)
     told = number_concerns(by_number)
     assert with_cause(told, (swapped,), by_number) == (told, (swapped,))
     assert with_cause((), (swapped,), by_time) == ((), (swapped,))
     for arrangement, kept in ((Arrangement.TURNED, True), (Arrangement.BOTH_TURNED, False)):
-        turned = Concern(Doubt.TURNED, "t", "r", arrangement=arrangement)  # one on its head is so at any moment
+        turned = diagnose(Code.TURNED, "t", "r", evidence=Misplaced(arrangement))  # one on its head is so at any moment
         assert bool(with_cause(number_concerns(by_time), (turned,), by_time)[1]) == kept

@@ -9,7 +9,7 @@ from common.camera.base import CameraHealth, CameraState
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.accounts.link_account import Away
 from phone_host.diagnostics.arrangement import ImageSource, mirrored_further, turned_further, with_final_options
-from phone_host.diagnostics.concern import Concern, Doubt
+from phone_host.diagnostics.codes import Code, diagnose
 from phone_host.diagnostics.headline import Answer, Grade, headline
 from phone_host.diagnostics.image_judge import ImageJudge, ImageTrust, history_lines, past_seconds
 from phone_host.diagnostics.image_numbers import ImageEvidence
@@ -178,7 +178,7 @@ def test_a_rejected_rig_is_doubted_but_does_not_block() -> None:
     said = headline(used)
     assert said.grade is Grade.WARNING
     assert said.sentence.startswith("Depth may be wrong: the calibration itself was rejected")
-    assert [concern.doubt for concern in concerns(used)] == [Doubt.REJECTED_RIG]
+    assert [concern.code for concern in concerns(used)] == [Code.REJECTED_RIG]
     assert not depth_is_wrong(used)
     for text in (summary(used), run_page(used, None, Side.LEFT, ())):
         assert "rejected" in text
@@ -187,7 +187,7 @@ def test_a_rejected_rig_is_doubted_but_does_not_block() -> None:
 def test_what_was_not_used_makes_no_depth_doubtful_unless_somebody_lies() -> None:
     """Spoiled images are told with the doubts, and the depth of the others is right. Stamps from the future are no accident."""
     spoiled = replace(with_judged(GOOD, GOOD), spoiled_images=(("truncated", 2),))
-    assert [concern.doubt for concern in concerns(spoiled)] == [Doubt.SPOILED_IMAGES]
+    assert [concern.code for concern in concerns(spoiled)] == [Code.SPOILED_IMAGES]
     assert headline(spoiled).sentence.startswith("Depth looks right")
     lying = replace(with_judged(GOOD, GOOD), own_future=2)
     assert headline(lying).sentence.startswith("Depth may be wrong: 2 of")
@@ -209,7 +209,7 @@ def test_judgements_that_are_doubtful_for_unlike_reasons_do_not_cancel_out() -> 
     """One sparse, one with rows apart: neither holds in most, yet none was clean. The newest one's reason stands, in headline and report."""
     off = replace(evidence(), vertical_px=12.0, density=0.17)
     mixed = with_judged(replace(evidence(), density=0.1), off)
-    assert [concern.doubt for concern in concerns(mixed)] == [Doubt.VERTICAL_ERROR]
+    assert [concern.code for concern in concerns(mixed)] == [Code.VERTICAL_ERROR]
     assert headline(mixed).grade is Grade.BAD
     assert concerns(with_judged(off, GOOD)) == ()
 
@@ -331,5 +331,5 @@ def test_a_quarter_is_named_with_its_direction() -> None:
         "mount the wrong camera upright, or give the left camera rotate=90, or else the right camera rotate=270"
     )
     assert "rotate=90 or rotate=270" in remedy(lying, UPRIGHT, UPRIGHT)
-    other = Concern(Doubt.COVERED, "c", "r")
+    other = diagnose(Code.COVERED, "c", "r")
     assert with_final_options(other, (UPRIGHT, TURN_90)) is other

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Final
 
 from common.camera.base import CameraHealth, CameraState
+from common.diagnostic import Diagnostic
 from common.protocol.message import BoardCounts, RefusalReason
 from common.versions import PROTOCOL_VERSION
 from phone_host.accounts.link_account import Away, LinkAccount, SessionAccount
-from phone_host.diagnostics.concern import REJECTED_RIG, Concern
+from phone_host.diagnostics.codes import REJECTED_RIG
 from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.diagnostics.run_rules import arrival_concerns, gone_concerns, no_depth
 from phone_host.diagnostics.throughput import RunFigures, judge
@@ -81,7 +82,7 @@ def sentences() -> Iterator[str]:
     yield from map(told, timing_concerns(FAST))
     for name, (offset, own) in STAMPS.items():
         doubt = stamp_doubt(offset, own)
-        yield f"stamps, {name}: {doubt.why}\n    {doubt.remedy}"
+        yield f"stamps, {name}: {doubt.message}\n    {doubt.remedy}"
     for reason in (Disbelief.CLOCK, Disbelief.FUTURE):
         session = SessionAccount("s", BoardCounts(), BoardCounts(), received=100, disbelieved=Counter({reason: 3}))
         link = LinkAccount([session], clock_steps=2, suspects=deque([Suspects(session="s", first=1, last=7, frames=7)]))
@@ -95,7 +96,7 @@ def sentences() -> Iterator[str]:
         yield f"refused, version {protocol}: {problem}\n    {remedy}"
 
 
-def image_examples() -> Iterator[Concern]:
+def image_examples() -> Iterator[Diagnostic]:
     """One example of each doubt that the images raise."""
     sharp = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
     blind = replace(sharp, mean_level=3, bright_level=5, structure=0.3)
@@ -133,9 +134,9 @@ def image_examples() -> Iterator[Concern]:
     yield from gone_concerns(replace(run(1), away=(Away(3.0, 7.0, is_over=False),), camera=gone, last_s=5.2))
 
 
-def told(concern: Concern) -> str:
+def told(concern: Diagnostic) -> str:
     """A concern with its remedy."""
-    return f"concern, {concern.doubt.value}: {concern.sentence}\n    {concern.remedy}"
+    return f"concern, {concern.code}: {concern.message}\n    {concern.remedy}"
 
 
 def test_the_sentences_are_those_that_were_read_and_agreed_to() -> None:

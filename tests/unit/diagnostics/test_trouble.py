@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.errors import BusyBoardError, DataError
 from common.ledger import PairLedger
 from phone_host.accounts.link_account import Absence, Away, LinkAccount, LinkTally
-from phone_host.diagnostics.concern import Trouble, Troubles, trouble_of
 from phone_host.diagnostics.headline import Grade, headline
 from phone_host.diagnostics.run_rules import gone_concerns
 from phone_host.model import PairCounts, Side
@@ -26,12 +26,12 @@ from tests.unit.test_ledgerer import enter
 from tests.unit.test_pair_queue import MS
 
 SIDE = DataError("the right image is 370x1226 px: it lies on its side", "turn it upright: --rotate-right 90")
-BUSY = Trouble("the board is busy with another host", "stop that one first")
+BUSY = Diagnostic("the board is busy with another host", "stop that one first", Severity.FAIL)
 
 
 def test_the_error_that_ended_a_run_is_told_everywhere() -> None:
     """Eleven pairs were of one upright and one lying image: headline, report.json and page name that and its remedy."""
-    lying = trouble_of(SIDE)
+    lying = diagnostic_of(SIDE)
     counts = PairCounts(received=12, paired=11, taken=11)
     failed = replace(run(0), ended="failed", counts=counts, undecodable=11, failed_pairs=((lying, 11),), failure=lying)
     said = headline(failed)
@@ -50,7 +50,9 @@ def test_the_error_that_ended_a_run_is_told_everywhere() -> None:
 
 def test_an_error_after_some_pairs_comes_before_what_was_found_until_then() -> None:
     """The disk failed after 31 pairs: that is bad news, and what was measured is told behind it."""
-    said = headline(replace(run(31), ended="failed", failure=Trouble("the disk is gone", "plug it in")))
+    said = headline(
+        replace(run(31), ended="failed", failure=Diagnostic("the disk is gone", "plug it in", Severity.FAIL))
+    )
     assert said.grade is Grade.BAD
     assert said.sentence.startswith(
         "The run broke off: the disk is gone. Remedy: plug it in. Until then: this run meas"
@@ -63,35 +65,35 @@ def test_pairs_that_failed_are_the_reason_for_a_run_without_pairs() -> None:
     for error in (DataError("a", "b"), SIDE, SIDE, SIDE, SIDE):
         books.enter_failed(error)
     found = books.books().failed_pairs
-    assert found == ((trouble_of(SIDE), 4), (Trouble("a", "b"), 1))
+    assert found == ((diagnostic_of(SIDE), 4), (Diagnostic("a", "b", Severity.FAIL), 1))
     seen = replace(run(0), ended="stream_ended", undecodable=5, failed_pairs=found)
     assert headline(seen).sentence.startswith(f"No pair was processed: {SIDE.problem}")
 
 
 def test_reasons_without_number_take_bounded_memory() -> None:
     """Of 100 images of 100 sizes each is counted; beyond 16 different reasons they are counted together."""
-    troubles = Troubles()
+    ledgerer = Ledgerer()
     for width in range(100):
-        troubles.add(DataError(f"{width} px", "calibrate"))
-    counts = troubles.counts()
+        ledgerer.enter_failed(DataError(f"{width} px", "calibrate"))
+    counts = ledgerer.books().failed_pairs
     assert (len(counts), sum(count for _, count in counts), counts[0][1]) == (17, 100, 84)
 
 
 def test_a_mistake_of_the_program_is_named_as_one() -> None:
     """A ZeroDivisionError is nobody's camera; no control character of its text reaches the page."""
-    found = trouble_of(ZeroDivisionError("by\x1b[1m zero"))
-    assert found.problem == "the program itself failed (ZeroDivisionError: by\\x1b[1m zero)"
+    found = diagnostic_of(ZeroDivisionError("by\x1b[1m zero"))
+    assert found.message == "the program itself failed (ZeroDivisionError: by\\x1b[1m zero)"
 
 
 def test_a_busy_board_is_not_absent() -> None:
     """Another host has it: no word tells the user to start the board, neither at the end nor when it went away in between."""
     waiting = replace(run(0), refused=BUSY)
-    assert headline(waiting).sentence == f"No pair was processed: {BUSY.problem}. Remedy: {BUSY.remedy}."
-    busy = trouble_of(BusyBoardError(BUSY.problem, BUSY.remedy))
+    assert headline(waiting).sentence == f"No pair was processed: {BUSY.message}. Remedy: {BUSY.remedy}."
+    busy = diagnostic_of(BusyBoardError(BUSY.message, BUSY.remedy))
     assert headline(replace(run(0), ended="failed", failure=busy)).sentence == headline(waiting).sentence
     assert "no board came" in headline(run(0)).sentence
     (gone,) = gone_concerns(replace(run(1), away=(Away(3.0, 7.0, is_over=False),), refused=BUSY))
-    assert "did not come back, because the board is busy with another host" in gone.sentence
+    assert "did not come back, because the board is busy with another host" in gone.message
     assert gone.remedy == BUSY.remedy
 
 
@@ -102,7 +104,7 @@ def test_a_wait_says_at_once_that_the_board_is_busy() -> None:
     note = WaitingNote(["tcp://board:5555"], lambda: False, lambda: next(refusals), said.append)
     for _ in range(5):
         note.refresh()
-    assert said == [f"phone-host: waiting: {BUSY.problem}: {BUSY.remedy}"]
+    assert said == [f"phone-host: waiting: {BUSY.message}: {BUSY.remedy}"]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.camera.base import CameraHealth, CameraState
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.timing import Timing, stamp_doubt, timing_concerns
 from phone_host.model import UNMEASURED_NS, TimeOffset
 
@@ -20,11 +20,11 @@ STILL = Timing(time_skew_ns=16 * MS, uncertainty_ns=0.1 * MS, end_to_end_ns=80 *
     [
         (STILL, []),
         (replace(STILL, motion_px_s=31.0), []),  # 16 ms x 31 px/s = 0.496 px
-        (replace(STILL, motion_px_s=32.0), [Doubt.TIME_SKEW]),  # 0.512 px
+        (replace(STILL, motion_px_s=32.0), [Code.TIME_SKEW]),  # 0.512 px
         (replace(STILL, motion_px_s=300.0, time_skew_ns=0.1 * MS), []),
-        (replace(STILL, motion_px_s=300.0, time_skew_ns=0, uncertainty_ns=5 * MS), [Doubt.CLOCK]),
-        (replace(STILL, motion_px_s=410.0, time_skew_ns=0), [Doubt.AGE]),  # 80 ms x 410 px/s: 32.8 of 640 px
-        (replace(STILL, motion_px_s=1e4, uncertainty_ns=5 * MS), [Doubt.TIME_SKEW, Doubt.CLOCK, Doubt.AGE]),
+        (replace(STILL, motion_px_s=300.0, time_skew_ns=0, uncertainty_ns=5 * MS), [Code.CLOCK]),
+        (replace(STILL, motion_px_s=410.0, time_skew_ns=0), [Code.AGE]),  # 80 ms x 410 px/s: 32.8 of 640 px
+        (replace(STILL, motion_px_s=1e4, uncertainty_ns=5 * MS), [Code.TIME_SKEW, Code.CLOCK, Code.AGE]),
         (replace(STILL, motion_px_s=float("nan")), []),
         (
             replace(
@@ -38,15 +38,15 @@ STILL = Timing(time_skew_ns=16 * MS, uncertainty_ns=0.1 * MS, end_to_end_ns=80 *
         ),
     ],
 )
-def test_the_limits(timing: Timing, found: list[Doubt]) -> None:
+def test_the_limits(timing: Timing, found: list[Code]) -> None:
     """Half a pixel by time skew or clock, a twentieth of the width by age; unknown values cause no warning."""
-    assert [concern.doubt for concern in timing_concerns(timing)] == found
+    assert [concern.code for concern in timing_concerns(timing)] == found
 
 
 def warned(skew_ns: float, motion_px_s: float) -> bool:
     """Whether this time skew at this motion causes a warning; a warning has a remedy."""
     concerns = [*timing_concerns(replace(STILL, time_skew_ns=skew_ns, motion_px_s=motion_px_s))]
-    found = [concern for concern in concerns if concern.doubt is Doubt.TIME_SKEW]
+    found = [concern for concern in concerns if concern.code == Code.TIME_SKEW]
     assert all(concern.remedy for concern in found)
     return bool(found)
 
@@ -110,11 +110,11 @@ def test_what_is_not_known_of_the_stamps_adds_up(
 ) -> None:
     """An unmeasured time offset and an own camera's latency and jitter add up; if that is half a pixel, a warning names figure and remedy."""
     doubt = stamp_doubt(offset, own)
-    assert doubt.half_width_ns == half_width_ns
+    assert doubt.evidence == half_width_ns
     limit_px_s = 0.5e9 / half_width_ns
     calm = replace(STILL, time_skew_ns=0, uncertainty_ns=0, end_to_end_ns=0, stamps=doubt)
     assert not [*timing_concerns(replace(calm, motion_px_s=0.99 * limit_px_s))]
     (concern,) = timing_concerns(replace(calm, motion_px_s=1.01 * limit_px_s))
-    assert concern.doubt is Doubt.STAMPS
-    assert said in concern.sentence
+    assert concern.code == Code.STAMPS
+    assert said in concern.message
     assert remedy in concern.remedy

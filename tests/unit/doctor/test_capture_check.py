@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from common.camera_identity import CameraIdentity
-from common.doctor.finding import Grade
+from common.diagnostic import Severity
 from common.errors import DataError
 from phone_host.doctor.camera_check.check import ENOUGH, CaptureCheck, Plan, Stage, rigidity_of
 from phone_host.doctor.camera_check.look import FRAMES, Reading, Window, guessed_lens, look
@@ -41,10 +41,10 @@ def shots(times_ms: list[float], delay_ms: float = 30.0, **given: float) -> list
     ]
 
 
-def grades(pace: Pace, rigidity: Rigidity | None = None) -> dict[str, Grade]:
+def grades(pace: Pace, rigidity: Rigidity | None = None) -> dict[str, Severity]:
     """What each finding of a report comes to."""
     report = CaptureReport(source=PHONE, pace=pace, rigidity=rigidity or rigidity_of([RIGID] * 3))
-    return {each.what: each.verdict for each in findings_of(report)}
+    return {each.code: each.severity for each in findings_of(report)}
 
 
 def even(hz: float, seconds: float = 8.0) -> list[float]:
@@ -58,7 +58,7 @@ def test_an_even_camera_is_fine() -> None:
     assert pace.rate_hz == pytest.approx(30)
     assert pace.jitter_ms < 0.01
     assert pace.delay_ms == pytest.approx(30)
-    assert set(grades(pace).values()) == {Grade.OK}
+    assert set(grades(pace).values()) == {Severity.OK}
     assert list(grades(pace)) == ["rate", "stamps", "exposure", "shutter", "slow-down", "stabilisation"]
 
 
@@ -67,10 +67,10 @@ def test_half_the_rate_in_the_dark_is_told_with_light_as_the_remedy() -> None:
     dark = pace_of(shots(even(15), exposure_ms=60, brightness=30), 30.0)
     report = CaptureReport(source=PHONE, pace=dark, rigidity=Rigidity())
     rate, _, exposure, *_ = findings_of(report)
-    assert rate.verdict is exposure.verdict is Grade.WARN
+    assert rate.severity is exposure.severity is Severity.WARN
     assert "light" in rate.remedy
     slow = findings_of(replace(report, pace=pace_of(shots(even(24)), 30.0)))[0]
-    assert slow.verdict is Grade.WARN
+    assert slow.severity is Severity.WARN
     assert "light" not in slow.remedy
 
 
@@ -81,7 +81,7 @@ def test_gaps_are_counted_as_missing_frames_and_not_as_jitter() -> None:
     assert pace.missing == pytest.approx(240 / 5, abs=1)
     assert pace.usual_hz == pytest.approx(30)
     assert pace.jitter_ms < 0.01
-    assert grades(pace)["rate"] is Grade.WARN
+    assert grades(pace)["rate"] is Severity.WARN
 
 
 def test_jitter_is_that_of_one_stamp() -> None:
@@ -90,15 +90,15 @@ def test_jitter_is_that_of_one_stamp() -> None:
     times = np.sort(np.array(even(20, 60)) + random.normal(0, 6, 1200)).tolist()
     pace = pace_of(shots(times), 20.0)
     assert pace.jitter_ms == pytest.approx(2 * 6, rel=0.15)
-    assert grades(pace)["stamps"] is Grade.WARN
+    assert grades(pace)["stamps"] is Severity.WARN
     assert pace_of(shots([*even(30), 100.0]), 30.0).backwards == 1
-    assert grades(pace_of(shots([*even(30), 100.0]), 30.0))["stamps"] is Grade.WARN
+    assert grades(pace_of(shots([*even(30), 100.0]), 30.0))["stamps"] is Severity.WARN
 
 
 def test_a_phone_that_grows_hot_is_told() -> None:
     """A rate that falls over the minute, or frames that arrive ever later, are a slow-down."""
     slower = [*even(30, 20), *(20_000 + at for at in even(20, 20))]
-    assert grades(pace_of(shots(slower), math.nan))["slow-down"] is Grade.WARN
+    assert grades(pace_of(shots(slower), math.nan))["slow-down"] is Severity.WARN
     later = [
         *shots(even(30, 10), 30),
         *(
@@ -106,7 +106,7 @@ def test_a_phone_that_grows_hot_is_told() -> None:
             for each in shots(even(30, 10), 80)
         ),
     ]
-    assert grades(pace_of(later, math.nan))["slow-down"] is Grade.WARN
+    assert grades(pace_of(later, math.nan))["slow-down"] is Severity.WARN
 
 
 @pytest.mark.parametrize("times", [[], [0.0], [5.0, 5.0], [0.0, 33.0, 66.0]])
@@ -115,7 +115,7 @@ def test_few_frames_say_little_and_break_nothing(times: list[float]) -> None:
     pace = pace_of(shots(times), 30.0)
     assert pace.frames == len(times)
     if len(set(times)) < 2:
-        assert grades(pace) == {"rate": Grade.WARN}
+        assert grades(pace) == {"rate": Severity.WARN}
 
 
 def passing(number: int) -> Image:
@@ -206,8 +206,8 @@ def test_all_stretches_together_give_the_verdict(
     """Three stretches must tell something; one that contradicts three others is overruled, two of five are not; before a wall only a strong warp tells."""
     found = rigidity_of(readings)
     assert (found.warping, found.unseen) == (verdict, unseen)
-    grade = Grade.OK if verdict is Warping.GOOD else Grade.WARN
-    assert warp_finding(found).verdict is grade
+    grade = Severity.OK if verdict is Warping.GOOD else Severity.WARN
+    assert warp_finding(found).severity is grade
 
 
 def test_rows_of_one_moment_are_a_programs_work() -> None:
@@ -216,13 +216,13 @@ def test_rows_of_one_moment_are_a_programs_work() -> None:
     assert rigidity_of(rows).warping is Warping.GOOD
     found = rigidity_of(rows, by_phone=True)
     assert found.warping is Warping.STABILISED
-    assert "one moment" in warp_finding(found).text
+    assert "one moment" in warp_finding(found).message
     assert rigidity_of([RIGID] * 3, by_phone=True).warping is Warping.GOOD
 
 
 def test_a_missing_calibration_and_a_global_shutter_are_named() -> None:
     """A good film without a lens says what is missing; rows that are read at once are called so."""
-    assert "once the lens is calibrated" in warp_finding(rigidity_of([RIGID] * 3)).text
+    assert "once the lens is calibrated" in warp_finding(rigidity_of([RIGID] * 3)).message
     assert (
         "global"
         in findings_of(
@@ -231,7 +231,7 @@ def test_a_missing_calibration_and_a_global_shutter_are_named() -> None:
                 pace=pace_of(shots(even(30)), 30),
                 rigidity=rigidity_of([replace(RIGID, readout_ms=0.4)] * 3),
             )
-        )[3].text
+        )[3].message
     )
 
 
@@ -253,26 +253,26 @@ def test_a_report_survives_its_file_and_belongs_to_one_camera(tmp_path: Path) ->
         replace(PHONE, camera=CameraIdentity("browser", "front")),
     ]
     assert not any(holds_for(kept.source, each) for each in others)
-    verdicts = [stored_finding(each, PHONE, has_lens=True).verdict for each in (None, kept)]
-    assert verdicts == [Grade.WARN, Grade.WARN]
-    assert "never" in stored_finding(None, PHONE, has_lens=True).text
-    assert "Firefox" in stored_finding(kept, others[0], has_lens=True).text
+    verdicts = [stored_finding(each, PHONE, has_lens=True).severity for each in (None, kept)]
+    assert verdicts == [Severity.WARN, Severity.WARN]
+    assert "never" in stored_finding(None, PHONE, has_lens=True).message
+    assert "Firefox" in stored_finding(kept, others[0], has_lens=True).message
 
 
 def test_a_check_before_the_calibration_is_kept_elsewhere_and_made_again_after_it(tmp_path: Path) -> None:
     """Without a lens a rigid film is good until there is a calibration, which would show a crop; a warped one is warped before and after."""
     assert capture_path(None, tmp_path / "data").parent == tmp_path / "data"
     early = CaptureReport(source=PHONE, pace=pace_of(shots(even(30)), math.nan), rigidity=rigidity_of([RIGID] * 3))
-    assert stored_finding(early, PHONE, has_lens=False).verdict is Grade.OK
+    assert stored_finding(early, PHONE, has_lens=False).severity is Severity.OK
     now = stored_finding(early, PHONE, has_lens=True)
-    assert (now.verdict, now.remedy) == (Grade.WARN, CHECK_AGAIN)
-    assert "before it was calibrated" in now.text
+    assert (now.severity, now.remedy) == (Severity.WARN, CHECK_AGAIN)
+    assert "before it was calibrated" in now.message
     late = replace(early, rigidity=replace(early.rigidity, knows_lens=True))
-    assert stored_finding(late, PHONE, has_lens=True).verdict is Grade.OK
+    assert stored_finding(late, PHONE, has_lens=True).severity is Severity.OK
     warped = replace(early, rigidity=rigidity_of([WARPED] * 3))
     said = [stored_finding(warped, PHONE, has_lens=has_lens) for has_lens in (False, True)]
     assert said[0] == said[1]
-    assert "warped or cropped" in said[0].text
+    assert "warped or cropped" in said[0].message
 
 
 @pytest.mark.parametrize(

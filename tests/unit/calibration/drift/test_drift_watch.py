@@ -8,7 +8,7 @@ import pytest
 
 from phone_host.calibration.drift.rows import RowModel, Sighting
 from phone_host.calibration.drift.watch import DriftWatch, Trends
-from phone_host.diagnostics.concern import Doubt
+from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.drift import drift_concerns
 from phone_host.model import AS_CALIBRATED, ChangeKind, Departure, DriftState
 from phone_host.stereo.rectify import rectify_rig
@@ -280,7 +280,7 @@ def test_a_rig_that_stands_far_away_is_told_once_as_a_turn(made: Sight, axis: in
     drift = watch.drift
     assert (drift.state, watch.overlay) == (DriftState.BEYOND, AS_CALIBRATED)
     assert drift.departure.turn_rad[axis] == pytest.approx(turn[axis], rel=0.05)
-    assert [concern.doubt for concern in drift_concerns(drift)] == [Doubt.RIG_MOVED]
+    assert [concern.code for concern in drift_concerns(drift)] == [Code.RIG_MOVED]
 
 
 def test_a_focus_beyond_bounds_is_told_as_a_focus(made: Sight) -> None:
@@ -289,5 +289,5 @@ def test_a_focus_beyond_bounds_is_told_as_a_focus(made: Sight) -> None:
     shown(watch, made, AS_CALIBRATED, range(6))
     shown(watch, made, Departure(focal=1.04), range(6, 10))
     [concern] = drift_concerns(watch.drift)
-    assert (watch.drift.state, concern.doubt) == (DriftState.BEYOND, Doubt.FOCUS_CHANGED)
-    assert "too far to be corrected" in concern.sentence
+    assert (watch.drift.state, concern.code) == (DriftState.BEYOND, Code.FOCUS_CHANGED)
+    assert "too far to be corrected" in concern.message
