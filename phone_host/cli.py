@@ -1,27 +1,20 @@
-"""phone-host: the host's command.
-
-Every start imports the options of all verbs, which are light. A verb's code is imported only when the verb runs.
-"""
+"""phone-host: the host's command. A verb's module is imported when that verb is parsed."""
 
 import argparse
 import importlib
 import sys
-from collections.abc import Sequence
-from typing import Final, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any, Final
 
 from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
 from common.program.interrupts import interruptible
 from common.program.invocation import as_found
+from common.program.request import add_options, read_request
 from phone_host.verbs.calibrate import arguments as calibrate
 from phone_host.verbs.calibrate_time import arguments as calibrate_time
 from phone_host.verbs.demo import arguments as demo
-from phone_host.verbs.doctor import arguments as doctor
-from phone_host.verbs.export import arguments as export
-from phone_host.verbs.keys import arguments as keys
 from phone_host.verbs.measure import arguments as measure
-from phone_host.verbs.pair import arguments as pair
 from phone_host.verbs.print import arguments as print_
-from phone_host.verbs.printcheck import arguments as printcheck
 from phone_host.verbs.quality import arguments as quality
 from phone_host.verbs.record import arguments as record
 from phone_host.verbs.relief import arguments as relief
@@ -29,22 +22,10 @@ from phone_host.verbs.run import arguments as run
 from phone_host.verbs.scan import arguments as scan
 from phone_host.verbs.serve import arguments as serve
 from phone_host.verbs.sessions import arguments as sessions
-from phone_host.verbs.settings import arguments as settings
 from phone_host.verbs.stereo import arguments as stereo
 from phone_host.verbs.target import arguments as target
 
-
-class Arguments(Protocol):
-    """The light half of a verb: what the help and the parser need."""
-
-    SUMMARY: str
-    EXAMPLES: str
-
-    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Declare the verb's options."""
-
-
-_VERBS: Final[dict[str, Arguments]] = {
+_VERBS: Final[dict[str, Any]] = {
     "demo": demo,
     "serve": serve,
     "run": run,
@@ -55,17 +36,18 @@ _VERBS: Final[dict[str, Arguments]] = {
     "calibrate-time": calibrate_time,
     "stereo": stereo,
     "scan": scan,
-    "export": export,
+    "export": "write a scan or mesh as STL, OBJ, 3DS, PLY, 3MF or GLB for other programs and printers",
     "relief": relief,
-    "printcheck": printcheck,
+    "printcheck": "tell whether a scan or mesh can be printed, and what to do if not",
     "print": print_,
     "measure": measure,
     "quality": quality,
-    "pair": pair,
-    "keys": keys,
-    "doctor": doctor,
-    "settings": settings,
+    "pair": "make this host and a board known to each other, with the code that the board shows",
+    "keys": "list the boards that this host trusts, or change the list or this host's key",
+    "doctor": "check this machine, its camera, the board, the calibration and the disk",
+    "settings": "print each setting, its value and where the value comes from",
 }
+"""What each verb does. A verb's module is imported when that verb is parsed."""
 
 _NATIVE: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
@@ -119,31 +101,67 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Import the command half of the verb, and run it. The only place that imports by a verb's name."""
+    """Run the verb."""
     if options.verb is None:
         print(as_found(_NEXT_STEPS), end="")
         return 0
-    if options.verb not in _WITHOUT_NUMPY:
-        importlib.import_module("numpy")  # before OpenCV, which prints three lines on stdout where numpy is missing
-    command = importlib.import_module(f"phone_host.verbs.{options.verb.replace('-', '_')}.command")
     from phone_host.output.folder_lock import command_locks  # noqa: PLC0415 - the help needs none
 
+    run, kind = command_of(options.verb)
+    request = options if kind is argparse.Namespace else read_request(kind, vars(options))
     with interruptible(native=options.verb in _NATIVE), command_locks():
-        code: int = command.run(options)
-    return code
+        return run(request)
+
+
+def command_of(verb: str) -> tuple[Callable[[Any], int], type]:
+    """Import a verb's module; return what runs it, and what that takes."""
+    if verb not in _WITHOUT_NUMPY:
+        importlib.import_module("numpy")  # before OpenCV, which prints three lines on stdout where numpy is missing
+    module = importlib.import_module(_module_of(verb))
+    return module.run, next(iter(module.run.__annotations__.values()))
+
+
+def _module_of(verb: str) -> str:
+    name = f"phone_host.verbs.{verb.replace('-', '_')}"
+    return name if isinstance(_VERBS[verb], str) else f"{name}.command"
+
+
+class _VerbParser(ExamplesFirstParser):
+    """The parser of one verb, which learns its options when it is first used."""
+
+    _is_known = False
+
+    def parse_known_args(  # type: ignore[override]  # of one type only
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """See ExamplesFirstParser."""
+        self.learn()
+        return super().parse_known_args(args, namespace)
+
+    def learn(self) -> None:
+        """Import the verb's module, and declare what it takes."""
+        if self._is_known:
+            return
+        self._is_known, verb = True, self.prog.split()[-1]
+        if isinstance(_VERBS[verb], str):
+            run, kind = command_of(verb)
+            self.description = f"examples:\n{run.__globals__['EXAMPLES']}"
+            add_options(self, kind)
+        else:
+            self.description = f"examples:\n{_VERBS[verb].EXAMPLES}"
+            _VERBS[verb].add_arguments(self)
+        add_version_option(self)
+        self.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+        self.add_argument("--debug", action="store_true", help="show tracebacks")
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return the parser with all verbs and their options."""
+    """Return the parser with all verbs."""
     made = ExamplesFirstParser("phone-host", description=_EXAMPLES)
     add_version_option(made)
-    verbs = made.add_subparsers(dest="verb", metavar="VERB")
-    for name, arguments in _VERBS.items():
-        verb = verbs.add_parser(name, help=arguments.SUMMARY, description=f"examples:\n{arguments.EXAMPLES}")
-        arguments.add_arguments(verb)
-        add_version_option(verb)
-        verb.add_argument("--json", action="store_true", help="print one JSON object on stdout")
-        verb.add_argument("--debug", action="store_true", help="show tracebacks")
+    verbs = made.add_subparsers(dest="verb", metavar="VERB", parser_class=_VerbParser)
+    for name, summary in _VERBS.items():
+        verbs.add_parser(name, help=summary if isinstance(summary, str) else summary.SUMMARY)
     return made
 
 

@@ -1,11 +1,11 @@
 """Resolve the host's settings from file, environment and options, and reject those that `run` could not use."""
 
-import argparse
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from common.errors import SettingsError
 from common.keys import KeyFolder, default_folder
@@ -33,11 +33,11 @@ _MOST_MEGAPIXELS: Final = 1024
 """OpenCV's own limit, 2^30 pixels (CV_IO_MAX_IMAGE_PIXELS)."""
 
 
-def resolve_settings(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
+def resolve_settings(given: Mapping[str, Any]) -> Resolved[PhoneHostSettings]:
     """Resolve the settings from file, environment and a verb's options. Options named like a setting are used."""
-    given = {item.name: getattr(options, item.name, None) for item in fields(PhoneHostSettings)}
-    given["link"] = tuple(given["link"]) if given["link"] else None
-    resolved = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, options.config, given, aside=_ASIDE)
+    options = {item.name: given.get(item.name) for item in fields(PhoneHostSettings)}
+    options["link"] = tuple(options["link"]) if options["link"] else None
+    resolved = resolve(PhoneHostSettings, ENVIRONMENT_PREFIX, given["config"], options, aside=_ASIDE)
     if matcher_is_given(resolved):
         return resolved
     return replace(resolved, values=replace(resolved.values, matcher=default_matcher().value))

@@ -17,6 +17,8 @@ _NAME: Final = re.compile(
 )
 _EXAMPLES: Final = "width, depth and height in mm, as in 220,220,250, with the origin elsewhere 200,200,300@centre or 250,210,210@0,-5, of a round bed round:200,300"
 
+BED_HELP: Final = "what the printer holds: width, depth and height, mm; @centre or @X,Y behind them says where the coordinates begin, round:DIAMETER,HEIGHT a round one"
+
 _MIN_CORNERS, _MAX_CORNERS = 3, 1000
 _ROUND_CORNERS: Final = 16
 """A slicer writes a round bed as a polygon of 36 or more corners, others have 4 to 8."""
@@ -72,24 +74,25 @@ class Bed:
 USUAL_BED: Final = Bed((220.0, 220.0, 250.0))
 
 
-def parse_bed(text: str) -> Bed:
+def parse_bed(text: str, option: str = "--bed") -> Bed:
     """Read a bed.
 
     Args:
         text: "X,Y,Z" (width, depth, height, mm) or "round:D,Z"; behind it "@centre", or "@X0,Y0", the smallest
             coordinates on it. Without it a rectangle begins at 0,0 and a round bed has 0,0 in its middle.
+        option: the option, for errors.
 
     Raises:
         SettingsError: it is none.
     """
     found = _NAME.fullmatch(text.strip().lower().replace(" ", "").replace("mm", ""))
     if found is None:
-        raise SettingsError(f"--bed is {text!r}", f"give {_EXAMPLES}")
+        raise SettingsError(f"{option} is {text!r}", f"give {_EXAMPLES}")
     is_round = found[4] is not None
     size = (found[4], found[4], found[5]) if is_round else (found[1], found[2], found[3])
     width, depth, height = map(float, size)
     if not _is_believable(width, depth, height):
-        raise SettingsError(f"--bed is {text!r}", "give lengths above 0 and up to 10000 mm")
+        raise SettingsError(f"{option} is {text!r}", "give lengths above 0 and up to 10000 mm")
     if found[7] is not None:
         origin = float(found[7]), float(found[8])
     else:

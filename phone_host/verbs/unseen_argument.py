@@ -1,6 +1,9 @@
 """The option that says what becomes of surface that no view measured. Light."""
 
 import argparse
+from typing import Final
+
+UNSEEN_HELP: Final = "surface that no view measured: fill it in with colours from its border, fill it in pink, or cut it, which leaves the surface open"
 
 
 def add_unseen_argument(
@@ -18,6 +21,5 @@ def add_unseen_argument(
         "--unseen",
         choices=("fill", "pink", "cut"),  # of `model.unseen.UnseenSurface`, which is not light
         default=default,
-        help=f"{when}surface that no view measured: fill it in with colours from its border, fill it in pink, or cut it, which leaves the surface open"
-        f" ({otherwise})",
+        help=f"{when}{UNSEEN_HELP} ({otherwise})",
     )

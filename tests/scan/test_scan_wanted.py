@@ -1,7 +1,5 @@
 """What is wanted of a scan: the page's words mean what the command's options mean, and what does not go together is refused in one line."""
 
-import argparse
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,6 +7,7 @@ import pytest
 from common.errors import SettingsError
 from phone_host import api
 from phone_host.cli import main
+from phone_host.cli import parser as parser_of
 from phone_host.model.unseen import UnseenSurface
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.mat import USUAL_MAT, parse_mat
@@ -17,9 +16,8 @@ from phone_host.scan.pose_source import TablePoses, VisualPoses
 from phone_host.scan.turntable import TurntablePoses
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.verbs.export.arguments import add_arguments
-from phone_host.verbs.scan.arguments import add_model_arguments
 from phone_host.verbs.serve.page_scan import asked_scan
+from tests.support.requests import verbs_of
 
 
 def test_the_page_wants_what_the_command_wants() -> None:
@@ -36,11 +34,10 @@ def test_the_page_wants_what_the_command_wants() -> None:
         asked_scan({"turntable": "1", "mat": USUAL_MAT})
 
 
-@pytest.mark.parametrize("add", [add_model_arguments, add_arguments], ids=["scan", "export"])
-def test_unseen_takes_each_choice_and_no_other(add: Callable[[argparse.ArgumentParser], None]) -> None:
+@pytest.mark.parametrize("verb", ["scan", "export"])
+def test_unseen_takes_each_choice_and_no_other(verb: str) -> None:
     """Scan and export offer the values of the choice, in its order."""
-    parser = argparse.ArgumentParser()
-    add(parser)
+    parser = verbs_of(parser_of())[verb]
     assert f"--unseen {{{','.join(each.value for each in UnseenSurface)}}}" in parser.format_help()
 
 

@@ -1,7 +1,6 @@
 """Which matcher is used when nobody names one, and what summaries say of it."""
 
-import argparse
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,16 +50,12 @@ def test_tandem_without_its_library_is_refused_with_a_remedy(tmp_path: Path) -> 
     assert isinstance(required(native()), Library)
 
 
-def _options(**given: object) -> argparse.Namespace:
-    return argparse.Namespace(**{"config": None, **{item.name: None for item in fields(PhoneHostSettings)}, **given})
-
-
 def test_the_settings_name_the_matcher_that_is_used() -> None:
     """The setting nobody gave shows the default matcher's name, with its origin; a name that was given stays."""
-    usual = resolve_settings(_options())
+    usual = resolve_settings({"config": None})
     assert usual.values.matcher == PREFERRED.value
     assert not matcher_is_given(usual)
-    named = resolve_settings(_options(matcher="block"))
+    named = resolve_settings({"config": None, "matcher": "block"})
     assert named.values.matcher == "block"
     assert matcher_is_given(named)
     assert resolve(PhoneHostSettings, "NONE", None, {}).values.matcher == ""
@@ -69,7 +64,7 @@ def test_the_settings_name_the_matcher_that_is_used() -> None:
 def test_an_empty_name_in_the_environment_is_no_default(monkeypatch: pytest.MonkeyPatch) -> None:
     """A variable that is set to nothing is a mistake, as any unknown name."""
     monkeypatch.setenv("PHONE_HOST_MATCHER", "")
-    assert resolve_settings(_options()).values.matcher == ""
+    assert resolve_settings({"config": None}).values.matcher == ""
 
 
 def test_the_note_of_a_run_stands_in_its_summary_once_and_in_its_report() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import board_agent.cli
 import phone_host.bench.cli
 import phone_host.cli
+from tests.support.requests import verbs_of
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "options.txt"
 PARSERS = (phone_host.cli.parser, board_agent.cli.parser, phone_host.bench.cli.parser)
@@ -29,14 +30,10 @@ def described(action: argparse.Action) -> str:
 
 def options(parser: argparse.ArgumentParser) -> Iterator[str]:
     """The options of a program and its verbs, sorted: their order and groups may change."""
-    found = []
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for verb in action.choices.values():
-                yield from options(verb)
-        else:
-            found.append(f"{parser.prog} {described(action)}")
-    yield from sorted(found)
+    for verb in verbs_of(parser).values():
+        yield from options(verb)
+    own = [action for action in parser._actions if not isinstance(action, argparse._SubParsersAction)]
+    yield from sorted(f"{parser.prog} {described(action)}" for action in own)
 
 
 def current() -> str:

@@ -210,7 +210,7 @@ def wanted_of(*words: str, core: StereoCore | None = None) -> BudgetWanted | Non
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     options = parser.parse_args(words)
-    resolved = resolve_settings(options)
+    resolved = resolve_settings(vars(options))
     check(resolved.values)
     return budget_wanted(options, resolved, core or settings_core())
 
@@ -262,7 +262,7 @@ def test_a_budget_without_depth_is_refused() -> None:
     add_arguments(parser)
     options = parser.parse_args(["--budget", "30"])
     with pytest.raises(SettingsError, match="without --calibration or --rectified"):
-        budget_wanted(options, resolve_settings(options), None)
+        budget_wanted(options, resolve_settings(vars(options)), None)
 
 
 def test_a_budget_may_stand_in_the_settings_file(tmp_path: Path) -> None:
@@ -276,7 +276,7 @@ def test_a_budget_may_stand_in_the_settings_file(tmp_path: Path) -> None:
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     options = parser.parse_args(["--config", str(file)])
-    assert budget_wanted(options, resolve_settings(options), None) is None
+    assert budget_wanted(options, resolve_settings(vars(options)), None) is None
 
 
 def test_counts_of_pixels_go_on_over_changes() -> None:

@@ -23,6 +23,7 @@ from common.program.quantities import (
 )
 from phone_host.bench.cases import Size, parse_qualities, parse_rates, parse_sizes
 from phone_host.settings import most_pixels, resolve_settings
+from tests.support.requests import verbs_of
 
 Parser = Callable[[], argparse.ArgumentParser]
 HOST, BOARD, BENCH = phone_host.cli.parser, board_agent.cli.parser, phone_host.bench.cli.parser
@@ -96,10 +97,7 @@ def test_no_option_for_a_time_is_forgotten() -> None:
     """Every option whose help names seconds or milliseconds takes units."""
     forgotten = []
     for parser in (HOST(), BOARD(), BENCH()):
-        parsers = [
-            parser,
-            *(verb for item in parser._actions if isinstance(item.choices, dict) for verb in item.choices.values()),
-        ]
+        parsers = [parser, *verbs_of(parser).values()]
         actions = [
             (one.prog, action)
             for one in parsers
@@ -117,12 +115,12 @@ def test_files_and_variables_take_units(tmp_path: Path, monkeypatch: pytest.Monk
     file = tmp_path / "host.toml"
     for written in ('tolerance = "5ms"', "tolerance = 5", 'tolerance = "0.005 s"'):
         file.write_text(written)
-        assert resolve_settings(HOST().parse_args(["settings", "--config", str(file)])).values.tolerance == 5
+        assert resolve_settings({"config": file}).values.tolerance == 5
     file.write_text('tolerance = "wide"')
     with pytest.raises(SettingsError, match=r"tolerance in .*host.toml is 'wide'"):
-        resolve_settings(HOST().parse_args(["settings", "--config", str(file)]))
+        resolve_settings({"config": file})
     monkeypatch.setenv("PHONE_HOST_TOLERANCE", "7ms")
-    assert resolve_settings(HOST().parse_args(["settings"])).values.tolerance == 7
+    assert resolve_settings({"config": None}).values.tolerance == 7
     monkeypatch.setenv("BOARD_AGENT_IDLE_AFTER", "2min")
     assert board_agent.settings.resolve_settings(BOARD().parse_args(["settings"])).values.idle_after == 120
 

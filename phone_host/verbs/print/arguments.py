@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from phone_host.verbs.printer_bed import BED_HELP
+from phone_host.printers.bed import BED_HELP
 
 SUMMARY = "slice a model, or take G-code, and send it to a 3D printer"
 

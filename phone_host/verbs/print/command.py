@@ -19,6 +19,7 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.output.json_text import json_text
 from phone_host.printers.announced_printers import SERVICES, FoundPrinter, printers_of
+from phone_host.printers.bed import parse_bed
 from phone_host.printers.door import Job, Wishes
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, is_gcode
@@ -28,7 +29,6 @@ from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import Slicer, SlicingWanted
 from phone_host.run.model_job import PreparedPrint, prepare_print
 from phone_host.run.progress_bar import busy_bar, share_bar, step_bar
-from phone_host.verbs.printer_bed import bed_of
 
 _STEP_S: Final = 0.1
 
@@ -43,7 +43,11 @@ def run(options: argparse.Namespace) -> int:
     slicer = None if options.slicer is None else Slicer(options.slicer)
     if slicer is not None and is_gcode(options.what):
         raise SettingsError("--slicer is for models", f"leave it out, or give a model, not {options.what}")
-    wanted = Wanted(SlicingWanted(bed_of(options), options.profile, slicer), options.unit, options.up)
+    wanted = Wanted(
+        SlicingWanted(None if options.bed is None else parse_bed(options.bed), options.profile, slicer),
+        options.unit,
+        options.up,
+    )
     with ExitStack() as kept:
         with step_bar("reading", None) as watcher:
             prepared = kept.enter_context(

@@ -39,7 +39,7 @@ from phone_host.verbs.output_folders import require_alone
 
 def run(options: argparse.Namespace) -> int:
     """Record until stopped, until the time is over, or until a stream ends."""
-    found = resolve_settings(options)
+    found = resolve_settings(vars(options))
     settings = found.values
     check(settings)
     if not settings.camera:

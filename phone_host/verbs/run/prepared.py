@@ -213,7 +213,7 @@ def checked(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
     Raises:
         SettingsError: a setting or an option is not valid.
     """
-    found = resolve_settings(options)
+    found = resolve_settings(vars(options))
     check(found.values)
     _check_numbers(options)
     depth_wanted(options)

@@ -6,7 +6,6 @@ never some of both; results of a part of the pairs may lie beside the earlier on
 """
 
 import contextlib
-import importlib
 import json
 import os
 import random
@@ -20,7 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from phone_host.cli import main
+from phone_host.cli import command_of, main
 from phone_host.output.result_files import claim
 from tests.support.killed_at import Ending, killed_at
 from tests.system.hostile.attack import Attack, Outcome, Rounds
@@ -210,7 +209,7 @@ def prepared(folder: Path) -> Iterator[tuple[tuple[Path, Path], Path]]:
         "run",
         "sessions",
     ):
-        importlib.import_module(f"phone_host.verbs.{verb}.command")
+        command_of(verb)
     for given, turn in zip(inputs, (False, True), strict=True):
         given.mkdir()
         in_child(partial(write_inputs, given, is_other=turn))

@@ -1,6 +1,6 @@
 """phone-host printcheck: whether a scan or mesh can be printed."""
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import CHECK_FAILED
+from common.program.request import Request, option
 from common.program.terminal import say
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
@@ -20,35 +21,76 @@ from phone_host.output.meshes.printable_view import picture
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model
 from phone_host.output.upright import upright_model
-from phone_host.printers.bed import USUAL_BED
+from phone_host.printers.bed import BED_HELP, USUAL_BED, Bed, parse_bed
 from phone_host.run.progress_bar import step_bar
 from phone_host.verbs.output_folders import require_alone, require_folder, written_together
-from phone_host.verbs.printer_bed import bed_of
 from phone_host.verbs.units import length_mm
 
+EXAMPLES = """  phone-host printcheck scan                          # scan: the folder that phone-host scan wrote
+  phone-host printcheck part.stl --unit mm --bed 180,180,180 --out print    # and draws what is wrong
+  phone-host printcheck scan --fix --out print        # cuts a base, drops crumbs, scales; says what it did
+"""
 
-def run(options: argparse.Namespace) -> int:
+
+def _wall_mm(text: str, name: str) -> float:
+    return length_mm(text, name, "0.8mm")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintcheckRequest(Request):
+    """What printcheck can be told."""
+
+    model: str = option(metavar="MODEL", help="the folder of a scan, or a mesh: .ply, .stl, .obj, .glb, .3mf")
+    unit: str | None = option(
+        "--unit", choices=("m", "mm"), help="unit of a mesh file of another program (default m; our own files say it)"
+    )
+    up: str | None = option(
+        "--up",
+        choices=("z", "y", "-y"),
+        help="axis of the model that points up (default: -y or y for a scan in the camera's axes, as its report says; z otherwise)",
+    )
+    bed: Bed | None = option("--bed", read=parse_bed, metavar="X,Y,Z", help=f"{BED_HELP} (default 220,220,250)")
+    wall_mm: float = option(
+        "--wall", read=_wall_mm, default="0.8mm", metavar="MM", help="least thickness of a wall (default 0.8mm)"
+    )
+    overhang_deg: float = option(
+        "--overhang",
+        type=float,
+        default=45.0,
+        metavar="DEG",
+        help="what hangs over by more needs supports (default 45)",
+    )
+    fix: bool = option("--fix", action="store_true", help="write a mended model, and say what was done")
+    out: Path | None = option(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder for a picture of what is wrong and for the mended model (default: nothing is written)",
+    )
+
+
+def run(request: PrintcheckRequest) -> int:
     """Check the model, draw what is wrong, mend it if asked, and check what came of that."""
-    printer = _printer(options)
-    if options.out is not None:
-        require_folder(options.out)
-    elif options.fix:
+    printer = _printer(request)
+    if request.out is not None:
+        require_folder(request.out)
+    elif request.fix:
         raise SettingsError("--fix writes a mended model, but no --out is given", "add --out DIR")
-    upright = upright_model(Path(options.model), options.unit, options.up)
+    upright = upright_model(Path(request.model), request.unit, request.up)
     model, points = upright.model, upright.points_mm
     triangles = model.solid.triangles
     with step_bar("edges", None) as watcher:
         found = problems(points, triangles, printer, watcher.say)
-        mended = _mended(points, triangles, printer, found) if options.fix else None
+        mended = _mended(points, triangles, printer, found) if request.fix else None
         left = found if mended is None else problems(mended.points_mm, mended.triangles, printer, watcher.say)
         paths: list[str] = []
-        if options.out is not None:
+        if request.out is not None:
             watcher.say("drawing")
             files = {f"{model.stem}-printcheck.png": _png(points, triangles, found)}
             if mended is not None:
                 files[f"{model.stem}-fixed.stl"] = _stl(mended)
-            paths = _written(options.out, files)
-    if options.json:
+            paths = _written(request.out, files)
+    if request.as_json:
         print(json_text(_told(model, found, left, mended, paths)))
     else:
         say(_lines(found, left, mended, paths))
@@ -69,12 +111,11 @@ def _written(out: Path, files: dict[str, bytes]) -> list[str]:
     return [str(out / name) for name in files]
 
 
-def _printer(options: argparse.Namespace) -> Printer:
-    bed_mm = (bed_of(options) or USUAL_BED).size_mm
-    if not 0 < options.overhang < 90:
-        raise SettingsError(f"--overhang is {options.overhang:g}", "give degrees between 0 and 90, for example 45")
-    wall_mm = length_mm(options.wall, "--wall", "0.8mm")
-    return Printer(bed_mm=bed_mm, least_wall_mm=wall_mm, overhang_deg=options.overhang)
+def _printer(request: PrintcheckRequest) -> Printer:
+    if not 0 < request.overhang_deg < 90:
+        raise SettingsError(f"--overhang is {request.overhang_deg:g}", "give degrees between 0 and 90, for example 45")
+    bed = request.bed or USUAL_BED
+    return Printer(bed_mm=bed.size_mm, least_wall_mm=request.wall_mm, overhang_deg=request.overhang_deg)
 
 
 def _mended(points: NDArray[np.float64], triangles: NDArray[np.int32], printer: Printer, found: list[Problem]) -> Fixed:

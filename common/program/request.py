@@ -1,0 +1,137 @@
+"""Requests: what a command is asked for, as a frozen dataclass each of whose fields says by which option it is given. Light.
+
+    @dataclass(frozen=True, slots=True, kw_only=True)
+    class ExportRequest(Request):
+        unit: str | None = option("--unit", choices=("m", "mm"), help="unit of a mesh file of another program")
+
+`add_options` gives a parser the options; `read_request` makes the request of what was given, by whomever: a value is read and checked by the
+same function, whether it comes from a command line, a page or a settings file.
+"""
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from functools import partial
+from typing import Any, Final, TypeVar
+
+T = TypeVar("T")
+
+_OPTION: Final = "option"
+_PART: Final = "part"
+
+
+@dataclass(frozen=True, slots=True)
+class _Option:
+    """See `option`."""
+
+    flags: tuple[str, ...]
+    read: Callable[[str, str], Any] | None
+    number: Callable[[str, str], float] | None
+    alone: bool
+    declared: dict[str, Any]
+
+    def called(self, name: str) -> str:
+        """Return what a user calls it: the flag, or what stands for a positional argument."""
+        return self.flags[0] if self.flags else str(self.declared.get("metavar", name))
+
+    def key(self, name: str) -> str:
+        """Return the name of its value among those given."""
+        return self.flags[0].lstrip("-").replace("-", "_") if self.flags else name
+
+    def value(self, given: Any, name: str) -> Any:  # noqa: ANN401 - of any field
+        """Read what was given."""
+        if isinstance(given, list | tuple):
+            return tuple(self.value(each, name) for each in given)
+        return self.read(given, self.called(name)) if self.read is not None and isinstance(given, str) else given
+
+
+def option(
+    *flags: str,
+    read: Callable[[str, str], Any] | None = None,
+    number: Callable[[str, str], float] | None = None,
+    alone: bool = False,
+    **declared: Any,  # noqa: ANN401 - argparse's own
+) -> Any:  # noqa: ANN401 - stands in a dataclass field of any type, as dataclasses.field does
+    """Declare a field of a request, and the option that gives it.
+
+    Args:
+        flags: names of the option; none: it is a positional argument, called as the field.
+        read: makes the field's value of a text and the option's name, or raises SettingsError. What was given is kept as it was written.
+        number: reads a number that may have a unit, likewise; what was given is kept as that number.
+        alone: this option and the others that say so exclude each other.
+        declared: what `ArgumentParser.add_argument` takes; the default is as a user writes it.
+    """
+    made = _Option(flags, read, number, alone, declared)
+    usual: Any = False if declared.get("action") == "store_true" else None
+    is_required = declared.get("required", not flags and declared.get("nargs") not in {"?", "*"})
+    usual = MISSING if is_required else made.value(declared.get("default", usual), "")
+    return field(default=usual, metadata={_OPTION: made})
+
+
+def part(kind: type[T], when: str = "") -> T:
+    """Declare a field of a request that is a group of options, which several requests share.
+
+    Args:
+        kind: the group: a dataclass of such fields.
+        when: begins the help of each, such as "live: ".
+    """
+    return field(default_factory=kind, metadata={_PART: (kind, when)})  # type: ignore[no-any-return, call-overload]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What every command can be asked for.
+
+    Attributes:
+        as_json: whether to print one JSON object on stdout.
+        given: all options as they were given, by name, for reports that say what a run was told.
+    """
+
+    as_json: bool = False
+    given: Mapping[str, object] = field(default_factory=dict, repr=False, compare=False)
+
+
+def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "") -> None:
+    """Declare the options of a request, or of a group of options.
+
+    Args:
+        parser: of the command.
+        kind: the dataclass.
+        when: begins the help of each.
+    """
+    alone = None
+    for item in fields(kind):
+        if _PART in item.metadata:
+            add_options(parser, *item.metadata[_PART])
+        if _OPTION not in item.metadata:
+            continue
+        made: _Option = item.metadata[_OPTION]
+        declared = {**made.declared, "help": when + made.declared["help"]}
+        if made.number is not None:
+            declared["type"] = partial(made.number, option=made.called(item.name))
+        if made.flags:
+            declared["dest"] = made.key(item.name)
+        if made.alone and alone is None:
+            alone = parser.add_mutually_exclusive_group()
+        (alone if made.alone and alone else parser).add_argument(*made.flags or (item.name,), **declared)
+
+
+def read_request(kind: type[T], given: Mapping[str, object]) -> T:
+    """Make a request of what was given.
+
+    Args:
+        kind: the request, or a group of options.
+        given: values by the option's name, as `add_options` has a parser read them; what is missing is as usual.
+
+    Raises:
+        SettingsError: a value makes no sense.
+    """
+    values: dict[str, Any] = {}
+    for item in fields(kind):  # type: ignore[arg-type]  # T is always a dataclass
+        if _PART in item.metadata:
+            values[item.name] = read_request(item.metadata[_PART][0], given)
+        elif _OPTION in item.metadata and (key := item.metadata[_OPTION].key(item.name)) in given:
+            values[item.name] = item.metadata[_OPTION].value(given[key], item.name)
+    if issubclass(kind, Request):
+        values |= {"as_json": bool(given.get("json")), "given": given}
+    return kind(**values)

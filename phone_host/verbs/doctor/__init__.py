@@ -1,1 +1,0 @@
-"""phone-host doctor: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host export: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host keys: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host pair: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host printcheck: its options (light), and its command."""

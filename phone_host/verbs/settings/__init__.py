@@ -1,1 +1,0 @@
-"""phone-host settings: its options (light), and its command."""
