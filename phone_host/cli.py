@@ -11,35 +11,29 @@ from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from common.program.request import add_options, read_request
 from phone_host.verbs.calibrate import arguments as calibrate
-from phone_host.verbs.calibrate_time import arguments as calibrate_time
-from phone_host.verbs.demo import arguments as demo
 from phone_host.verbs.measure import arguments as measure
-from phone_host.verbs.print import arguments as print_
 from phone_host.verbs.quality import arguments as quality
-from phone_host.verbs.record import arguments as record
 from phone_host.verbs.relief import arguments as relief
 from phone_host.verbs.run import arguments as run
 from phone_host.verbs.scan import arguments as scan
 from phone_host.verbs.serve import arguments as serve
-from phone_host.verbs.sessions import arguments as sessions
 from phone_host.verbs.stereo import arguments as stereo
-from phone_host.verbs.target import arguments as target
 
 _VERBS: Final[dict[str, Any]] = {
-    "demo": demo,
+    "demo": "run both programs on this machine with a rendered scene or thing, and compare depth or model with the truth",
     "serve": serve,
     "run": run,
-    "record": record,
-    "sessions": sessions,
-    "target": target,
+    "record": "record what both cameras give, without computing anything, to replay it later",
+    "sessions": "look into recordings, mend, cut and join them, and turn them into folders and back",
+    "target": "make a calibration board or an object mat to print, as PDF and SVG to scale",
     "calibrate": calibrate,
-    "calibrate-time": calibrate_time,
+    "calibrate-time": "measure the time offset between the two cameras with a screen or a moving scene",
     "stereo": stereo,
     "scan": scan,
     "export": "write a scan or mesh as STL, OBJ, 3DS, PLY, 3MF or GLB for other programs and printers",
     "relief": relief,
     "printcheck": "tell whether a scan or mesh can be printed, and what to do if not",
-    "print": print_,
+    "print": "slice a model, or take G-code, and send it to a 3D printer",
     "measure": measure,
     "quality": quality,
     "pair": "make this host and a board known to each other, with the code that the board shows",

@@ -11,8 +11,9 @@ same function, whether it comes from a command line, a page or a settings file.
 import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
-from functools import partial
 from typing import Any, Final, TypeVar
+
+from common.program.quantities import reading
 
 T = TypeVar("T")
 
@@ -75,7 +76,7 @@ def part(kind: type[T], when: str = "") -> T:
         kind: the group: a dataclass of such fields.
         when: begins the help of each, such as "live: ".
     """
-    return field(default_factory=kind, metadata={_PART: (kind, when)})  # type: ignore[no-any-return, call-overload]
+    return field(default_factory=kind, metadata={_PART: (kind, when)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +109,7 @@ def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "") -> 
         made: _Option = item.metadata[_OPTION]
         declared = {**made.declared, "help": when + made.declared["help"]}
         if made.number is not None:
-            declared["type"] = partial(made.number, option=made.called(item.name))
+            declared["type"] = reading(made.number, made.called(item.name))
         if made.flags:
             declared["dest"] = made.key(item.name)
         if made.alone and alone is None:

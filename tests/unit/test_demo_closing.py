@@ -10,7 +10,7 @@ import board_agent.cli
 import phone_host.cli
 from phone_host.demo.demonstration import DepthErrors
 from phone_host.scene.film import Film
-from phone_host.verbs.demo.command import _closing
+from phone_host.verbs.demo import _closing
 
 ERRORS = DepthErrors(
     pairs=1,

@@ -1,6 +1,5 @@
 """phone-host demo --scan: a rendered thing on the mat is scanned with both programs, compared with what it is, and sliced."""
 
-import argparse
 import math
 import sys
 from contextlib import nullcontext
@@ -55,22 +54,28 @@ _WORST_MM: Final = 1.5
 """A model that is farther off on average is no model: thin parts come out 1 mm off, and a scan that was lost several."""
 
 
-def run_scan_demo(options: argparse.Namespace) -> int:
+def run_scan_demo(
+    seconds_s: float | None, thing: str | None, views: int | None, out: Path | None, *, as_json: bool
+) -> int:
     """Render, scan, compare with the thing, slice.
 
     Args:
-        options: of `demo`, with --scan.
+        seconds_s: how long to stream; it must not be given.
+        thing: what is scanned; None: the usual thing.
+        views: pairs all around it; None: the usual number.
+        out: folder for the results; None: the usual one.
+        as_json: whether to print one JSON object.
     """
-    views = _VIEWS if options.views is None else options.views
-    if options.seconds is not None:
+    if seconds_s is not None:
         raise SettingsError(
             "--seconds is of the demo that streams", "leave it out: a scan takes as many pairs as --views says"
         )
+    views, out = _VIEWS if views is None else views, out or _OUT
     if not _LEAST_VIEWS <= views <= _MOST_VIEWS:
         raise SettingsError(f"--views is {views}", f"give {_LEAST_VIEWS} to {_MOST_VIEWS}")
     logs.set_up(30)
-    signals, console, out = StopSignals(), Console(stderr=True), options.out or _OUT
-    scene = object_scene(options.object or _OBJECT, Setting(views=views))
+    signals, console = StopSignals(), Console(stderr=True)
+    scene = object_scene(thing or _OBJECT, Setting(views=views))
     try:
         done = _scanned(scene, out, console, signals)
         if done is None:
@@ -87,7 +92,7 @@ def run_scan_demo(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room on the disk, or give another folder with --out",
         ) from None
-    if options.json:
+    if as_json:
         print(json_text(report_values(scan) | {"print": printed}))
     else:
         say(scan_lines(scan.report, str(out)))

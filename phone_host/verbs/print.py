@@ -1,6 +1,5 @@
 """phone-host print: slice a model or take G-code, check it, ask, and send it to a printer."""
 
-import argparse
 import math
 import select
 import sys
@@ -8,18 +7,21 @@ import termios
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from common.android import is_android
 from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import HUNG_UP
+from common.program.request import Request, option
 from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.json_text import json_text
 from phone_host.printers.announced_printers import SERVICES, FoundPrinter, printers_of
-from phone_host.printers.bed import parse_bed
+from phone_host.printers.bed import BED_HELP, Bed, parse_bed
 from phone_host.printers.door import Job, Wishes
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, is_gcode
@@ -30,40 +32,98 @@ from phone_host.printers.slicing import Slicer, SlicingWanted
 from phone_host.run.model_job import PreparedPrint, prepare_print
 from phone_host.run.progress_bar import busy_bar, share_bar, step_bar
 
+EXAMPLES = """  phone-host print --find                                   # printers that announce themselves in the network
+  phone-host print scan --printer octoprint://octopi.local  # scan: the folder that phone-host scan wrote; needs a slicer
+  phone-host print cup.gcode --printer moonraker://192.168.1.20
+  phone-host print cup.gcode --printer serial:/dev/ttyUSB0
+  phone-host print cup.gcode --printer 'serial:/dev/ttyACM0?baud=250000' --bed 180,180,180
+  phone-host print cup.gcode --printer socket://192.168.1.20:8080 --yes    # ser2net, or a bridge app of a phone
+  phone-host print cup.gcode --printer rfcomm://00:11:22:33:44:55          # Bluetooth
+  phone-host print scan --printer file:cup.gcode            # the sliced G-code, for a card or a stick
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintRequest(Request):
+    """What print can be told."""
+
+    what: Path | None = option(
+        type=Path,
+        nargs="?",
+        metavar="MODEL_OR_GCODE",
+        help="the folder of a scan or a mesh, which is sliced, or the G-code of a slicer",
+    )
+    printer: str | None = option(
+        "--printer",
+        metavar="URI",
+        help="octoprint://HOST, moonraker://HOST, prusalink://HOST (keys: table [printers] of the settings file),"
+        " serial:DEVICE?baud=115200, rfcomm://ADDRESS, socket://HOST:PORT, or file:OUT.gcode",
+    )
+    find: bool = option("--find", action="store_true", help="list the printers that announce themselves in the network")
+    bed: Bed | None = option(
+        "--bed",
+        read=parse_bed,
+        metavar="X,Y,Z",
+        help=f"{BED_HELP} (default: what the G-code states, else 220,220,250); no model that leaves it is sent",
+    )
+    slicer: Slicer | None = option(
+        "--slicer",
+        read=lambda text, _: Slicer(text),
+        choices=("prusa", "cura"),
+        help="of those installed (default: prusa, else cura)",
+    )
+    profile: Path | None = option(
+        "--profile",
+        type=Path,
+        metavar="FILE",
+        help="settings that PrusaSlicer has exported (.ini), or a machine of Cura (.def.json) (default: PLA, layers of 0.2 mm, nozzle of 0.4 mm)",
+    )
+    unit: str | None = option("--unit", choices=("m", "mm"), help="unit of a mesh file of another program (default m)")
+    up: str | None = option(
+        "--up", choices=("z", "y", "-y"), help="axis of the model that points up (default: as its axes say, else z)"
+    )
+    yes: bool = option("--yes", action="store_true", help="start without asking")
+    config: Path | None = option(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="settings file with the keys (default: ~/.config/tandemscan/phone-host.toml)",
+    )
+
+
 _STEP_S: Final = 0.1
 
 
-def run(options: argparse.Namespace) -> int:
+def run(request: PrintRequest) -> int:
     """Slice a model, check the G-code, ask, send it, and say how it ended."""
-    if options.find:
-        return _find(options)
-    if options.what is None or not options.printer:
+    if request.find:
+        return _find(request)
+    if request.what is None or not request.printer:
         raise SettingsError("print needs a model or G-code, and --printer", "phone-host print --find lists printers")
-    uri = read_uri(options.printer)
-    slicer = None if options.slicer is None else Slicer(options.slicer)
-    if slicer is not None and is_gcode(options.what):
-        raise SettingsError("--slicer is for models", f"leave it out, or give a model, not {options.what}")
+    uri = read_uri(request.printer)
+    if request.slicer is not None and is_gcode(request.what):
+        raise SettingsError("--slicer is for models", f"leave it out, or give a model, not {request.what}")
     wanted = Wanted(
-        SlicingWanted(None if options.bed is None else parse_bed(options.bed), options.profile, slicer),
-        options.unit,
-        options.up,
+        SlicingWanted(request.bed, request.profile, request.slicer),
+        request.unit,
+        request.up,
     )
     with ExitStack() as kept:
         with step_bar("reading", None) as watcher:
             prepared = kept.enter_context(
-                closing(prepare_print(options.what, options.printer, wanted, config=options.config, tell=watcher.say))
+                closing(prepare_print(request.what, request.printer, wanted, config=request.config, tell=watcher.say))
             )
         if isinstance(uri, FileUri):
-            return _told(printed(prepared.place, prepared.job, Wishes(), lambda _: None), options, uri, prepared.job)
+            return _told(printed(prepared.place, prepared.job, Wishes(), lambda _: None), request, uri, prepared.job)
         if prepared.place.journal is not None:
             _tell_left(prepared.place.journal)
-        _ask(options, prepared.job)
+        _ask(request, prepared.job)
         signals = StopSignals()
-        code = _told(_sent(prepared, signals), options, uri, prepared.job)
+        code = _told(_sent(prepared, signals), request, uri, prepared.job)
         return HUNG_UP if signals.hung_up and code == INTERRUPTED else code
 
 
-def _find(options: argparse.Namespace) -> int:
+def _find(request: PrintRequest) -> int:
     """List the printers.
 
     Raises:
@@ -71,7 +131,7 @@ def _find(options: argparse.Namespace) -> int:
     """
     with busy_bar("listening for printers"):
         found = _announced()
-    if options.json:
+    if request.as_json:
         told = [{"printer": each.uri, "name": each.name} for each in found]
         print(json_text({"command": "print", "printers": told}))
         return 0
@@ -162,14 +222,14 @@ def _words(name: str, progress: Progress) -> str:
     return f"{words}; p goes on" if progress.phase is Phase.PAUSED else f"{words}; p pauses, c cancels"
 
 
-def _told(ended: Ended, options: argparse.Namespace, uri: PrinterUri, job: Job) -> int:
+def _told(ended: Ended, request: PrintRequest, uri: PrinterUri, job: Job) -> int:
     """Say how it ended; return the exit code."""
     lines, done = job.facts.lines, round(ended.share * job.facts.lines)
-    if options.json:
+    if request.as_json:
         told = {
             "command": "print",
-            "file": str(options.what),
-            "printer": options.printer,
+            "file": str(request.what),
+            "printer": request.printer,
             "ended": ended.phase.value,
             "share": round(ended.share, 4),
             "lines": lines,
@@ -180,7 +240,7 @@ def _told(ended: Ended, options: argparse.Namespace, uri: PrinterUri, job: Job) 
         print(json_text(told))
     if ended.phase is Phase.FAILED:
         raise UnavailableError(ended.problem, ended.remedy)
-    if not options.json:
+    if not request.as_json:
         say([_sentence(ended, uri, done, lines), *(f"note: {note}" for note in ended.notes)])
     return 0 if ended.phase is Phase.DONE else INTERRUPTED
 
@@ -211,21 +271,21 @@ def _tell_left(journal: Journal) -> None:
         say(lines, sys.stderr)
 
 
-def _ask(options: argparse.Namespace, job: Job) -> None:
+def _ask(request: PrintRequest, job: Job) -> None:
     """Ask before anything is heated or moved.
 
     Raises:
         SettingsError: nobody can be asked.
         DataError: the answer is no.
     """
-    if options.yes:
+    if request.yes:
         return
     if not sys.stdin.isatty():
         raise SettingsError("nobody can be asked whether to start", "give --yes")
     seconds = job.facts.seconds
     minutes = "" if math.isnan(seconds) else f", {seconds / 60:.0f} min"
     say(
-        f"print {options.what} ({counted(job.facts.lines, 'line')}{minutes}) on {options.printer}? Is the bed empty? [y/N] ",
+        f"print {request.what} ({counted(job.facts.lines, 'line')}{minutes}) on {request.printer}? Is the bed empty? [y/N] ",
         sys.stderr,
     )
     if sys.stdin.readline().strip().lower() not in {"y", "yes"}:

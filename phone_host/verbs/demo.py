@@ -1,9 +1,9 @@
 """phone-host demo: run both programs on this machine with a rendered scene of known depth, and write a full report."""
 
-import argparse
 import shlex
 import sys
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
@@ -13,6 +13,8 @@ from common.errors import SettingsError, UnavailableError
 from common.program import logs
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.invocation import command_line, program_name
+from common.program.quantities import seconds
+from common.program.request import Request, option
 from common.program.settings import with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
@@ -35,28 +37,58 @@ from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
 from phone_host.stereo.rectify import rectify_rig
 
+EXAMPLES = """  phone-host demo
+  phone-host demo --seconds 30 --out demo
+  phone-host demo --scan                   # scan a thing on the mat, as `scan --mat` does; about a minute
+  phone-host demo --scan --object thin
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DemoRequest(Request):
+    """What demo can be told."""
+
+    duration_s: float | None = option(
+        "--seconds", number=seconds, metavar="S", help="seconds to stream (default 12); not with --scan"
+    )
+    scan: bool = option(
+        "--scan",
+        action="store_true",
+        help="scan a rendered thing that stands on the mat instead, compare the model with it, and slice it where PrusaSlicer is installed",
+    )
+    thing: str | None = option(
+        "--object",
+        choices=("speckled", "thin", "shiny", "plain"),
+        help="the thing to scan: speckled (default), with thin parts, shiny, or nearly without texture",
+    )
+    views: int | None = option(
+        "--views", type=int, metavar="N", help="pairs all around the thing (default 36, 6 to 360), with --scan"
+    )
+    out: Path | None = option(
+        "--out", type=Path, metavar="DIR", help="folder for the results (default out/demo, with --scan out/demo-scan)"
+    )
+
+
 _SECONDS = 12.0
 _OUT = Path("out/demo")
 
 
-def run(options: argparse.Namespace) -> int:
+def run(request: DemoRequest) -> int:
     """Render, stream, measure and compare with the truth."""
-    if options.scan:
-        from phone_host.verbs.demo.scanned import run_scan_demo  # noqa: PLC0415 - the other demo needs none of it
+    if request.scan:
+        from phone_host.verbs.demo_scan import run_scan_demo  # noqa: PLC0415 - the other demo needs none of it
 
-        return run_scan_demo(options)
+        return run_scan_demo(request.duration_s, request.thing, request.views, request.out, as_json=request.as_json)
     for name in ("object", "views"):
-        if getattr(options, name):
+        if request.given[name]:
             raise SettingsError(f"--{name} is for a scan", "add --scan, or leave it out")
-    if options.seconds is None:
-        options.seconds = _SECONDS
-    if not 1 <= options.seconds <= 3600:
-        raise SettingsError(f"--seconds is {options.seconds:g}", "give 1 to 3600 seconds")
+    seconds_s = _SECONDS if request.duration_s is None else request.duration_s
+    if not 1 <= seconds_s <= 3600:
+        raise SettingsError(f"--seconds is {seconds_s:g}", "give 1 to 3600 seconds")
     logs.set_up(30)
     signals = StopSignals()
     console = Console(stderr=True)
-    out: Path = options.out or _OUT
-    options.out = out
+    out = request.out or _OUT
     rig, scene = unlike_rig(), demo_scene()
 
     try:
@@ -64,12 +96,18 @@ def run(options: argparse.Namespace) -> int:
         film = _render(scene, rig, out / "film", console, signals)
         write_rig(out / "rig.yaml", rig, rectify_rig(rig))
         with socket_folder() as sockets:
-            demo = DemoRun(film, rig, out, sockets, with_origins(None, vars(options), sys.argv))
-            live = LiveTable(demo.host.snapshot, console, seconds=options.seconds) if console.is_terminal else None
-            announce(f"streaming and computing depth for {options.seconds:g} s", console)
+            demo = DemoRun(
+                film,
+                rig,
+                out,
+                sockets,
+                with_origins(None, {**request.given, "seconds": seconds_s, "out": out}, sys.argv),
+            )
+            live = LiveTable(demo.host.snapshot, console, seconds=seconds_s) if console.is_terminal else None
+            announce(f"streaming and computing depth for {seconds_s:g} s", console)
             try:
                 with live or nullcontext():
-                    demo.run(options.seconds, lambda: signals.stop, live.refresh if live else None)
+                    demo.run(seconds_s, lambda: signals.stop, live.refresh if live else None)
             except BaseException as error:
                 failed = build(demo.host.snapshot("failed", diagnostic_of(error)), "demo")
                 demo.host.write_report(failed, replaces_earlier=False)
@@ -92,7 +130,7 @@ def run(options: argparse.Namespace) -> int:
             f"{error.filename or out} cannot be written ({error.strerror})",
             "make room on the disk, or give another folder with --out",
         ) from None
-    print(json_text(report) if options.json else headed(summary(snapshot, columns()), columns(), rows()))
+    print(json_text(report) if request.as_json else headed(summary(snapshot, columns()), columns(), rows()))
     say(_closing(out, film, errors), sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0

@@ -1,10 +1,10 @@
 """phone-host record: keep what both cameras give, without computing anything."""
 
-import argparse
 import math
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
@@ -15,6 +15,8 @@ from common.errors import SettingsError, TandemError
 from common.link.base import Link
 from common.program import logs
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
+from common.program.quantities import seconds
+from common.program.request import Request, option, part
 from common.program.settings import log_level, with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import fitted
@@ -25,6 +27,7 @@ from phone_host.boards.opened import open_named
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.diagnostics.run_snapshot import RecordingAccount
+from phone_host.jobs.options import CameraOptions
 from phone_host.model import Rig, Side
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig
@@ -36,68 +39,105 @@ from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings
 from phone_host.verbs.output_folders import require_alone
 
+EXAMPLES = """  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --out session.mcap
+  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --seconds 60 --out session.mcap    # run --replay with the same rig computes depth from it
+  phone-host record --alone --camera v4l2:/dev/video0 --out host.mcap    # the board runs board-agent record; then sessions join
+"""
 
-def run(options: argparse.Namespace) -> int:
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordRequest(Request):
+    """What record can be told."""
+
+    config: Path | None = option("--config", type=Path, metavar="FILE", help="settings file (TOML)")
+    cameras: CameraOptions = part(CameraOptions)
+    alone: bool = option(
+        "--alone",
+        action="store_true",
+        help="record this machine's camera only, while the board records its own; sessions join puts both together",
+    )
+    out: Path = option("--out", type=Path, required=True, metavar="FILE.mcap", help="the recording; it must not exist")
+    duration_s: float = option(
+        "--seconds",
+        number=seconds,
+        default=0.0,
+        metavar="S",
+        help="end after S seconds, counted from the board's first frame (default: when it is stopped)",
+    )
+    calibration: str | None = option(
+        "--calibration",
+        metavar="rig.yaml",
+        help="calibration to keep in the recording; other programs read it as camera_info",
+    )
+    board_side: Side | None = option(
+        "--board-side",
+        read=lambda text, _: Side(text),
+        choices=("left", "right"),
+        help="which view the board's camera gives (default: as in the calibration, else left)",
+    )
+
+
+def run(request: RecordRequest) -> int:
     """Record until stopped, until the time is over, or until a stream ends."""
-    found = resolve_settings(vars(options))
+    found = resolve_settings(request.given)
     settings = found.values
     check(settings)
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
     require_alone(
-        options.out.parent, options.out.name
+        request.out.parent, request.out.name
     )  # before the file that another program just writes is in the way
-    require_new(options.out, "--out")
-    if options.alone and options.link:
+    require_new(request.out, "--out")
+    if request.alone and request.cameras.link:
         raise SettingsError("--alone records without a board, and --link names one", "leave one of both out")
-    if not (math.isfinite(options.seconds) and options.seconds >= 0):
-        raise SettingsError(f"--seconds is {options.seconds:g}", "give 0 (no limit) or more seconds")
+    if not (math.isfinite(request.duration_s) and request.duration_s >= 0):
+        raise SettingsError(f"--seconds is {request.duration_s:g}", "give 0 (no limit) or more seconds")
     logs.set_up(log_level(settings.log_level))
-    attached = {"settings.json": json_text(with_origins(found, vars(options), sys.argv), indent=1).encode()}
+    attached = {"settings.json": json_text(with_origins(found, request.given, sys.argv), indent=1).encode()}
     rig: Rig | None = None
     if settings.calibration:
         rig = read_own_rig(Path(settings.calibration))
         attached["rig.yaml"] = Path(settings.calibration).read_bytes()
-    side = Side(options.board_side) if options.board_side else rig.board_side if rig is not None else Side.LEFT
+    side = request.board_side or (rig.board_side if rig is not None else Side.LEFT)
     signals = StopSignals()
     with ExitStack() as opened:
         camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels)
         opened.enter_context(closing(camera))
         keys = key_folder(settings.keys)
-        links = () if options.alone else open_named(settings.link, keys, options.wait)[1]
+        links = () if request.alone else open_named(settings.link, keys, request.cameras.wait_s)[1]
         for link in links:
             opened.enter_context(closing(link))
-        recorder = begin_recording(options.out, camera.description, side, rig, attached)
+        recorder = begin_recording(request.out, camera.description, side, rig, attached)
         opened.pop_all()
     frames, is_vain = UnpairedFrames(recorder), False
     try:
-        _film(options, camera, links, frames, signals)
+        _film(request, camera, links, frames, signals)
     except TandemError:
-        is_vain = frames.begun_ns is None and not options.alone
+        is_vain = frames.begun_ns is None and not request.alone
         raise
     finally:
         account = recorder.finish()
         if is_vain:
-            options.out.unlink(missing_ok=True)  # the board gave nothing: the next try may use the name again
-    return _tell(account, as_json=options.json, is_interrupted=signals.interrupted)
+            request.out.unlink(missing_ok=True)  # the board gave nothing: the next try may use the name again
+    return _tell(account, as_json=request.as_json, is_interrupted=signals.interrupted)
 
 
 def _film(
-    options: argparse.Namespace,
+    request: RecordRequest,
     camera: Camera,
     links: Sequence[Link],
     frames: UnpairedFrames,
     signals: StopSignals,
 ) -> None:
     """Take frames, and show how many there are, until it is over."""
-    wait_ns = None if options.wait is None else round(options.wait * 1e9)
-    seconds = options.seconds or math.inf
-    with step_bar("recording" if options.alone else "waiting for the board", None, Console(stderr=True)) as bar:
+    wait_ns = None if request.cameras.wait_s is None else round(request.cameras.wait_s * 1e9)
+    seconds = request.duration_s or math.inf
+    with step_bar("recording" if request.alone else "waiting for the board", None, Console(stderr=True)) as bar:
 
         def advance(_: float) -> None:
             bar.say(frames.account.words)
 
-        if options.alone:
+        if request.alone:
             take_alone(camera, frames, seconds, stop=lambda: signals.stop, advance=advance)
         else:
             take_frames(links, camera, frames, seconds, wait_ns, stop=lambda: signals.stop, advance=advance)

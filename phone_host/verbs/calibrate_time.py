@@ -1,10 +1,11 @@
 """phone-host calibrate-time: measure the time offset between the two cameras and store it in rig.yaml."""
 
-import argparse
 import math
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from common import now
@@ -13,6 +14,8 @@ from common.frame import SpoiledImageError
 from common.places import make_folder
 from common.program import logs
 from common.program.commandline import INTERRUPTED
+from common.program.quantities import seconds
+from common.program.request import Request, option, part
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import fitted
@@ -26,6 +29,7 @@ from phone_host.calibration.time_offset.shared_motion import measure_shared_moti
 from phone_host.calibration.time_offset.shots import Measured, Times, require_shots, to_seconds
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
+from phone_host.jobs.options import OneLinkOptions
 from phone_host.model import Image, Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -47,75 +51,118 @@ from phone_host.verbs.output_folders import (
 )
 from phone_host.verbs.run.page_beside import camera_page
 
+EXAMPLES = """  phone-host calibrate-time --pattern pattern.html    # open it full screen in a browser, in view of both cameras
+  phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing
+  phone-host calibrate-time --by scene --frames timing --calibration rig.yaml --out timing
+  phone-host calibrate-time --by scene --frames session.mcap --calibration rig.yaml --out timing    # of a recording
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrateTimeRequest(Request):
+    """What calibrate-time can be told."""
+
+    pattern: Path | None = option(
+        "--pattern", type=Path, metavar="FILE.html", help="write the page to show on a screen, then end"
+    )
+    by: str = option(
+        "--by",
+        choices=("screen", "scene"),
+        default="screen",
+        help="what both cameras film: the page of --pattern on a screen; or, with"
+        " --calibration, any textured thing that moves up and down (default screen)",
+    )
+    cameras: OneLinkOptions = part(OneLinkOptions)
+    frames: Path | None = option(
+        "--frames",
+        type=Path,
+        metavar="DIR|FILE.mcap",
+        help="use the frames that an earlier run kept with --keep, or those of a recording, instead of --link and --camera",
+    )
+    duration_s: float = option(
+        "--seconds", number=seconds, default=20.0, metavar="S", help="seconds to film (default 20)"
+    )
+    calibration: Path | None = option(
+        "--calibration", type=Path, metavar="rig.yaml", help="calibration to write the result into; --by scene needs it"
+    )
+    out: Path | None = option("--out", type=Path, metavar="DIR", help="folder for report.json and time-offset.svg")
+    keep: bool = option("--keep", action="store_true", help="keep the frames in --out, for a later --frames")
+
+
 _Reading = TypeVar("_Reading")
 _FILES = "report.json", "time-offset.svg"
 
 
-def run(options: argparse.Namespace) -> int:
+def run(request: CalibrateTimeRequest) -> int:
     """Film or read frames, measure and store."""
-    if options.pattern is not None:
-        return _write_pattern(options)
-    _check(options)
+    if request.pattern is not None:
+        return _write_pattern(request.pattern, as_json=request.as_json)
+    _check(request)
     logs.set_up(log_level("warning"))
-    rig = None if options.calibration is None else read_own_rig(options.calibration)
-    if options.out is not None:
-        require_folder(options.out)
-        require_alone(options.out)
-        announce_other_report(options.out, "calibrate-time")
-        claim_names(options.out, options.out, *_FILES)
+    rig = None if request.calibration is None else read_own_rig(request.calibration)
+    if request.out is not None:
+        require_folder(request.out)
+        require_alone(request.out)
+        announce_other_report(request.out, "calibrate-time")
+        claim_names(request.out, request.out, *_FILES)
     signals = StopSignals()
-    footage = _footage(options, signals)
+    footage = _footage(request, signals)
     if signals.interrupted:
         return INTERRUPTED
-    measured = _measure(options.by, footage, rig)
-    report = _report(options, measured, footage)
-    _store(options, measured, report)
-    print(json_text(report) if options.json else fitted(_summary(report)))
+    measured = _measure(request.by, footage, rig)
+    report = _report(request, measured, footage)
+    _store(request, measured, report)
+    print(json_text(report) if request.as_json else fitted(_summary(report)))
     return 0
 
 
-def _check(options: argparse.Namespace) -> None:
-    if (options.frames is None) == (options.camera is None):
+def _check(request: CalibrateTimeRequest) -> None:
+    if (request.frames is None) == (request.cameras.camera is None):
         raise SettingsError(
             "give either --camera or --frames",
             f"--camera {EXAMPLE}, --frames DIR of an earlier --keep, or --frames FILE.mcap",
         )
-    if options.by == "scene" and options.calibration is None:
+    if request.by == "scene" and request.calibration is None:
         raise SettingsError("--by scene without --calibration", "add --calibration rig.yaml, or use --by screen")
-    if not (math.isfinite(options.seconds) and 0 < options.seconds <= 600):
-        raise SettingsError(f"--seconds is {options.seconds:g}", "give 1 to 600 seconds")
-    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
-        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")
-    if options.keep and (options.out is None or options.frames is not None):
+    if not (math.isfinite(request.duration_s) and 0 < request.duration_s <= 600):
+        raise SettingsError(f"--seconds is {request.duration_s:g}", "give 1 to 600 seconds")
+    if request.cameras.wait_s is not None and not (
+        math.isfinite(request.cameras.wait_s) and request.cameras.wait_s >= 0
+    ):
+        raise SettingsError(
+            f"--wait is {request.cameras.wait_s}", "give 0 or more seconds, or leave it out to wait for ever"
+        )
+    if request.keep and (request.out is None or request.frames is not None):
         raise SettingsError("--keep needs --camera and --out", "add both, or leave --keep out")
 
 
-def _write_pattern(options: argparse.Namespace) -> int:
-    require_file(options.pattern, "--pattern")
+def _write_pattern(file: Path, *, as_json: bool) -> int:
+    require_file(file, "--pattern")
     try:
-        make_folder(options.pattern.parent)
-        write_text(options.pattern, pattern_page())
+        make_folder(file.parent)
+        write_text(file, pattern_page())
     except OSError as error:
-        raise unwritable(options.pattern, error, "--pattern") from error
-    print(json_text({"pattern": str(options.pattern)}) if options.json else fitted(f"written to {options.pattern}"))
+        raise unwritable(file, error, "--pattern") from error
+    print(json_text({"pattern": str(file)}) if as_json else fitted(f"written to {file}"))
     return 0
 
 
-def _footage(options: argparse.Namespace, signals: StopSignals) -> Footage:
-    if options.frames is not None:
-        return (read_recording if is_recording(str(options.frames)) else read)(options.frames)
-    keys = key_folder(options.keys or "")
-    with camera_page(options.camera, keys.path) as feed:
-        camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), feed=feed)
-        _, links = open_named((options.link,) if options.link else (), keys, options.wait)
-        wait_ns = None if options.wait is None else round(options.wait * 1e9)
+def _footage(request: CalibrateTimeRequest, signals: StopSignals) -> Footage:
+    if request.frames is not None:
+        return (read_recording if is_recording(str(request.frames)) else read)(request.frames)
+    camera_uri = request.cameras.camera or ""
+    keys = key_folder(request.cameras.keys or "")
+    with camera_page(camera_uri, keys.path) as feed:
+        camera = open_camera(camera_uri, HOST_CLOCK, now.monotonic_ns(), feed=feed)
+        _, links = open_named((request.cameras.link,) if request.cameras.link else (), keys, request.cameras.wait_s)
+        wait_ns = None if request.cameras.wait_s is None else round(request.cameras.wait_s * 1e9)
         with share_bar("waiting for the board", then="filming") as advance:
-            footage = film(links, camera, options.seconds, wait_ns, stop=lambda: signals.stop, advance=advance)
-    if options.keep:
+            footage = film(links, camera, request.duration_s, wait_ns, stop=lambda: signals.stop, advance=advance)
+    if request.keep and request.out is not None:
         try:
-            keep(footage, options.out)
+            keep(footage, request.out)
         except OSError as error:
-            raise unwritable(options.out, error) from error
+            raise unwritable(request.out, error) from error
     return footage
 
 
@@ -147,7 +194,7 @@ def _seen(
 ) -> list[tuple[Times, list[_Reading]]]:
     """Return the readings of each camera's images with their times. A spoiled image is skipped as if it were lost."""
     done, sides = 0, []
-    for shots, seconds in ((footage.board, board_s), (footage.host, host_s)):
+    for shots, times_s in ((footage.board, board_s), (footage.host, host_s)):
         whole: list[int] = []
         readings: list[_Reading] = []
         for at, shot in enumerate(shots):
@@ -156,12 +203,12 @@ def _seen(
                 whole.append(at)
             done += 1
             advance(done / (len(board_s) + len(host_s)))
-        sides.append((seconds[whole], readings))
+        sides.append((times_s[whole], readings))
     require_shots(len(sides[0][0]), len(sides[1][0]))
     return sides
 
 
-def _report(options: argparse.Namespace, measured: Measured, footage: Footage) -> dict[str, Any]:
+def _report(request: CalibrateTimeRequest, measured: Measured, footage: Footage) -> dict[str, Any]:
     return {
         "format_version": REPORT_FORMAT,
         "command": "calibrate-time",
@@ -170,23 +217,23 @@ def _report(options: argparse.Namespace, measured: Measured, footage: Footage) -
         "uncertainty_ns": measured.offset.uncertainty_ns,
         "samples": measured.samples,
         "frames": {"board": len(footage.board), "host": len(footage.host)},
-        "stored_in": None if options.calibration is None else str(options.calibration),
+        "stored_in": None if request.calibration is None else str(request.calibration),
         "meaning": "stamp of the host's camera minus stamp of the board's camera for one moment; middle row of both images",
     }
 
 
-def _store(options: argparse.Namespace, measured: Measured, report: dict[str, Any]) -> None:
-    if options.out is not None:
-        with written_together(options.out, *_FILES, command="calibrate-time") as place:
+def _store(request: CalibrateTimeRequest, measured: Measured, report: dict[str, Any]) -> None:
+    if request.out is not None:
+        with written_together(request.out, *_FILES, command="calibrate-time") as place:
             write_text(place / "report.json", json_text(report, indent=2) + "\n")
             write_text(place / "time-offset.svg", misfit_svg(measured))
-    if options.calibration is None:
+    if request.calibration is None:
         print("phone-host: no --calibration: the result is stored nowhere", file=sys.stderr)
         return
     try:
-        write_time_offset(options.calibration, measured.offset)
+        write_time_offset(request.calibration, measured.offset)
     except OSError as error:
-        raise unwritable(options.calibration, error, "--calibration") from error
+        raise unwritable(request.calibration, error, "--calibration") from error
 
 
 def _summary(report: dict[str, Any]) -> str:

@@ -1,0 +1,89 @@
+"""Groups of options that several requests share. Light."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from common.camera.options import TURNED
+from common.orientation import Flip, Orientation
+from common.program.quantities import milliseconds, seconds
+from common.program.request import option
+from phone_host.camera.examples import EXAMPLE
+from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+
+_FORMS: Final = "address of the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: look for a board)"
+_WAIT_HELP: Final = "seconds to wait for a board, then exit with code 3 (default: wait for ever{})"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraOptions:
+    """Which board and which camera pairs come from."""
+
+    link: tuple[str, ...] | None = option(
+        "--link",
+        action="append",
+        metavar="URI",
+        help=f"{_FORMS}; repeat the option: the frames come over the best link that is up",
+    )
+    camera: str | None = option("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}; {TURNED}")
+    wait_s: float | None = option("--wait", number=seconds, metavar="S", help=_WAIT_HELP.format(""))
+    keys: str | None = option("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OneLinkOptions(CameraOptions):
+    """The same, with one link."""
+
+    link: str | None = option("--link", metavar="URI", help=_FORMS)  # type: ignore[assignment]  # one in place of several
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunCameraOptions(CameraOptions):
+    """The same, for `run`, which may have a time limit."""
+
+    wait_s: float | None = option(
+        "--wait", number=seconds, metavar="S", help=_WAIT_HELP.format("; with --seconds S, S + 10 seconds")
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToleranceOption:
+    """When two frames are a pair."""
+
+    tolerance_ms: float | None = option(
+        "--tolerance",
+        number=milliseconds,
+        metavar="MS",
+        help="greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
+    )
+
+
+def _flip(side: str) -> Flip:
+    mirror = f"mirror the {side} images, after turning them: h exchanges left and right, v top and bottom"
+    return option(  # type: ignore[no-any-return]
+        f"--flip-{side}",
+        read=lambda text, _: Flip(text),
+        choices=(Flip.H.value, Flip.V.value),
+        default=Flip.NONE.value,
+        help=mirror,
+    )
+
+
+def _rotate(side: str) -> int:
+    turn = f"turn the {side} images clockwise by so many degrees: their camera is mounted turned"
+    return option(f"--rotate-{side}", type=int, choices=(90, 180, 270), default=0, help=turn)  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageOptions:
+    """How image files are read, turned and mirrored."""
+
+    rotate_left: int = _rotate("left")
+    rotate_right: int = _rotate("right")
+    flip_left: Flip = _flip("left")
+    flip_right: Flip = _flip("right")
+    max_megapixels: int | None = option("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+
+    @property
+    def mounted(self) -> tuple[Orientation, Orientation]:
+        """How the left and the right images are turned upright, after what their EXIF headers say."""
+        return Orientation(self.rotate_left, self.flip_left), Orientation(self.rotate_right, self.flip_right)

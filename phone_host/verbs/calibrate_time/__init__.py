@@ -1,1 +1,0 @@
-"""phone-host calibrate-time: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host demo: its options (light), and its command."""

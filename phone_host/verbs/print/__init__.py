@@ -1,1 +1,0 @@
-"""phone-host print: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host record: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host sessions: its options (light), and its command."""

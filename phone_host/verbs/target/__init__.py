@@ -1,1 +1,0 @@
-"""phone-host target: its options (light), and its command."""
