@@ -10,32 +10,24 @@ from common.program.commandline import ExamplesFirstParser, add_version_option, 
 from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from common.program.request import add_options, read_request
-from phone_host.verbs.calibrate import arguments as calibrate
-from phone_host.verbs.measure import arguments as measure
-from phone_host.verbs.quality import arguments as quality
-from phone_host.verbs.relief import arguments as relief
-from phone_host.verbs.run import arguments as run
-from phone_host.verbs.scan import arguments as scan
-from phone_host.verbs.serve import arguments as serve
-from phone_host.verbs.stereo import arguments as stereo
 
-_VERBS: Final[dict[str, Any]] = {
+_VERBS: Final = {
     "demo": "run both programs on this machine with a rendered scene or thing, and compare depth or model with the truth",
-    "serve": serve,
-    "run": run,
+    "serve": "the page: find, check, calibrate and run both cameras in a browser",
+    "run": "pair the board's frames with those of this machine's camera, compute depth, measure every delay",
     "record": "record what both cameras give, without computing anything, to replay it later",
     "sessions": "look into recordings, mend, cut and join them, and turn them into folders and back",
     "target": "make a calibration board or an object mat to print, as PDF and SVG to scale",
-    "calibrate": calibrate,
+    "calibrate": "calibrate two cameras, live or from pictures of a board",
     "calibrate-time": "measure the time offset between the two cameras with a screen or a moving scene",
-    "stereo": stereo,
-    "scan": scan,
+    "stereo": "compute disparity and point clouds of pairs of images",
+    "scan": "put pairs from several places together to one model with colours",
     "export": "write a scan or mesh as STL, OBJ, 3DS, PLY, 3MF or GLB for other programs and printers",
-    "relief": relief,
+    "relief": "make a printable relief of one pair of images",
     "printcheck": "tell whether a scan or mesh can be printed, and what to do if not",
     "print": "slice a model, or take G-code, and send it to a 3D printer",
-    "measure": measure,
-    "quality": quality,
+    "measure": "measure points of a pair of images in millimetres, with their uncertainty",
+    "quality": "measure how good a rig's depth is, on a flat wall or board",
     "pair": "make this host and a board known to each other, with the code that the board shows",
     "keys": "list the boards that this host trusts, or change the list or this host's key",
     "doctor": "check this machine, its camera, the board, the calibration and the disk",
@@ -45,6 +37,9 @@ _VERBS: Final[dict[str, Any]] = {
 
 _NATIVE: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
+
+_PACKAGES: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "serve", "stereo"})
+"""Verbs that still take argparse's options."""
 
 _WITHOUT_NUMPY: Final = frozenset({"doctor", "keys", "pair", "settings"})
 """Verbs that run where numpy is missing; the doctor names it."""
@@ -111,13 +106,11 @@ def command_of(verb: str) -> tuple[Callable[[Any], int], type]:
     """Import a verb's module; return what runs it, and what that takes."""
     if verb not in _WITHOUT_NUMPY:
         importlib.import_module("numpy")  # before OpenCV, which prints three lines on stdout where numpy is missing
-    module = importlib.import_module(_module_of(verb))
-    return module.run, next(iter(module.run.__annotations__.values()))
-
-
-def _module_of(verb: str) -> str:
     name = f"phone_host.verbs.{verb.replace('-', '_')}"
-    return name if isinstance(_VERBS[verb], str) else f"{name}.command"
+    module = importlib.import_module(name)
+    if verb in _PACKAGES:
+        module = importlib.import_module(f"{name}.command")
+    return module.run, next(iter(module.run.__annotations__.values()))
 
 
 class _VerbParser(ExamplesFirstParser):
@@ -137,13 +130,14 @@ class _VerbParser(ExamplesFirstParser):
         if self._is_known:
             return
         self._is_known, verb = True, self.prog.split()[-1]
-        if isinstance(_VERBS[verb], str):
-            run, kind = command_of(verb)
+        run, kind = command_of(verb)
+        if verb in _PACKAGES:
+            arguments = importlib.import_module(f"phone_host.verbs.{verb}.arguments")
+            self.description = f"examples:\n{arguments.EXAMPLES}"
+            arguments.add_arguments(self)
+        else:
             self.description = f"examples:\n{run.__globals__['EXAMPLES']}"
             add_options(self, kind)
-        else:
-            self.description = f"examples:\n{_VERBS[verb].EXAMPLES}"
-            _VERBS[verb].add_arguments(self)
         add_version_option(self)
         self.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         self.add_argument("--debug", action="store_true", help="show tracebacks")
@@ -155,7 +149,7 @@ def parser() -> argparse.ArgumentParser:
     add_version_option(made)
     verbs = made.add_subparsers(dest="verb", metavar="VERB", parser_class=_VerbParser)
     for name, summary in _VERBS.items():
-        verbs.add_parser(name, help=summary if isinstance(summary, str) else summary.SUMMARY)
+        verbs.add_parser(name, help=summary)
     return made
 
 

@@ -1,7 +1,7 @@
 """Times, rates and image sizes on the command line, in settings files and in the environment: one way to write each. Pure, light.
 
 A number alone is in the unit that the option's help names, so every script that gives bare numbers stays right. Units are read in upper and
-lower case, with or without a space before them. Lengths: `phone_host/verbs/units.py`.
+lower case, with or without a space before them. Lengths: `phone_host/jobs/units.py`.
 """
 
 import math

@@ -117,6 +117,17 @@ def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "") -> 
         (alone if made.alone and alone else parser).add_argument(*made.flags or (item.name,), **declared)
 
 
+def usual_values(kind: type) -> dict[str, object]:
+    """Return what counts as given where nothing is, by the option's name.
+
+    Args:
+        kind: a request of which nothing is required.
+    """
+    parser = argparse.ArgumentParser(add_help=False)
+    add_options(parser, kind)
+    return vars(parser.parse_args([]))
+
+
 def read_request(kind: type[T], given: Mapping[str, object]) -> T:
     """Make a request of what was given.
 

@@ -10,6 +10,13 @@ from common.program.request import option
 from phone_host.camera.examples import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 
+PAIRED: Final = (
+    "two files, two folders or two globs; images of folders and globs are paired by the number in the name, else by equal names,"
+    " else in name order. Or a recording, FILE.mcap: its stillest pair of each second, at most a hundred, written to DIR/views"
+)
+"""How LEFT and RIGHT are given, for the verbs that take pairs of images."""
+
+LAN_HELP: Final = "serve the page to other machines: by https with a certificate authority of this machine's own, and only with the token of the first address"
 _FORMS: Final = "address of the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: look for a board)"
 _WAIT_HELP: Final = "seconds to wait for a board, then exit with code 3 (default: wait for ever{})"
 
@@ -37,23 +44,23 @@ class OneLinkOptions(CameraOptions):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunCameraOptions(CameraOptions):
-    """The same, for `run`, which may have a time limit."""
-
-    wait_s: float | None = option(
-        "--wait", number=seconds, metavar="S", help=_WAIT_HELP.format("; with --seconds S, S + 10 seconds")
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ToleranceOption:
-    """When two frames are a pair."""
+class PairOptions(CameraOptions):
+    """The same, and when two frames are a pair."""
 
     tolerance_ms: float | None = option(
         "--tolerance",
         number=milliseconds,
         metavar="MS",
         help="greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunCameraOptions(PairOptions):
+    """The same, for `run`, which may have a time limit."""
+
+    wait_s: float | None = option(
+        "--wait", number=seconds, metavar="S", help=_WAIT_HELP.format("; with --seconds S, S + 10 seconds")
     )
 
 

@@ -30,6 +30,15 @@ from phone_host.calibration.time_offset.shots import Measured, Times, require_sh
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.jobs.options import OneLinkOptions
+from phone_host.jobs.output_folders import (
+    announce_other_report,
+    claim_names,
+    require_alone,
+    require_file,
+    require_folder,
+    unwritable,
+    written_together,
+)
 from phone_host.model import Image, Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -40,16 +49,7 @@ from phone_host.run.progress_bar import share_bar
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectifier import Rectifier
-from phone_host.verbs.output_folders import (
-    announce_other_report,
-    claim_names,
-    require_alone,
-    require_file,
-    require_folder,
-    unwritable,
-    written_together,
-)
-from phone_host.verbs.run.page_beside import camera_page
+from phone_host.verbs.page_beside import camera_page
 
 EXAMPLES = """  phone-host calibrate-time --pattern pattern.html    # open it full screen in a browser, in view of both cameras
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing

@@ -8,6 +8,8 @@ from common.errors import SettingsError
 from common.program.request import Request, option
 from common.program.terminal import say
 from common.words import counted
+from phone_host.jobs.output_folders import require_alone, require_folder, written_together
+from phone_host.jobs.units import length_mm
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_number, json_text
@@ -15,8 +17,6 @@ from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, me
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
 from phone_host.run.model_job import fewer_triangles, spare_model, usual_tolerance_m, with_unseen
-from phone_host.verbs.output_folders import require_alone, require_folder, written_together
-from phone_host.verbs.units import length_mm
 from phone_host.verbs.unseen_argument import UNSEEN_HELP
 
 EXAMPLES = """  phone-host export scan --to stl --out print                    # scan: the folder that phone-host scan wrote
@@ -27,17 +27,17 @@ EXAMPLES = """  phone-host export scan --to stl --out print                    #
 """
 
 
-def _kinds(text: str, name: str) -> tuple[str, ...]:
+def _kinds(text: str, option: str) -> tuple[str, ...]:
     kinds = [word.strip().lower() for word in text.split(",")]
     for kind in kinds:
         if kind not in FORMATS:
-            what = f"{name} {text!r} names {kind!r}" if "," in text else f"{name} is {text!r}"
+            what = f"{option} {text!r} names {kind!r}" if "," in text else f"{option} is {text!r}"
             raise SettingsError(f"{what}, which is no format", f"give some of {','.join(FORMATS)}")
     return tuple(dict.fromkeys(kinds))
 
 
-def _tolerance_m(text: str, name: str) -> float:
-    return 0.0 if text.strip() in {"0", "0mm"} else length_mm(text, name, "0.1mm") / 1000
+def _tolerance_m(text: str, option: str) -> float:
+    return 0.0 if text.strip() in {"0", "0mm"} else length_mm(text, option, "0.1mm") / 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

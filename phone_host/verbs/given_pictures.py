@@ -7,11 +7,11 @@ from typing import Final
 
 from common.errors import SettingsError
 from common.recording.opened import is_recording
+from phone_host.jobs.output_folders import writing
 from phone_host.model import Side
 from phone_host.recording.chosen_views import choose_views
 from phone_host.run.progress_bar import share_bar
 from phone_host.verbs.globs import two_lists
-from phone_host.verbs.output_folders import writing
 
 VIEWS: Final = "views"
 """The folder beside the results for pictures that a command takes or chooses itself."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from common.errors import SettingsError
 from common.places import resolved
 from common.program.terminal import say
+from phone_host.jobs.output_folders import announce_other_report, require_alone, require_writable, spare_inputs, writing
 from phone_host.report.stereo_report import Size
 from phone_host.run.file_pairs import FilePairs, Matching
 from phone_host.run.progress_bar import StepBar, step_bar
@@ -17,15 +18,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.view_files import pair_files
 from phone_host.verbs.given_pictures import given_pictures
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import (
-    announce_other_report,
-    require_alone,
-    require_writable,
-    spare_inputs,
-    writing,
-)
-from phone_host.verbs.stereo_options import metric_core
+from phone_host.verbs.stereo_options import metric_core, orientations
 
 MakeCore = Callable[[argparse.Namespace, str, Size, Path], StereoCore]
 """Makes the core by the options, the matcher's name, the size of the left images, px, and one of them."""

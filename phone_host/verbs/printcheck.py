@@ -11,6 +11,8 @@ from common.errors import DataError, SettingsError, UnavailableError
 from common.program.commandline import CHECK_FAILED
 from common.program.request import Request, option
 from common.program.terminal import say
+from phone_host.jobs.output_folders import require_alone, require_folder, written_together
+from phone_host.jobs.units import length_mm
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
 from phone_host.output.meshes.decimated import NoLibraryError
@@ -23,8 +25,6 @@ from phone_host.output.model_file import Model
 from phone_host.output.upright import upright_model
 from phone_host.printers.bed import BED_HELP, USUAL_BED, Bed, parse_bed
 from phone_host.run.progress_bar import step_bar
-from phone_host.verbs.output_folders import require_alone, require_folder, written_together
-from phone_host.verbs.units import length_mm
 
 EXAMPLES = """  phone-host printcheck scan                          # scan: the folder that phone-host scan wrote
   phone-host printcheck part.stl --unit mm --bed 180,180,180 --out print    # and draws what is wrong
@@ -32,8 +32,8 @@ EXAMPLES = """  phone-host printcheck scan                          # scan: the 
 """
 
 
-def _wall_mm(text: str, name: str) -> float:
-    return length_mm(text, name, "0.8mm")
+def _wall_mm(text: str, option: str) -> float:
+    return length_mm(text, option, "0.8mm")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,6 +28,7 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.jobs.options import CameraOptions
+from phone_host.jobs.output_folders import require_alone
 from phone_host.model import Rig, Side
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig
@@ -37,7 +38,6 @@ from phone_host.recording.unpaired import UnpairedFrames
 from phone_host.report.run_json import recording_values
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings
-from phone_host.verbs.output_folders import require_alone
 
 EXAMPLES = """  phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --out session.mcap
   phone-host record --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --seconds 60 --out session.mcap    # run --replay with the same rig computes depth from it

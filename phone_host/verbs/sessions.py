@@ -20,6 +20,7 @@ from common.recording.recording_file import require_new
 from common.recording.stamps import MAX_HZ, MIN_HZ
 from common.versions import REPORT_FORMAT
 from common.words import counted, listed
+from phone_host.jobs.output_folders import require_alone, unwritable
 from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -32,7 +33,6 @@ from phone_host.recording.other_topics import ImportOptions, import_topics
 from phone_host.recording.session_info import SessionInfo, session_info
 from phone_host.recording.timed_images import TimeOptions
 from phone_host.run.progress_bar import busy_bar
-from phone_host.verbs.output_folders import require_alone, unwritable
 from phone_host.verbs.sessions_page import info_page
 
 EXAMPLES = """  phone-host sessions info session.mcap --out info    # what is inside, gaps, rates; info/index.html shows plots

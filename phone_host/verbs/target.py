@@ -25,10 +25,10 @@ from phone_host.calibration.target.sheet_layout import (
     marked_sheet,
     screen_board,
 )
+from phone_host.jobs.output_folders import require_folder, unwritable
+from phone_host.jobs.units import length_mm, square_mm
 from phone_host.output.atomic import replacing
 from phone_host.output.json_text import json_text
-from phone_host.verbs.output_folders import require_folder, unwritable
-from phone_host.verbs.units import length_mm, square_mm
 
 EXAMPLES = """  phone-host target chessboard                                # 9x6 inner corners on A4, as large as fits
   phone-host target chessboard --size 7x5 --square 40mm --paper A3 --out print
@@ -62,14 +62,14 @@ def _counts(text: str, option: str, most: int = _MOST, example: str = "9x6") -> 
     return int(found[1]), int(found[2])
 
 
-def _diagonal_mm(text: str, name: str) -> float:
+def _diagonal_mm(text: str, option: str) -> float:
     if text.strip().replace(".", "", 1).isdecimal():
-        raise SettingsError(f"{name} is {text!r}", "give its unit, such as 15.6in or 396mm")
+        raise SettingsError(f"{option} is {text!r}", "give its unit, such as 15.6in or 396mm")
     inches = _INCHES.fullmatch(text)
-    found_mm = float(inches[1]) * _INCH_MM if inches else length_mm(text, name, "15.6in or 396mm")
+    found_mm = float(inches[1]) * _INCH_MM if inches else length_mm(text, option, "15.6in or 396mm")
     if not _SCREENS_MM[0] <= found_mm <= _SCREENS_MM[1]:
         raise SettingsError(
-            f"{name} is {text!r}, which no screen has", "give it with its unit, such as 15.6in or 396mm"
+            f"{option} is {text!r}, which no screen has", "give it with its unit, such as 15.6in or 396mm"
         )
     return found_mm
 

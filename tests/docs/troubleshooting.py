@@ -21,6 +21,7 @@ _ROOMS: Final = (
         (
             "common/program",
             "phone_host/settings",
+            "phone_host/jobs",
             "phone_host/verbs",
             "board_agent/settings",
             "board_agent/verbs",

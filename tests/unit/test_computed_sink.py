@@ -1,6 +1,5 @@
 """Depth and clouds in a recording: what they hold, how often, and only if asked for."""
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,13 +16,14 @@ from common.recording.mcap_records import Message
 from common.recording.opened import open_recorded, stored_data
 from common.recording.ros_messages import IMAGE, POINT_BYTES, POINT_CLOUD
 from common.recording.salvage import Salvage
+from phone_host.jobs.run_request import checked
 from phone_host.model import FramePair, Processed, RectifiedPair, Result, Side
 from phone_host.recording.begin import begin_recording
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.run.recording_sinks import Computed, ComputedSink, cloud_data
-from phone_host.verbs.run.prepared import computed_wanted
 from tests.support.programs import until
 from tests.support.recorded import own_frame, payload
+from tests.support.requests import request_of
 from tests.support.samples import LEDGER
 
 _CAMERA = CameraDescription(
@@ -85,8 +85,7 @@ def test_depth_and_cloud_are_recorded_once_a_second(tmp_path: Path) -> None:
 def test_wrong_names_are_refused(names: str, record: Path | None, problem: str) -> None:
     """One line that says what there is."""
     with pytest.raises(SettingsError) as refused:
-        computed_wanted(argparse.Namespace(record_topics=names, record=record))
+        checked(request_of("run", "--record-topics", names, *(() if record is None else ("--record", str(record)))))
     assert problem in str(refused.value)
-    asked = argparse.Namespace(record_topics="cloud, depth", record=Path("s"))
-    assert computed_wanted(asked) == set(Computed)
-    assert computed_wanted(argparse.Namespace(record_topics=None)) == set()
+    assert request_of("run", "--record-topics", "cloud, depth", "--record", "s").record_topics == set(Computed)
+    assert request_of("run").record_topics is None

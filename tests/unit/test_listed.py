@@ -12,14 +12,14 @@ import pytest
 
 from common.errors import DataError, SettingsError, TandemError, UnavailableError
 from common.files import read_whole
+from phone_host.jobs.output_folders import spare_inputs
+from phone_host.jobs.run import spare
 from phone_host.output.atomic import replacing, write_bytes, write_text
 from phone_host.output.folder_lock import LOCK
 from phone_host.output.listed import LIST, ListedFolder
 from phone_host.output.move_up import STAGED
 from phone_host.output.result_files import claim, remove_results
 from phone_host.run.file_sink import NAMES, FileSink
-from phone_host.verbs.output_folders import spare_inputs
-from phone_host.verbs.run.prepared import spare
 from tests.unit.test_replay import fill
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from phone_host.cli import main
+from phone_host.jobs.output_folders import announce_other_report, stale_page, unwritable
 from phone_host.model import CameraModel, Rig
 from phone_host.output.result_files import claim
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.output_folders import announce_other_report, stale_page, unwritable
 from tests.support.planes import noise
 
 CALIB = (

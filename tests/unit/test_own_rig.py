@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from phone_host.cli import main
+from phone_host.jobs.run import Opened, open_run
+from phone_host.jobs.run_request import checked
 from phone_host.model import Rig, Verdict
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.run.prepared import Opened, checked, open_run
-from phone_host.verbs.serve.choices import run_options
 from tests.support.pictures import jpeg
 from tests.support.recorded import recording
+from tests.support.requests import request_of
 from tests.support.rigs import unlike_rig
 
 _SIZES = {"left": (640, 480), "right": (1280, 720)}
@@ -33,8 +34,8 @@ def _recording(folder: Path, rig: Rig | None) -> Path:
 def _opened(folder: Path, *words: str) -> tuple[Opened, list[str]]:
     """The run that these words open, and what it told."""
     told: list[str] = []
-    options = run_options(["--replay", str(folder / "session.mcap"), *words])
-    return open_run(options, checked(options), told.append), told
+    request = request_of("run", "--replay", str(folder / "session.mcap"), *words)
+    return open_run(request, checked(request), told.append), told
 
 
 def test_a_replay_computes_depth_by_the_recording_s_own_rig(tmp_path: Path) -> None:

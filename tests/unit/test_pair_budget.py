@@ -1,6 +1,5 @@
 """A run's time budget: what the core does with a choice, what the account tells, and what the user may ask for."""
 
-import argparse
 import html
 import json
 import math
@@ -20,6 +19,7 @@ from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.diagnostics.throughput import budget_lines, missed_words, narrowed_words, with_budget
+from phone_host.jobs.run_request import budget_wanted
 from phone_host.model import (
     BudgetAccount,
     BudgetReason,
@@ -39,10 +39,9 @@ from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
-from phone_host.verbs.run.arguments import add_arguments
-from phone_host.verbs.run.budget import budget_wanted
 from tests.support.budget_accounts import ACCOUNT, BEST, MS, NARROW, SMALL
 from tests.support.planes import plane
+from tests.support.requests import request_of
 from tests.support.rigs import unlike_rig
 from tests.support.run_snapshots import run
 
@@ -207,12 +206,10 @@ def test_a_missed_budget_is_a_warning() -> None:
 
 def wanted_of(*words: str, core: StereoCore | None = None) -> BudgetWanted | None:
     """What these words of `run` ask for."""
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    options = parser.parse_args(words)
-    resolved = resolve_settings(vars(options))
+    request = request_of("run", *words)
+    resolved = resolve_settings(request.given)
     check(resolved.values)
-    return budget_wanted(options, resolved, core or settings_core())
+    return budget_wanted(request, resolved, core or settings_core())
 
 
 def test_what_is_given_stays_as_given() -> None:
@@ -258,11 +255,9 @@ def test_a_budget_that_may_change_nothing_is_refused() -> None:
 
 def test_a_budget_without_depth_is_refused() -> None:
     """There is nothing to match; one from a settings file waits for the next run with depth."""
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    options = parser.parse_args(["--budget", "30"])
+    request = request_of("run", "--budget", "30")
     with pytest.raises(SettingsError, match="without --calibration or --rectified"):
-        budget_wanted(options, resolve_settings(vars(options)), None)
+        budget_wanted(request, resolve_settings(request.given), None)
 
 
 def test_a_budget_may_stand_in_the_settings_file(tmp_path: Path) -> None:
@@ -273,10 +268,8 @@ def test_a_budget_may_stand_in_the_settings_file(tmp_path: Path) -> None:
         wanted = wanted_of("--config", str(file))
         assert wanted is not None
         assert wanted.budget_ns == 40 * MS
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    options = parser.parse_args(["--config", str(file)])
-    assert budget_wanted(options, resolve_settings(vars(options)), None) is None
+    request = request_of("run", "--config", str(file))
+    assert budget_wanted(request, resolve_settings(request.given), None) is None
 
 
 def test_counts_of_pixels_go_on_over_changes() -> None:

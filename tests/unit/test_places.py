@@ -13,9 +13,9 @@ from common.errors import DataError, TandemError, UnavailableError
 from common.places import Kind, kind_of, make_folder, nearest, resolved
 from phone_host.cli import main
 from phone_host.doctor.host_doctor import examine_out
+from phone_host.jobs.output_folders import announce_other_report, require_file, require_folder, spare_inputs
+from phone_host.jobs.run import spare
 from phone_host.stereo.view_files import pair_files
-from phone_host.verbs.output_folders import announce_other_report, require_file, require_folder, spare_inputs
-from phone_host.verbs.run.prepared import spare
 
 LONG = "a" * 300
 DEEP = 2000

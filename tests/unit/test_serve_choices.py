@@ -9,7 +9,7 @@ import pytest
 from common.errors import DataError, SettingsError
 from phone_host.output.axes import Axes
 from phone_host.verbs.scan.arguments import add_arguments
-from phone_host.verbs.serve.choices import choices_of, run_options, run_words, shown_words, with_changes, without_depth
+from phone_host.verbs.serve.choices import choices_of, run_request, run_words, shown_words, with_changes, without_depth
 from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.page import address_of, page_settings
 from phone_host.verbs.serve.program import Commands
@@ -20,9 +20,13 @@ def test_choices_are_a_command_line_and_back() -> None:
     made = with_changes({"far": "5m"}, {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "far": "", "near": " 300 "})
     assert made == {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "near": "300"}
     assert run_words(made) == ["--link", "tcp://a:1", "--link", "tcp://b:2", "--rectified", "--near", "300"]
-    options = run_options(run_words(made))
-    assert (options.link, options.rectified, options.near) == (["tcp://a:1", "tcp://b:2"], True, "300")
-    assert choices_of(options) == made
+    request = run_request(run_words(made))
+    assert (request.cameras.link, request.depth.rectified, request.depth.near_m) == (
+        ("tcp://a:1", "tcp://b:2"),
+        True,
+        0.3,
+    )
+    assert choices_of(request.given) == made
     assert shown_words(made) == run_words(made)
     assert shown_words({"camera": "browser:"}) == ["--camera", "browser:", "--serve"]
     assert with_changes(made, {"rectified": "no"}) == {"link": "tcp://a:1 tcp://b:2", "near": "300"}

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError, TandemError
+from common.program.request import add_options, read_request
 from phone_host.cli import main
+from phone_host.jobs.depth import LimitedDepthOptions, build_core, depth_wanted, refuse_rejected
 from phone_host.model import Crop, Side, StereoGeometry, Verdict
 from phone_host.output.axes import Axes
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.stereo_arguments import add_stereo_arguments
-from phone_host.verbs.stereo_options import build_core, depth_wanted, output_options, refuse_rejected
 from tests.support.planes import noise
 from tests.support.rigs import unlike_rig
 
@@ -33,11 +33,11 @@ ndisp=70
 """As Middlebury publishes it (quarter size)."""
 
 
-def parsed(*words: str) -> argparse.Namespace:
+def parsed(*words: str) -> LimitedDepthOptions:
     """The options as a verb gets them."""
     parser = argparse.ArgumentParser()
-    add_stereo_arguments(parser)
-    return parser.parse_args(words)
+    add_options(parser, LimitedDepthOptions)
+    return read_request(LimitedDepthOptions, vars(parser.parse_args(words)))
 
 
 def core_of(*words: str, size_px: tuple[int, int] = (640, 480)) -> StereoCore:
@@ -86,8 +86,8 @@ def test_the_rest_is_passed_on() -> None:
     assert plain.crop is None
     assert math.isnan(plain.scale)
     assert math.isnan(plain.far_m)
-    assert output_options(parsed()).axes is Axes.CAMERA
-    assert output_options(parsed("--axes", "y-up")).axes is Axes.Y_UP
+    assert parsed().axes is Axes.CAMERA
+    assert parsed("--axes", "y-up").axes is Axes.Y_UP
 
 
 def test_a_rig_brings_its_side_and_its_range(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_a_rejected_rig_is_refused_unless_it_is_asked_for() -> None:
         (("--near", "0"), "--near is '0'"),
         (("--near", "two"), "--near is 'two'"),
         (("--far", "-3"), "--far is '-3'"),
-        (("--near", "5m", "--far", "500"), "--near 5m is not nearer than --far 500"),
+        (("--near", "5m", "--far", "500"), "--near 5m is not nearer than --far 0.5m"),
         (("--crop", "1,2,3"), "--crop is '1,2,3'"),
         (("--crop", "1,2,0,4"), "--crop is '1,2,0,4'"),
         (("--crop", "1.5,2,3,4"), "--crop is '1.5,2,3,4'"),
@@ -220,7 +220,7 @@ def test_what_makes_no_sense_is_refused_with_a_remedy(words: tuple[str, ...], pr
     assert caught.value.remedy
 
 
-def _parsed_joined(words: tuple[str, ...]) -> argparse.Namespace:
+def _parsed_joined(words: tuple[str, ...]) -> LimitedDepthOptions:
     """Parse with `--name=value`, so that a value may begin with a minus."""
     joined: list[str] = []
     for word in words:

@@ -3,7 +3,7 @@
 import pytest
 
 from common.errors import SettingsError
-from phone_host.verbs.units import baseline_mm, bounded_mm, length_mm, limit_mm
+from phone_host.jobs.units import baseline_mm, bounded_mm, length_mm, limit_mm
 
 
 @pytest.mark.parametrize(

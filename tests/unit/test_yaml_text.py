@@ -107,7 +107,7 @@ def test_what_is_written_in_brackets_is_read_back(tree: dict[str, Tree]) -> None
 _WITHOUT = """
 import sys
 sys.modules["yaml"] = None  # as where it is not installed
-import phone_host.doctor.vision_checks, phone_host.verbs.doctor, phone_host.verbs.run.command
+import phone_host.doctor.vision_checks, phone_host.verbs.doctor, phone_host.verbs.run
 from phone_host.output.rig_files.yaml_text import read_yaml
 try:
     read_yaml("a: 1", "f")

@@ -4,10 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
-
-SUMMARY = "calibrate two cameras, live or from pictures of a board"
+from common.program.request import add_options
+from phone_host.jobs.options import ImageOptions, PairOptions
 
 EXAMPLES = """  phone-host calibrate --live --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --square 25mm --out rig.yaml    # says what to show
   phone-host calibrate left/ right/ --square 25mm --out rig.yaml    # the board's size is found in the pictures
@@ -73,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("left", "right"),
         help="which of the two is the board's camera (default left, or as in --from)",
     )
-    add_image_arguments(parser)
+    add_options(parser, ImageOptions)
     parser.add_argument(
         "--out",
         type=Path,
@@ -89,8 +87,7 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="take the pictures now, from both cameras: says what to show, takes each view by itself, ends when it is enough",
     )
-    add_source_arguments(parser, "for --live: ")
-    add_tolerance_argument(parser, "for --live: ")
+    add_options(parser, PairOptions, "for --live: ")
     parser.add_argument(
         "--views",
         type=int,

@@ -10,9 +10,9 @@ from phone_host.calibration.target.board_names import named_board, no_square
 from phone_host.calibration.target.board_size import require_marks_of, require_size, size_in_files
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.marked import Charuco
+from phone_host.jobs.units import square_mm
 from phone_host.run.progress_bar import busy_bar
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.units import square_mm
 
 AUTO: Final = "auto"
 

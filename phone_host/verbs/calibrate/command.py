@@ -5,6 +5,7 @@ import argparse
 from common.errors import DataError
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.terminal import say
+from phone_host.jobs.output_folders import require_alone
 from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
 from phone_host.verbs.calibrate.earlier import asked_of
@@ -12,8 +13,7 @@ from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require
 from phone_host.verbs.calibrate.given import require_pictures
 from phone_host.verbs.calibrate.importing import import_calibration
 from phone_host.verbs.calibrate.report_json import report_values
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import require_alone
+from phone_host.verbs.stereo_options import orientations
 
 
 def run(options: argparse.Namespace) -> int:

@@ -16,6 +16,7 @@ from phone_host.calibration.target.board_views import Mounted
 from phone_host.calibration.target.cameras_beside import first_sizes
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
+from phone_host.jobs.units import square_mm
 from phone_host.model import CameraModel, Rig, Side
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.output.rig_views import RigViews
@@ -24,7 +25,6 @@ from phone_host.settings import most_pixels
 from phone_host.stereo.scaled_rig import is_scaling, scaled_rig
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.calibrate.board import AUTO, Known, Named, Origin, named
-from phone_host.verbs.units import square_mm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

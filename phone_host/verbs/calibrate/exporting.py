@@ -9,12 +9,12 @@ from common.errors import SettingsError
 from common.imagesize.head import size_text
 from common.places import resolved
 from phone_host.declared_settings import NEAR_M
+from phone_host.jobs.output_folders import written_together
 from phone_host.model import Rectification, Rig
 from phone_host.output.atomic import write_text
 from phone_host.output.rig_files.imported import RigKind, export_texts
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.verbs.calibrate.report import Exported
-from phone_host.verbs.output_folders import written_together
 
 _OF_RECTIFIED: Final = frozenset({RigKind.MIDDLEBURY, RigKind.KITTI})
 

@@ -13,6 +13,14 @@ from phone_host.calibration.solve.series_snapshot import Taken
 from phone_host.calibration.target.board_views import Mounted, look_for_boards
 from phone_host.calibration.target.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.target.pairs import Reason
+from phone_host.jobs.output_folders import (
+    announce_other_report,
+    claim_names,
+    require_file,
+    spare_names,
+    written_beside,
+)
+from phone_host.jobs.units import baseline_mm
 from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -41,15 +49,7 @@ from phone_host.verbs.calibrate.rig_file import replace_rig, require_own
 from phone_host.verbs.calibrate.solving import Solved, solve_series
 from phone_host.verbs.calibrate.summary import pairing_notes, passed_over_notes, summary
 from phone_host.verbs.given_pictures import GivenPictures, given_pictures
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import (
-    announce_other_report,
-    claim_names,
-    require_file,
-    spare_names,
-    written_beside,
-)
-from phone_host.verbs.units import baseline_mm
+from phone_host.verbs.stereo_options import orientations
 
 if TYPE_CHECKING:  # cameras and links: 0.2 s that pictures need not wait for
     from phone_host.verbs.calibrate.live import Live

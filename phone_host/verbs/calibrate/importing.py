@@ -12,6 +12,16 @@ from common.imagesize.head import size_text
 from common.places import resolved
 from common.program.terminal import say
 from phone_host.calibration.failure_modes.name import BASELINE_OFF
+from phone_host.jobs.output_folders import (
+    announce_other_report,
+    claim_names,
+    require_alone,
+    require_file,
+    spare_names,
+    stale_page,
+    written_beside,
+)
+from phone_host.jobs.units import baseline_mm, length_mm
 from phone_host.model import Rig, Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
@@ -25,16 +35,6 @@ from phone_host.verbs.calibrate.given import require_import_alone
 from phone_host.verbs.calibrate.report import ImportReport
 from phone_host.verbs.calibrate.report_json import import_values
 from phone_host.verbs.calibrate.rig_file import REFUSED, earlier_words, replace_rig, require_own
-from phone_host.verbs.output_folders import (
-    announce_other_report,
-    claim_names,
-    require_alone,
-    require_file,
-    spare_names,
-    stale_page,
-    written_beside,
-)
-from phone_host.verbs.units import baseline_mm, length_mm
 
 Sizes = tuple[tuple[int, int], tuple[int, int]]
 

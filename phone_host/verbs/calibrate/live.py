@@ -36,6 +36,8 @@ from phone_host.calibration.target.sharpness import SeenLook
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
+from phone_host.jobs.output_folders import require_folder, unwritable
+from phone_host.jobs.units import baseline_mm
 from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, Shows, SnapshotFiles, Spoken, tell_sides
 from phone_host.live.voice import Voice, speech_program
@@ -49,9 +51,7 @@ from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated, every_
 from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.hints import arrangement_hint
 from phone_host.verbs.given_pictures import VIEWS
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import require_folder, unwritable
-from phone_host.verbs.units import baseline_mm
+from phone_host.verbs.stereo_options import orientations
 
 _LOG = logging.getLogger(__name__)
 

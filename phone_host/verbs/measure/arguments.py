@@ -1,12 +1,12 @@
 """The options of phone-host measure. Light, because every start of the command imports them."""
 
 import argparse
+from pathlib import Path
 
+from common.program.request import add_options
+from phone_host.jobs.depth import DEFAULT_NEAR_MM
+from phone_host.jobs.options import ImageOptions
 from phone_host.stereo.matcher_names import default_words
-from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.stereo_arguments import DEFAULT_NEAR_MM, add_overlay_argument
-
-SUMMARY = "measure points of a pair of images in millimetres, with their uncertainty"
 
 EXAMPLES = """  phone-host measure left.png right.png --calibration rig.yaml --points 220,220
   phone-host measure left.png right.png --calibration rig.yaml --points 220,220 310,230.5    # and the distance between the two
@@ -24,7 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="rig.yaml of the two cameras; or, for rectified images, the calib.txt of Middlebury, ETH3D or KITTI",
     )
-    add_overlay_argument(parser)
+    parser.add_argument(
+        "--overlay",
+        type=Path,
+        metavar="FILE",
+        help="overlay.yaml that a run saved: how the cameras had turned against each other since the calibration",
+    )
     parser.add_argument(
         "--points",
         nargs="+",
@@ -47,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--disparities", type=int, metavar="N", help="search disparities from 0 to N-1 px (default: as --near needs)"
     )
     parser.add_argument("--matcher", metavar="NAME", help=f"as for phone-host stereo ({default_words()})")
-    add_image_arguments(parser)
+    add_options(parser, ImageOptions)
     # What the stereo core could be told besides. Limits and crops would only hide the points that are asked for.
     parser.set_defaults(
         rectified=False,

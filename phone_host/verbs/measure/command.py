@@ -15,6 +15,7 @@ from common.places import Kind, kind_of
 from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
+from phone_host.jobs.depth import point_px
 from phone_host.output.json_text import json_number, json_text
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.seen_pair import (
@@ -29,7 +30,6 @@ from phone_host.run.seen_pair import (
 from phone_host.stereo.measured_point import Within, distance_between
 from phone_host.stereo.rig_errors import Known
 from phone_host.verbs.picture_pairs import matching_of
-from phone_host.verbs.stereo_numbers import point_px
 
 _NOISE: Final = "noise of both images"
 _RIG: Final = "the rig's calibration (covariance)"

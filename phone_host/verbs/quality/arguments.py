@@ -3,10 +3,9 @@
 import argparse
 from pathlib import Path
 
-from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.stereo_arguments import PAIRED, add_core_arguments, add_overlay_argument
-
-SUMMARY = "measure how good a rig's depth is, on a flat wall or board"
+from common.program.request import add_options
+from phone_host.jobs.depth import DepthOptions
+from phone_host.jobs.options import PAIRED, ImageOptions
 
 EXAMPLES = """  phone-host quality left.png right.png --calibration rig.yaml --distance 1.2m --out quality
   phone-host quality left/ right/ --calibration rig.yaml --board 9x6 --square 25mm --out quality    # the board gives the true distance
@@ -44,9 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the region that counts, px of the rectified left image (default: the middle 40 %% x 40 %%, or the board inside its"
         " outermost inner corners)",
     )
-    add_core_arguments(parser)
-    add_overlay_argument(parser)
-    add_image_arguments(parser)
+    add_options(parser, DepthOptions)
+    add_options(parser, ImageOptions)
     parser.add_argument(
         "--out",
         type=Path,

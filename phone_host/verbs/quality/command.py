@@ -7,15 +7,15 @@ from common.program.commandline import CHECK_FAILED
 from common.program.terminal import columns, say
 from common.words import counted
 from phone_host.calibration.target.corners import Board, parse_board
+from phone_host.jobs.depth import crop_of
+from phone_host.jobs.units import limit_mm, square_mm
 from phone_host.output.json_text import json_text
 from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_lines import quality_lines
 from phone_host.run.quality_job import NAMES, QualityJob, run_quality
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.verbs.picture_pairs import file_pairs, reading, require_place
-from phone_host.verbs.stereo_numbers import crop_of
 from phone_host.verbs.stereo_options import require_metres
-from phone_host.verbs.units import limit_mm, square_mm
 
 
 def run(options: argparse.Namespace) -> int:

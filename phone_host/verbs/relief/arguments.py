@@ -3,11 +3,10 @@
 import argparse
 from pathlib import Path
 
+from common.program.request import add_options
+from phone_host.jobs.depth import DEFAULT_NEAR_MM
+from phone_host.jobs.options import ImageOptions
 from phone_host.stereo.matcher_names import default_words
-from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.stereo_arguments import DEFAULT_NEAR_MM, add_overlay_argument
-
-SUMMARY = "make a printable relief of one pair of images"
 
 EXAMPLES = """  phone-host relief left.png right.png --calibration rig.yaml --out print
   phone-host relief left.png right.png --calibration rig.yaml --width 150mm --far 2m --out print
@@ -24,7 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         help="rig.yaml of the two cameras; or, for rectified images, the calib.txt of Middlebury, ETH3D or KITTI",
     )
-    add_overlay_argument(parser)
+    parser.add_argument(
+        "--overlay",
+        type=Path,
+        metavar="FILE",
+        help="overlay.yaml that a run saved: how the cameras had turned against each other since the calibration",
+    )
     parser.add_argument("--width", metavar="MM", default="100mm", help="longer side of the plaque (default 100mm)")
     parser.add_argument(
         "--height",
@@ -45,5 +49,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--crop", metavar="X,Y,W,H", help="part of the rectified left image, px")
     parser.add_argument("--disparities", type=int, metavar="N", help="search disparities from 0 to N-1 px")
     parser.add_argument("--matcher", metavar="NAME", help=f"as for phone-host stereo ({default_words()})")
-    add_image_arguments(parser)
+    add_options(parser, ImageOptions)
     parser.set_defaults(rectified=False, scale=None, focal=None, baseline=None, doffs=None, center=None)

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Final
 
 from common.program.terminal import say
+from phone_host.jobs.output_folders import require_alone, require_folder, written_together
+from phone_host.jobs.units import bounded_mm
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
 from phone_host.output.meshes.decimated import NoLibraryError, decimated
@@ -13,9 +15,7 @@ from phone_host.output.meshes.relief import Relief, Sizes, relief_of
 from phone_host.output.meshes.solid import Solid
 from phone_host.run.file_pairs import sound_pair
 from phone_host.run.progress_bar import step_bar
-from phone_host.verbs.output_folders import require_alone, require_folder, written_together
 from phone_host.verbs.picture_pairs import matching_of
-from phone_host.verbs.units import bounded_mm
 
 _NAMES: Final = ("relief.stl", "relief.3mf")
 _TOLERANCE_M: Final = 0.00005

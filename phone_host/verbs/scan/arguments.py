@@ -4,17 +4,10 @@ import argparse
 from pathlib import Path
 
 from common.program.quantities import file_size, reading, seconds
-from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.source_arguments import add_source_arguments, add_tolerance_argument
-from phone_host.verbs.stereo_arguments import (
-    PAIRED,
-    add_core_arguments,
-    add_limit_arguments,
-    add_overlay_argument,
-)
+from common.program.request import add_options
+from phone_host.jobs.depth import LimitedDepthOptions
+from phone_host.jobs.options import PAIRED, ImageOptions, PairOptions
 from phone_host.verbs.unseen_argument import add_unseen_argument
-
-SUMMARY = "put pairs from several places together to one model with colours"
 
 EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup    # folders: photographs on the way around the cup
   phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
@@ -40,10 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f" scanned live: {PAIRED}",
     )
     _add_live_arguments(parser)
-    add_core_arguments(parser)
-    add_limit_arguments(parser)
-    add_overlay_argument(parser)
-    add_image_arguments(parser)
+    add_options(parser, LimitedDepthOptions)
+    add_options(parser, ImageOptions)
     add_model_arguments(parser)
     add_turntable_arguments(parser)
     _add_resume_arguments(parser)
@@ -58,8 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, metavar="FILE", help="live: settings file (TOML)")
-    add_source_arguments(parser, "live: ")
-    add_tolerance_argument(parser, "live: ")
+    add_options(parser, PairOptions, "live: ")
     parser.add_argument(
         "--board-side",
         choices=("left", "right"),

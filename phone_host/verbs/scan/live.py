@@ -9,11 +9,21 @@ from common.errors import SettingsError
 from common.orientation import UPRIGHT
 from common.program import logs
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
+from common.program.request import read_request, usual_values
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.protocol.message import Pacing
 from phone_host.declared_settings import PhoneHostSettings
+from phone_host.jobs.output_folders import (
+    announce_other_report,
+    require_alone,
+    require_writable,
+    spare_inputs,
+    writing,
+)
+from phone_host.jobs.run import Opened, PreparedRun, open_run
+from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.live.scan import LiveScan
 from phone_host.live.scan_view import ScanPicture
 from phone_host.recording.playback import Playback
@@ -23,17 +33,8 @@ from phone_host.run.kept import partial_words
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap
-from phone_host.verbs.orientation_arguments import orientations
-from phone_host.verbs.output_folders import (
-    announce_other_report,
-    require_alone,
-    require_writable,
-    spare_inputs,
-    writing,
-)
-from phone_host.verbs.run.prepared import Opened, PreparedRun, checked, open_run
 from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
-from phone_host.verbs.serve.choices import run_options
+from phone_host.verbs.stereo_options import orientations
 
 
 def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
@@ -50,7 +51,7 @@ def scan_live(options: argparse.Namespace) -> tuple[ScanReport, int]:
         UnavailableError: a camera, a link or the folder cannot be had.
         DataError: the rig cannot be used, or no pair has depth.
     """
-    wanted, of_run = scan_wanted(options), _run_options(options)
+    wanted, of_run = scan_wanted(options), _run_request(options)
     axes = axes_of(options, wanted)
     found = checked(of_run)
     _require(options, found.values)
@@ -122,11 +123,12 @@ def _followed(prepared: PreparedRun, live: LiveScan, signals: StopSignals) -> En
     return ended
 
 
-def _run_options(options: argparse.Namespace) -> argparse.Namespace:
-    """Return the options of the run beneath: it writes nothing itself."""
-    of_run = run_options([])
-    own = {name: value for name, value in vars(options).items() if hasattr(of_run, name)}
-    return argparse.Namespace(**{**vars(of_run), **own, "out": None})
+def _run_request(options: argparse.Namespace) -> RunRequest:
+    """Return the request of the run beneath: it writes nothing itself."""
+    own = vars(options)
+    usual = {**usual_values(RunRequest), "json": False, "debug": False}
+    given = {name: own.get(name, value) for name, value in usual.items()}
+    return read_request(RunRequest, {**given, "out": None})
 
 
 def _require(options: argparse.Namespace, settings: PhoneHostSettings) -> None:

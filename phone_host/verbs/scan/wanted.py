@@ -11,6 +11,7 @@ from common.errors import SettingsError, UnavailableError
 from common.program.quantities import decimal_number
 from common.program.terminal import say
 from common.words import counted
+from phone_host.jobs.units import length_mm
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.run.kept_submaps import read_submaps, require_no_submaps
@@ -23,7 +24,6 @@ from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap
 from phone_host.stereo.match_tandem import matching_threads
 from phone_host.verbs.stereo_options import output_options
-from phone_host.verbs.units import length_mm
 
 _LEAST_VOXEL_MM, _MOST_VOXEL_MM = 0.2, 250.0
 _USUAL: Final = "usual"
@@ -142,16 +142,21 @@ def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
 
 
 def axes_of(options: argparse.Namespace, wanted: ScanWanted) -> Axes:
+    """Return the axes of the files, as `axes_beside` does."""
+    return axes_beside(output_options(options).axes, wanted)
+
+
+def axes_beside(asked: Axes, wanted: ScanWanted) -> Axes:
     """Return the axes of the files.
 
     Args:
-        options: options as `scan` declares them.
-        wanted: what they ask for.
+        asked: the value of --axes.
+        wanted: how the model is made.
 
     Raises:
         SettingsError: --axes beside a mat, or beside an object on a table.
     """
-    asked, own = output_options(options).axes, own_axes(wanted)
+    own = own_axes(wanted)
     if own is None:
         return asked
     option = "--mat" if own is Axes.MAT else "--object"

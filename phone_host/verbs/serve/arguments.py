@@ -3,27 +3,12 @@
 import argparse
 from pathlib import Path
 
-SUMMARY = "the page: find, check, calibrate and run both cameras in a browser"
+from phone_host.jobs.options import LAN_HELP
 
 EXAMPLES = """  phone-host serve --open    # the page in this machine's browser
   phone-host serve 127.0.0.1:9000
   phone-host serve --lan    # for a phone in the same network: https, with a code to scan
 """
-
-
-def add_lan_argument(parser: argparse.ArgumentParser, when: str = "") -> None:
-    """Declare --lan, for every verb that serves the page.
-
-    Args:
-        parser: of the verb.
-        when: begins the help text, such as "with --serve: ".
-    """
-    parser.add_argument(
-        "--lan",
-        action="store_true",
-        help=f"{when}serve the page to other machines: by https with a certificate authority of this machine's own, and only"
-        " with the token of the first address",
-    )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the page is served (default 127.0.0.1:8765; with --lan 0.0.0.0:8765); port 0: any that is free",
     )
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
-    add_lan_argument(parser)
+    parser.add_argument("--lan", action="store_true", help=LAN_HELP)
     parser.add_argument(
         "--config",
         type=Path,

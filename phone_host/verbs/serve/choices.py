@@ -9,9 +9,10 @@ from typing import Final, NoReturn
 
 from common.errors import SettingsError
 from common.program.commandline import ExamplesFirstParser
+from common.program.request import add_options, read_request
 from phone_host.camera.browser_uri import is_browser
+from phone_host.jobs.run_request import RunRequest
 from phone_host.verbs.calibrate import arguments as calibrate_arguments
-from phone_host.verbs.run import arguments as run_arguments
 from phone_host.verbs.scan import arguments as scan_arguments
 
 _YES: Final = frozenset({"yes", "true", "on", "1"})
@@ -39,7 +40,9 @@ class _Strict(ExamplesFirstParser):
         )
 
 
-def _parser(add_arguments: Callable[[argparse.ArgumentParser], None]) -> _Strict:
+def _parser(
+    add_arguments: Callable[[argparse.ArgumentParser], None] = lambda made: add_options(made, RunRequest),
+) -> _Strict:
     made = _Strict("phone-host", add_help=False)
     add_arguments(made)
     made.add_argument("--json", action="store_true")
@@ -50,7 +53,7 @@ def _parser(add_arguments: Callable[[argparse.ArgumentParser], None]) -> _Strict
 @cache
 def _declared() -> dict[str, argparse.Action]:
     """Return the options of `run`: the state asks for them several times a second."""
-    return _parser(run_arguments.add_arguments).declared
+    return _parser().declared
 
 
 @cache
@@ -123,27 +126,27 @@ def shown_words(choices: Mapping[str, str]) -> list[str]:
     return [*run_words(choices), *(["--serve"] if is_browser(choices.get("camera", "")) else [])]
 
 
-def choices_of(options: argparse.Namespace) -> dict[str, str]:
+def choices_of(given: Mapping[str, object]) -> dict[str, str]:
     """Return the options of a run that differ from the usual ones, as choices.
 
     Args:
-        options: of `run`.
+        given: of `run`, by name.
     """
     found = {}
     for name, action in _declared().items():
-        value = getattr(options, action.dest, None)
+        value = given.get(action.dest)
         if name not in _NOT_CHOSEN and value != action.default and value is not None:
             found[name] = "yes" if _is_switch(action) else " ".join(value) if isinstance(value, list) else str(value)
     return found
 
 
-def run_options(words: Sequence[str]) -> argparse.Namespace:
+def run_request(words: Sequence[str]) -> RunRequest:
     """Read words as `phone-host run` reads them.
 
     Raises:
         SettingsError: they are not valid.
     """
-    return argparse.Namespace(**vars(_parser(run_arguments.add_arguments).parse_args(list(words))))
+    return read_request(RunRequest, vars(_parser().parse_args(list(words))))
 
 
 def calibrate_options(words: Sequence[str]) -> argparse.Namespace:

@@ -4,7 +4,7 @@ import argparse
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +12,9 @@ from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.jobs.output_folders import writing
+from phone_host.jobs.run import PreparedRun, open_run
+from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.live.scan import LiveScan
 from phone_host.model.unseen import UnseenSurface
 from phone_host.output.axes import Axes
@@ -24,11 +27,9 @@ from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.scan.box import Box
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
-from phone_host.verbs.output_folders import writing
-from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
 from phone_host.verbs.scan.arguments import add_model_arguments, add_turntable_arguments
 from phone_host.verbs.scan.live import live_scan
-from phone_host.verbs.scan.wanted import axes_of, box_of, scan_wanted
+from phone_host.verbs.scan.wanted import axes_beside, box_of, scan_wanted
 
 OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object", "unseen")
 """Options of `scan` that the page may give."""
@@ -87,7 +88,7 @@ class PageScan:
 
 
 def page_scan(
-    options: argparse.Namespace,
+    request: RunRequest,
     values: Choices,
     folder: Path,
     sinks_of: SinksOf,
@@ -98,7 +99,7 @@ def page_scan(
     """Open everything that a scan needs.
 
     Args:
-        options: of `run`.
+        request: of the run.
         values: options of `scan` by name, those of OF_SCAN.
         folder: of all scans; created if missing.
         sinks_of: makes further sinks.
@@ -110,9 +111,10 @@ def page_scan(
         UnavailableError: a camera, a link or the folder cannot be had.
         DataError: the rig cannot be used.
     """
-    options.out, options.save_every = None, 0
-    found = checked(options)
-    if not found.values.calibration and not (options.rectified and options.focal):
+    nothing = {"out": None, "save_every": 0}  # the run beneath writes nothing itself
+    request = replace(request, out=None, save_every=0, given={**request.given, **nothing})
+    found = checked(request)
+    if not found.values.calibration and not (request.depth.rectified and request.depth.focal_px):
         raise SettingsError("there is no calibration, so there are no metres", "calibrate, or name a rig.yaml")
     if unknown := set(values) - set(OF_SCAN):
         raise SettingsError(
@@ -120,10 +122,10 @@ def page_scan(
         )
     wanted = asked_scan(values)
     out = _new_folder(folder)
-    opened = open_run(options, found, tell, feed)
+    opened = open_run(request, found, tell, feed)
     live = live_scan(opened, wanted, out)
     prepared = opened.prepared((), (live.sink, *sinks_of(opened.core)))
-    return PageScan(prepared, live, out, found.values.matcher, axes_of(options, wanted))
+    return PageScan(prepared, live, out, found.values.matcher, axes_beside(request.depth.axes, wanted))
 
 
 def asked_scan(values: Choices) -> ScanWanted:

@@ -21,6 +21,9 @@ from phone_host.camera.http_uri import without_password
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
+from phone_host.jobs.depth import refuse_rejected
+from phone_host.jobs.run import PreparedRun, open_run
+from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
 from phone_host.model import Verdict
@@ -37,11 +40,10 @@ from phone_host.stereo.matcher_names import MATCHERS
 from phone_host.verbs.calibrate.earlier import Asked, asked_of
 from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place
 from phone_host.verbs.calibrate.live import PreparedViews, prepare_views
-from phone_host.verbs.run.prepared import PreparedRun, checked, open_run
 from phone_host.verbs.serve.choices import (
     calibrate_options,
     placed,
-    run_options,
+    run_request,
     run_words,
     scan_words,
     shown_words,
@@ -52,7 +54,6 @@ from phone_host.verbs.serve.kept_choices import is_there, keep, kept
 from phone_host.verbs.serve.page_print import asked_print
 from phone_host.verbs.serve.page_scan import PageScan, asked_box, page_scan
 from phone_host.verbs.serve.places import recording_folder, scan_folder, snapshot_folder
-from phone_host.verbs.stereo_options import refuse_rejected
 
 _TRIAL_S: Final = 2.5
 """Two seconds show the rate of both cameras; a clock is known after less than one."""
@@ -92,7 +93,7 @@ class Commands:
     @property
     def log_level(self) -> int:
         """The least important messages that are logged, as the settings file says."""
-        return log_level(checked(self._options({})).values.log_level)
+        return log_level(checked(self._request({})).values.log_level)
 
     def kept(self) -> Choices:
         """See Program."""
@@ -107,8 +108,8 @@ class Commands:
         """See Program."""
         shown = self.shown(choices)
         new = with_changes(choices, {name: value for name, value in changes.items() if value != shown.get(name)})
-        options = self._options(new)
-        checked(options)
+        request = self._request(new)
+        checked(request)
         camera = new.get("camera", "")
         if camera and camera != choices.get("camera"):
             require_replayed(camera)
@@ -116,7 +117,7 @@ class Commands:
         if idle := [name for name in _OF_DEPTH if changes.get(name) and not (rig or is_rectified)]:
             raise SettingsError(f"--{idle[0]} without a calibration", "calibrate, or name a rig.yaml")
         if rig and changes.get("calibration") and not is_rectified and not is_calib_txt(Path(rig)):
-            refuse_rejected(read_own_rig(Path(rig)), rig, allowed=options.use_rejected_rig)
+            refuse_rejected(read_own_rig(Path(rig)), rig, allowed=request.depth.use_rejected_rig)
         return new
 
     def shown(self, choices: Choices) -> Choices:
@@ -139,26 +140,26 @@ class Commands:
     def run(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
         """See Program."""
         words = [*self._fixed, *run_words(choices)]
-        options = run_options(words)
-        opened = open_run(options, checked(options), self._tell, self.feed)
+        request = run_request(words)
+        opened = open_run(request, checked(request), self._tell, self.feed)
         return opened.prepared(["phone-host", "run", *words], sinks_of(opened.core))
 
     def trial(self, choices: Choices, sinks_of: SinksOf) -> PreparedRun:
         """See Program."""
         short = {**without_depth(choices), "seconds": str(_TRIAL_S)}
-        options = run_options([*self._fixed, *run_words(short), "--wait", str(_BOARD_S)])
-        opened = open_run(options, checked(options), lambda _: None, self.feed)
+        request = run_request([*self._fixed, *run_words(short), "--wait", str(_BOARD_S)])
+        opened = open_run(request, checked(request), lambda _: None, self.feed)
         return opened.prepared((), sinks_of(None))
 
     def question(self, choices: Choices) -> Question:
         """See Program."""
-        options = self._options(choices)
-        settings = checked(options).values
+        request = self._request(choices)
+        settings = checked(request).values
         return Question(
             camera=settings.camera,
             links=settings.link,
-            calibration="" if options.rectified else settings.calibration,
-            out=options.out or data_folder(),
+            calibration="" if request.depth.rectified else settings.calibration,
+            out=request.out or data_folder(),
             wait_s=_BOARD_S,
             keys=self.keys,
             data=data_folder(),
@@ -192,7 +193,7 @@ class Commands:
         """See Program."""
         out = choices.get("out", "")
         folder = scan_folder(Path(out) if out else None)
-        return page_scan(self._options(choices), values, folder, sinks_of, tell=self._tell, feed=self.feed)
+        return page_scan(self._request(choices), values, folder, sinks_of, tell=self._tell, feed=self.feed)
 
     def box(self, values: Choices) -> Box | None:
         """See Program."""
@@ -212,8 +213,8 @@ class Commands:
         out = choices.get("out", "")
         return recording_folder(Path(out) if out else None)
 
-    def _options(self, choices: Choices) -> argparse.Namespace:
-        return run_options([*self._fixed, *run_words(choices)])
+    def _request(self, choices: Choices) -> RunRequest:
+        return run_request([*self._fixed, *run_words(choices)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

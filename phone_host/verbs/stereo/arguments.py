@@ -3,10 +3,9 @@
 import argparse
 from pathlib import Path
 
-from phone_host.verbs.orientation_arguments import add_image_arguments
-from phone_host.verbs.stereo_arguments import PAIRED, add_overlay_argument, add_stereo_arguments
-
-SUMMARY = "compute disparity and point clouds of pairs of images"
+from common.program.request import add_options
+from phone_host.jobs.depth import LimitedDepthOptions
+from phone_host.jobs.options import PAIRED, ImageOptions
 
 EXAMPLES = """  phone-host stereo left.png right.png --calibration rig.yaml --out scan
   phone-host stereo left/ right/ --calibration rig.yaml --out scans    # folders: a folder scans/pair-NNNNNN per pair
@@ -25,9 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="LEFT RIGHT",
         help=f"images of the left and of the right camera: {PAIRED}",
     )
-    add_stereo_arguments(parser)
-    add_overlay_argument(parser)
-    add_image_arguments(parser)
+    add_options(parser, LimitedDepthOptions)
+    add_options(parser, ImageOptions)
     parser.add_argument(
         "--out",
         type=Path,

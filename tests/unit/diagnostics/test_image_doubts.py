@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import pytest
 
+from common.program.request import add_options
 from phone_host.diagnostics.arrangement import EXCHANGE, ImageSource, tries_of
 from phone_host.diagnostics.codes import BLOCKING, Code, diagnose
 from phone_host.diagnostics.headline import Grade, answer, depth_error_m, headline
@@ -15,6 +16,7 @@ from phone_host.diagnostics.image_judge import ImageJudge, ImageTrust
 from phone_host.diagnostics.image_rules import ImageFigures, image_doubts, median_figures
 from phone_host.diagnostics.run_rules import concerns, depth_is_wrong
 from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.jobs.options import ImageOptions
 from phone_host.model import (
     Arrangement,
     CutCounts,
@@ -28,7 +30,6 @@ from phone_host.model import (
 )
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
-from phone_host.verbs.orientation_arguments import add_orientation_arguments
 from tests.support.run_snapshots import run
 
 SHARP: Final = Exposure(mean_level=110, bright_level=200, structure=30, blur_px=1.0, features=400)
@@ -134,7 +135,7 @@ def test_remedies_for_files_name_what_stereo_takes(found: Evidence, words: str) 
     assert words in concern.remedy
     assert not re.search(r"rotate=|flip=|board-side|camera's app", concern.remedy)
     parser = argparse.ArgumentParser()
-    add_orientation_arguments(parser)
+    add_options(parser, ImageOptions)
     for given in tries_of(concern.remedy):
         if given != (EXCHANGE,):
             parser.parse_args(given)  # ends the test if it takes them not

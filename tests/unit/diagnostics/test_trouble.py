@@ -20,7 +20,7 @@ from phone_host.report.summary import summary
 from phone_host.run.course import patience_s
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.svg.plots import Percentiles
-from phone_host.verbs.run.command import WaitingNote
+from phone_host.verbs.run import WaitingNote
 from tests.support.run_snapshots import run
 from tests.unit.test_ledgerer import enter
 from tests.unit.test_pair_queue import MS

@@ -6,7 +6,7 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.calibration.target.corners import Board, agree, find_corners, order_by_colour, parse_board
-from phone_host.verbs.units import square_mm
+from phone_host.jobs.units import square_mm
 from tests.support.boards import BOARD, poses, render_pair
 from tests.support.rigs import project_points, unlike_rig
 

@@ -1,6 +1,5 @@
 """phone-host run: pair a board's frames with the host camera's, compute depth and measure every delay."""
 
-import argparse
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -17,25 +16,40 @@ from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_rules import depth_is_wrong, nothing_whole
+from phone_host.jobs.run import Ended, PreparedRun, open_run
+from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.output.json_text import json_text
 from phone_host.report.summary import summary
 from phone_host.run.host_settings import EndReason
 from phone_host.run.terminal_view import LiveTable
-from phone_host.verbs.run.prepared import Ended, PreparedRun, checked, open_run
 
 if TYPE_CHECKING:
     from phone_host.serve.beside import BesideRun
+
+EXAMPLES = """  phone-host run --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --calibration rig.yaml --out scan
+  phone-host run --link ipc://$XDG_RUNTIME_DIR/board --camera replay:right --rectified --disparities 64 --out scan    # photographs, by number
+  phone-host run --link tcp://192.168.7.2:5555 --camera 'http://127.0.0.1:8080/video?latency_ms=120' --calibration rig.yaml --out scan
+  phone-host run --link serial:/dev/ttyACM0 --link tcp://192.168.7.2:5555 --camera 'replay:right?loop=1' --out scan
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --align-phase    # both cameras expose together
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --budget 30ms    # coarser depth rather than slower
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --serve    # shows the page of this run
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --record session.mcap    # to compute it again later
+  phone-host run --camera v4l2:/dev/video0 --calibration rig.yaml --record session.mcap --record-topics depth,cloud    # for other programs
+  phone-host run --replay session.mcap --calibration rig.yaml --out again
+  phone-host run --replay 'session.mcap?pace=clock' --calibration rig.yaml --fifo 2:drop-newest --out again
+  phone-host run --camera 'replay:right?loop=1' --pairs 300 --json    # no depth: pairs and delays only
+"""
 
 _SOON_NS: Final = 1_000_000_000
 """A board that is there is met within a fifth of this; then there is nothing to say."""
 
 
-def run(options: argparse.Namespace) -> int:
+def run(request: RunRequest) -> int:
     """Run until stopped, until the number of pairs is reached, or until a stream ends."""
-    found = checked(options)
+    found = checked(request)
     logs.set_up(log_level(found.values.log_level))
-    with _page(options, found) as page:  # first of all, because a browser gives its camera by it
-        opened = open_run(options, found, _tell, None if page is None else page.feed)
+    with _page(request, found) as page:  # first of all, because a browser gives its camera by it
+        opened = open_run(request, found, _tell, None if page is None else page.feed)
         signals = StopSignals()
         prepared = opened.prepared(sys.argv, () if page is None else (page.sink(opened.core, opened.named),))
         if page is not None:
@@ -45,36 +59,36 @@ def run(options: argparse.Namespace) -> int:
             return signals.stop or (page is not None and page.stopped())
 
         try:
-            ended = _watched(options, prepared, stopped)
+            ended = _watched(request, prepared, stopped)
         except BaseException as error:
             with suppress(Exception):  # tell what ended the run, not what followed
                 failed = prepared.failed(diagnostic_of(error))
-                if options.json:
+                if request.as_json:
                     print(json_text(failed.report))
             raise
         written = prepared.ended(ended)
         if page is not None:
             page.ended(written.snapshot)
-    return _finish(options, prepared, written, ended, signals, is_stopped=stopped())
+    return _finish(request, prepared, written, ended, signals, is_stopped=stopped())
 
 
-def _page(
-    options: argparse.Namespace, found: Resolved[PhoneHostSettings]
-) -> "AbstractContextManager[BesideRun | None]":
+def _page(request: RunRequest, found: Resolved[PhoneHostSettings]) -> "AbstractContextManager[BesideRun | None]":
     """Serve the page of a run, if it is wanted."""
-    if options.serve is None:
-        if options.lan:
+    if request.serve is None:
+        if request.lan:
             raise SettingsError("--lan without --serve", "add --serve, or leave it out")
         return nullcontext()
-    from phone_host.verbs.run.page_beside import page_beside  # noqa: PLC0415 - a server that most runs do without
+    from phone_host.verbs.page_beside import page_beside  # noqa: PLC0415 - a server that most runs do without
 
-    return page_beside(options, found)
+    return page_beside(request, found)
 
 
-def _watched(options: argparse.Namespace, prepared: PreparedRun, stop: Callable[[], bool]) -> EndReason:
+def _watched(request: RunRequest, prepared: PreparedRun, stop: Callable[[], bool]) -> EndReason:
     """Run before the user's eyes: a live table on a terminal, else a line where one is due."""
     host = prepared.host
-    live = LiveTable(host.snapshot, pairs=options.pairs or 0, seconds=options.seconds) if sys.stderr.isatty() else None
+    live = (
+        LiveTable(host.snapshot, pairs=request.pairs or 0, seconds=request.duration_s) if sys.stderr.isatty() else None
+    )
     note = WaitingNote(
         prepared.named, lambda: host.has_met_board, lambda: host.refused, lambda line: say(line, sys.stderr, flush=True)
     )
@@ -83,7 +97,7 @@ def _watched(options: argparse.Namespace, prepared: PreparedRun, stop: Callable[
 
 
 def _finish(
-    options: argparse.Namespace,
+    request: RunRequest,
     prepared: PreparedRun,
     written: Ended,
     ended: EndReason,
@@ -95,15 +109,15 @@ def _finish(
     host, snapshot = prepared.host, written.snapshot
     missing = f"\nnot written: {written.missing}: make room and run again" if written.missing else ""
     told = summary(snapshot, columns()) + missing
-    text = json_text(written.report) if options.json else headed(told, columns(), rows())
+    text = json_text(written.report) if request.as_json else headed(told, columns(), rows())
     print(text, flush=host.has_given_up)
-    if options.json and snapshot.shortfall:
+    if request.as_json and snapshot.shortfall:
         _tell(snapshot.shortfall)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
         return INTERRUPTED
-    too_few = options.pairs and ended is EndReason.STREAM_ENDED
+    too_few = request.pairs and ended is EndReason.STREAM_ENDED
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
     is_wrong = not is_stopped and (depth_is_wrong(snapshot) or nothing_whole(snapshot))
     return CHECK_FAILED if too_few or is_wrong or not written.is_complete else 0

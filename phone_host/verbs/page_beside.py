@@ -1,6 +1,5 @@
 """The page beside a run: `run --serve`."""
 
-import argparse
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
+from phone_host.jobs.run_request import RunRequest
 from phone_host.output.axes import Axes
 from phone_host.serve.beside import BesideRun
 from phone_host.settings import key_folder
@@ -58,11 +58,11 @@ def _tell(server: PageServer, settings: PageSettings, camera: str) -> None:
 
 
 @contextmanager
-def page_beside(options: argparse.Namespace, found: Resolved[PhoneHostSettings]) -> Iterator[BesideRun]:
+def page_beside(request: RunRequest, found: Resolved[PhoneHostSettings]) -> Iterator[BesideRun]:
     """Serve the page of a run while the block lasts; its address is told on stderr.
 
     Args:
-        options: of the run, of which nothing is open yet.
+        request: of the run, of which nothing is open yet.
         found: its settings.
 
     Raises:
@@ -70,16 +70,16 @@ def page_beside(options: argparse.Namespace, found: Resolved[PhoneHostSettings])
         UnavailableError: the port is taken, or a package is missing.
     """
     values = found.values
-    choices = {**choices_of(options), "camera": without_password(values.camera)}
+    choices = {**choices_of(request.given), "camera": without_password(values.camera)}
     beside = BesideRun(
         choices,
         lambda chosen: command_line("phone-host", "run", *shown_words(chosen)),
-        snapshots=snapshot_folder(options.out),
-        recordings=recording_folder(options.out),
-        axes=Axes(options.axes),
+        snapshots=snapshot_folder(request.out),
+        recordings=recording_folder(request.out),
+        axes=request.depth.axes,
     )
-    address = None if options.serve is True else options.serve
-    settings = page_settings(address, key_folder(values.keys).path, lan=options.lan)
+    address = request.serve if isinstance(request.serve, str) else None
+    settings = page_settings(address, key_folder(values.keys).path, lan=request.lan)
     with served(beside, settings) as server:
         _tell(server, settings, values.camera)
         yield beside

@@ -1,12 +1,10 @@
-"""A run as its options describe it, whoever asks: `run` itself, or the page. Prepares it, and writes its report."""
+"""A run as its request describes it, whoever asks: `run` itself, `scan`, or the page. Prepares it, and writes its report."""
 
-import argparse
-import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from common import now
 from common.camera.base import Camera, upright_px
@@ -25,6 +23,9 @@ from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.jobs.depth import build_core, overlay_of
+from phone_host.jobs.output_folders import announce_other_report, require_alone, spare_inputs
+from phone_host.jobs.run_request import RunRequest, budget_wanted, with_own_rig
 from phone_host.model import Rig, Side, TimeOffset
 from phone_host.output.json_text import json_text
 from phone_host.recording.begin import begin_recording
@@ -37,20 +38,13 @@ from phone_host.run.course import patience_s
 from phone_host.run.file_sink import NAMES
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
-from phone_host.run.recording_sinks import Computed, ComputedSink
+from phone_host.run.recording_sinks import ComputedSink
 from phone_host.run.sinks import Sink
-from phone_host.settings import check, key_folder, matcher_is_given, resolve_settings
+from phone_host.settings import key_folder, matcher_is_given
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_note
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
-from phone_host.verbs.output_folders import announce_other_report, require_alone, spare_inputs
-from phone_host.verbs.run.budget import budget_wanted
-from phone_host.verbs.run.own_rig import with_own_rig
-from phone_host.verbs.stereo_options import build_core, depth_wanted, output_options, overlay_of
-
-_MOST_SECONDS: Final = 10_000_000
-"""Four months; more than that is a slip of the hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +52,7 @@ class Opened:
     """Everything that a run needs, open, before it takes its results folder.
 
     Attributes:
-        options: of `run`.
+        request: what was asked for.
         found: its settings.
         camera: of this machine; or a recording of both.
         links: to the board.
@@ -68,7 +62,7 @@ class Opened:
         board_side: which view the board's camera gives.
     """
 
-    options: argparse.Namespace
+    request: RunRequest
     found: Resolved[PhoneHostSettings]
     camera: Camera | Playback
     links: Sequence[Link]
@@ -94,18 +88,17 @@ class Opened:
                 opened.enter_context(closing(self.camera))
             for link in self.links:
                 opened.enter_context(closing(link))
-            if self.options.out is not None:
-                announce_other_report(self.options.out, "run")
+            if self.request.out is not None:
+                announce_other_report(self.request.out, "run")
             settings = _host_settings(self, words)
             recording = self._recording(settings)
-            computed = computed_wanted(self.options)
-            if recording is not None and computed:
-                sinks = (*sinks, ComputedSink(recording, computed, self.board_side))
+            if recording is not None and self.request.record_topics:
+                sinks = (*sinks, ComputedSink(recording, self.request.record_topics, self.board_side))
             host = Host(settings, self.camera, self.links, self.core, sinks, recording=recording)
             opened.pop_all()
-        pairs = self.options.pairs or 0
+        pairs = self.request.pairs or 0
         is_replay = isinstance(self.camera, Playback)
-        return PreparedRun(host, self.named, self.keys, self.board_side, self.options.out, pairs, is_replay)
+        return PreparedRun(host, self.named, self.keys, self.board_side, self.request.out, pairs, is_replay)
 
     def _recording(self, settings: HostSettings) -> RecordingSwitch | None:
         """Return what records, begun if that was asked for; None: a recording is played."""
@@ -118,8 +111,8 @@ class Opened:
             attached[Path(rig).name if known is None else "rig.yaml"] = Path(rig).read_bytes()
         camera = self.camera.description
         recording = RecordingSwitch(lambda path: begin_recording(path, camera, self.board_side, known, attached))
-        if self.options.record is not None:
-            recording.begin(self.options.record)
+        if self.request.record is not None:
+            recording.begin(self.request.record)
         return recording
 
 
@@ -204,25 +197,8 @@ class PreparedRun:
         return Ended(snapshot, report, is_complete, ", ".join(missing))
 
 
-def checked(options: argparse.Namespace) -> Resolved[PhoneHostSettings]:
-    """Resolve the settings and check them and all numbers, as far as that can be done without opening anything.
-
-    Args:
-        options: of `run`.
-
-    Raises:
-        SettingsError: a setting or an option is not valid.
-    """
-    found = resolve_settings(vars(options))
-    check(found.values)
-    _check_numbers(options)
-    depth_wanted(options)
-    computed_wanted(options)
-    return found
-
-
 def open_run(
-    options: argparse.Namespace,
+    request: RunRequest,
     found: Resolved[PhoneHostSettings],
     tell: Callable[[str], None],
     feed: BrowserFeed | None = None,
@@ -230,7 +206,7 @@ def open_run(
     """Open the camera, the core and the links of a run.
 
     Args:
-        options: of `run`.
+        request: of the run.
         found: its settings, from `checked`.
         tell: takes a line that the user should know.
         feed: brings browsers that give their cameras; None: there is no page.
@@ -241,44 +217,44 @@ def open_run(
         DataError: the rig or the camera's images cannot be used.
     """
     settings = found.values
-    if options.replay is not None:
-        return _open_replay(options, found, tell)
+    if request.replay is not None:
+        return _open_replay(request, request.replay, found, tell)
     if not settings.camera:
         raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
-    if getattr(options, "record", None) is not None:
-        require_alone(options.record.parent, options.record.name, "--record")
-        require_new(options.record, "--record")
-    if options.out is not None:
-        spare(options.out, replayed(settings.camera), settings.calibration, options.overlay)
+    if request.record is not None:
+        require_alone(request.record.parent, request.record.name, "--record")
+        require_new(request.record, "--record")
+    if request.out is not None:
+        spare(request.out, replayed(settings.camera), settings.calibration, request.depth.overlay)
     with ExitStack() as opened:  # what cannot be had closes what was
         camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels, feed)
         opened.enter_context(closing(camera))
-        core, board_side = _core(options, settings, upright_px(camera), tell)
-        overlay_of(options, core)
-        budget_wanted(options, found, core)
+        core, board_side = _core(request, settings, upright_px(camera), tell)
+        overlay_of(request.depth, core)
+        budget_wanted(request, found, core)
         keys = key_folder(settings.keys)
-        named, links = open_named(settings.link, keys, patience_s(options.wait, options.seconds))
+        named, links = open_named(settings.link, keys, patience_s(request.cameras.wait_s, request.duration_s))
         opened.pop_all()
-    return Opened(options, found, camera, links, tuple(named), keys.path, core, board_side)
+    return Opened(request, found, camera, links, tuple(named), keys.path, core, board_side)
 
 
 def _open_replay(
-    options: argparse.Namespace, found: Resolved[PhoneHostSettings], tell: Callable[[str], None]
+    request: RunRequest, replay: str, found: Resolved[PhoneHostSettings], tell: Callable[[str], None]
 ) -> Opened:
     """Open the recording that a run plays, and the core."""
     for name in ("link", "camera", "record", "record_topics", "align_phase"):
-        if getattr(options, name, None) is not None:
+        if request.given.get(name) is not None:
             raise SettingsError(f"--{name.replace('_', '-')} beside --replay", "leave one of them out")
-    playback = open_playback(options.replay, options.board_side)
-    if options.out is not None:
-        spare(options.out, "", found.values.calibration, options.overlay)
-        spare_inputs(options.out, NAMES, {"--replay": playback.file})
-    found, rig = with_own_rig(options, found, playback, tell)
+    playback = open_playback(replay, None if request.board_side is None else request.board_side.value)
+    if request.out is not None:
+        spare(request.out, "", found.values.calibration, request.depth.overlay)
+        spare_inputs(request.out, NAMES, {"--replay": playback.file})
+    found, rig = with_own_rig(request, found, playback, tell)
     settings, size_px = replace(found.values, camera=""), playback.description.upright_px
-    core, board_side = _core(options, settings, size_px, tell, playback.board_side, rig=rig)
-    overlay_of(options, core)
-    budget_wanted(options, found, core)
-    return Opened(options, found, playback, (), (str(playback.file),), key_folder(settings.keys).path, core, board_side)
+    core, board_side = _core(request, settings, size_px, tell, playback.board_side, rig=rig)
+    overlay_of(request.depth, core)
+    budget_wanted(request, found, core)
+    return Opened(request, found, playback, (), (str(playback.file),), key_folder(settings.keys).path, core, board_side)
 
 
 def replayed(uri: str) -> str:
@@ -321,7 +297,7 @@ def _page(host: Host, snapshot: RunSnapshot, board_side: Side, out: Path) -> str
 
 
 def _core(
-    options: argparse.Namespace,
+    request: RunRequest,
     settings: PhoneHostSettings,
     size_px: tuple[int, int],
     tell: Callable[[str], None],
@@ -332,20 +308,20 @@ def _core(
     """Return the stereo core, if any, and the side of the board's camera: from the option, else the rig, else the usual one."""
     images = replayed(settings.camera)
     core, rig_side = build_core(
-        options,
+        request.depth,
         settings.calibration,
         settings.matcher,
         size_px,
         Path(images) if images else None,
         rig=rig,
     )
-    board_side = Side(options.board_side) if options.board_side else rig_side or usual
+    board_side = request.board_side or rig_side or usual
     if rig_side not in {None, board_side}:
         raise SettingsError(
             f"--board-side {board_side.value} contradicts {settings.calibration}",
             "leave it out, or calibrate with the board there",
         )
-    if options.record_topics is not None and (core is None or core.geometry is None):
+    if request.record_topics is not None and (core is None or core.geometry is None):
         raise SettingsError(
             "--record-topics without depth in metres",
             "add --calibration rig.yaml, or leave it out: a replay computes depth",
@@ -356,56 +332,26 @@ def _core(
 
 
 def _host_settings(opened: Opened, words: Sequence[str]) -> HostSettings:
-    options, found, core = opened.options, opened.found, opened.core
-    settings, wait_s = found.values, patience_s(options.wait, options.seconds)
+    request, found, core = opened.request, opened.found, opened.core
+    settings, wait_s = found.values, patience_s(request.cameras.wait_s, request.duration_s)
     shown = replace(found, values=replace(settings, camera=without_password(settings.camera)))
     return HostSettings(
         matcher_note="" if core is None or matcher_is_given(found) else default_note(),
-        resolved=with_origins(shown, vars(options), words),
+        resolved=with_origins(shown, request.given, words),
         board_side=opened.board_side,
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=FifoSettings.parse(settings.fifo),
-        pairs=options.pairs or 0,
-        seconds_ns=round(options.seconds * 1e9),
+        pairs=request.pairs or 0,
+        seconds_ns=round(request.duration_s * 1e9),
         wait_ns=None if wait_s is None else round(wait_s * 1e9),
-        out=options.out,
-        save_every=options.save_every,
-        axes=output_options(options).axes,
-        corrects=not options.no_correction,
+        out=request.out,
+        save_every=request.save_every,
+        axes=request.depth.axes,
+        corrects=not request.no_correction,
         time_offset=TimeOffset() if core is None or core.rig is None else core.rig.time_offset,
         interpolate=settings.interpolate,
         most_pixels=settings.most_pixels,
         steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
-        budget=budget_wanted(options, found, core),
-        overlay=overlay_of(options, core),
+        budget=budget_wanted(request, found, core),
+        overlay=overlay_of(request.depth, core),
     )
-
-
-def computed_wanted(options: argparse.Namespace) -> frozenset[Computed]:
-    """Read --record-topics.
-
-    Raises:
-        SettingsError: a name is unknown, or nothing is recorded.
-    """
-    if options.record_topics is None:
-        return frozenset()
-    if options.record is None:
-        raise SettingsError("--record-topics without --record", "add --record FILE.mcap, or leave it out")
-    known = {each.value: each for each in Computed}
-    names = [name.strip() for name in options.record_topics.split(",")]
-    if not set(names) <= known.keys():
-        raise SettingsError(f"--record-topics {options.record_topics!r}", "give depth, cloud, or depth,cloud")
-    return frozenset(known[name] for name in names)
-
-
-def _check_numbers(options: argparse.Namespace) -> None:
-    if options.pairs is not None and options.pairs < 0:
-        raise SettingsError(f"--pairs is {options.pairs}", "give 1 or more, or 0 for no limit")
-    if options.save_every < 0:
-        raise SettingsError(f"--save-every is {options.save_every}", "give 0 or more")
-    if options.budget == 0:
-        raise SettingsError("--budget is 0 ms", "give the time for each pair, for example 30ms, or leave it out")
-    if not 0 <= options.seconds <= _MOST_SECONDS:
-        raise SettingsError(f"--seconds is {options.seconds:g}", f"give 0 (no limit) to {_MOST_SECONDS} seconds")
-    if options.wait is not None and not (math.isfinite(options.wait) and options.wait >= 0):
-        raise SettingsError(f"--wait is {options.wait}", "give 0 or more seconds, or leave it out to wait for ever")

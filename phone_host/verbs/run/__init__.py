@@ -1,1 +1,0 @@
-"""phone-host run: its options (light), and its command."""
