@@ -1,6 +1,9 @@
 """What becomes of the part of a closed surface that no view measured."""
 
 from enum import Enum
+from typing import Final
+
+UNSEEN_HELP: Final = "surface that no view measured: fill it in with colours from its border, fill it in pink, or cut it, which leaves the surface open"
 
 
 class UnseenSurface(Enum):

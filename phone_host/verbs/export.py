@@ -10,14 +10,13 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.jobs.output_folders import require_alone, require_folder, written_together
 from phone_host.jobs.units import length_mm
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model.unseen import UNSEEN_HELP, UnseenSurface
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_number, json_text
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model, read_model
 from phone_host.run.model_job import fewer_triangles, spare_model, usual_tolerance_m, with_unseen
-from phone_host.verbs.unseen_argument import UNSEEN_HELP
 
 EXAMPLES = """  phone-host export scan --to stl --out print                    # scan: the folder that phone-host scan wrote
   phone-host export scan --to stl,3mf,glb --out print

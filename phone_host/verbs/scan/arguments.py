@@ -3,11 +3,11 @@
 import argparse
 from pathlib import Path
 
-from common.program.quantities import file_size, reading, seconds
+from common.program.quantities import reading, seconds
 from common.program.request import add_options
 from phone_host.jobs.depth import LimitedDepthOptions
 from phone_host.jobs.options import PAIRED, ImageOptions, PairOptions
-from phone_host.verbs.unseen_argument import add_unseen_argument
+from phone_host.verbs.scan.wanted import ModelOptions
 
 EXAMPLES = """  phone-host scan left/ right/ --calibration rig.yaml --out cup    # folders: photographs on the way around the cup
   phone-host scan left/ right/ --calibration rig.yaml --voxel 2mm --far 80cm --out cup    # finer, and without the background
@@ -35,8 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_live_arguments(parser)
     add_options(parser, LimitedDepthOptions)
     add_options(parser, ImageOptions)
-    add_model_arguments(parser)
-    add_turntable_arguments(parser)
+    add_options(parser, ModelOptions)
     _add_resume_arguments(parser)
     parser.add_argument(
         "--out",
@@ -73,59 +72,6 @@ def _add_live_arguments(parser: argparse.ArgumentParser) -> None:
         default=0.0,
         metavar="S",
         help="live: end S seconds after the first pair (default: with Ctrl-C or SIGTERM)",
-    )
-
-
-def add_model_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --mat, --object, --voxel, --box, --unseen and --memory: how the model is made."""
-    parser.add_argument(
-        "--mat",
-        nargs="?",
-        const="usual",
-        metavar="10x8:25mm:18mm:5x5",
-        help="scan what lies on a printed mat, whether it is turned or the cameras go around it: the sheet of `phone-host target mat`, or any ChArUco"
-        " sheet by its squares, side of a square, side of a mark and family; the model stands on the sheet's middle, z up",
-    )
-    parser.add_argument(
-        "--object",
-        action="store_true",
-        help="scan what stands on a table, without a mat, while the cameras go around it: table and background are found and left out, and the model"
-        " stands on the table, z up; the first pair must show the object in its middle and the table around it",
-    )
-    parser.add_argument(
-        "--voxel",
-        metavar="MM",
-        help="how fine the model is, such as 2mm (default: half the noise of the near depths of the first pair)",
-    )
-    parser.add_argument(
-        "--box",
-        metavar="WxHxD@X,Y,Z",
-        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat or table",
-    )
-    when = "with --box, --mat, --object or --turntable: "
-    add_unseen_argument(parser, when, default="fill", otherwise="default fill")
-    parser.add_argument(
-        "--memory",
-        type=reading(file_size, "--memory"),
-        default=300e6,
-        metavar="SIZE",
-        help="memory of the model at most; when it is full, voxels become twice as wide, or with --voxel what does not fit is left out; the report says so (default 300MB)",
-    )
-
-
-def add_turntable_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare --turntable and --onto: an object that turns."""
-    parser.add_argument(
-        "--turntable",
-        action="store_true",
-        help="the cameras stand still and an object turns before them, on anything or by hand, about one axis and by 3 to 15 degrees between the"
-        " pairs; background and table are left out, and the turn is closed after 360 degrees",
-    )
-    parser.add_argument(
-        "--onto",
-        type=Path,
-        metavar="DIR",
-        help="with --turntable: a second pass, the object turned over, is added to the one whose results are in DIR; how it lies is found by its shape",
     )
 
 

@@ -1,18 +1,20 @@
-"""Reads how a model is to be made: --mat, --object, --voxel, --box, --unseen and --memory."""
+"""How a model is to be made: the options about it, and what they ask for."""
 
 import argparse
 import math
 import re
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError, UnavailableError
-from common.program.quantities import decimal_number
+from common.program.quantities import decimal_number, file_size
+from common.program.request import option, read_request
 from common.program.terminal import say
 from common.words import counted
 from phone_host.jobs.units import length_mm
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model.unseen import UNSEEN_HELP, UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.run.kept_submaps import read_submaps, require_no_submaps
 from phone_host.run.scan_files import read_field
@@ -34,51 +36,158 @@ _BOX: Final = re.compile(r"([^x@]+)x([^x@]+)x([^x@]+)@([^,@]+),([^,@]+),([^,@]+)
 _BOX_REMEDY: Final = "give sides and middle in mm, such as 400x300x400@0,100,900"
 
 
-def scan_wanted(options: argparse.Namespace) -> ScanWanted:
-    """Read them.
-
-    Args:
-        options: options as `add_model_arguments` and `add_turntable_arguments` declare them.
-
-    Raises:
-        SettingsError: one of them is invalid.
-    """
-    if options.memory < _LEAST_BYTES:
-        raise SettingsError(f"--memory is {options.memory / 1e6:g} MB", "give at least 10MB")
-    if options.mat is not None and options.turntable:
-        raise SettingsError("--turntable beside --mat", "leave --turntable out: the mat tells how it turns")
-    if options.object and (options.mat is not None or options.turntable):
-        raise SettingsError(
-            f"--object beside {'--turntable' if options.mat is None else '--mat'}",
-            "leave --object out: it is for a table without a mat, around which the cameras go",
-        )
-    onto = _onto_of(options)
-    usual_m = math.nan if onto is None else onto.settings.voxel_m
-    return ScanWanted(
-        voxel_m=usual_m if options.voxel is None else voxel_of(options.voxel),
-        most_bytes=int(options.memory),
-        box=None if options.box is None else box_of(options.box),
-        threads=matching_threads(),
-        mat=None if options.mat is None else _mat_of(options.mat),
-        turntable=options.turntable,
-        on_table=options.object,
-        onto=onto,
-        unseen=UnseenSurface(options.unseen),
-    )
-
-
-def _mat_of(text: str) -> Mat:
+def _mat_of(text: str, option: str) -> Mat:
     if text == _USUAL:
         return parse_mat(USUAL_MAT)
     if Path(text).exists():
         raise SettingsError(
-            f"--mat takes {text!r} for the name of a sheet",
+            f"{option} takes {text!r} for the name of a sheet",
             "write --mat behind LEFT and RIGHT, or before another option",
         )
     return parse_mat(text)
 
 
-def _onto_of(options: argparse.Namespace) -> KeptField | None:
+def voxel_of(text: str, option: str = "--voxel") -> float:
+    """Read how fine a model is, m.
+
+    Args:
+        text: what the user wrote, mm unless it names a unit.
+        option: the option, for errors.
+
+    Raises:
+        SettingsError: it is none.
+    """
+    value = length_mm(text, option, "2mm")
+    if not _LEAST_VOXEL_MM <= value <= _MOST_VOXEL_MM:
+        raise SettingsError(f"{option} is {value:g} mm", f"give {_LEAST_VOXEL_MM:g} to {_MOST_VOXEL_MM:g} mm")
+    return value / 1000
+
+
+def box_of(text: str, option: str = "--box") -> Box:
+    """Read a box: WxHxD@X,Y,Z, mm.
+
+    Args:
+        text: what the user wrote.
+        option: the option, for errors.
+
+    Raises:
+        SettingsError: it is none.
+    """
+    found = _BOX.fullmatch(text.replace(" ", ""))
+    try:
+        values = [decimal_number(part) / 1000 for part in found.groups()] if found else []
+    except ValueError:
+        values = []
+    if not values or min(values[:3]) <= 0:
+        raise SettingsError(f"{option} is {text!r}", _BOX_REMEDY)
+    width, height, depth, x, y, z = values
+    return Box(
+        (x - width / 2, y - height / 2, z - depth / 2),
+        (x + width / 2, y + height / 2, z + depth / 2),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelOptions:
+    """How the model of a scan is made."""
+
+    mat: Mat | None = option(
+        "--mat",
+        read=_mat_of,
+        nargs="?",
+        const="usual",
+        metavar="10x8:25mm:18mm:5x5",
+        help="scan what lies on a printed mat, whether it is turned or the cameras go around it: the sheet of `phone-host target mat`, or any ChArUco"
+        " sheet by its squares, side of a square, side of a mark and family; the model stands on the sheet's middle, z up",
+    )
+    on_table: bool = option(
+        "--object",
+        action="store_true",
+        help="scan what stands on a table, without a mat, while the cameras go around it: table and background are found and left out, and the model"
+        " stands on the table, z up; the first pair must show the object in its middle and the table around it",
+    )
+    voxel_m: float | None = option(
+        "--voxel",
+        read=voxel_of,
+        metavar="MM",
+        help="how fine the model is, such as 2mm (default: half the noise of the near depths of the first pair)",
+    )
+    box: Box | None = option(
+        "--box",
+        read=box_of,
+        metavar="WxHxD@X,Y,Z",
+        help="keep only the surface in this box, mm: its sides, and its middle in the axes of the first left camera (x right, y down, z forward), or of the mat or table",
+    )
+    unseen: UnseenSurface = option(
+        "--unseen",
+        read=lambda text, _: UnseenSurface(text),
+        choices=tuple(each.value for each in UnseenSurface),
+        default="fill",
+        help=f"with --box, --mat, --object or --turntable: {UNSEEN_HELP} (default fill)",
+    )
+    most_bytes: float = option(
+        "--memory",
+        number=file_size,
+        default=300e6,
+        metavar="SIZE",
+        help="memory of the model at most; when it is full, voxels become twice as wide, or with --voxel what does not fit is left out; the report says so (default 300MB)",
+    )
+    turntable: bool = option(
+        "--turntable",
+        action="store_true",
+        help="the cameras stand still and an object turns before them, on anything or by hand, about one axis and by 3 to 15 degrees between the"
+        " pairs; background and table are left out, and the turn is closed after 360 degrees",
+    )
+    onto: Path | None = option(
+        "--onto",
+        type=Path,
+        metavar="DIR",
+        help="with --turntable: a second pass, the object turned over, is added to the one whose results are in DIR; how it lies is found by its shape",
+    )
+
+
+def scan_wanted(options: argparse.Namespace) -> ScanWanted:
+    """Read the options of `scan` as `model_wanted` does."""
+    return model_wanted(read_request(ModelOptions, vars(options)), options.out)
+
+
+def model_wanted(options: ModelOptions, out: Path | None) -> ScanWanted:
+    """Return how the model is made.
+
+    Args:
+        options: about the model.
+        out: folder for the results; None: it is another than that of --onto.
+
+    Raises:
+        SettingsError: options contradict each other.
+        DataError: --onto names no scan, or a damaged one.
+        UnavailableError: it cannot be read.
+    """
+    if options.most_bytes < _LEAST_BYTES:
+        raise SettingsError(f"--memory is {options.most_bytes / 1e6:g} MB", "give at least 10MB")
+    if options.mat is not None and options.turntable:
+        raise SettingsError("--turntable beside --mat", "leave --turntable out: the mat tells how it turns")
+    if options.on_table and (options.mat is not None or options.turntable):
+        raise SettingsError(
+            f"--object beside {'--turntable' if options.mat is None else '--mat'}",
+            "leave --object out: it is for a table without a mat, around which the cameras go",
+        )
+    onto = _onto_of(options, out)
+    usual_m = math.nan if onto is None else onto.settings.voxel_m
+    return ScanWanted(
+        voxel_m=usual_m if options.voxel_m is None else options.voxel_m,
+        most_bytes=int(options.most_bytes),
+        box=options.box,
+        threads=matching_threads(),
+        mat=options.mat,
+        turntable=options.turntable,
+        on_table=options.on_table,
+        onto=onto,
+        unseen=options.unseen,
+    )
+
+
+def _onto_of(options: ModelOptions, out: Path | None) -> KeptField | None:
     """Read the field that --onto names.
 
     Raises:
@@ -90,7 +199,7 @@ def _onto_of(options: argparse.Namespace) -> KeptField | None:
         return None
     if not options.turntable:
         raise SettingsError("--onto without --turntable", "scan both passes with --turntable")
-    if options.onto.resolve() == options.out.resolve():
+    if out is not None and options.onto.resolve() == out.resolve():
         raise SettingsError("--onto and --out are the same folder", "give the results another folder")
     try:
         return read_field(options.onto)
@@ -165,41 +274,3 @@ def axes_beside(asked: Axes, wanted: ScanWanted) -> Axes:
             f"--axes {asked.value} beside {option}", f"leave --axes out: the model stands on the {own.value}, z up"
         )
     return own
-
-
-def voxel_of(text: str) -> float:
-    """Read how fine a model is, m.
-
-    Args:
-        text: what the user wrote, mm unless it names a unit.
-
-    Raises:
-        SettingsError: it is none.
-    """
-    value = length_mm(text, "--voxel", "2mm")
-    if not _LEAST_VOXEL_MM <= value <= _MOST_VOXEL_MM:
-        raise SettingsError(f"--voxel is {value:g} mm", f"give {_LEAST_VOXEL_MM:g} to {_MOST_VOXEL_MM:g} mm")
-    return value / 1000
-
-
-def box_of(text: str) -> Box:
-    """Read a box: WxHxD@X,Y,Z, mm.
-
-    Args:
-        text: what the user wrote.
-
-    Raises:
-        SettingsError: it is none.
-    """
-    found = _BOX.fullmatch(text.replace(" ", ""))
-    try:
-        values = [decimal_number(part) / 1000 for part in found.groups()] if found else []
-    except ValueError:
-        values = []
-    if not values or min(values[:3]) <= 0:
-        raise SettingsError(f"--box is {text!r}", _BOX_REMEDY)
-    width, height, depth, x, y, z = values
-    return Box(
-        (x - width / 2, y - height / 2, z - depth / 2),
-        (x + width / 2, y + height / 2, z + depth / 2),
-    )

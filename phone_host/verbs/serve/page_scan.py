@@ -1,6 +1,5 @@
 """A scan that the page begins: a run whose pairs become a model, in a folder of its own."""
 
-import argparse
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -10,6 +9,7 @@ from typing import Final
 
 from common.errors import SettingsError, UnavailableError
 from common.places import make_folder
+from common.program.request import read_request, usual_values
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.jobs.output_folders import writing
@@ -27,9 +27,8 @@ from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.scan.box import Box
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
-from phone_host.verbs.scan.arguments import add_model_arguments, add_turntable_arguments
 from phone_host.verbs.scan.live import live_scan
-from phone_host.verbs.scan.wanted import axes_beside, box_of, scan_wanted
+from phone_host.verbs.scan.wanted import ModelOptions, axes_beside, box_of, model_wanted
 
 OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object", "unseen")
 """Options of `scan` that the page may give."""
@@ -137,17 +136,12 @@ def asked_scan(values: Choices) -> ScanWanted:
     Raises:
         SettingsError: one of them is invalid, or contradicts another.
     """
-    given = {name: values.get(name, "").strip() for name in OF_SCAN}
-    parser = argparse.ArgumentParser()
-    add_model_arguments(parser)
-    add_turntable_arguments(parser)
-    options = parser.parse_args([])
-    options.voxel, options.box, options.mat = (given[name] or None for name in ("voxel", "box", "mat"))
-    options.turntable, options.object = bool(given["turntable"]), bool(given["object"])
-    options.unseen = given["unseen"] or options.unseen
-    if options.unseen not in {each.value for each in UnseenSurface}:
-        raise SettingsError(f"unseen is {options.unseen!r}", "give fill, pink or cut")
-    return scan_wanted(options)
+    chosen = {name: text for name in OF_SCAN if (text := values.get(name, "").strip())}
+    given = {**usual_values(ModelOptions), **chosen}
+    given |= {name: name in chosen for name in ("turntable", "object")}
+    if given["unseen"] not in {each.value for each in UnseenSurface}:
+        raise SettingsError(f"unseen is {given['unseen']!r}", "give fill, pink or cut")
+    return model_wanted(read_request(ModelOptions, given), None)
 
 
 def asked_box(values: Choices) -> Box | None:
