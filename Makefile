@@ -11,7 +11,7 @@ PARTS := unit cases scan contract native system hostile print web
 # Every signal in every state, and printers that lie: `make test` runs a part of them, `make attack` all.
 SIGNALS := tests/print/test_signals.py tests/print/test_lying_printers.py tests/print/test_strange_firmware.py tests/system/test_signals_of_verbs.py
 # What the native library is made of; .ci/venv knows the same.
-NATIVE := setup.py phone_host/stereo/native/build_library.py $(wildcard phone_host/stereo/native/src/*)
+NATIVE := setup.py phone_host/native/build_library.py $(wildcard phone_host/native/src/*)
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
 
 ifndef SCAN_DATA
@@ -40,7 +40,7 @@ demo: $(RUN) ## run both programs on this machine with a rendered scene; writes 
 	@$(BIN)/phone-host demo --out out/demo
 
 native: $(RUN) ## build the native library again, in place (the set-up does this itself; after installing a compiler, or with CC=clang)
-	@$(BIN)/python -m phone_host.stereo.native.build_library
+	@$(BIN)/python -m phone_host.native.build_library
 
 test: $(READY) ## run the unit, cases, scan, contract, native, system, hostile, print and web tests; prints the minutes of each part
 	@.ci/test $(PARTS)

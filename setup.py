@@ -14,7 +14,7 @@ from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_ext import build_ext
 
 ROOT = Path(__file__).resolve().parent
-PACKAGE = Path("phone_host", "stereo", "native")
+PACKAGE = Path("phone_host", "native")
 
 
 def _builder() -> ModuleType:
@@ -69,6 +69,6 @@ class Wheel(bdist_wheel):
 
 
 setup(
-    ext_modules=[Extension("phone_host.stereo.native._tandem", sources=[], optional=True)],
+    ext_modules=[Extension("phone_host.native._tandem", sources=[], optional=True)],
     cmdclass={"build_ext": BuildNative, "bdist_wheel": Wheel},
 )

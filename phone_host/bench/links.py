@@ -22,10 +22,10 @@ from phone_host.accounts.link_account import LinkAccount
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.emulate import NOTHING
 from phone_host.bench.relay import RelayAccount, RelayProcess, relay_process
-from phone_host.children.board_process import BoardAccount, BoardProcess, board_process, free_port
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver
+from phone_host.subprocesses.board_process import BoardAccount, BoardProcess, board_process, free_port
 
 _CHANNEL: Final = 22
 """For the benchmark's own RFCOMM listener: in the range that profiles do not use on their own (channels 1 to 30 exist)."""

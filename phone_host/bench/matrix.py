@@ -14,9 +14,9 @@ from common.program.signals import StopSignals
 from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.links import ask_board
 from phone_host.bench.runs import PATIENCE_NS, WARM_UP_S, CaseResult, RunSettings, film_images, render, run_case
-from phone_host.children.board_process import socket_folder
 from phone_host.run.progress_bar import busy_bar, progress_bar
 from phone_host.scene.film import Film
+from phone_host.subprocesses.board_process import socket_folder
 
 _RENDER_S: Final = 0.06
 """About how long an image takes to render; the progress bar estimates the remaining time with it."""

@@ -20,10 +20,10 @@ from common.words import counted
 from phone_host.accounts.link_account import LinkAccount, SessionAccount
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.runs import WARM_UP_S, CaseResult, after_warm_up
-from phone_host.children.board_process import BoardAccount
 from phone_host.model import PairCounts
 from phone_host.recording.clock_messages import told_clocks
 from phone_host.recording.playback import Playback
+from phone_host.subprocesses.board_process import BoardAccount
 from phone_host.sync.fifo import FifoSettings
 
 _LEAST: Final = 10

@@ -23,7 +23,6 @@ from phone_host.accounts.link_account import LinkAccount
 from phone_host.bench.cases import Case, Size
 from phone_host.bench.links import Ends, open_ends
 from phone_host.bench.relay import RelayAccount
-from phone_host.children.board_process import BoardAccount
 from phone_host.demo.demonstration import NEAR_M
 from phone_host.model import CameraModel, PairCounts, Result, Rig, StereoGeometry
 from phone_host.run.host import Host
@@ -35,6 +34,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import AnyMatcher
 from phone_host.stereo.reproject import disparities_for_near
+from phone_host.subprocesses.board_process import BoardAccount
 from phone_host.sync.fifo import FifoSettings
 
 WARM_UP_S: Final = 1.0

@@ -13,7 +13,6 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.children.board_process import board_process
 from phone_host.model import CloudImage, Processed, Result, Rig
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import disparity_picture, write_png
@@ -26,6 +25,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
+from phone_host.subprocesses.board_process import board_process
 
 FPS: Final = 15
 """Leaves the stereo pipeline enough time on two small cores, so that the demo shows delays and not an overload."""

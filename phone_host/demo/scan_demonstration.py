@@ -13,7 +13,6 @@ from common.camera.factory import open_camera
 from common.diagnostic import Diagnostic, Severity
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.children.board_process import board_process
 from phone_host.demo.scan_truth import ModelErrors, model_errors
 from phone_host.live.scan import LiveScan
 from phone_host.model import Side
@@ -31,6 +30,7 @@ from phone_host.stereo.match_tandem import matching_threads
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
+from phone_host.subprocesses.board_process import board_process
 
 NEAR_M: Final = 0.25
 """Nearest depth searched: the thing begins 0.35 m before the cameras, and the mat's lower edge at 0.28 m."""

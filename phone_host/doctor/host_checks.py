@@ -12,7 +12,7 @@ from common.diagnostic import Diagnostic
 from common.doctor.finding import fail, ok, warn
 from common.doctor.package_probe import missing_package
 from common.errors import SettingsError
-from phone_host.stereo.native.library import VARIABLE, Library, Missing
+from phone_host.native.library import VARIABLE, Library, Missing
 
 OPENCV_WHEELS: Final = (
     "opencv-python-headless",

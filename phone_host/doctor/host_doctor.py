@@ -52,7 +52,7 @@ from phone_host.doctor.host_checks import (
     check_ports,
     check_python,
 )
-from phone_host.stereo.native.library import VARIABLE, native
+from phone_host.native.library import VARIABLE, native
 
 _CONNECT_S: Final = 2.0
 

@@ -15,14 +15,14 @@ from common.places import Kind, kind_of, resolved
 from common.program.settings import Resolved, with_origins
 from common.recording.recording_file import require_new
 from common.stamp import HOST_CLOCK
-from phone_host.boards.discovery import remember
-from phone_host.boards.opened import open_named
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.discovery.discovery import remember
+from phone_host.discovery.opened import open_named
 from phone_host.jobs.depth import build_core, overlay_of
 from phone_host.jobs.output_folders import announce_other_report, require_alone, spare_inputs
 from phone_host.jobs.run_request import RunRequest, budget_wanted, with_own_rig

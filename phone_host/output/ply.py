@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.model import CloudImage, Image
+from phone_host.native.library import Library, Missing, PackJob, native
 from phone_host.output.atomic import write_parts
 from phone_host.output.axes import Axes
 from phone_host.output.strips import strips
-from phone_host.stereo.native.library import Library, Missing, PackJob, native
 
 _VERTEX = np.dtype([*((name, "<f4") for name in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))])
 _SEEN_VERTEX = np.dtype([*((name, _VERTEX[name]) for name in _VERTEX.names or ()), ("seen", "u1")])

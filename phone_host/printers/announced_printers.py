@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from phone_host.boards.found import Announcement
+from phone_host.discovery.found import Announcement
 from phone_host.printers.printer_uri import ServerKind
 
 _KINDS: Final = {

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
+from phone_host.native.volume_jobs import CarveJob
 from phone_host.scan.box import Cells
 from phone_host.scan.view import View
 from phone_host.scan.volume import aim, rows_of
-from phone_host.stereo.native.library import Library, Missing, native
-from phone_host.stereo.native.volume_jobs import CarveJob
 
 _SIGMAS: Final = 3.0
 _HALF_DIAGONAL: Final = 0.87

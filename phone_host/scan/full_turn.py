@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
+from phone_host.native.library import Library, native
 from phone_host.scan.camera_pose import Observer
 from phone_host.scan.circle_bundle import Circle, Seen, TurnAxis, axis_of, fitted_circle, misfits, unwrapped
 from phone_host.scan.circle_tracks import tracks_of
@@ -15,7 +16,6 @@ from phone_host.scan.registration import RegistrationSettings, registered
 from phone_host.scan.view import Camera, View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, native
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

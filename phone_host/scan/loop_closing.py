@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
+from phone_host.native.library import Library, Missing
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.relocalisation import lies_alone, shown_place
 from phone_host.scan.stretches import ClosedLoop, Placed, Stretches, WayCertainty
 from phone_host.scan.view import View, narrowed
-from phone_host.stereo.native.library import Library, Missing
 
 _WIDTH_PX: Final = 320
 """A voxel is some 2.5 px of the matched image for each metre of the distance (`fineness`): half of VGA leaves one depth for each voxel 0.8 m away."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
 from phone_host.scan.box import Box
 from phone_host.scan.exact_depths import with_exact_depths, without_reflections
 from phone_host.scan.mat import ABOVE_M, Mat, mat_corners
@@ -32,7 +33,6 @@ from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, Depth, View, narrowed, reduced
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings, fineness_for, thinner
-from phone_host.stereo.native.library import Library, Missing, native
 
 _TRUNCATION_SHARE: Final = 1 / 2
 """Of the usual truncation. Poses are exact, so the field need not bridge their errors, and a surface seen from one side only is fattened by less. With two

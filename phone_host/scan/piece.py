@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing
 from phone_host.scan.odometry import Moved
 from phone_host.scan.places import Places
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
@@ -17,7 +18,6 @@ from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, narrowed
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, Missing
 
 _ALIGNED_PX: Final = 240
 """Width up to which depth is laid against the model. Twice that costs 11 of 49 ms of processor time at VGA, and gives the same poses."""

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.graph import Loop, chained, connected, without_outliers
 from phone_host.scan.motion_belief import Belief, UsualStep
@@ -21,7 +22,6 @@ from phone_host.scan.stretches import ModelMotion
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, Missing
 
 _MODEL: Final = 0
 _MOST_APART: Final = 4

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
+from phone_host.native.library import Library
+from phone_host.native.volume_jobs import RegisterJob
 from phone_host.scan.view import Depth
 from phone_host.scan.volume import Surface, aim, rows_of
-from phone_host.stereo.native.library import Library
-from phone_host.stereo.native.volume_jobs import RegisterJob
 
 Floats = NDArray[np.float64]
 

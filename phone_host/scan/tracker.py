@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
 from phone_host.scan.loop_closing import LoopCloser, LoopSettings
 from phone_host.scan.odometry import Moved, Odometry, odometry_for
 from phone_host.scan.piece import Found, Joined, Joining, Piece, PoseGate, pose_gate_for
@@ -27,7 +28,6 @@ from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View, reduced
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, Missing, native
 
 _SURE_SHARE, _SUREST_PX, _LEAST_SURE_PX = 0.1, 0.25, 1.0
 """How far off a view's pixels are after odometry: a share of the way of the corners, px, between the two. On real rooms and streets 1 px, 3 mm at 2 m. A camera at

@@ -15,14 +15,8 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.scan import volume_numpy
-from phone_host.scan.absorbed import absorbed, reached
-from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
-from phone_host.scan.exposure import gains_of, multiplied
-from phone_host.scan.view import Camera, Depth, View
-from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
-from phone_host.stereo.native.library import Library, Missing, native
-from phone_host.stereo.native.volume_jobs import (
+from phone_host.native.library import Library, Missing, native
+from phone_host.native.volume_jobs import (
     AbsorbJob,
     CarveJob,
     CastJob,
@@ -31,6 +25,12 @@ from phone_host.stereo.native.volume_jobs import (
     TouchJob,
     VolumeArrays,
 )
+from phone_host.scan import volume_numpy
+from phone_host.scan.absorbed import absorbed, reached
+from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
+from phone_host.scan.exposure import gains_of, multiplied
+from phone_host.scan.view import Camera, Depth, View
+from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
 
 _LOOKS_A_BLOCK: Final = 3
 _NEARLY_FULL: Final = 0.9

@@ -17,10 +17,10 @@ from common.link.enrolment_door import pairing_address
 from common.link.factory import parse_link
 from common.protocol.enrolment_code import read_code
 from common.words import counted
-from phone_host.boards.enrolment import PairingCall
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.discovery.enrolment import PairingCall
 from phone_host.doctor.host_doctor import examine
 from phone_host.live.calibration_view import SnapshotValues
 from phone_host.run.freed_memory import give_back_freed_memory

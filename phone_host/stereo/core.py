@@ -29,6 +29,7 @@ from phone_host.model import (
     Search,
     StereoGeometry,
 )
+from phone_host.native.library import native
 from phone_host.stereo.budget_ladder import Choice, Extent
 from phone_host.stereo.depth_limits import (
     DepthWanted,
@@ -42,7 +43,6 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.match_told import without_untold
 from phone_host.stereo.matcher_names import FASTEST
 from phone_host.stereo.matcher_protocol import Matcher, matched_by
-from phone_host.stereo.native.library import native
 from phone_host.stereo.points import points_of
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near

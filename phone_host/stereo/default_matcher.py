@@ -1,8 +1,8 @@
 """Which matcher a command uses when nobody names one: the preferred one where it works, else the one that works everywhere."""
 
 from common.errors import SettingsError
+from phone_host.native.library import Library, Missing, fallback_note, native
 from phone_host.stereo.matcher_names import FALLBACK, PREFERRED, MatcherName
-from phone_host.stereo.native.library import Library, Missing, fallback_note, native
 
 
 def default_matcher(preferred: MatcherName = PREFERRED, library: Library | Missing | None = None) -> MatcherName:

@@ -23,6 +23,7 @@ from common.errors import DataError, SettingsError, TandemError
 from common.program.extensions import make_registered
 from common.words import counted
 from phone_host.model import Disparity, RectifiedPair
+from phone_host.native.library import native, required
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
@@ -30,7 +31,6 @@ from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.match_tandem import TandemMatcher
 from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
-from phone_host.stereo.native.library import native, required
 from phone_host.stereo.network_name import NetworkMatcher
 
 _MEND: Final = "mend or uninstall the package that registers it"

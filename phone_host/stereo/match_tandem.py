@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from common.errors import SettingsError
 from phone_host.model import Confidence, Disparity, Image, Matched, RectifiedPair
+from phone_host.native.library import Library, MatchJob
 from phone_host.stereo.match_differences import Differences, differences
 from phone_host.stereo.match_input import check_pair, grey
-from phone_host.stereo.native.library import Library, MatchJob
 
 GREATEST_SEARCH = 2048
 """Disparities that the library's tables hold."""

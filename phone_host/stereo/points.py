@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import CloudImage, CutCounts, DepthLimits, Disparity, StereoGeometry
+from phone_host.native.library import Library, Missing, ReprojectJob, native
 from phone_host.stereo.depth_limits import above_zero, cut_cloud, drop_zeros, float32_below, is_wide
-from phone_host.stereo.native.library import Library, Missing, ReprojectJob, native
 from phone_host.stereo.reproject import least_in_front_px, rays, reproject
 
 

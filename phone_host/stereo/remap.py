@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Image
-from phone_host.stereo.native.library import Library, Missing, RemapJob, Simd, native
+from phone_host.native.library import Library, Missing, RemapJob, Simd, native
 
 Maps = tuple["cv2.typing.MatLike", "cv2.typing.MatLike"]
 """(H, W, 2) int16 and (H, W) uint16, as `cv2.convertMaps` makes them for CV_16SC2. Only OpenCV's wheels have `cv2.typing`: Termux's and Debian's packages lack it."""

@@ -19,7 +19,6 @@ from common.program.settings import with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
 from common.words import counted
-from phone_host.children.board_process import socket_folder
 from phone_host.demo.demo_page import demo_page
 from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
 from phone_host.model import Rig
@@ -36,6 +35,7 @@ from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
 from phone_host.stereo.rectify import rectify_rig
+from phone_host.subprocesses.board_process import socket_folder
 
 EXAMPLES = """  phone-host demo
   phone-host demo --seconds 30 --out demo

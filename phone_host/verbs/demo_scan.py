@@ -17,7 +17,6 @@ from common.program.invocation import command_line
 from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
-from phone_host.children.board_process import socket_folder
 from phone_host.demo.scan_demonstration import ScanDemo, render_pictures, with_truth
 from phone_host.demo.scan_truth import ModelErrors
 from phone_host.live.scan_view import ScanPicture
@@ -41,6 +40,7 @@ from phone_host.run.scan_result import require_something
 from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.rectify import rectify_rig
+from phone_host.subprocesses.board_process import socket_folder
 
 _OUT: Final = Path("out/demo-scan")
 _OBJECT: Final = "speckled"

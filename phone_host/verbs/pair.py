@@ -16,9 +16,9 @@ from common.program.invocation import command_line
 from common.program.request import Request, option
 from common.program.terminal import fitted, say
 from common.protocol.enrolment_code import CODE_DIGITS, read_code
-from phone_host.boards.discovery import find_board_and_say
-from phone_host.boards.enrolment import PairingCall
-from phone_host.boards.udev_rule import RULES, find_usb_board, write_rule
+from phone_host.discovery.discovery import find_board_and_say
+from phone_host.discovery.enrolment import PairingCall
+from phone_host.discovery.udev_rule import RULES, find_usb_board, write_rule
 from phone_host.output.json_text import json_text
 from phone_host.settings import chosen_keys
 

@@ -147,7 +147,7 @@ def _find(request: PrintRequest) -> int:
 
 def _announced() -> list[FoundPrinter]:
     try:
-        from phone_host.boards.announced import listen  # noqa: PLC0415 - zeroconf is optional
+        from phone_host.discovery.announced import listen  # noqa: PLC0415 - zeroconf is optional
     except ImportError:
         why = "Android keeps mDNS from Termux" if is_android() else "the package zeroconf is missing"
         raise UnavailableError(f"printers cannot be looked for: {why}", "give the address with --printer") from None

@@ -23,10 +23,10 @@ from common.program.terminal import fitted
 from common.recording.recording_file import require_new
 from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
-from phone_host.boards.opened import open_named
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.diagnostics.run_snapshot import RecordingAccount
+from phone_host.discovery.opened import open_named
 from phone_host.jobs.options import CameraOptions
 from phone_host.jobs.output_folders import require_alone
 from phone_host.model import Rig, Side

@@ -29,12 +29,12 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.children.board_process import board_process, free_port
 from phone_host.model import BoardFrame, Disparity, RectifiedPair, Result
 from phone_host.run.host import Host
 from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.stereo.core import StereoCore
+from phone_host.subprocesses.board_process import board_process, free_port
 from phone_host.sync.fifo import FifoSettings
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine

@@ -30,7 +30,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from phone_host.children.board_process import free_port
+from phone_host.subprocesses.board_process import free_port
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.link_worker import receives
 from tests.bench.machine import machine, may_use_fifo

@@ -25,8 +25,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.children.board_process import board_process, socket_folder
 from phone_host.scene.scene import WEBCAM_LOOK, Renderer, demo_scene, matched_rig, rig_poses
+from phone_host.subprocesses.board_process import board_process, socket_folder
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.page_loads import Load, loads

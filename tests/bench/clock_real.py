@@ -12,8 +12,8 @@ import numpy as np
 
 from common import now
 from common.link.factory import open_link, parse_link
-from phone_host.children.board_process import board_process, free_port
 from phone_host.stream.receiver import Receiver
+from phone_host.subprocesses.board_process import board_process, free_port
 from phone_host.sync.clock import ClockEstimate
 from tests.bench.machine import Busyness, be_quiet, may_use_fifo
 from tests.bench.payloads import write_raw

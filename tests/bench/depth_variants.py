@@ -1,6 +1,6 @@
 """Chooses constants of `tandem` with each scene held out: `python -m tests.bench.depth_variants [NAME=V,V,V ...] [--help]`.
 
-A constant is any enumerator of the C sources (phone_host/stereo/native/src) that is set in one place: STEP_COST (P1),
+A constant is any enumerator of the C sources (phone_host/native/src) that is set in one place: STEP_COST (P1),
 JUMP_COST (P2), SPECKLE_AREA, WARM_UP, ISLAND, ... The sources are copied to build/variants, the values are put in, and
 each variant is built into a library of its own with the product's flags; nothing of the product is changed. Libraries
 are kept there, by the digest of their sources. COST_CAP + JUMP_COST must stay below 85, or sums of paths overflow.
@@ -22,10 +22,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Final
 
+from phone_host.native import build_library
+from phone_host.native.library import Library, Simd, load, native
+from phone_host.native.library import required as required_library
 from phone_host.stereo.match_tandem import TandemMatcher
-from phone_host.stereo.native import build_library
-from phone_host.stereo.native.library import Library, Simd, load, native
-from phone_host.stereo.native.library import required as required_library
 from tests.bench.depth_accuracy import MakeMatcher, room_cases, scene_cases
 from tests.bench.depth_choice import leave_one_out
 

@@ -19,7 +19,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.children.board_process import free_port
+from phone_host.subprocesses.board_process import free_port
 from tests.bench import link_job
 from tests.bench.link_job import Job
 from tests.bench.machine import be_quiet, machine

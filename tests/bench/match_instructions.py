@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from phone_host.stereo.native.build_library import FLAGS, SOURCES, WARNINGS, _compiled, _usable_sets
+from phone_host.native.build_library import FLAGS, SOURCES, WARNINGS, _compiled, _usable_sets
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.instructions import Emulated, missing, per_pixel_and_disparity
 

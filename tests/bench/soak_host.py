@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import cv2
 
-from phone_host.children.board_process import free_port
+from phone_host.subprocesses.board_process import free_port
 from tests.bench.soak_checks import Check, Resident, count, drift, memory
 from tests.support.planes import plane
 from tests.support.programs import Program, board, host, ledgers, lines

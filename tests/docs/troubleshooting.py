@@ -30,10 +30,10 @@ _ROOMS: Final = (
         ),
     ),
     ("Cameras", ("common/camera", "phone_host/camera", "board_agent/rate")),
-    ("Links", ("common/link", "phone_host/stream", "phone_host/run/course", "phone_host/children")),
+    ("Links", ("common/link", "phone_host/stream", "phone_host/run/course", "phone_host/subprocesses")),
     (
         "Finding a board, keys and enrolment",
-        ("phone_host/boards", "common/keys", "board_agent/enrolment", "common/protocol", "common/trusted"),
+        ("phone_host/discovery", "common/keys", "board_agent/enrolment", "common/protocol", "common/trusted"),
     ),
     ("Calibration and rig.yaml", ("phone_host/calibration", "phone_host/output/rig")),
     ("Images and depth", ("phone_host/stereo", "common/image", "phone_host/scene")),

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import DepthLimits, StereoGeometry
+from phone_host.native.build_library import LIBRARY_FILE, SOURCES, WARNINGS, build
+from phone_host.native.library import Library, native
 from phone_host.output.ply import packed_points
-from phone_host.stereo.native.build_library import LIBRARY_FILE, SOURCES, WARNINGS, build
-from phone_host.stereo.native.library import Library, native
 from phone_host.stereo.points import points_of, reproject_job
 from phone_host.stereo.reproject import rays
 from tests.native.match_cases import fixed_cases, result_of

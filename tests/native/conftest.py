@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from phone_host.stereo.native import library as product
-from phone_host.stereo.native.library import IsaState, Library, Simd, load
+from phone_host.native import library as product
+from phone_host.native.library import IsaState, Library, Simd, load
 
 FOLDER = "TANDEM_LIBRARY_FOLDER"
 """Environment variable of these tests: where the library under test lies."""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from phone_host.stereo.native.library import Library, load
+from phone_host.native.library import Library, load
 from tests.native.conftest import FOLDER
 from tests.native.match_cases import random_case
 from tests.native.test_match import reference, require_sound

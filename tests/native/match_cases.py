@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from phone_host.native.library import Library, MatchJob
 from phone_host.stereo.match_tandem import GREATEST_SEARCH
-from phone_host.stereo.native.library import Library, MatchJob
 from tests.support.planes import noise, plane
 
 Bytes = NDArray[np.uint8]

@@ -4,8 +4,8 @@ import os
 import subprocess
 from pathlib import Path
 
-from phone_host.stereo.native.build_library import find_compiler
-from phone_host.stereo.native.library import Library
+from phone_host.native.build_library import find_compiler
+from phone_host.native.library import Library
 from tests.native.arm import built_program, every_case, write_cases
 
 

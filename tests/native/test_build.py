@@ -12,8 +12,8 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.doctor.host_checks import check_native
-from phone_host.stereo.native import build_library
-from phone_host.stereo.native.build_library import (
+from phone_host.native import build_library
+from phone_host.native.build_library import (
     LIBRARY_FILE,
     REASON_FILE,
     Built,
@@ -21,10 +21,10 @@ from phone_host.stereo.native.build_library import (
     build_or_explain,
     sources_digest,
 )
-from phone_host.stereo.native.library import IsaState, Library, Missing, Simd, fallback_note, load, model_note
+from phone_host.native.library import IsaState, Library, Missing, Simd, fallback_note, load, model_note
 
 ROOT = Path(__file__).resolve().parents[2]
-NATIVE = "phone_host/stereo/native"
+NATIVE = "phone_host/native"
 
 
 def loaded(folder: Path, wanted: str = "") -> Library:

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from phone_host.model import RectifiedPair
+from phone_host.native.library import Library, MatchJob, Simd
 from phone_host.stereo.match_tandem import TandemMatcher
-from phone_host.stereo.native.library import Library, MatchJob, Simd
 from tests.native.match_cases import MatchCase, fixed_cases, random_case, result_of, tiles
 from tests.support.planes import noise
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from phone_host.model import DepthLimits, Disparity, StereoGeometry
+from phone_host.native.library import Library, Missing
 from phone_host.output.axes import Axes
 from phone_host.output.ply import packed_points
-from phone_host.stereo.native.library import Library, Missing
 from phone_host.stereo.points import Points, points_of
 
 NONE = Missing(reason="left out by this test", remedy="none")

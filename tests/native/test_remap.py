@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from phone_host.model import Image
-from phone_host.stereo.native.library import Library, Missing
+from phone_host.native.library import Library, Missing
 from phone_host.stereo.remap import Maps, remap, remap_by
 
 NONE = Missing(reason="left out by this test", remedy="none")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from phone_host.stereo.native.build_library import build, find_compiler
+from phone_host.native.build_library import build, find_compiler
 from tests.native.conftest import FOLDER
 
 FLAGS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-O1", "-g1")
@@ -65,7 +65,7 @@ def test_the_sanitizers_are_on(sanitized: dict[str, str]) -> None:
     code = (
         "import os, numpy as np\n"
         "from pathlib import Path\n"
-        "from phone_host.stereo.native.library import PackJob, load\n"
+        "from phone_host.native.library import PackJob, load\n"
         f"library = load(Path(os.environ['{FOLDER}']))\n"
         "cloud, colours, records = np.ones((3, 90, 3), np.float32), np.zeros((4, 90), np.uint8), np.empty(15 * 361, np.uint8)\n"
         "library.pack(PackJob(cloud_m=cloud.ctypes.data, colours=colours.ctypes.data, records=records.ctypes.data,\n"

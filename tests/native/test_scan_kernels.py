@@ -5,12 +5,12 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
+from phone_host.native.library import Library, Missing
 from phone_host.scan.box import Cells
 from phone_host.scan.carving import Carving
 from phone_host.scan.view import Depth, View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, Missing
 
 NONE = Missing(reason="left out by this test", remedy="none")
 SETTINGS = VolumeSettings(voxel_m=0.02, far_m=3.0)

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from phone_host.model import Image, RectifiedPair
+from phone_host.native.library import Library
 from phone_host.stereo.match_tandem import TandemMatcher
-from phone_host.stereo.native.library import Library
 from tests.support.planes import noise
 
 PERIOD_PX = 24

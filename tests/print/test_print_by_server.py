@@ -13,7 +13,7 @@ from zeroconf import ServiceInfo, Zeroconf
 
 from common.errors import SettingsError
 from common.program.settings import read_file
-from phone_host.boards.found import Announcement
+from phone_host.discovery.found import Announcement
 from phone_host.printers.announced_printers import FoundPrinter, printers_of
 from phone_host.printers.doors import key_of
 from phone_host.printers.gcode import examine

@@ -13,12 +13,12 @@ import pytest
 
 from common.errors import DataError
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
 from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import Arrays, field_bytes, field_of, packed, unpacked
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.view import Camera
 from phone_host.scan.volume import Volume
-from phone_host.stereo.native.library import Library, Missing, native
 from tests.scan.test_scan_submaps import POSES, WANTED, taken
 from tests.scan.test_scan_volume import NONE, SETTINGS, filled
 from tests.support.plane_films import GEOMETRY

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.mesh import mesh_of
 from phone_host.scan.view import Camera
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, Missing, native
 from tests.support.plane_films import CORNER, plane_view, texture
 
 SETTINGS = VolumeSettings(voxel_m=0.02, far_m=3.0)

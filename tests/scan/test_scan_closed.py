@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.ply import PointCloud, write_surface
@@ -22,7 +23,6 @@ from phone_host.scan.scan_model import ScanModel, closed_model
 from phone_host.scan.view import View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, Missing, native
 from tests.support.solid_views import Thing, around, thing_view
 
 THING = Thing()

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import native
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.registration import Registered
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings, fineness_for
-from phone_host.stereo.native.library import native
 from tests.support.plane_films import Plane, plane_at, plane_view, texture
 
 PICTURE = texture()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import native
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Found, Joining, Piece, PoseGate
 from phone_host.scan.pieces import Pieces
@@ -14,7 +15,6 @@ from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import native
 from tests.support.niches import APART_M, BARE, niches_view, station
 from tests.support.plane_films import CORNER, distance, plane_view, texture
 

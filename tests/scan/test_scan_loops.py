@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, native
 from phone_host.scan.box import Box
 from phone_host.scan.factory import scan_for
 from phone_host.scan.loop_closing import LoopCloser, LoopSettings
@@ -17,7 +18,6 @@ from phone_host.scan.stretches import Placed
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, native
 from tests.support.papered_room import WALLS, room_view, station
 from tests.support.plane_films import distance, texture
 from tests.support.turning_things import processed_of

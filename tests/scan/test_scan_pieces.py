@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, native
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.box import Box, Cells
 from phone_host.scan.carving import Carving
@@ -21,7 +22,6 @@ from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, native
 from tests.support.plane_films import CORNER, WALL, distance, plane_view, texture
 from tests.support.turning_things import processed_of
 

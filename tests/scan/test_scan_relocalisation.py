@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import native
 from phone_host.scan.graph import Loop, without_outliers
 from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
@@ -16,7 +17,6 @@ from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import native
 from tests.support.papered_room import WALLS, room_view, station
 from tests.support.plane_films import CORNER, WALL, distance, plane_view, texture
 

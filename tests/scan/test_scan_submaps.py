@@ -12,6 +12,7 @@ from common.ledger import StageTimes
 from common.words import distance_text
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair
+from phone_host.native.library import Missing
 from phone_host.run.kept_submaps import KeptSubmaps, read_submaps
 from phone_host.run.scan_result import memory_remarks
 from phone_host.scan.box import Box
@@ -21,7 +22,6 @@ from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Missing
 from tests.support.plane_films import CORNER, GEOMETRY, path, plane_view, texture
 
 PICTURE = texture()

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.tracked import Tracked
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import View
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.stereo.native.library import Library, Missing, native
 from tests.support.plane_films import CORNER, WALL, distance, path, plane_view, texture
 
 PICTURE = texture()

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.native.library import Library, Missing, native
 from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
 from phone_host.scan.mesh import Mesh, cube_cases, mesh_of
 from phone_host.scan.registration import RegistrationSettings, Trial, registered, summed
 from phone_host.scan.view import Camera, View, halved, narrowed
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import MOST_WEIGHT, VolumeSettings
-from phone_host.stereo.native.library import Library, Missing, native
 from tests.support.plane_films import CORNER, GEOMETRY, WALL, distance, path, plane_view, texture
 
 PICTURE = texture()

@@ -9,8 +9,8 @@ from phone_host.bench.analysis import Analysis, analyse
 from phone_host.bench.cases import Case, Interface, Size
 from phone_host.bench.report import Conditions
 from phone_host.bench.runs import CaseResult, after_warm_up
-from phone_host.children.board_process import BoardAccount
 from phone_host.model import PairCounts
+from phone_host.subprocesses.board_process import BoardAccount
 from phone_host.sync.fifo import FifoSettings
 from tests.support.samples import LEDGER
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from zeroconf import ServiceInfo, Zeroconf
 
-from phone_host.boards.found import SERVICE
+from phone_host.discovery.found import SERVICE
 from tests.support.programs import board, host, program, until
 
 PORT = 5555

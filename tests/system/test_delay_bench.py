@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from phone_host.children.board_process import board_process
+from phone_host.subprocesses.board_process import board_process
 from tests.support.numbered import write_film
 from tests.support.programs import Program, board, children_of, command_of, free_port, program, until
 from tests.support.trace_format import checked

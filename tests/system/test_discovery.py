@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from phone_host.boards.discovery import _last, remember
-from phone_host.boards.found import SERVICE
+from phone_host.discovery.discovery import _last, remember
+from phone_host.discovery.found import SERVICE
 from tests.support.numbered import write_film
 from tests.support.programs import PATIENCE_S
 

@@ -138,7 +138,7 @@ def test_two_wheels_of_opencv_are_found(tmp_path: Path) -> None:
 def test_on_android_what_android_keeps_away_is_said(tmp_path: Path) -> None:
     """With the platform's value that Python has there: no finding fails, links that cannot be do, and each remedy names a way that works."""
     (tmp_path / "sitecustomize.py").write_text("import sys\nsys.platform = 'android'\n")
-    asked = "from pathlib import Path; from phone_host.boards.discovery import _why_not; from phone_host.stereo.native.library import load; "
+    asked = "from pathlib import Path; from phone_host.discovery.discovery import _why_not; from phone_host.native.library import load; "
     asked += f"print(load(Path({str(tmp_path)!r})).remedy, _why_not(), sep='|')"  # no library lies there
     android = {**os.environ, "PYTHONPATH": str(tmp_path)}
     told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True, env=android).stdout

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from phone_host.stereo.native.build_library import SOURCES
+from phone_host.native.build_library import SOURCES
 from tests.bench.bench_matcher import OLD, Row, with_old_sgbm
 from tests.bench.depth_variants import VariantError, current, variants_of, with_values
 from tests.bench.match_contestants import Times

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import zmq
 
-from phone_host.boards.discovery import find_board, list_boards
+from phone_host.discovery.discovery import find_board, list_boards
 
 
 def test_a_board_on_the_documented_ipc_socket_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

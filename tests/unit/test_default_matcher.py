@@ -8,13 +8,13 @@ import pytest
 from common.errors import SettingsError, UnavailableError
 from common.program.settings import resolve
 from phone_host.declared_settings import PhoneHostSettings
+from phone_host.native.library import Library, Missing, load, native, required
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.settings import matcher_is_given, resolve_settings
 from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import BEST_FIRST, FALLBACK, PREFERRED, MatcherName, default_words
-from phone_host.stereo.native.library import Library, Missing, load, native, required
 from tests.support import run_snapshots
 
 NOT_BUILT = Missing(reason="not built: no C compiler", remedy="install gcc")

@@ -8,7 +8,7 @@ import pytest
 from board_agent.enrolment import absence
 from common.errors import UnavailableError
 from common.keys import SERVICE_FOLDER, KeyFolder
-from phone_host.boards.enrolment import PairingCall
+from phone_host.discovery.enrolment import PairingCall
 
 
 def closed_port() -> int:

@@ -21,8 +21,8 @@ from phone_host.doctor.host_checks import (
 from phone_host.doctor.rig_checks import RigReadings, check_rig
 from phone_host.doctor.vision_checks import read_rig_readings
 from phone_host.model import Verdict
+from phone_host.native.library import Missing, native
 from phone_host.output.rig_yaml import write_rig
-from phone_host.stereo.native.library import Missing, native
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 

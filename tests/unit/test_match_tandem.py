@@ -5,9 +5,9 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.model import Image, RectifiedPair
+from phone_host.native.library import Library, native
 from phone_host.stereo.match_tandem import CLASSES, TandemMatcher, confidence_histogram
 from phone_host.stereo.matcher_protocol import ReportingMatcher
-from phone_host.stereo.native.library import Library, native
 from tests.support.planes import noise, plane
 
 

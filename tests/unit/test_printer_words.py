@@ -6,7 +6,7 @@ import math
 import pytest
 
 from common.errors import UnavailableError
-from phone_host.boards.found import Announcement
+from phone_host.discovery.found import Announcement
 from phone_host.printers.announced_printers import FoundPrinter, printers_of
 from phone_host.printers.prusalink import digest_header
 from phone_host.printers.server_answer import Answer, Value

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from common.versions import PACKAGE_VERSION
-from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
+from phone_host.native.build_library import LIBRARY_FILE, REASON_FILE
 
 ROOT = Path(__file__).resolve().parents[2]
 TOP_PACKAGES = ("board_agent", "common", "phone_host")

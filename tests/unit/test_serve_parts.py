@@ -15,7 +15,7 @@ from common.doctor.machine_checks import LOG_UNREADABLE
 from common.errors import DataError, SettingsError, UnavailableError
 from common.ledger import StageTimes
 from common.peers import Peer
-from phone_host.boards.found import Found
+from phone_host.discovery.found import Found
 from phone_host.doctor.camera_check.words import stored_finding
 from phone_host.live.scan import LiveScan
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError, MissingDeviceError, SettingsError, UnavailableError
-from phone_host.boards.udev_rule import find_usb_board, rule_text, write_rule
+from phone_host.discovery.udev_rule import find_usb_board, rule_text, write_rule
 
 
 def plug(sysfs: Path, port: str, serial: str, manufacturer: str = "tandemscan", product: str = "0104") -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from common.doctor.network_checks import ACCESS_POINT, CABLE_BOARD
-from phone_host.boards.udev_rule import RULES, UsbBoard, write_rule
+from phone_host.discovery.udev_rule import RULES, UsbBoard, write_rule
 from tests.support.programs import ledgers, lines, until
 from tests.vm.conftest import CAMERA
 from tests.vm.contract import run_contract

@@ -20,7 +20,6 @@ from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.stamp import HOST_CLOCK
 from common.words import counted
-from phone_host.boards.opened import open_named
 from phone_host.calibration.failure_modes.mistakes import Mistake
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.guide.gates import View
@@ -36,6 +35,7 @@ from phone_host.calibration.target.sharpness import SeenLook
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
+from phone_host.discovery.opened import open_named
 from phone_host.jobs.output_folders import require_folder, unwritable
 from phone_host.jobs.units import baseline_mm
 from phone_host.live.calibration import LiveCalibration, LiveSettings

@@ -6,6 +6,7 @@ import sys
 from common.errors import SettingsError
 from common.program.commandline import CHECK_FAILED
 from common.program.terminal import say
+from phone_host.native.library import model_note, native
 from phone_host.output.json_text import json_text
 from phone_host.report.scan_json import scan_json
 from phone_host.report.scan_lines import scan_lines
@@ -13,7 +14,6 @@ from phone_host.report.scan_next import next_lines
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.scan_files import NAMES
 from phone_host.run.scan_job import run_scan
-from phone_host.stereo.native.library import model_note, native
 from phone_host.verbs.picture_pairs import file_pairs, reading, require_place
 from phone_host.verbs.scan.wanted import axes_of, resumed_of, scan_wanted
 from phone_host.verbs.stereo_options import require_metres

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from common.keys import KeyFolder
 from common.link.base import Link
 from common.link.factory import open_links, parse_link, tell_insecure
-from phone_host.boards.discovery import find_board_and_say
+from phone_host.discovery.discovery import find_board_and_say
 
 
 def open_named(named: Sequence[str], keys: KeyFolder, wait_s: float | None) -> tuple[tuple[str, ...], list[Link]]:

@@ -10,7 +10,7 @@ from contextlib import closing
 
 from zeroconf import ServiceBrowser, ServiceStateChange, Zeroconf
 
-from phone_host.boards.found import LISTEN_S, SERVICE, Announcement, Found
+from phone_host.discovery.found import LISTEN_S, SERVICE, Announcement, Found
 
 
 def announced() -> list[Found]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from common.errors import UnavailableError
 from common.link.ipc_folder import runtime_folder
 from common.program.commandline import INTERRUPTED
-from phone_host.children.child_process import GOODBYE_S, child_process
+from phone_host.subprocesses.child_process import GOODBYE_S, child_process
 
 
 @dataclass(frozen=True, slots=True)

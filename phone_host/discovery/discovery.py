@@ -20,8 +20,8 @@ from common import now
 from common.android import is_android
 from common.errors import TandemError, UnavailableError
 from common.files import opened_folder, read_file, replacing_in
-from phone_host.boards.found import LISTEN_S, Found
-from phone_host.boards.udev_rule import find_usb_board
+from phone_host.discovery.found import LISTEN_S, Found
+from phone_host.discovery.udev_rule import find_usb_board
 
 GADGET: Final = "tcp://192.168.7.2:5555"
 """A BeagleBone on its USB cable."""
@@ -180,7 +180,7 @@ def _why_not() -> str:
 def _announced() -> list[Found]:
     """Listen for boards that announce themselves. Without zeroconf, wait as long and return none."""
     try:
-        from phone_host.boards.announced import announced  # noqa: PLC0415 - zeroconf is optional, slow to load and seldom needed
+        from phone_host.discovery.announced import announced  # noqa: PLC0415 - zeroconf is optional, slow to load and seldom needed
     except ImportError:
         threading.Event().wait(LISTEN_S)
         return []

@@ -14,8 +14,8 @@ from typing import Final
 from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
 from common.errors import SettingsError, UnavailableError
-from phone_host.stereo.native.build_library import LIBRARY_FILE, REASON_FILE
-from phone_host.stereo.native.volume_jobs import AbsorbJob, CarveJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
+from phone_host.native.build_library import LIBRARY_FILE, REASON_FILE
+from phone_host.native.volume_jobs import AbsorbJob, CarveJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""

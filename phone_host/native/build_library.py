@@ -4,7 +4,7 @@ Each file in `PER_ISA` is compiled once per instruction set, with that set's fla
 time. The installation never fails because of it: whatever goes wrong becomes a sentence in a file beside the library
 (`REASON_FILE`), which `library` reads.
 
-    python -m phone_host.stereo.native.build_library        rebuilds the library of a checkout, in place
+    python -m phone_host.native.build_library        rebuilds the library of a checkout, in place
 
 Environment: CC, the compiler and its arguments (default: the first of cc, gcc, clang). CFLAGS is not heeded: flags of others, such as
 -ffast-math or -march=native, would change results or crash on other processors.
