@@ -1,4 +1,4 @@
-"""The commands' help as a new user sees it, by real processes; tests/unit/test_examples.py looks at every verb's."""
+"""The commands' help as a new user sees it, by real processes; tests/unit/board_agent/test_examples.py looks at every verb's."""
 
 import shlex
 from pathlib import Path

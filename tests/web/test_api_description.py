@@ -29,7 +29,7 @@ OPERATIONS = {found.ok().label: found.ok() for found in SCHEMA.get_all_operation
 
 WITH_INPUT = [label for label, operation in OPERATIONS.items() if "{" in label or operation.method == "post"]
 
-# Other methods, and requests without a token: tests/system/test_page_server.py. What is refused: tests/unit/test_page_wishes.py, which knows
+# Other methods, and requests without a token: tests/system/test_page_server.py. What is refused: tests/unit/web/test_page_wishes.py, which knows
 # more than a schema says (control characters).
 LEFT_OUT = [
     checks.unsupported_method,

@@ -22,8 +22,8 @@ from phone_host.run.ledgerer import Ledgerer
 from phone_host.svg.plots import Percentiles
 from phone_host.verbs.run import WaitingNote
 from tests.support.run_snapshots import run
-from tests.unit.test_ledgerer import enter
-from tests.unit.test_pair_queue import MS
+from tests.unit.run.test_ledgerer import enter
+from tests.unit.stream.test_pair_queue import MS
 
 SIDE = DataError("the right image is 370x1226 px: it lies on its side", "turn it upright: --rotate-right 90")
 BUSY = Diagnostic("the board is busy with another host", "stop that one first", Severity.FAIL)

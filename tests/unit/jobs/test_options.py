@@ -1,0 +1,49 @@
+"""What the programs take: every option, and what help says of it, as tests/golden/options.txt has it. `python -m tests.unit.jobs.test_options` writes that file."""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import board_agent.cli
+import phone_host.bench.cli
+import phone_host.cli
+from tests.support.requests import verbs_of
+
+GOLDEN = Path(__file__).parents[2] / "golden" / "options.txt"
+PARSERS = (phone_host.cli.parser, board_agent.cli.parser, phone_host.bench.cli.parser)
+
+
+def described(action: argparse.Action) -> str:
+    """An option in one line: how it is called, its values, its default and its help."""
+    kind = type(action).__name__.strip("_").removesuffix("Action")
+    shown = {
+        "nargs": action.nargs,
+        "const": action.const,
+        "default": action.default,
+        "choices": action.choices,
+        "metavar": action.metavar,
+        "required": action.required,
+    }
+    told = " ".join(f"{name}={value!r}" for name, value in shown.items() if value is not None and value is not False)
+    return f"{' '.join(action.option_strings) or action.dest} {kind} {told}: {action.help}"
+
+
+def options(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """The options of a program and its verbs, sorted: their order and groups may change."""
+    for verb in verbs_of(parser).values():
+        yield from options(verb)
+    own = [action for action in parser._actions if not isinstance(action, argparse._SubParsersAction)]
+    yield from sorted(f"{parser.prog} {described(action)}" for action in own)
+
+
+def current() -> str:
+    return "".join(f"{line}\n" for make in PARSERS for line in options(make()))
+
+
+def test_the_options_are_those_that_were_decided() -> None:
+    """No option, choice, default or help text changes unnoticed."""
+    assert current().splitlines() == GOLDEN.read_text().splitlines()
+
+
+if __name__ == "__main__":
+    GOLDEN.write_text(current())
