@@ -18,7 +18,7 @@ from _pytest.mark import ParameterSet
 
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
-from tests.support.board_films import FPS, board_films
+from tests.support.board_films import FPS, SECONDS, board_films
 from tests.support.planes import noise
 from tests.support.programs import Program, board, children_of, command_of, lines, program, until
 from tests.support.rigs import small_rig
@@ -97,8 +97,11 @@ def _cases() -> list[ParameterSet]:
 
 
 @contextmanager
-def _films(folder: Path) -> Iterator[None]:
+def _films(folder: Path, *, still: bool) -> Iterator[None]:
     board_films(folder)
+    for path in folder.glob("*/*.jpg"):
+        if still and int(path.stem) >= round(SECONDS * FPS):
+            path.unlink()
     write_rig(folder / "small.yaml", small_rig(), rectify_rig(small_rig()))
     camera = f"replay:{folder}/left?fps={FPS}&loop=1"
     with board(["run", "--camera", camera, "--link", f"ipc://{folder}/link"], folder):
@@ -115,7 +118,7 @@ def test_a_stream_ends_in_order_with_what_it_has_come_to(name: str, number: sign
     verb = VERBS[name]
     arguments = verb.arguments.replace("{}", str(tmp_path)).split()
     with (
-        _films(tmp_path) if verb.is_streaming else nullcontext(),
+        _films(tmp_path, still=name == "scan") if verb.is_streaming else nullcontext(),
         program(verb.module, arguments, tmp_path, "verb") as running,
     ):
         for begins in verb.begins:
