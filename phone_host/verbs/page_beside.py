@@ -18,7 +18,7 @@ from phone_host.serve.beside import BesideRun
 from phone_host.settings import key_folder
 from phone_host.verbs.serve.choices import choices_of, shown_words
 from phone_host.verbs.serve.page import first_url, page_settings, served, tell_page
-from phone_host.verbs.serve.places import recording_folder, snapshot_folder
+from phone_host.verbs.serve.places import page_folder
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 
@@ -40,8 +40,8 @@ def camera_page(uri: str, keys: Path) -> Iterator[BrowserFeed | None]:
     page = BesideRun(
         {"camera": uri},
         lambda _: "",
-        snapshots=snapshot_folder(None),
-        recordings=recording_folder(None),
+        snapshots=page_folder(None, "snapshots"),
+        recordings=page_folder(None, "recordings"),
         axes=Axes.CAMERA,
     )
     settings = page_settings(None, keys)
@@ -74,8 +74,8 @@ def page_beside(request: RunRequest, found: Resolved[PhoneHostSettings]) -> Iter
     beside = BesideRun(
         choices,
         lambda chosen: command_line("phone-host", "run", *shown_words(chosen)),
-        snapshots=snapshot_folder(request.out),
-        recordings=recording_folder(request.out),
+        snapshots=page_folder(request.out, "snapshots"),
+        recordings=page_folder(request.out, "recordings"),
         axes=request.depth.axes,
     )
     address = request.serve if isinstance(request.serve, str) else None

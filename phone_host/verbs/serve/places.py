@@ -5,28 +5,11 @@ from pathlib import Path
 from phone_host.output.data_folder import data_folder
 
 
-def snapshot_folder(out: Path | None) -> Path:
-    """Return the folder of the snapshots. No run empties it.
+def page_folder(out: str | Path | None, kind: str) -> Path:
+    """Return the folder of what is made on the page; no run empties it.
 
     Args:
-        out: folder for the results of runs; None: none.
+        out: folder for the results of runs; None or empty: none.
+        kind: snapshots, recordings, or scans, which lie in a folder of their own each.
     """
-    return (out or data_folder()) / "snapshots"
-
-
-def recording_folder(out: Path | None) -> Path:
-    """Return the folder of the recordings that are begun on the page.
-
-    Args:
-        out: folder for the results of runs; None: none.
-    """
-    return (out or data_folder()) / "recordings"
-
-
-def scan_folder(out: Path | None) -> Path:
-    """Return the folder of the scans that are made on the page, each in a folder of its own.
-
-    Args:
-        out: folder for the results of runs; None: none.
-    """
-    return (out or data_folder()) / "scans"
+    return (Path(out) if out else data_folder()) / kind

@@ -31,11 +31,17 @@ from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.data_folder import data_folder
 from phone_host.output.rig_files.imported import read_own_rig
+from phone_host.printers.bed import parse_bed
+from phone_host.printers.doors import configured_door
+from phone_host.printers.journal import Journal
+from phone_host.printers.preparing import Wanted
+from phone_host.printers.printer_uri import read_uri
+from phone_host.printers.slicing import SlicingWanted
 from phone_host.run.pair_budget import usable_matchers
 from phone_host.run.sinks import Sink
 from phone_host.scan.box import Box
 from phone_host.serve.program import Calibrated, Choices, PrintWanted, SinksOf
-from phone_host.settings import chosen_keys
+from phone_host.settings import chosen_keys, printer_keys
 from phone_host.stereo.matcher_names import MATCHERS
 from phone_host.verbs.calibrate.earlier import Asked, asked_of
 from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place
@@ -51,9 +57,8 @@ from phone_host.verbs.serve.choices import (
     without_depth,
 )
 from phone_host.verbs.serve.kept_choices import is_there, keep, kept
-from phone_host.verbs.serve.page_print import asked_print
 from phone_host.verbs.serve.page_scan import PageScan, asked_box, page_scan
-from phone_host.verbs.serve.places import recording_folder, scan_folder, snapshot_folder
+from phone_host.verbs.serve.places import page_folder
 
 _TRIAL_S: Final = 2.5
 """Two seconds show the rate of both cameras; a clock is known after less than one."""
@@ -191,8 +196,7 @@ class Commands:
 
     def scan(self, choices: Choices, values: Choices, sinks_of: SinksOf) -> PageScan:
         """See Program."""
-        out = choices.get("out", "")
-        folder = scan_folder(Path(out) if out else None)
+        folder = page_folder(choices.get("out"), "scans")
         return page_scan(self._request(choices), values, folder, sinks_of, tell=self._tell, feed=self.feed)
 
     def box(self, values: Choices) -> Box | None:
@@ -205,13 +209,11 @@ class Commands:
 
     def snapshots(self, choices: Choices) -> tuple[Path, Axes]:
         """See Program."""
-        out = choices.get("out", "")
-        return snapshot_folder(Path(out) if out else None), Axes(choices.get("axes", Axes.CAMERA.value))
+        return page_folder(choices.get("out"), "snapshots"), Axes(choices.get("axes", Axes.CAMERA.value))
 
     def recordings(self, choices: Choices) -> Path:
         """See Program."""
-        out = choices.get("out", "")
-        return recording_folder(Path(out) if out else None)
+        return page_folder(choices.get("out"), "recordings")
 
     def _request(self, choices: Choices) -> RunRequest:
         return run_request([*self._fixed, *run_words(choices)])
@@ -258,3 +260,22 @@ class _Nobody:
     """Nobody wants the end of it all: the page's stop does not come this far."""
 
     interrupted = False
+
+
+def asked_print(values: Choices, file: Path | None) -> PrintWanted:
+    """Return how the page wants a scan printed. Nothing is opened.
+
+    Args:
+        values: `printer`, which may be missing, and `bed`.
+        file: settings file with the keys of servers; None: there is none.
+
+    Raises:
+        SettingsError: they make no sense.
+    """
+    text = values.get("printer", "").strip()
+    bed = parse_bed(words) if (words := values.get("bed", "").strip()) else None
+    how, journal = Wanted(SlicingWanted(bed)), Journal(data_folder() / "printing")
+    if not text:
+        return PrintWanted("", None, None, how, journal)
+    uri = read_uri(text)
+    return PrintWanted(uri.text, uri, configured_door(uri, *printer_keys(file)), how, journal)
