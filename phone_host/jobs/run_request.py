@@ -1,6 +1,5 @@
 """What a run is asked for, and what of it can be checked before anything is opened."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -161,12 +160,6 @@ def _check(request: RunRequest) -> None:
         raise SettingsError("--budget is 0 ms", "give the time for each pair, for example 30ms, or leave it out")
     if not 0 <= request.duration_s <= _MOST_SECONDS:
         raise SettingsError(f"--seconds is {request.duration_s:g}", f"give 0 (no limit) to {_MOST_SECONDS} seconds")
-    if request.cameras.wait_s is not None and not (
-        math.isfinite(request.cameras.wait_s) and request.cameras.wait_s >= 0
-    ):
-        raise SettingsError(
-            f"--wait is {request.cameras.wait_s}", "give 0 or more seconds, or leave it out to wait for ever"
-        )
 
 
 def with_own_rig(

@@ -90,8 +90,6 @@ def run(request: RecordRequest) -> int:
     require_new(request.out, "--out")
     if request.alone and request.cameras.link:
         raise SettingsError("--alone records without a board, and --link names one", "leave one of both out")
-    if not (math.isfinite(request.duration_s) and request.duration_s >= 0):
-        raise SettingsError(f"--seconds is {request.duration_s:g}", "give 0 (no limit) or more seconds")
     logs.set_up(log_level(settings.log_level))
     attached = {"settings.json": json_text(with_origins(found, request.given, sys.argv), indent=1).encode()}
     rig: Rig | None = None
