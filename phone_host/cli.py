@@ -121,7 +121,11 @@ class _VerbParser(ExamplesFirstParser):
     def parse_known_args(  # type: ignore[override]  # of one type only
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """See ExamplesFirstParser."""
+        """See ExamplesFirstParser. Versions are told without the verb, which may lack a package."""
+        if "--version" in (args or ()):
+            only = argparse.ArgumentParser(self.prog, add_help=False)
+            add_version_option(only)
+            only.parse_known_args(args)
         self.learn()
         return super().parse_known_args(args, namespace)
 

@@ -217,7 +217,8 @@ def run_command(
     Returns:
         The exit code: 0 done, 2 wrong usage, 3 a device or link cannot be had or stdout cannot be written, 4 bad data, 129, 130, 131 and 143 ended by a signal.
     """
-    options = argparse.Namespace(debug=False)
+    words = sys.argv[1:] if arguments is None else arguments
+    options = argparse.Namespace(debug="--debug" in words)  # before they are read: to read them may already fail
     code = 0
     mend_streams()
     try:

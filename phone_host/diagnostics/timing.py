@@ -1,8 +1,7 @@
 """Says in words when timing makes depth wrong. Pure.
 
 While the image moves, depth is wrong if the frames of a pair are apart in time, clocks or stamps are uncertain, or
-results are old. There is also a concern if frames were not believed: then clocks had stepped, or a board, a driver or a
-stranger sent something impossible.
+results are old.
 
 In a frame that is t s late, a point that moves at v px/s is displaced by t * v px, and a matcher takes that for
 disparity. Beyond half a pixel, the depth error exceeds a good matcher's own error.

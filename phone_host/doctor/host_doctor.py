@@ -255,7 +255,7 @@ def _examine_board(uri: str, wait_s: float, keys: KeyFolder, *, works: bool) -> 
     try:
         board = ask_board(uri, wait_s, keys)
     except TandemError as error:
-        return [*findings, Diagnostic(error.problem, error.remedy, Severity.FAIL, "board")]
+        return [*findings, fail("board", error.problem, error.remedy)]
     if board.answer is Answer.BOARD:  # whatever way it came
         findings = [finding for finding in findings if finding.severity is not Severity.FAIL]
     if board.answer is Answer.SILENT:

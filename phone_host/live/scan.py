@@ -44,7 +44,7 @@ class LiveScan:
     """Takes the pairs of a run.
 
     Attributes:
-        work: takes them, and is written when the run has ended.
+        work: the scan and its folder; written when the run has ended.
         scan: what has become of them; whole once the run has ended.
         axes: that the model has from mat or table; None: those of the camera.
         patches: its surface, for whoever watches; while the run goes on, `surface_since` asks them.

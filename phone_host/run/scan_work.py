@@ -1,4 +1,4 @@
-"""A scan at work, from files or live: it takes pairs, keeps what came of them on the disk, and ends."""
+"""A scan at work, from files or live: what came of its pairs is kept on the disk, and it ends in one way."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

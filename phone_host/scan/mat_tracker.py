@@ -108,6 +108,11 @@ class MatPoses(PoseSource):
         """Each pose is told by itself."""
         return PoseErrors.INDEPENDENT
 
+    def crop(self, box: Box | None) -> None:
+        """See `PoseSource.crop`. The model is begun in the box that is chosen by then."""
+        if self._volume is None:
+            self._box = self._room = box or self._finder.mat.room
+
     def track(self, number: int, view: View) -> Tracked:
         """See `PoseSource.track`."""
         del number

@@ -72,6 +72,14 @@ class PoseSource(ABC):
             view: of the size and the geometry of those before.
         """
 
+    def crop(self, box: Box | None) -> None:
+        """Note the box that counts from now on, where it matters to what is fused.
+
+        Args:
+            box: m; None: everything.
+        """
+        del box
+
     def settle(self) -> Sequence[Placed]:
         """Put the poses, and the model with them, where all that is known agrees best, before the surface is made; return those that have moved."""
         return ()

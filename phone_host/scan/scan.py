@@ -292,6 +292,7 @@ class Scan:
             box: m; None: everything.
         """
         self._wanted = replace(self._wanted, box=box)
+        self.poses.crop(self._wanted.model_box)
 
     def model(self) -> ScanModel:
         """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""

@@ -333,6 +333,14 @@ def test_what_a_mat_told_is_kept_in_submaps() -> None:
     assert np.array_equal(after.world_camera.t_m, without_end.world_camera.t_m)
 
 
+def test_a_box_that_is_moved_before_the_first_pair_counts() -> None:
+    """A scan whose box holds nothing begins once the box is taken away."""
+    scan = scan_for(replace(WANTED, box=Box((0.5, 0.5, 0.0), (0.6, 0.6, 0.1))))
+    assert scan.take("0", 0.0, walked(0)).weakness is Weakness.EMPTY_BOX
+    scan.crop(None)
+    assert scan.take("1", 1.0, walked(0)).is_fused
+
+
 def test_a_scan_on_a_mat_goes_on_with_the_same_mat_and_box_only() -> None:
     """Without the mat, with another box, or with another sheet it is refused in one line."""
     kept = scanned([0], WANTED)[0].close_submap()

@@ -87,6 +87,14 @@ def test_a_verb_without_numpy_is_one_line(tmp_path: Path, verb: str) -> None:
     assert "needs the package numpy, which is not installed: install it: pip install numpy" in done.stderr
 
 
+def test_versions_and_the_traceback_are_there_without_numpy(tmp_path: Path) -> None:
+    """What a user with a broken installation is asked for: `run --version` prints the versions, and --debug shows where the import failed."""
+    versions = without("numpy", tmp_path, "phone-host", "run", "--version")
+    assert (versions.returncode, versions.stderr) == (0, "")
+    assert "protocol" in versions.stdout
+    assert "Traceback" in without("numpy", tmp_path, "phone-host", "run", "--debug", "--camera", "x").stderr
+
+
 @pytest.mark.parametrize(
     ("module", "program", "arguments"),
     [

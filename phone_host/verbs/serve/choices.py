@@ -146,7 +146,16 @@ def run_request(words: Sequence[str]) -> RunRequest:
     Raises:
         SettingsError: they are not valid.
     """
-    return read_request(RunRequest, vars(_parser().parse_args(list(words))))
+    return read_request(RunRequest, run_given(words))
+
+
+def run_given(words: Sequence[str]) -> dict[str, object]:
+    """Return the options of words by name, as they were written; what they say is not checked.
+
+    Raises:
+        SettingsError: there is no such option, or it lacks its value.
+    """
+    return vars(_parser().parse_args(list(words)))
 
 
 def calibrate_options(words: Sequence[str]) -> argparse.Namespace:

@@ -13,7 +13,7 @@ from common.program.settings import read_file
 from common.program.settings_file import Value, changed
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.settings import PAGE_TABLE
-from phone_host.verbs.serve.choices import run_request, run_words, with_changes
+from phone_host.verbs.serve.choices import run_given, run_words, with_changes
 
 _NAMES: Final = {item.name.replace("_", "-"): item.name for item in fields(PhoneHostSettings)}
 _OF_PROGRAM: Final = ("keys", "log-level")
@@ -102,7 +102,7 @@ def _merged(current: Mapping[str, str], before: Mapping[str, str], after: Mappin
 
 def _with_choices(text: str, choices: Mapping[str, str]) -> str:
     """Return the text of a settings file with these choices in place of its own."""
-    options = run_request(run_words(choices)).given
+    options = run_given(run_words(choices))
     keys: dict[str, Value | None] = {}
     for name, key in _NAMES.items():
         if name not in _OF_PROGRAM:

@@ -1,5 +1,6 @@
 """The host doctor's own verdicts: Python, packages, rig and the board's answer."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 from common.diagnostic import Severity
 from common.errors import SettingsError
+from phone_host.cli import main
 from phone_host.doctor.host_checks import (
     Answer,
     BoardReadings,
@@ -148,3 +150,11 @@ def test_a_missing_native_library_is_a_warning_with_its_reason() -> None:
     found = check_native(native())
     assert found.severity is OK
     assert found.message.startswith("own matcher: ")
+
+
+def test_a_link_that_cannot_be_opened_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The board's check fails with the link's own words, and the exit code is that of a failed check."""
+    assert main(["doctor", "--link", f"serial:{tmp_path}/tty", "--wait", "1", "--json"]) == 4
+    checks = {check["what"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
+    assert checks["board"]["verdict"] == "fail"
+    assert "cannot be opened" in checks["board"]["finding"]
