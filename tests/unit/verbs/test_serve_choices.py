@@ -65,6 +65,14 @@ def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
         keep(tmp_path / "folder" / "host.toml", choices)
 
 
+def test_a_choice_is_kept_beside_one_that_another_hand_spoiled(tmp_path: Path) -> None:
+    """A value in the file that no run would take does not keep the page from keeping another."""
+    file = tmp_path / "host.toml"
+    file.write_text('[page]\nnear = "1"\n')
+    keep(file, {"camera": "replay:y"}, {"camera": "replay:x"})
+    assert kept(file) == ({"camera": "replay:y", "near": "1"}, [])
+
+
 def test_the_command_of_a_scan_has_the_choices_that_scan_takes(tmp_path: Path) -> None:
     """Options that only `run` has are left out, the folder of the results is one of its own, and `scan` takes all of it; there is none for a browser's camera."""
     commands = Commands(tmp_path / "host.toml", str(tmp_path / "keys"), lambda _: None)
