@@ -48,5 +48,6 @@ def test_a_board_that_was_suspended_streams_on(
         stream.more(20, "after the sleep")
         assert before_ns - offset_ns(guest) > 0.9e9 * SLEEP_S, "the board's clock stood still"
         report = stream.finish(skew)
-    assert len(report["sessions"]) == 1
-    assert "slept" in guest.journal()
+    journal = guest.journal()
+    assert len(report["sessions"]) == 1, f"{journal}\n{stream.receiver.stderr}"
+    assert "slept" in journal

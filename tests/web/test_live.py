@@ -383,8 +383,16 @@ def test_the_page_is_light_and_asks_nobody_else(opened: Opener, complaints: Comp
         "Network.emulateNetworkConditions",
         {"offline": False, "latency": 40, "downloadThroughput": 100_000, "uploadThroughput": 100_000},
     )
+    asked: set[str] = set()
     sizes: list[float] = []
-    session.on("Network.loadingFinished", lambda told: sizes.append(told["encodedDataLength"]))
+
+    def on_finished(event: dict[str, Any]) -> None:
+        """Count what this page asked for, and not what the page before the reload was still waiting for."""
+        if event["requestId"] in asked:
+            sizes.append(event["encodedDataLength"])
+
+    session.on("Network.requestWillBeSent", lambda event: asked.add(event["requestId"]))
+    session.on("Network.loadingFinished", on_finished)
     began_ns = now.monotonic_ns()
     page.reload()
     page.evaluate("location.hash = 'run'")
