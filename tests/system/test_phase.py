@@ -1,6 +1,7 @@
 """Two real processes whose cameras are out of phase: the phase is reported, and steered to 0 on request."""
 
 from pathlib import Path
+from statistics import median
 
 import pytest
 
@@ -60,9 +61,10 @@ def test_the_boards_image_is_taken_to_the_hosts_moment(tmp_path: Path) -> None:
             assert running.wait() == 0, running.stderr
             report = running.json()
     records = ledgers(out)
-    # Reading the clock twice takes next to nothing; the stage decodes an image and warps it, so it takes as long as decoding on any machine.
+    # Reading the clock twice takes next to nothing; the stage decodes an image and warps it, so it takes as long as decoding usually does.
     stages = [record["stages_ns"] for record in records]
-    assert sum(one["interpolate"] > one["decode"] / 10 for one in stages) >= len(records) - 1
+    decode_ns = median(one["decode"] for one in stages)
+    assert sum(one["interpolate"] > decode_ns / 10 for one in stages) >= len(records) - 1
     assert all(sum(record["stages_ns"].values()) <= record["processing_ns"] for record in records)
     assert report["stages_ms"]["interpolate"]["p50"] > 0
     doubt_ms = max(record["uncertainty_ns"] for record in records) / 1e6
