@@ -1,5 +1,6 @@
 """The scan's step: what it tells, the surface as it grows, and what can be saved."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,14 @@ import numpy as np
 import pytest
 
 from phone_host.geometry.se3 import SE3
+from phone_host.report.scan_report import scan_verdict
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.patches import Patches
+from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.web.source import Activity, Do, ScanState
+from tests.scan.test_scan_report import GOOD, MODEL
 from tests.support.plane_films import CORNER, plane_view, texture
 from tests.support.programs import until
 from tests.web.conftest import LAPTOP, PHONE, Complaints, Opener
@@ -98,6 +102,28 @@ def test_the_surface_grows_until_it_is_saved(
     page.click("#scan-go")
     page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts === 0")
     assert complaints == []
+
+
+@pytest.mark.parametrize(("scope", "level"), [(ErrorScope.DRIFT, "good"), (ErrorScope.NOISE, "warning")])
+def test_a_scan_that_is_over_states_its_error_and_what_was_never_in_view(
+    program: Played, opened: Opener, tmp_path: Path, scope: ErrorScope, level: str
+) -> None:
+    """The report's sentence stands on the step whole, and its mark is green only where the stated error includes drift."""
+    verdict, words = scan_verdict(replace(GOOD, model=replace(MODEL, unseen_share=0.25, error_scope=scope)))
+    program.patches = Patches(1)
+    program.scan = ScanState(words=words, level=verdict.value, pairs=5, fused=5, folder=str(tmp_path), files=FILES)
+    page = opened("scan")
+    page.wait_for_selector(f"#scan-state[data-level={level}]")
+    assert page.inner_text("#scan-words") == (
+        f"All 5 pairs are in the model. Expected surface error: \u00b11.2 mm ({scope.value}). "
+        "25 % was never in view and is filled in."
+    )
+    assert page.inner_text("#scan-pairs") == ""
+    mark = page.evaluate("getComputedStyle(document.querySelector('#scan-state i')).backgroundColor")
+    assert mark == page.evaluate(
+        "level => { document.body.style.color = `var(--${level})`; return getComputedStyle(document.body).color; }",
+        level,
+    )
 
 
 def test_a_surface_is_drawn_and_turned_by_keys(program: Played, opened: Opener, complaints: Complaints) -> None:
