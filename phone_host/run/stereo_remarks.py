@@ -37,9 +37,10 @@ def files_remarks(files: ViewFiles, matcher_note: str = "") -> tuple[Diagnostic,
         matcher_note: what is to be said of the choice of the matcher; empty: nothing.
     """
     remarks = []
-    for side, paths in (("left", files.left_alone), ("right", files.right_alone)):
+    for side, paths, at in (("left", files.left_alone, 1), ("right", files.right_alone, 2)):
         if paths:
-            alone = list(distinct_names([*map(str, paths)]).values())
+            names = distinct_names([*(str(pair[at]) for pair in files.pairs), *map(str, paths)])
+            alone = [names[str(path)] for path in paths]
             named = ", ".join(alone[:_MOST_NAMES]) + (", …" if len(alone) > _MOST_NAMES else "")
             remarks.append(
                 Diagnostic(f"{counted(len(alone), f'{side} image has', f'{side} images have')} no partner: {named}")

@@ -206,6 +206,8 @@ def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_to
     many, order = files_remarks(_files(4, [f"{n}.png" for n in range(7)], [], by_number=False))
     assert many.message == "7 left images have no partner: 0.png, 1.png, 2.png, 3.png, 4.png, …"
     assert "order of their names though the counts differ" in order.message
+    alike = ViewFiles((("a", Path("a/l.png"), Path("a/r.png")),), (Path("b/l.png"),), (), by_number=False, by_name=True)
+    assert files_remarks(alike)[0].message == "1 left image has no partner: b/l.png"
     assert files_remarks(_files(1, [], [], by_number=False)) == ()
     assert files_remarks(_files(1, [], [], by_number=False), "sgbm") == (Diagnostic("sgbm", severity=Severity.NOTE),)
 
