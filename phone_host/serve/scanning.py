@@ -1,5 +1,6 @@
 """The scan that goes on on the page, or the last one: how it goes in words, its surface, and where its files lie. Any thread may use it."""
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final
@@ -20,6 +21,17 @@ _LEVELS: Final = {
     Tracking.WEAK: "warning",
     Tracking.LOST: "bad",
 }
+
+_ON_THE_PAGE: Final = (
+    (
+        r"use --mat(?: (\S+))?(?: in place of --\w+)? to scan the object on it",
+        lambda found: f"press Stop and choose \u201cAn object on a mat\u201d{f' ({found[1]})' if found[1] else ''}",
+    ),
+    (r"a larger --memory or --voxel", "a larger number in Detail"),
+    (r"move or enlarge --box, or leave it out", "move, enlarge or remove the box"),
+    (r"leave --turntable out", "choose another kind in \u201cWhat to scan\u201d"),
+)
+"""What helps by an option of the command line, and by what the page has in its place."""
 
 
 class Scanning:
@@ -80,7 +92,9 @@ class Scanning:
         """How it goes; None: there was none."""
         if (live := self._live) is not None:
             pairs, fused = live.counts
-            return ScanState(words=live.words, level=_level(live.last), pairs=pairs, fused=fused, options=self._options)
+            return ScanState(
+                words=page_words(live.words), level=_level(live.last), pairs=pairs, fused=fused, options=self._options
+            )
         if self._patches is None:
             return None
         (pairs, fused), over = self._counts, self._over
@@ -103,6 +117,13 @@ class Scanning:
         return (
             None if self._patches is None else Surface(self._begun, self._patches.since(since, most_points), self._axes)
         )
+
+
+def page_words(words: str) -> str:
+    """Return advice with the page's fields in place of the command's options."""
+    for option, field in _ON_THE_PAGE:
+        words = re.sub(option, field, words)
+    return words
 
 
 def _level(last: ScannedPair | None) -> str:

@@ -46,7 +46,7 @@ def steps(facts: Facts) -> tuple[Step, ...]:
         _step(
             StepName.RUN,
             _run_words(facts),
-            "run" if has_both else "choose both cameras first",
+            "start a run" if has_both else "choose both cameras first",
         ),
         _scan(facts, has_both=has_both),
     )
@@ -59,7 +59,7 @@ def _scan(facts: Facts, *, has_both: bool) -> Step:
         return Step(name=StepName.SCAN, done=False, words="choose both cameras first")
     if not {"calibration", "rectified"} & facts.choices.keys():
         return Step(name=StepName.SCAN, done=False, words="calibrate first: a scan needs metres")
-    words = "press Start and move the cameras slowly around the object; press Stop when every side has been in view"
+    words = "press Start and slowly move the cameras around, or turn the turntable; press Stop when every side has been in view"
     return Step(name=StepName.SCAN, done=False, words=words)
 
 

@@ -23,13 +23,14 @@ from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes
 from phone_host.scan.box import Box
 from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scan.tracking_words import Weakness
 from phone_host.serve import check
 from phone_host.serve.activities import Activities, Task
 from phone_host.serve.find import board_choice, stranger
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
 from phone_host.serve.program import Scanned
-from phone_host.serve.scanning import Scanning
+from phone_host.serve.scanning import Scanning, page_words
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.steps import Facts, steps
@@ -226,7 +227,7 @@ def test_the_steps_lead_from_nothing_to_a_run_and_a_scan() -> None:
     ready = steps(Facts(choices={**both, "calibration": "rig.yaml"}, checked="seen", pairs=2))
     assert [step.done for step in ready] == [True] * 5 + [False]
     assert ready[4].words == "the last run gave 2 pairs"
-    assert "move the cameras slowly" in ready[5].words
+    assert "slowly move the cameras" in ready[5].words
     scanned = steps(Facts(choices=both, scan="3 of 3 pairs are in the model", has_scan=True))[5]
     assert (scanned.done, scanned.words) == (True, "3 of 3 pairs are in the model")
     assert steps(Facts(choices={**both, "rectified": "yes"}, is_running=True))[3].done
@@ -322,6 +323,26 @@ def test_the_terminal_tells_what_goes_on() -> None:
         "phone-host: ready",
     ]
     assert told(replace(ready, trouble=Diagnostic("no rig", "calibrate", Severity.FAIL))) == "ready; no rig: calibrate"
+
+
+@pytest.mark.parametrize("weakness", Weakness)
+def test_advice_on_the_page_names_no_option_of_the_command_line(weakness: Weakness) -> None:
+    """The page has fields in their place."""
+    assert "--" not in page_words(weakness.advice)
+
+
+@pytest.mark.parametrize(
+    ("option", "way", "words"),
+    [
+        ("--mat", "", "press Stop and choose \u201cAn object on a mat\u201d, or take the mat away"),
+        ("--mat 8x6:28mm:20mm:6x6", " in place of --turntable",
+         "press Stop and choose \u201cAn object on a mat\u201d (8x6:28mm:20mm:6x6), or take the mat away"),
+    ],
+)  # fmt: skip
+def test_a_mat_that_is_not_used_is_named_with_its_field(option: str, way: str, words: str) -> None:
+    """With the sheet where it is not the usual one."""
+    remedy = f"use {option}{way} to scan the object on it, or take the mat away"
+    assert page_words(f"3 pairs in the model: {remedy}") == f"3 pairs in the model: {words}"
 
 
 def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
