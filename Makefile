@@ -101,7 +101,6 @@ figures: .venv/.ready-bench ## run short benchmarks of everything and write docs
 	@touch $@
 
 docs: .venv/.ready-docs ## build the documentation as a site that opens offline, in build/site
-	@$(BIN)/python -m tests.docs.troubleshooting
 	@$(BIN)/python -m mkdocs build --strict --config-file tests/docs/mkdocs.yml
 	@echo "look at build/site/index.html"
 

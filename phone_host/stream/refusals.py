@@ -93,7 +93,7 @@ def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
                 "stop that one first, because a board serves one host at a time",
             )
         case RefusalReason.VERSION:
-            # The same words as in `other_protocol`, written out: docs/troubleshooting.md is generated from them.
+            # The same words as in `other_protocol`, written out: tests/docs/troubleshooting.py reads them.
             theirs, ours = refusal.protocol, PROTOCOL_VERSION
             if theirs is None:  # a board of 0.1, at most protocol 3: ours is newer, or it would accept us
                 return (

@@ -40,7 +40,7 @@ class Command:
 
 def pages() -> list[Path]:
     """Every page that a reader may type from; pages generated from the code are left out."""
-    made = {"troubleshooting.md", "figures.md", "changelog.md"}
+    made = {"figures.md", "changelog.md"}
     found = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
     return [path for path in found if path.name not in made]
 

@@ -1,11 +1,10 @@
-"""Writes docs/troubleshooting.md from the code: `python -m tests.docs.troubleshooting`.
+"""The site's page of messages, made from the code when `make docs` builds the site (see `site.py`).
 
 It searches the syntax trees of the three packages for every place that raises one of our errors or makes a concern
 about a run, so that none can be missing.
 """
 
 import ast
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -13,7 +12,6 @@ from typing import Final
 from tests.docs.message_texts import Code, Place, called
 
 _ROOT: Final = Path(__file__).parents[2]
-PAGE: Final = _ROOT / "docs" / "troubleshooting.md"
 
 _ROOMS: Final = (
     (
@@ -143,19 +141,3 @@ def page(code: Code) -> str:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ").replace("*", "\\*").replace("__", "\\_\\_")
-
-
-def main() -> None:
-    """Write the page."""
-    code = Code(packages())
-    PAGE.write_text(page(code), encoding="utf-8")
-    for place in unresolved(code):
-        print(
-            f"error: no message could be read at {place}: give it a literal text, or a variable with literal texts",
-            file=sys.stderr,
-        )
-    sys.exit(4 if unresolved(code) else 0)
-
-
-if __name__ == "__main__":
-    main()
