@@ -53,9 +53,6 @@ class Way(Enum):
 def ways(names: Iterable[str]) -> frozenset[Way]:
     """Parse the list of what may be lowered.
 
-    Args:
-        names: as they appear in the settings.
-
     Raises:
         SettingsError: a name is unknown.
     """

@@ -11,11 +11,7 @@ _WIDE_MARKS: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 def without_mark(content: bytes) -> bytes:
-    """Return a text's bytes without its byte order mark, and UTF-16 as UTF-8.
-
-    Args:
-        content: of the text, or its beginning.
-    """
+    """Return a text's bytes without its byte order mark, and UTF-16 as UTF-8."""
     if content.startswith(_WIDE_MARKS):
         return content.decode("utf-16", "replace").encode()
     return content.removeprefix(UTF_8_MARK)

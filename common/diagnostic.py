@@ -66,11 +66,7 @@ class Diagnostic:
 
 
 def diagnostic_of(error: BaseException) -> Diagnostic:
-    """Return an error in words. One that is none of ours is a mistake of the program, and named by its kind.
-
-    Args:
-        error: what ended the run, or a pair.
-    """
+    """Return an error in words. One that is none of ours is a mistake of the program, and named by its kind."""
     if isinstance(error, TandemError):
         return Diagnostic(printable(error.problem), printable(error.remedy), Severity.FAIL)
     reported = printable(f"{type(error).__name__}: {error}")

@@ -116,11 +116,6 @@ _RAW_BITS = {PixelFormat.YUYV: 16, PixelFormat.GREY: 8, PixelFormat.NV12: 12}
 def raw_bytes(pixel_format: PixelFormat, width_px: int, height_px: int) -> int | None:
     """Return the length of a raw image.
 
-    Args:
-        pixel_format: its encoding.
-        width_px: width, px.
-        height_px: height, px.
-
     Returns:
         Bytes; None for a compressed format.
     """

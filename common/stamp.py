@@ -8,11 +8,7 @@ HOST_CLOCK = "host"
 
 
 def board_clock(boot_id: str) -> str:
-    """Name the CLOCK_MONOTONIC of a board. A reboot starts a new clock; a restart of the service does not.
-
-    Args:
-        boot_id: the board's boot id.
-    """
+    """Name the CLOCK_MONOTONIC of a board. A reboot starts a new clock; a restart of the service does not."""
     return f"board:{boot_id}"
 
 

@@ -11,9 +11,6 @@ _LARGEST: Final = 2**62
 def strict_json(text: str | bytes) -> Any:  # noqa: ANN401 - whatever JSON can hold
     """Read JSON as its standard has it (RFC 8259): without NaN and infinite numbers.
 
-    Args:
-        text: the JSON.
-
     Raises:
         ValueError: it is none, holds a number that no computer can, or is nested too deep.
     """

@@ -18,22 +18,13 @@ def counted(count: int, noun: str, plural: str = "") -> str:
 
 
 def listed(items: Sequence[str], most: int = 8) -> str:
-    """Write names one after the other, but not more than fit a line: `a, b and 70 more`.
-
-    Args:
-        items: the names.
-        most: how many are written.
-    """
+    """Write names one after the other, but not more than fit a line: `a, b and 70 more`."""
     more = f" and {len(items) - most} more" if len(items) > most else ""
     return ", ".join(items[:most]) + more
 
 
 def times(count: int) -> str:
-    """Write how often something happened: `once`, `twice`, `3 times`.
-
-    Args:
-        count: how often.
-    """
+    """Write how often something happened: `once`, `twice`, `3 times`."""
     return {1: "once", 2: "twice"}.get(count, f"{count} times")
 
 

@@ -112,10 +112,6 @@ def parse_camera(uri: str, clock: str, example: str = EXAMPLE) -> object:
 def parse_orientation(uri: str, example: str = EXAMPLE) -> Orientation:
     """Parse how a camera URI says that the camera is mounted.
 
-    Args:
-        uri: see EXAMPLE.
-        example: URIs that the program takes, for an error.
-
     Raises:
         SettingsError: the URI makes no sense.
     """

@@ -240,11 +240,7 @@ class Life:
         self._come_back()
 
     def stirred(self, now_ns: int) -> None:
-        """Report that something other than a usable frame came: it is not silent, but not back either.
-
-        Args:
-            now_ns: the time.
-        """
+        """Report that something other than a usable frame came: it is not silent, but not back either."""
         if self._phase is Standing.STREAMING:
             self._listen_until(now_ns, self._settings.silence_ns)
 

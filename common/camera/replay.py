@@ -50,9 +50,6 @@ class ReplaySettings:
 def find_images(pattern: str) -> list[Path]:
     """List the images that a folder or glob names, in name order.
 
-    Args:
-        pattern: folder or glob.
-
     Returns:
         At least one path.
 

@@ -33,10 +33,5 @@ class TurnedCamera:
 
 
 def turned(camera: Camera, orientation: Orientation) -> Camera:
-    """Return a camera whose description tells its orientation.
-
-    Args:
-        camera: an open camera.
-        orientation: how it is mounted.
-    """
+    """Return a camera whose description tells its orientation."""
     return camera if orientation == UPRIGHT else cast("Camera", TurnedCamera(camera, orientation))

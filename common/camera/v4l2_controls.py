@@ -180,10 +180,6 @@ def lower_qualities(control: Control, present: int) -> tuple[int, ...]:
 
     The range is the driver's own. Only positive values have a meaning, and larger ones give better images (ext-ctrls-jpeg).
 
-    Args:
-        control: the quality control.
-        present: its current value.
-
     Returns:
         Values below that, the best first.
     """

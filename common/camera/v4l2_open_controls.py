@@ -64,9 +64,6 @@ class OpenControls:
     def lock(self, wishes: ControlWishes) -> tuple[tuple[Axis, int], ...]:
         """Hold exposure, gain, white balance and focus at the values that the automatic modes have found.
 
-        Args:
-            wishes: what is already held.
-
         Returns:
             What was found.
 

@@ -110,9 +110,6 @@ def estimated_readout_ns(shortest_period_ns: int) -> int:
 
     A sensor reads its rows within one frame at that rate too, so R lies between 0 (global shutter) and that period. Half of it is therefore wrong by
     at most half the period, and the mid-point by at most a quarter. Webcams with 30 frames a second have 15 to 30 ms.
-
-    Args:
-        shortest_period_ns: the period, ns.
     """
     return shortest_period_ns // 2
 

@@ -78,13 +78,7 @@ def may_open(node: Node, account: Account) -> bool:
 
 
 def check_access(what: str, node: Node, account: Account) -> Diagnostic:
-    """Judge whether a user may open a device.
-
-    Args:
-        what: the thing checked.
-        node: the device.
-        account: the user who must open it.
-    """
+    """Judge whether a user may open a device."""
     state = f"{node.path} (group {node.group}, mode {node.mode:03o})"
     if may_open(node, account):
         return ok(what, f"user {account.name} may open {state}")

@@ -132,13 +132,7 @@ def check_format(camera: str, offered: Offered, wanted: Wanted) -> Diagnostic:
 
 
 def check_bus(bus: UsbBus, frame_bytes: int, rate_hz: float) -> Diagnostic:
-    """Judge whether the USB bus can carry a stream.
-
-    Args:
-        bus: how the camera is plugged in.
-        frame_bytes: length of a frame.
-        rate_hz: frames a second.
-    """
+    """Judge whether the USB bus can carry a stream."""
     needed = frame_bytes * rate_hz
     shares = f", shared with {counted(bus.cameras - 1, 'more camera')}" if bus.cameras > 1 else ""
     room = next((room for megabits, room in _BUS_BYTES if bus.megabits <= megabits), 0)

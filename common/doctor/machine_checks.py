@@ -204,12 +204,7 @@ def check_clocks(clocks: Clocks) -> list[Diagnostic]:
 
 
 def check_bluetooth(bluetooth: Bluetooth, *, wanted: bool) -> Diagnostic:
-    """Judge whether links over Bluetooth are possible.
-
-    Args:
-        bluetooth: what there is.
-        wanted: whether a link needs it.
-    """
+    """Judge whether links over Bluetooth are possible."""
     usable = [name for name in bluetooth.adapters if name not in bluetooth.blocked]
     if not bluetooth.in_python:
         text, remedy = "this Python has no Bluetooth sockets", "use Debian's python3 (apt install python3)"

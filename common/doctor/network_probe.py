@@ -13,11 +13,7 @@ _EVERYWHERE: Final = "*"
 
 
 def examine_network(link: LinkUri) -> list[Diagnostic]:
-    """Check the way of a tcp link to another machine; nothing is said of other links.
-
-    Args:
-        link: the link.
-    """
+    """Check the way of a tcp link to another machine; nothing is said of other links."""
     host, _, port = link.address.removeprefix("tcp://").rpartition(":")
     if not link.address.startswith("tcp://") or is_this_machine(host.strip("[]")) or ":" in host:
         return []

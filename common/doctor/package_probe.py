@@ -11,21 +11,12 @@ from common.program.packages import remedy_for
 
 
 def missing_packages(modules: Iterable[str]) -> list[Diagnostic]:
-    """Look for modules, and return a finding for each that is not installed.
-
-    Args:
-        modules: names of top-level modules.
-    """
+    """Look for modules, and return a finding for each that is not installed."""
     return [missing_package(module, "is not installed") for module in modules if not _is_installed(module)]
 
 
 def missing_package(module: str, problem: str) -> Diagnostic:
-    """Return the finding that a package cannot be used.
-
-    Args:
-        module: name of the module.
-        problem: why it cannot be used.
-    """
+    """Return the finding that a package cannot be used."""
     remedy = f"install it: {remedy_for(module, on_android=is_android())}"
     return fail(module, problem, remedy, exit_code=UnavailableError.exit_code)
 

@@ -64,9 +64,6 @@ class RfcommLine:
 def new_socket(kind: SocketKind) -> socket.socket:
     """Make a non-blocking socket.
 
-    Args:
-        kind: its protocol.
-
     Raises:
         UnavailableError: Python or the system does not support it.
     """
@@ -99,9 +96,6 @@ def secure(made: socket.socket, *, unpaired: bool) -> None:
 
 def check_adapter(uri: str) -> None:
     """Check that this machine has an adapter at all. One that is switched off shows only when dialling.
-
-    Args:
-        uri: as the user named it, for messages.
 
     Raises:
         UnavailableError: Python or the kernel lacks Bluetooth (MissingDeviceError if only the adapter is missing).

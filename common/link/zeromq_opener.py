@@ -10,9 +10,6 @@ from common.peers import Peer, peer_at
 def open_zeromq(request: LinkRequest) -> ZeroMqListener | ZeroMqDialer:
     """Open a tcp or ipc link.
 
-    Args:
-        request: what to open.
-
     Raises:
         SettingsError: the address makes no sense, or needs keys and there is no key folder.
         UnavailableError: the port or path is taken, or the peer is not known.

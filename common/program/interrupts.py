@@ -138,11 +138,7 @@ def answering() -> Iterator[None]:
 
 
 def leave(number: int = signal.SIGINT) -> NoReturn:
-    """End this process now with one line and the exit code of a signal, or of what could not be left safely. What it had begun to write is removed.
-
-    Args:
-        number: one of `ENDINGS`.
-    """
+    """End this process now with one line and the exit code of a signal, or of what could not be left safely. What it had begun to write is removed."""
     from common.unfinished import remove_unfinished  # noqa: PLC0415 - a start does not pay for it
 
     if threading.current_thread() is threading.main_thread():

@@ -55,11 +55,7 @@ def words_of(error: BaseException) -> str:
 
 
 def remedy_of(options: Container[str]) -> str:
-    """Say what helps.
-
-    Args:
-        options: names of the options that the command has.
-    """
+    """Say what helps."""
     scale = " (--scale 0.5)" if "scale" in options else ""
     fewer = " or fewer --disparities" if "disparities" in options else ""
     has_images = any(name in options for name in _OF_IMAGES)

@@ -31,10 +31,6 @@ Reader = Callable[[str], float]
 def seconds(text: str, option: str) -> float:
     """Read a time in s: 3, 3s, 500ms or 2min; a number alone means s.
 
-    Args:
-        text: what the user wrote.
-        option: the option, for errors.
-
     Raises:
         SettingsError: it is no time.
     """
@@ -43,10 +39,6 @@ def seconds(text: str, option: str) -> float:
 
 def milliseconds(text: str, option: str) -> float:
     """Read a time in ms: 5, 5ms or 0.005s; a number alone means ms.
-
-    Args:
-        text: what the user wrote.
-        option: the option, for errors.
 
     Raises:
         SettingsError: it is no time.
@@ -58,10 +50,6 @@ def milliseconds(text: str, option: str) -> float:
 def frames_per_second(text: str, option: str) -> float:
     """Read a rate in 1/s: 30, 30fps or 30Hz.
 
-    Args:
-        text: what the user wrote.
-        option: the option, for errors.
-
     Raises:
         SettingsError: it is no rate.
     """
@@ -71,10 +59,6 @@ def frames_per_second(text: str, option: str) -> float:
 def file_size(text: str, option: str) -> float:
     """Read a size in bytes: 500MB, 2GB or 1.5GiB; a number alone means MB.
 
-    Args:
-        text: what the user wrote.
-        option: the option, for errors.
-
     Raises:
         SettingsError: it is no size.
     """
@@ -83,10 +67,6 @@ def file_size(text: str, option: str) -> float:
 
 def image_size(text: str, option: str) -> tuple[int, int]:
     """Read a size: 640x480 or 640X480.
-
-    Args:
-        text: what the user wrote.
-        option: the option, for errors.
 
     Returns:
         Width and height, px, both above 0.

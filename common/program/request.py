@@ -93,13 +93,7 @@ class Request:
 
 
 def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "") -> None:
-    """Declare the options of a request, or of a group of options.
-
-    Args:
-        parser: of the command.
-        kind: the dataclass.
-        when: begins the help of each.
-    """
+    """Declare the options of a request, or of a group of options."""
     alone = None
     for item in fields(kind):
         if _PART in item.metadata:
@@ -118,11 +112,7 @@ def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "") -> 
 
 
 def usual_values(kind: type) -> dict[str, object]:
-    """Return what counts as given where nothing is, by the option's name.
-
-    Args:
-        kind: a request of which nothing is required.
-    """
+    """Return what counts as given where nothing is, by the option's name."""
     parser = argparse.ArgumentParser(add_help=False)
     add_options(parser, kind)
     return vars(parser.parse_args([]))

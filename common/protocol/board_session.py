@@ -174,22 +174,13 @@ class BoardSession:
         self._host = None
 
     def describe(self, camera: CameraDescription, rung: Rung) -> None:
-        """Record that the camera delivers something else from now on. The next account tells the host; it becomes due now.
-
-        Args:
-            camera: its new description.
-            rung: how far its output is lowered.
-        """
+        """Record that the camera delivers something else from now on. The next account tells the host; it becomes due now."""
         self._camera, self._rung = camera, rung
         if self._host is not None:
             self._host.status_due_ns = 0
 
     def hold(self, held: Locks) -> None:
-        """Record which controls of the camera are held, and with which values. The host is told now if it reads that.
-
-        Args:
-            held: as the camera reports them.
-        """
+        """Record which controls of the camera are held, and with which values. The host is told now if it reads that."""
         self._held = held
         host = self._host
         if host is not None and host.reads_long:

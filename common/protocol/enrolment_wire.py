@@ -88,9 +88,6 @@ class WordReader:
     def feed(self, received: bytes) -> list[Word]:
         """Return the words that are now complete.
 
-        Args:
-            received: what has come.
-
         Raises:
             ProtocolError: these bytes are not words; the stream cannot be continued.
         """

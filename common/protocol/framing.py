@@ -118,9 +118,6 @@ class Deframer:
     def feed(self, data: bytes) -> list[Unit]:
         """Take bytes in chunks of any size.
 
-        Args:
-            data: what was read.
-
         Returns:
             The units completed by these bytes. Their bodies are views, not copies.
         """

@@ -201,11 +201,7 @@ class HostSession:
         return self._carriage.want(path, now_ns) if path.is_open and path is not self._carriage.wanted else []
 
     def grant(self, slots: int) -> list[Output]:
-        """Grant the board credit for this many frames beyond the last one that came. Credit is never taken back.
-
-        Args:
-            slots: places now free for frames.
-        """
+        """Grant the board credit for this many frames beyond the last one that came. Credit is never taken back."""
         carrier, stream = self._carriage.carrier, self._stream
         if carrier is None or stream is None or stream.next_index + slots <= stream.below_index:
             return []
@@ -214,20 +210,12 @@ class HostSession:
         return [Outgoing(carrier.lanes[Lane.CONTROL], Credit(below_index))]
 
     def steer(self, later_ns: int) -> list[Output]:
-        """Ask the board's camera to expose later.
-
-        Args:
-            later_ns: by how much, less than its period.
-        """
+        """Ask the board's camera to expose later."""
         carrier = self._carriage.carrier
         return [] if carrier is None else [Outgoing(carrier.lanes[Lane.CONTROL], Steer(later_ns))]
 
     def set_locks(self, locks: Locks) -> list[Output]:
-        """Ask the board to hold controls of its camera. A board that does not understand that is not asked.
-
-        Args:
-            locks: the controls with their values.
-        """
+        """Ask the board to hold controls of its camera. A board that does not understand that is not asked."""
         carrier, stream = self._carriage.carrier, self._stream
         if carrier is None or stream is None or not stream.hello.is_long:
             return []

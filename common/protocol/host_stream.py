@@ -41,9 +41,6 @@ class Stream:
     def take(self, index: int) -> int | StaleReason:
         """Take a frame of this life.
 
-        Args:
-            index: its index among the frames sent.
-
         Returns:
             How many frames before it are given up as lost, or why this frame was not expected.
         """

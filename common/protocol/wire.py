@@ -111,9 +111,6 @@ class VersionError(ProtocolError):
 def encode(message: Message) -> tuple[bytes, Buffer]:
     """Encode a message as header and payload. The payload is the frame's own buffer, not a copy.
 
-    Args:
-        message: any message.
-
     Returns:
         Header bytes and payload (empty for all but frames).
     """
@@ -219,12 +216,7 @@ def decode(header: Buffer, payload: Buffer = b"") -> Message:
 
 
 def encode_for_any_version(version: int, refusal: Refusal) -> bytes:
-    """Encode a refusal in the envelope of another version, so that an older or newer peer can read the reason.
-
-    Args:
-        version: the peer's version.
-        refusal: what to say.
-    """
+    """Encode a refusal in the envelope of another version, so that an older or newer peer can read the reason."""
     header: bytes = _PACKER.pack([version, _KINDS.index(Refusal), *_fields(refusal)])
     return header
 
@@ -358,12 +350,7 @@ def _check_frame(items: list[Any]) -> None:
 
 
 def _read_frame(items: list[Any], payload: Buffer) -> FrameMessage:
-    """Decode the message that comes thirty times a second, with the checks of FieldReader in one expression.
-
-    Args:
-        items: the whole header, version and kind included.
-        payload: the image.
-    """
+    """Decode the message that comes thirty times a second, with the checks of FieldReader in one expression."""
     if len(payload) > MAX_PAYLOAD_BYTES:
         raise bad_field(f"payload of {len(payload)} bytes")
     if len(items) != 3 + len(_FRAME_RANGES):

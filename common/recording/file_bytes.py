@@ -75,9 +75,6 @@ class FileBytes:
     def whole(cls, path: Path) -> Self:
         """Open a file, which is closed when nobody has a part of it any more.
 
-        Args:
-            path: the file.
-
         Raises:
             OSError: it cannot be opened.
         """
@@ -106,10 +103,6 @@ StoredData = memoryview | FileBytes
 
 def pieces(data: StoredData, at: int = 0) -> Iterator[tuple[int, bytes]]:
     """Return data piece by piece, each with its place.
-
-    Args:
-        data: the whole.
-        at: where to begin.
 
     Raises:
         DataError: as `FileBytes` says.

@@ -124,10 +124,6 @@ class RawLayout:
 def compressed_format(data: Buffer, label: str) -> PixelFormat:
     """Return the encoding of a compressed image by its first bytes.
 
-    Args:
-        data: the image.
-        label: what its message says, for the error.
-
     Raises:
         UnreadableEncodingError: it is neither JPEG nor PNG.
     """

@@ -59,11 +59,6 @@ class ChunkHead:
 def unpack(form: struct.Struct, data: StoredData, at: int) -> tuple[int, ...]:
     """Read numbers.
 
-    Args:
-        form: of the numbers.
-        data: where they stand.
-        at: where they begin.
-
     Raises:
         SpoiledError: the data end before them.
     """

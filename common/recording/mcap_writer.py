@@ -107,12 +107,7 @@ class McapWriter:
         return self.size + chunk.size + entries + self._summary_size + _END_BYTES + _CHANNEL_BYTES * len(self._topics)
 
     def tell(self, name: str, values: Mapping[str, str]) -> None:
-        """Write values by name, outside of chunks.
-
-        Args:
-            name: of the whole.
-            values: the values.
-        """
+        """Write values by name, outside of chunks."""
         record = _record(_METADATA, _text(name) + _texts(values))
         self._summed(_METADATA_INDEX, struct.pack("<QQ", self.size, len(record)) + _text(name))
         self._metadata += 1

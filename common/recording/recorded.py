@@ -113,11 +113,7 @@ class Recorded:
     size_bytes: int = 0
 
     def topic_of(self, side: str) -> str:
-        """Return the topic with the images of a side: ours, else by name; empty: there is none.
-
-        Args:
-            side: left or right.
-        """
+        """Return the topic with the images of a side: ours, else by name; empty: there is none."""
         ours = [topic for topic in self.images if side_of(topic) == side]
         if ours:
             return ours[0]
@@ -128,9 +124,6 @@ class Recorded:
 
     def camera(self, topic: str) -> CameraDescription:
         """Return what is known of the camera whose images a topic holds.
-
-        Args:
-            topic: one of `images`.
 
         Raises:
             SpoiledImageError: none of its images is one.

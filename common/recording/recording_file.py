@@ -160,10 +160,6 @@ class RecordingFile:
 def require_new(path: Path, option: str) -> None:
     """Refuse at once, before anything long, what cannot become a recording.
 
-    Args:
-        path: the file.
-        option: what names it.
-
     Raises:
         SettingsError: its name is none of a recording, by which it would be known later.
         UnavailableError: it exists.

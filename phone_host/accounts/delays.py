@@ -202,13 +202,7 @@ def replay_facts(file: str, pace: str, ledgers: Sequence[PairLedger]) -> ReplayF
 
 
 def side_by_side(replay: ReplayFacts, now: DelayStatistics, *, is_timeless: bool) -> list[str]:
-    """Return a table: delays of then and of this run; nothing without pairs of then.
-
-    Args:
-        replay: what is played.
-        now: the delays of this run.
-        is_timeless: whether its delays mean nothing.
-    """
+    """Return a table: delays of then and of this run; nothing without pairs of then."""
     if not replay.pairs or is_timeless:
         return []
     lines = [f"{'delay, ms':14} {'then p50':>9} {'now p50':>9} {'then p95':>9} {'now p95':>9}"]

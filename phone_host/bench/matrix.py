@@ -45,10 +45,6 @@ class Outcome:
 def remote_cases(remote: Sequence[Interface], signals: StopSignals) -> list[Case]:
     """Ask the remote boards what they show; returns fewer cases if a signal comes meanwhile.
 
-    Args:
-        remote: interfaces that are boards' URIs.
-        signals: checked while waiting for a board.
-
     Returns:
         A case for each board.
 

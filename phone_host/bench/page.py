@@ -51,13 +51,7 @@ _WHAT_IF_WORDS: Final = (
 
 
 def page(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> str:
-    """Make a self-contained HTML page: the interfaces side by side, the model beside the measurement, then every run stage by stage.
-
-    Args:
-        results: what was measured.
-        under: machine, date, settings.
-        analysis: conclusions from the results.
-    """
+    """Make a self-contained HTML page: the interfaces side by side, the model beside the measurement, then every run stage by stage."""
     sub = (
         f"{under.machine} · {under.date} · matcher {under.matcher}, FIFO {under.fifo.depth}:{under.fifo.overflow.value}"
     )

@@ -154,12 +154,7 @@ def measured(cell: Cell) -> Figures:
 
 
 def held_out(cell: Cell, cells: Sequence[Cell]) -> Figures | Unknown:
-    """Predict a cell from all others.
-
-    Args:
-        cell: the cell that contributes nothing.
-        cells: all cells.
-    """
+    """Predict a cell from all others."""
     others = [other for other in cells if other is not cell]
     link = learn_link(cell.interface, cell.images, others)
     if isinstance(link, Unknown):

@@ -50,9 +50,6 @@ class RecordedRun:
 def recorded_run(file: Path) -> RecordedRun:
     """Read the run that a recording was made beside.
 
-    Args:
-        file: the recording.
-
     Raises:
         DataError: it cannot be read, or is no recording of two cameras, or holds no delays of pairs.
     """

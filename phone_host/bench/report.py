@@ -64,13 +64,7 @@ def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) 
 
 
 def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> dict[str, object]:
-    """Make the object of delay-bench.json.
-
-    Args:
-        results: what was measured.
-        under: machine, date, settings.
-        analysis: conclusions from the results.
-    """
+    """Make the object of delay-bench.json."""
     return {
         "command": "delay-bench",
         "recording": under.recording or None,
@@ -118,11 +112,7 @@ def most_compared(results: Sequence[CaseResult]) -> list[CaseResult]:
 
 
 def few_pairs_words(results: Sequence[CaseResult]) -> str:
-    """Say that a run is too short to compare by; empty if each has enough pairs, or none at all.
-
-    Args:
-        results: the runs.
-    """
+    """Say that a run is too short to compare by; empty if each has enough pairs, or none at all."""
     measured = [result for result in results if result.ledgers]
     if not measured:
         return ""

@@ -68,12 +68,7 @@ class BrowserBorder:
         return self._stamps.scatter_ns
 
     def begin(self, hello: Hello, *, is_same_machine: bool) -> None:
-        """A browser has come. The stamps of a track that is known already go on.
-
-        Args:
-            hello: what it said.
-            is_same_machine: whether it may run on this machine.
-        """
+        """A browser has come. The stamps of a track that is known already go on."""
         if hello.track and hello.track == self._track:
             return
         self._track, self._is_phone = hello.track, hello.is_phone

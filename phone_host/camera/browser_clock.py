@@ -57,11 +57,7 @@ class BrowserClock:
             self._open.popitem(last=False)
 
     def heard(self, echo: EchoHeard) -> Heard:
-        """Learn from an echo that has ended. One that was never asked, or not so, teaches nothing.
-
-        Args:
-            echo: what the browser says about it.
-        """
+        """Learn from an echo that has ended. One that was never asked, or not so, teaches nothing."""
         asked, t1_ns, t2_ns = self._open.pop(echo.number, (None, 0, 0))
         if asked is None or asked.t0_us != echo.t0_us:
             return Heard.NOTHING

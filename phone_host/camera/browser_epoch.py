@@ -99,9 +99,6 @@ class Stamps:
     def exposed(self, seen: Handed) -> HostTime | None:
         """Return when an image was exposed, on the host's clock.
 
-        Args:
-            seen: the image.
-
         Returns:
             The time; None while the epoch is being found out, and for an image that does not fit it.
         """

@@ -148,10 +148,6 @@ class BrowserFeed:
     def camera(self, line: Line, hello: str) -> "CameraLine | None":
         """A browser wants to give its camera.
 
-        Args:
-            line: its WebSocket.
-            hello: its first message.
-
         Returns:
             What takes the following messages; None: it was refused, and told why.
         """

@@ -41,11 +41,7 @@ _HELD: Final = "manual"
 
 
 def locks_of(groups: Groups) -> Locks:
-    """Return what a browser's camera is held at.
-
-    Args:
-        groups: what the browser has read back.
-    """
+    """Return what a browser's camera is held at."""
     found = []
     for lock, control in _CONTROLS.items():
         values = groups.get(control.group, {})
@@ -60,11 +56,7 @@ def locks_of(groups: Groups) -> Locks:
 
 
 def groups_of(locks: Locks) -> dict[str, dict[str, object]]:
-    """Return locks as constraints.
-
-    Args:
-        locks: each control with its value.
-    """
+    """Return locks as constraints."""
     groups: dict[str, dict[str, object]] = {}
     for lock, value in locks:
         control = _CONTROLS[lock]

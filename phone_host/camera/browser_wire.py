@@ -152,9 +152,6 @@ Word = Hello | TrackState | Locked | Bye | EchoAsked | EchoHeard
 def read_frame(data: bytes) -> BrowserFrame | FrameFault:
     """Read a binary message.
 
-    Args:
-        data: header and image.
-
     Returns:
         The image, whole as far as its bytes show without decoding and of the size that it claims; else what is wrong.
     """
@@ -206,9 +203,6 @@ def _image_fault(pixel_format: PixelFormat, payload: bytes, size_px: tuple[int, 
 
 def read_word(text: str) -> Word | None:  # noqa: PLR0911 - one return for each kind of word
     """Read a text message.
-
-    Args:
-        text: JSON.
 
     Returns:
         What it says; None: nothing that we know.

@@ -139,11 +139,7 @@ class DemoRun:
             self.host.run(finished, watch)
 
     def check(self, scene: Scene) -> DepthErrors:
-        """Compare the kept pairs with the scene.
-
-        Args:
-            scene: the scene that the film shows.
-        """
+        """Compare the kept pairs with the scene."""
         left_pose, right_pose = rig_poses(self._rig)
         sensors = ((self._rig.left, left_pose), (self._rig.right, right_pose))
         rectification = self._rectifier.rectification

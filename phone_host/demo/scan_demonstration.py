@@ -149,11 +149,6 @@ class ScanDemo:
 
 
 def with_truth(scan: FinishedScan, errors: ModelErrors) -> FinishedScan:
-    """Return a scan whose report tells the comparison.
-
-    Args:
-        scan: a finished one.
-        errors: what the comparison gave.
-    """
+    """Return a scan whose report tells the comparison."""
     remarks = (Diagnostic(errors.sentence, severity=Severity.NOTE), *scan.report.remarks)
     return replace(scan, report=replace(scan.report, remarks=remarks))

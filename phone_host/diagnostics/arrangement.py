@@ -74,11 +74,7 @@ FILE_REMEDIES: Final[Mapping[Arrangement, FileRemedy]] = {
 
 
 def tries_of(remedy: str) -> tuple[tuple[str, ...], ...]:
-    """Return the options that may carry out a remedy for files; empty if there are none.
-
-    Args:
-        remedy: the words of one.
-    """
+    """Return the options that may carry out a remedy for files; empty if there are none."""
     return next((known.tries for known in FILE_REMEDIES.values() if known.words == remedy), ())
 
 

@@ -45,11 +45,7 @@ def turn_words(departure: Departure) -> str:
 
 
 def drift_concerns(drift: Drift) -> tuple[Diagnostic, ...]:
-    """Say what of a rig's departure its user must know.
-
-    Args:
-        drift: of the run.
-    """
+    """Say what of a rig's departure its user must know."""
     found = []
     if drift.state is DriftState.UNKNOWN and _was_knocked(drift):
         problem = f"the cameras turned against each other{_when(drift)}; by how much is not known, because too few features were seen since"
@@ -150,11 +146,7 @@ def _drift_line(drift: Drift) -> str:
 
 
 def stills_words(drift: Drift) -> str:
-    """Say how a rig stood over the order of pairs, with pairs for seconds.
-
-    Args:
-        drift: of pairs of images from files.
-    """
+    """Say how a rig stood over the order of pairs, with pairs for seconds."""
     if drift.state is DriftState.UNKNOWN:
         return "drift: not measured: too few features, or too badly spread"
     rows = f"the row error is known to {drift.rows_sigma_px:.2f} px"
@@ -173,11 +165,7 @@ def stills_words(drift: Drift) -> str:
 
 
 def stills_remedy(drift: Drift) -> str:
-    """Say what to do about the rig of some stills; empty: it stands as it was calibrated, or nothing is known of it.
-
-    Args:
-        drift: of pairs of images from files.
-    """
+    """Say what to do about the rig of some stills; empty: it stands as it was calibrated, or nothing is known of it."""
     if drift.state is DriftState.UNKNOWN or drift.left_px < TOLD_ROWS_PX:
         return ""
     return _HOLD if _is_focus(drift.departure) else _TIGHTEN

@@ -136,11 +136,7 @@ def metres(depth_m: float) -> str:
 
 
 def headline(run: RunSnapshot) -> Answer:
-    """Answer for a run.
-
-    Args:
-        run: the run.
-    """
+    """Answer for a run."""
     if not run.processed:
         return Answer(Grade.BAD, _without_pairs(run))
     if run.failure is not None:

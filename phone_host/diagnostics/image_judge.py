@@ -107,11 +107,7 @@ class DoubtHistory:
         )
 
     def episodes(self, standing: frozenset[str]) -> tuple[Episode, ...]:
-        """Return what stood and what stands, in order of beginning.
-
-        Args:
-            standing: the doubts that stand now.
-        """
+        """Return what stood and what stands, in order of beginning."""
         now = [replace(known, is_over=False) for doubt, known in self._open.items() if doubt in standing]
         return tuple(sorted((*self._over, *now), key=lambda episode: episode.from_s))
 

@@ -170,11 +170,7 @@ def _by_order(why: WhyOrder | None, board: ImageNumbers, own: ImageNumbers) -> t
 
 
 def pairing_words(evidence: ImageEvidence) -> str:
-    """Say what paired the images of two folders of stills; empty for anything else.
-
-    Args:
-        evidence: of the images.
-    """
+    """Say what paired the images of two folders of stills; empty for anything else."""
     if evidence.board is None or evidence.paired_by is PairedBy.TIME:
         return ""
     match evidence.why_order:
@@ -241,11 +237,6 @@ def with_cause(
     numbers: tuple[Diagnostic, ...], images: tuple[Diagnostic, ...], evidence: ImageEvidence
 ) -> tuple[tuple[Diagnostic, ...], tuple[Diagnostic, ...]]:
     """Blame how two films are paired, and not the cameras, for what pairs of different moments look like.
-
-    Args:
-        numbers: the concerns about the images' numbers.
-        images: the concerns about what the images show.
-        evidence: of the numbers.
 
     Returns:
         Both, with the cause of depth that cannot be right in the first.

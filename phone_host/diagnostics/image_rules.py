@@ -65,11 +65,7 @@ _REMEDY: Final = "give the calib.txt that was published with these images"
 
 
 def off_middle(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say that the principal point is that of other images; empty if it lies where theirs can lie.
-
-    Args:
-        evidence: of the pair.
-    """
+    """Say that the principal point is that of other images; empty if it lies where theirs can lie."""
     seen = evidence.off_middle
     if seen is None:
         return ()
@@ -84,11 +80,7 @@ def off_middle(evidence: Evidence) -> tuple[Diagnostic, ...]:
 
 
 def behind(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say that doffs is that of other images; empty if hardly a point lies behind infinity.
-
-    Args:
-        evidence: of the pair.
-    """
+    """Say that doffs is that of other images; empty if hardly a point lies behind infinity."""
     if not evidence.behind_share > _BEHIND_SHARE:
         return ()
     return (
@@ -162,12 +154,7 @@ def dark_doubts(left: Exposure, right: Exposure) -> tuple[Diagnostic, ...]:
 
 
 def is_plain(left: Exposure, right: Exposure) -> bool:
-    """Tell whether both images show nothing but a plain surface: what is found in them is noise.
-
-    Args:
-        left: the left image.
-        right: the right image.
-    """
+    """Tell whether both images show nothing but a plain surface: what is found in them is noise."""
     return max(left.structure, right.structure) < _PLAIN
 
 
@@ -210,21 +197,13 @@ _FEW: Final = 24
 
 
 def is_pattern(evidence: Evidence) -> bool:
-    """Tell whether so much of what the images show repeats that matched features prove nothing.
-
-    Args:
-        evidence: of the pair.
-    """
+    """Tell whether so much of what the images show repeats that matched features prove nothing."""
     most = max((item.features for item in evidence.supports), default=0)
     return evidence.ambiguous_share > _PATTERN_SHARE or (evidence.ambiguous_share > _HALF and most < _FEW)
 
 
 def too_short(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say how much of the scene is nearer than was searched; empty if hardly any.
-
-    Args:
-        evidence: of the pair.
-    """
+    """Say how much of the scene is nearer than was searched; empty if hardly any."""
     share = evidence.beyond_share
     if not share > _BEYOND_SHARE:
         return ()
@@ -248,11 +227,7 @@ def _rounded_down(depth_m: float) -> str:
 
 
 def ambiguous(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say that the pattern repeats within the search; empty if it does not.
-
-    Args:
-        evidence: of the pair.
-    """
+    """Say that the pattern repeats within the search; empty if it does not."""
     if not (evidence.ambiguous_share > _AMBIGUOUS_SHARE or is_pattern(evidence)):
         return ()
     return (

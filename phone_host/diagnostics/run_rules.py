@@ -43,12 +43,7 @@ from phone_host.sync.quarantine import Disbelief
 
 
 def state_of(camera: CameraDescription, held: Locks) -> RememberedCamera:
-    """Return what is to be remembered of a camera.
-
-    Args:
-        camera: what it says of itself.
-        held: the controls that it is held at.
-    """
+    """Return what is to be remembered of a camera."""
     locks = tuple((lock.value, value) for lock, value in held)
     return RememberedCamera(camera.identity, camera.width_px, camera.height_px, camera.orientation, locks)
 

@@ -77,11 +77,7 @@ def find_usb_board(port: Path | None, sysfs: Path = Path("/sys")) -> UsbBoard:
 
 
 def rule_text(board: UsbBoard) -> str:
-    """Return the text of the rule.
-
-    Args:
-        board: the board, from `find_usb_board`.
-    """
+    """Return the text of the rule."""
     known = (("idVendor", board.vendor), ("idProduct", board.product), ("serial", board.serial))
     own, above = (", ".join(f'{key}{{{name}}}=="{value}"' for name, value in known) for key in ("ATTR", "ATTRS"))
     return f"""# Written by `phone-host pair --udev` for the board on one USB cable; it gives names to its serial port and its network card.
@@ -94,10 +90,6 @@ SUBSYSTEM=="net", ACTION=="add", SUBSYSTEMS=="usb", {above}, NAME="tandemscan0"
 
 def write_rule(board: UsbBoard, rules: Path = RULES) -> None:
     """Write the rule atomically. It replaces an earlier one.
-
-    Args:
-        board: the board, from `find_usb_board`.
-        rules: the file.
 
     Raises:
         UnavailableError: the file cannot be written.

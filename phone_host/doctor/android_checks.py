@@ -63,11 +63,7 @@ def check_usb(cards: Sequence[Card], serial_links: Sequence[str]) -> Diagnostic:
 
 
 def check_bluetooth(links: Sequence[str]) -> Diagnostic:
-    """Say that Bluetooth needs another host.
-
-    Args:
-        links: links over Bluetooth that are asked for.
-    """
+    """Say that Bluetooth needs another host."""
     problem = "Android gives Termux no Bluetooth: that needs a laptop as the host"
     if not links:
         return ok("bluetooth", f"{problem}; no link asks for it")

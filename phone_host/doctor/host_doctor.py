@@ -145,11 +145,7 @@ def native_finding() -> Diagnostic:
 
 
 def examine_out(out: Path) -> list[Diagnostic]:
-    """Check the folder of the results, or where it would be made, as a run would find it.
-
-    Args:
-        out: as the user named it.
-    """
+    """Check the folder of the results, or where it would be made, as a run would find it."""
     try:
         there, kind = nearest(out)
         disk = machine.read_disk(there)

@@ -139,13 +139,7 @@ class LiveScan:
         self._has_ended = True
 
     def finished(self, snapshot: RunSnapshot, matcher: str, axes: Axes) -> FinishedScan:
-        """Make the surface and the report. The run has ended.
-
-        Args:
-            snapshot: its last one.
-            matcher: its name.
-            axes: of the files.
-        """
+        """Make the surface and the report. The run has ended."""
         self.end()
         remarks = [as_remark(concern) for concern in concerns(snapshot)]
         missed = sum(account.dropped for account in snapshot.sinks if account.name == _SINK)

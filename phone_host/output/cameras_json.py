@@ -27,21 +27,13 @@ _REMEDY: Final = "delete the file, or save it again with `phone-host run --out`"
 
 
 def cameras_text(left: RememberedCamera, right: RememberedCamera) -> str:
-    """Return the content of cameras.json.
-
-    Args:
-        left: the left camera.
-        right: the right camera.
-    """
+    """Return the content of cameras.json."""
     cameras = {"format_version": CAMERAS_FORMAT, "left": _values(left), "right": _values(right)}
     return json.dumps(cameras, indent=1) + "\n"
 
 
 def read_cameras(path: Path) -> tuple[RememberedCamera, RememberedCamera]:
     """Read cameras.json and check it.
-
-    Args:
-        path: the file.
 
     Returns:
         The left and the right camera.

@@ -62,9 +62,6 @@ def capture_text(report: CaptureReport) -> str:
 def read_capture(path: Path) -> CaptureReport | None:
     """Read capture.json and check it.
 
-    Args:
-        path: the file.
-
     Returns:
         The report; None: there is no such file.
 

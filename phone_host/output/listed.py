@@ -169,11 +169,7 @@ class ListedFolder:
         return self._path / (self._partial if is_named else STAGED)
 
     def publish_alone(self, name: str) -> bool:
-        """Move one new result up, where nothing is replaced, and leave the others; return whether it was there.
-
-        Args:
-            name: of a file that is whole.
-        """
+        """Move one new result up, where nothing is replaced, and leave the others; return whether it was there."""
         if not self.is_staged or self.earlier or name not in entries_of(self._into):
             return False
         with suppress(OSError):

@@ -67,10 +67,6 @@ def overlay_text(rig: Rig, drift: Drift) -> str:
 def read_overlay(path: Path, rig: Rig) -> Departure:
     """Read an overlay and check it.
 
-    Args:
-        path: the file.
-        rig: as it was calibrated.
-
     Raises:
         DataError: the file is missing, not valid, of a newer format, or belongs to another rig; names file and key.
     """

@@ -77,9 +77,6 @@ def _bottom_first(values: NDArray[np.float32]) -> Iterator[NDArray[np.float32]]:
 def read_pfm(path: Path) -> Disparity:
     """Read a one-channel PFM file of either byte order.
 
-    Args:
-        path: the file.
-
     Returns:
         (H, W) float32, top row first; NaN where the file holds no finite value.
 
@@ -93,9 +90,6 @@ def read_pfm(path: Path) -> Disparity:
 
 def read_xyz(path: Path) -> CloudImage:
     """Read a three-channel PFM file of either byte order.
-
-    Args:
-        path: the file.
 
     Returns:
         (H, W, 3) float32, top row first, in the axes of the file.

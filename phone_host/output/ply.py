@@ -222,9 +222,6 @@ def _vertices(cloud: CloudImage, colours: Image, chosen: NDArray[np.bool_], axes
 def read_ply(path: Path) -> PointCloud:
     """Read a PLY file in the form that `write_ply` writes.
 
-    Args:
-        path: the file.
-
     Returns:
         Its points and colours.
 

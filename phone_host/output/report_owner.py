@@ -34,11 +34,7 @@ _VERBS: Final = frozenset({"quality", "scan", *(verb for _, verb in _OWN_KEYS)})
 
 
 def report_owner(folder: Path) -> str:
-    """Return the verb that wrote the report in a folder; empty if there is none, or it does not say.
-
-    Args:
-        folder: the folder.
-    """
+    """Return the verb that wrote the report in a folder; empty if there is none, or it does not say."""
     try:
         content = json_value(read_whole(folder / REPORT, _MAX_REPORT_BYTES))
     except (OSError, DataError, ValueError):

@@ -56,10 +56,6 @@ def replacing_results(
 def remove_results(path: Path, names: str) -> None:
     """Remove files that an earlier run has left.
 
-    Args:
-        path: the folder.
-        names: pattern of their names.
-
     Raises:
         UnavailableError: such a name belongs to a foreign file, or to a link; or another program writes there.
         OSError: as the operating system reports it.

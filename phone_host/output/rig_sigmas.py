@@ -25,12 +25,7 @@ _ASYMMETRY: Final = 1e-6
 
 
 def write_sigmas(storage: cv2.FileStorage, rig: Rig) -> None:
-    """Write how well a rig is known, if it is.
-
-    Args:
-        storage: a rig.yaml, open for writing.
-        rig: the rig.
-    """
+    """Write how well a rig is known, if it is."""
     if not np.isfinite(rig.covariance).all():
         return
     sigmas = np.sqrt(np.diag(rig.covariance).clip(min=0))
@@ -46,10 +41,6 @@ def write_sigmas(storage: cv2.FileStorage, rig: Rig) -> None:
 
 def read_covariance(node: cv2.FileNode, problem: Problem) -> NDArray[np.float64]:
     """Read the covariance and check it.
-
-    Args:
-        node: what the file holds under the key.
-        problem: makes errors that name file and key.
 
     Returns:
         (30, 30); NaN if the file has none.

@@ -72,10 +72,6 @@ def write_views(storage: cv2.FileStorage, views: RigViews) -> None:
 def read_views(storage: cv2.FileStorage, problem: Problem) -> RigViews | None:
     """Read the views, and check them.
 
-    Args:
-        storage: a rig.yaml.
-        problem: makes errors that name file and key.
-
     Returns:
         The views; None if the file has none.
 

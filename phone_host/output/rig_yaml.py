@@ -91,10 +91,6 @@ def write_rig(path: Path, rig: Rig, rectification: Rectification, views: RigView
 def write_time_offset(path: Path, offset: TimeOffset) -> None:
     """Put a time offset into a rig.yaml; everything else in it stays as it is.
 
-    Args:
-        path: a file that `read_rig` accepts.
-        offset: the measured offset.
-
     Raises:
         OSError: the file cannot be written.
     """
@@ -150,9 +146,6 @@ def read_rig(path: Path, content: bytes | None = None) -> Rig:
 
 def read_rig_views(path: Path) -> RigViews | None:
     """Read what a rig was computed from.
-
-    Args:
-        path: a rig.yaml that `read_rig` accepts.
 
     Returns:
         The views; None if the file has none.

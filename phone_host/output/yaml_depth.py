@@ -17,11 +17,7 @@ _BLOCK: Final = re.compile(r":|-(?![\d.])")
 
 
 def is_too_deep(text: str) -> bool:
-    """Return whether a YAML text may nest more than `MOST_LEVELS` levels deep.
-
-    Args:
-        text: the whole file.
-    """
+    """Return whether a YAML text may nest more than `MOST_LEVELS` levels deep."""
     brackets = 0
     columns: list[int] = []  # of the maps and lists without brackets that are open
     for line in re.split(r"[\r\n]", text):

@@ -73,9 +73,6 @@ def _converter(gcode: Path) -> str:
 def text_gcode(gcode: Path) -> Iterator[Path]:
     """Give G-code as text, for as long as the block runs: the file itself, or what `bgcode` makes of a binary one.
 
-    Args:
-        gcode: the file.
-
     Raises:
         DataError: it is binary, and there is no `bgcode`, or it cannot convert it.
     """

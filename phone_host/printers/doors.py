@@ -53,11 +53,6 @@ def door_to(
 def configured_door(uri: PrinterUri, table: object, file: Path) -> PrinterDoor:
     """Return the door to a printer, with what the settings file says of it. Nothing is opened yet.
 
-    Args:
-        uri: where it is.
-        table: [printers] of the settings file.
-        file: its name, for messages.
-
     Raises:
         SettingsError: see `key_of`; or the longest time for a line is no number of minutes.
     """

@@ -41,11 +41,7 @@ def action_of(name: str) -> HostAction:
 
 
 def ignored_note(names: Sequence[str]) -> tuple[str, ...]:
-    """Return a sentence on the commands that are not obeyed here; nothing if there are none.
-
-    Args:
-        names: of all commands in a file.
-    """
+    """Return a sentence on the commands that are not obeyed here; nothing if there are none."""
     others = [f"@{name}" for name in names if action_of(name) is HostAction.NONE]
     return (f"its G-code has commands for another host ({', '.join(others)}): they were ignored",) if others else ()
 

@@ -96,9 +96,6 @@ class Journal:
     def begin(self, printer: str) -> JournalEntry:
         """Begin the entry of a print.
 
-        Args:
-            printer: its address.
-
         Raises:
             TakenError: another print of this machine goes to that printer.
         """

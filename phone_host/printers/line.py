@@ -60,9 +60,6 @@ class Line(Protocol):
 def open_line(uri: LineUri) -> Line:
     """Open the line to a printer.
 
-    Args:
-        uri: where it is.
-
     Raises:
         UnavailableError: it cannot be had.
     """

@@ -162,11 +162,7 @@ class MarlinSender:
         return reply.action
 
     def to_send(self, now_ns: int) -> bytes:
-        """Return what is to be sent now; empty: nothing.
-
-        Args:
-            now_ns: the time.
-        """
+        """Return what is to be sent now; empty: nothing."""
         urgent, self._urgent = self._urgent, b""
         if self.phase.is_over or urgent:
             return urgent

@@ -42,11 +42,7 @@ def ended_there(words: str, *, is_cold: bool) -> Problem:
 
 
 def still_heating(heaters: str) -> Problem:
-    """Return that the printer heats though it was told twice to switch its heaters off.
-
-    Args:
-        heaters: that are on, with their goals.
-    """
+    """Return that the printer heats though it was told twice to switch its heaters off."""
     return Problem(
         f"the printer has confirmed that its heaters are off, but still heats ({heaters})",
         "go and look; switch it off at its plug",

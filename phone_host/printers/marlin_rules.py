@@ -171,20 +171,12 @@ class Attempts:
         return True
 
     def not_before_ns(self, sent_ns: int) -> int:
-        """Return when a line that was requested may go again: later and later, so that a mad printer gets some copies, not thousands.
-
-        Args:
-            sent_ns: when it went the last time.
-        """
+        """Return when a line that was requested may go again: later and later, so that a mad printer gets some copies, not thousands."""
         extra = self.requests - _FREE_REQUESTS
         return sent_ns + min(_SLOWER_NS << extra, _SLOWEST_NS) if extra > 0 else 0
 
     def are_begun_again(self, number: int) -> bool:
-        """Return whether a request shows that the printer has restarted without a word: its first line is wanted long after it was taken.
-
-        Args:
-            number: of the line that is requested.
-        """
+        """Return whether a request shows that the printer has restarted without a word: its first line is wanted long after it was taken."""
         return number <= 1 and self.highest > _MOST_AHEAD
 
     @property

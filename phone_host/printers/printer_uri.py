@@ -103,9 +103,6 @@ PrinterUri = LineUri | ServerUri | FileUri
 def read_uri(text: str) -> PrinterUri:
     """Read where a printer is.
 
-    Args:
-        text: what the user wrote.
-
     Raises:
         SettingsError: it is none.
     """

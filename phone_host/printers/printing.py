@@ -188,11 +188,7 @@ class RunningPrint:
 
 @contextmanager
 def begun(running: RunningPrint) -> Iterator[None]:
-    """Start a print, and leave the block when it has ended. What is raised in the block cancels the print first.
-
-    Args:
-        running: it.
-    """
+    """Start a print, and leave the block when it has ended. What is raised in the block cancels the print first."""
     running.start()
     try:
         yield

@@ -217,10 +217,6 @@ def require_key(answer: Answer, key: str, example: str, where: str) -> None:
 def require_good(answer: Answer, what: str) -> None:
     """Refuse an answer that is an error.
 
-    Args:
-        answer: of the server.
-        what: was asked of it.
-
     Raises:
         UnavailableError: it is.
     """

@@ -111,11 +111,7 @@ class ServerDoor:
 
 
 def name_there(name: str) -> str:
-    """Return a name for a file on a server: plain characters, and one that takes no other program's file away.
-
-    Args:
-        name: of the print.
-    """
+    """Return a name for a file on a server: plain characters, and one that takes no other program's file away."""
     stem = re.sub(r"\.(gcode|gco|g)$", "", name, flags=re.IGNORECASE)
     plain = re.sub(r"[^A-Za-z0-9._-]+", "_", stem).strip("._")[:_MOST_NAME] or "print"
     return f"tandemscan-{plain}.gcode"

@@ -61,9 +61,6 @@ class RecordingSource:
 def as_recording(path: Path) -> Iterator[RecordingSource]:
     """Give a bag as an MCAP file while the block runs; any other path as it is.
 
-    Args:
-        path: a bag, or a recording.
-
     Raises:
         DataError: it cannot be read, or is not believed.
         UnavailableError: there is no room for the copy.

@@ -14,10 +14,6 @@ from phone_host.stereo.raw_images import EncodedImage
 def topics_of(recorded: Recorded, file: Path) -> Mapping[Side, str]:
     """Return the topics with the left and with the right images.
 
-    Args:
-        recorded: the recording.
-        file: its name, for people.
-
     Raises:
         DataError: it holds the images of one camera only.
     """
@@ -33,11 +29,6 @@ def topics_of(recorded: Recorded, file: Path) -> Mapping[Side, str]:
 
 def encoded(shown: Shown, camera: CameraDescription, name: str) -> EncodedImage:
     """Return an image as it is decoded. Its bytes stay where they are.
-
-    Args:
-        shown: the image.
-        camera: took it.
-        name: how error messages call it.
 
     Raises:
         SpoiledImageError: it is none.

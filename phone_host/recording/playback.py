@@ -103,11 +103,7 @@ class Playback:
         return found
 
     def into(self, sink: PlayedSink) -> "tuple[PlayedCamera, PlayedBoard]":
-        """Return the two streams of a run.
-
-        Args:
-            sink: takes the frames.
-        """
+        """Return the two streams of a run."""
         self.played = PlayedBoard(self, sink)
         return PlayedCamera(self.played), self.played
 

@@ -49,10 +49,6 @@ class TimedImage:
 def timed_images(folders: tuple[Path, Path], options: TimeOptions) -> tuple[list[TimedImage], list[TimedImage]]:
     """Return the images of both folders in the order of their times.
 
-    Args:
-        folders: the left and the right one.
-        options: what is given about their times.
-
     Raises:
         DataError: there are no images, or their times are not known or cannot be true.
         UnavailableError: a folder cannot be read.

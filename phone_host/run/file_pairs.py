@@ -76,12 +76,7 @@ class FilePairs(Matching):
     tell: Callable[[str], None] = lambda _: None
 
     def tell_of_partial(self, place: Path, done: int) -> None:
-        """Tell where the results of a part of the pairs are, and that the earlier results stay.
-
-        Args:
-            place: the folder of the results so far.
-            done: pairs so far.
-        """
+        """Tell where the results of a part of the pairs are, and that the earlier results stay."""
         count = counted(len(self.files.pairs), "pair")
         tell_if_heard(self.tell, f"ended after {done} of {count}: {partial_words(place, self.out)}")
 
@@ -241,12 +236,6 @@ def sound_pair(
     matching: Matching, left: Path, right: Path, watcher: Watcher
 ) -> tuple[ComputedPair, tuple[Diagnostic, ...]]:
     """Match the only pair of a verb, and refuse one that cannot be right.
-
-    Args:
-        matching: how.
-        left: file of the left image.
-        right: file of the right image.
-        watcher: is told how far it is.
 
     Returns:
         The pair, with geometry; and the reasons not to trust it that do not rule it out.

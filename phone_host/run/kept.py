@@ -43,12 +43,7 @@ def tell_if_heard(tell: Callable[[str], None], line: str) -> None:
 
 
 def partial_words(partial: Path, out: Path) -> str:
-    """Say where results are that are not whole, and that the earlier ones stay.
-
-    Args:
-        partial: their folder.
-        out: that of the earlier ones.
-    """
+    """Say where results are that are not whole, and that the earlier ones stay."""
     return f"the results so far are in {partial}, the earlier results stay in {out}"
 
 

@@ -24,9 +24,6 @@ _NAMES: Final = r"submap-\d{4,}\.bin"
 def require_no_submaps(folder: Path) -> None:
     """Refuse to begin a scan where the submaps of one that was ended would be lost.
 
-    Args:
-        folder: the results folder.
-
     Raises:
         SettingsError: it holds some.
     """
@@ -39,9 +36,6 @@ def require_no_submaps(folder: Path) -> None:
 
 def read_submaps(folder: Path) -> tuple[Submap, ...]:
     """Read the submaps that a killed scan has left, from its last whole one on.
-
-    Args:
-        folder: its results folder.
 
     Raises:
         DataError: there is none, or one is damaged or missing.

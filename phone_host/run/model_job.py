@@ -136,10 +136,6 @@ def check_model(
 def spare_model(model: Model, paths: Iterable[Path]) -> None:
     """Refuse to replace a model by what is made of it.
 
-    Args:
-        model: that was read.
-        paths: files that will be written.
-
     Raises:
         SettingsError: one of them is the model's own.
     """

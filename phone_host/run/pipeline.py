@@ -58,9 +58,6 @@ class Pipeline:
     def process(self, pair: FramePair) -> Processed:
         """Compute a pair's depth.
 
-        Args:
-            pair: two encoded frames.
-
         Returns:
             Images, disparity, cloud and stage times.
 

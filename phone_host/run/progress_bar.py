@@ -35,12 +35,7 @@ class Amount(Enum):
 
 
 def progress_bar(console: Console, amount: Amount = Amount.SHARE) -> Progress:
-    """Make a progress bar; it is hidden where the console is no terminal, and gone when it ends.
-
-    Args:
-        console: where to draw.
-        amount: how it tells how much is done.
-    """
+    """Make a progress bar; it is hidden where the console is no terminal, and gone when it ends."""
     narrow = console.width < _WIDE
     words = TextColumn("{task.description}", table_column=Column(ratio=1) if narrow else None)
     bar: list[ProgressColumn] = [] if narrow else [BarColumn()]
@@ -63,12 +58,7 @@ def _numbers(amount: Amount) -> tuple[ProgressColumn, ...]:
 
 
 def announce(stage: str, console: Console) -> None:
-    """Say in one line that a stage begins, where its bar is hidden: in a pipe, a log or a service.
-
-    Args:
-        stage: what is being done.
-        console: where the bar would be drawn.
-    """
+    """Say in one line that a stage begins, where its bar is hidden: in a pipe, a log or a service."""
     if not console.is_terminal:
         print(f"phone-host: {stage}", file=console.file, flush=True)
 

@@ -69,10 +69,6 @@ class QualityJob:
 def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
     """Measure all pairs, and write report.json and index.html; after Ctrl-C those of the pairs so far.
 
-    Args:
-        job: what to do.
-        watcher: is told how far it is.
-
     Returns:
         The report.
 

@@ -103,9 +103,6 @@ def trajectory_of(report: ScanReport) -> str:
 def read_field(folder: Path) -> KeptField:
     """Read the field that a scan has left.
 
-    Args:
-        folder: its results folder.
-
     Raises:
         DataError: there is none, or it is damaged.
         OSError: as the operating system reports it.

@@ -39,11 +39,7 @@ _BOTH = "let both passes show the object's sides, and leave its shape as it is w
 
 
 def own_axes(wanted: ScanWanted) -> Axes | None:
-    """Return the axes that a model has from what the thing stands on; None: it has those of the camera.
-
-    Args:
-        wanted: what is scanned.
-    """
+    """Return the axes that a model has from what the thing stands on; None: it has those of the camera."""
     if wanted.mat is not None:
         return Axes.MAT
     return Axes.TABLE if wanted.on_table else None
@@ -192,12 +188,7 @@ def require_turning(report: ScanReport) -> None:
 
 
 def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
-    """Return a model in numbers, as the files hold it.
-
-    Args:
-        scan: that made it.
-        model: its whole surface.
-    """
+    """Return a model in numbers, as the files hold it."""
     unseen_share, model = model.unseen_share if model.is_closed else math.nan, model.with_unseen(scan.wanted.unseen)
     known = model.noise_m[np.isfinite(model.noise_m)]
     noise_m, noise_p95_m = (float(np.percentile(known, share)) if len(known) else math.nan for share in (50, 95))
@@ -216,11 +207,7 @@ def figures_of(scan: Scan, model: ScanModel) -> ModelFigures:
 
 
 def memory_remarks(scan: Scan) -> Sequence[Diagnostic]:
-    """Say whether the model outgrew its memory: it has become coarser, or something is missing from it.
-
-    Args:
-        scan: that made it.
-    """
+    """Say whether the model outgrew its memory: it has become coarser, or something is missing from it."""
     settings, remarks = scan.settings, list[Diagnostic]()
     if settings is not None and settings.voxel_m > scan.poses.begun_voxel_m:
         begun, now = (distance_text(each) for each in (scan.poses.begun_voxel_m, settings.voxel_m))
@@ -259,11 +246,7 @@ def way_remarks(certainty: WayCertainty | None) -> Sequence[Diagnostic]:
 
 
 def turn_remarks(scan: Scan) -> Sequence[Diagnostic]:
-    """Say whether the turn was found, and whether it is closed.
-
-    Args:
-        scan: whose model was made.
-    """
+    """Say whether the turn was found, and whether it is closed."""
     poses = scan.poses
     if not isinstance(poses, TurntablePoses) or not scan.fused:
         return ()
@@ -307,11 +290,7 @@ def _closing_remarks(turn: FullTurn) -> Sequence[Diagnostic]:
 
 
 def keeps_field(scan: Scan) -> bool:
-    """Whether another pass can be added: there is a turn, and it was put together with the earlier pass if there was one.
-
-    Args:
-        scan: whose model was made.
-    """
+    """Whether another pass can be added: there is a turn, and it was put together with the earlier pass if there was one."""
     poses = scan.poses
     if not isinstance(poses, TurntablePoses) or poses.fit.turn is None:
         return False
@@ -319,20 +298,12 @@ def keeps_field(scan: Scan) -> bool:
 
 
 def field_of_turn(scan: Scan) -> bytes:
-    """Return the field of a turn, for another pass; empty: none can be added.
-
-    Args:
-        scan: whose model was made.
-    """
+    """Return the field of a turn, for another pass; empty: none can be added."""
     return field_bytes(scan.volume, scan.carved) if scan.volume is not None and keeps_field(scan) else b""
 
 
 def unused_mat(scan: Scan) -> Diagnostic | None:
-    """Return what must be said of a printed mat that is in view, though none is asked for; None: none was found.
-
-    Args:
-        scan: that looks for it in its pairs.
-    """
+    """Return what must be said of a printed mat that is in view, though none is asked for; None: none was found."""
     if scan.unused_mat is None:
         return None
     other = "--turntable" if scan.wanted.turntable else "--object" if scan.wanted.on_table else ""

@@ -59,10 +59,6 @@ class ScanWork:
     def write(self, finished: FinishedScan, partial: Callable[[Path], None] | None = None) -> None:
         """Write a scan that is over. Its submaps go when it is on the disk.
 
-        Args:
-            finished: what is written.
-            partial: see `write_scan`.
-
         Raises:
             DataError: there is nothing of it; see `require_something`.
             UnavailableError: a file in the folder was not written by this program.

@@ -82,12 +82,7 @@ class SeenPair:
 
 
 def seen_pair(core: StereoCore, processed: Processed) -> SeenPair | None:
-    """Return what a pair tells of points; None without disparity or geometry.
-
-    Args:
-        core: what computed it.
-        processed: the pair.
-    """
+    """Return what a pair tells of points; None without disparity or geometry."""
     geometry, disparity, search = processed.geometry, processed.disparity, processed.search
     if geometry is None or disparity is None or search is None:
         return None

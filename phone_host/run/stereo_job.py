@@ -49,12 +49,6 @@ def run_stereo(
 ) -> SetReport:
     """Compute and write all pairs.
 
-    Args:
-        pairs: the files, and where the results go.
-        watcher: is told how far it is.
-        axes: of cloud.ply and xyz.pfm.
-        commands: see Commands.
-
     Returns:
         The report. report.json holds it: that of the only pair, or that of all pairs together.
 

@@ -34,11 +34,6 @@ _WORDS: Final = {
 def pair_page(report: PairReport, processed: Processed, commands: Sequence[NextCommand]) -> str:
     """Make the page of one pair.
 
-    Args:
-        report: the pair.
-        processed: its images and depth.
-        commands: what to do next.
-
     Returns:
         An HTML document.
     """
@@ -64,11 +59,6 @@ def pair_page(report: PairReport, processed: Processed, commands: Sequence[NextC
 
 def set_page(report: SetReport, thumbnails: Mapping[str, Picture], commands: Sequence[NextCommand]) -> str:
     """Make the page that leads to the pairs.
-
-    Args:
-        report: all pairs.
-        thumbnails: small pictures by the pairs' names.
-        commands: what to do next.
 
     Returns:
         An HTML document.

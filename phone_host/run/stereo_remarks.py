@@ -128,11 +128,7 @@ def pair_remarks(processed: Processed, trust: PairTrust, near_m: float) -> tuple
 
 
 def turned_remarks(*files: EncodedFile) -> tuple[Diagnostic, ...]:
-    """Say which images were turned because of their EXIF headers.
-
-    Args:
-        files: the pair's image files.
-    """
+    """Say which images were turned because of their EXIF headers."""
     return tuple(
         Diagnostic(f"{file.name} was turned upright, as its EXIF header says", severity=Severity.NOTE)
         for file in files

@@ -199,11 +199,7 @@ class Scan:
         self._fusion.move(poses)
 
     def final(self, pair: ScannedPair) -> ScannedPair:
-        """Return what has become of a pair since it was taken.
-
-        Args:
-            pair: as it was told then.
-        """
+        """Return what has become of a pair since it was taken."""
         number = self._numbers.get(pair.name)
         return pair if number is None else self.poses.final(number, self._pairs[number])
 

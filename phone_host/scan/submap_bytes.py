@@ -53,10 +53,6 @@ def submap_bytes(submap: Submap) -> bytes:
 def submap_of(content: bytes, name: str) -> Submap:
     """Read a submap.
 
-    Args:
-        content: what `submap_bytes` gave.
-        name: of the file, for the error.
-
     Raises:
         DataError: it is damaged, or no submap.
     """

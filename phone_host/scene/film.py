@@ -128,10 +128,6 @@ def render_films(
 def prepare_folder(folder: Path, frames: int) -> None:
     """Make a folder for images, and refuse one with an image that will not be replaced: it would be shown with them.
 
-    Args:
-        folder: for the images of one camera.
-        frames: how many there will be.
-
     Raises:
         OSError: the folder cannot be written to.
         UnavailableError: there is such an image.

@@ -166,10 +166,6 @@ class ObjectScene:
     def image(self, number: int, side: Side) -> Image:
         """Render what a camera sees, before it is compressed.
 
-        Args:
-            number: of the view.
-            side: which camera.
-
         Returns:
             (H, W, 3) uint8 BGR.
         """
@@ -193,23 +189,13 @@ class ObjectScene:
 
 
 def object_scene(name: str, setting: Setting | None = None) -> ObjectScene:
-    """Return a thing on the mat.
-
-    Args:
-        name: one of `OBJECT_NAMES`.
-        setting: how it is seen.
-    """
+    """Return a thing on the mat."""
     wanted = Setting() if setting is None else setting
     return ObjectScene(OBJECTS[name](), object_rig(wanted.size), wanted, mat_body() if wanted.has_mat else None)
 
 
 def mat_body(board: MarkedBoard = MAT, paper: Paper = Paper.A4) -> Body:
-    """Return a printed mat as a body in the mat's axes.
-
-    Args:
-        board: what is printed.
-        paper: the sheet it is printed on.
-    """
+    """Return a printed mat as a body in the mat's axes."""
     sheet = marked_sheet(board, paper, "mat", "")
     width, height = sheet.width_mm / 1000.0, sheet.height_mm / 1000.0
     return Body("mat", Plane(width, height), (0.0, 0.0, 0.0), printed_sheet(sheet))

@@ -57,11 +57,7 @@ class Solid:
         return least
 
     def surface(self, spacing_m: float = 0.001) -> SurfaceSamples:
-        """Spread points over the surface.
-
-        Args:
-            spacing_m: distance between neighbours, about.
-        """
+        """Spread points over the surface."""
         found = []
         for index, part in enumerate(self.parts):
             own = samples_of(part.shape, spacing_m)

@@ -33,12 +33,7 @@ class SurfaceSamples:
 
 
 def samples_of(shape: Shape, spacing_m: float) -> SurfaceSamples:
-    """Spread points over a solid's surface.
-
-    Args:
-        shape: the solid.
-        spacing_m: distance between neighbours, about.
-    """
+    """Spread points over a solid's surface."""
     match shape:
         case Box(size_m):
             parts = [_rectangle(size_m, axis, side, spacing_m) for axis in range(3) for side in (-0.5, 0.5)]

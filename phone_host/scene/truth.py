@@ -44,9 +44,6 @@ class Truth:
 def rectified_cameras(view: RectifiedView) -> tuple[tuple[CameraModel, Pose], tuple[CameraModel, Pose]]:
     """Return the two ideal cameras of a rectified geometry; rendering both gives a perfectly rectified pair.
 
-    Args:
-        view: the rectified left camera and its geometry.
-
     Returns:
         (left camera, pose), (right camera, pose).
     """

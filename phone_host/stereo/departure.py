@@ -13,12 +13,7 @@ from phone_host.model import AS_CALIBRATED, Departure, Rectification, Rig
 
 
 def corrected_rig(rig: Rig, departure: Departure) -> Rig:
-    """Return the rig as it stands now.
-
-    Args:
-        rig: as it was calibrated.
-        departure: how its right camera departs from that.
-    """
+    """Return the rig as it stands now."""
     if departure == AS_CALIBRATED:
         return rig
     turn = rotations_of(np.array(departure.turn_rad))
@@ -33,12 +28,7 @@ def corrected_rig(rig: Rig, departure: Departure) -> Rig:
 
 
 def corrected_rectification(made: Rectification, departure: Departure) -> Rectification:
-    """Return the rectification of the corrected rig: that of the calibrated one but for the right camera's rotation.
-
-    Args:
-        made: of the rig as it was calibrated.
-        departure: how its right camera departs from that.
-    """
+    """Return the rectification of the corrected rig: that of the calibrated one but for the right camera's rotation."""
     if departure == AS_CALIBRATED:
         return made
     return replace(made, R_right=made.R_right @ rotations_of(np.array(departure.turn_rad)).T)

@@ -68,11 +68,7 @@ def maps_of(core: StereoCore, processed: Processed) -> PointMaps:
 
 
 def has_depth(processed: Processed) -> bool:
-    """Tell whether a pair has depth: a point, and not only the few chance matches that images without relation give.
-
-    Args:
-        processed: the pair.
-    """
+    """Tell whether a pair has depth: a point, and not only the few chance matches that images without relation give."""
     cut = processed.cut
     if cut is not None:
         return cut.kept > 0 and cut.inside - cut.unmatched >= _CHANCE_SHARE * cut.inside

@@ -98,11 +98,6 @@ class EncodedFile:
 def decode(payload: bytes | memoryview, name: str = "the image", most_pixels: int = MOST_PIXELS) -> Image:
     """Decode one encoded image (JPEG, PNG, ...) to 8 bit.
 
-    Args:
-        payload: the encoded bytes.
-        name: how error messages call it.
-        most_pixels: an image that claims more is refused.
-
     Returns:
         (H, W) grey or (H, W, 3) BGR, uint8.
 
@@ -164,11 +159,6 @@ def _upright(image: Image, file: EncodedFile) -> Image:
 
 def examine(payload: bytes | memoryview, name: str, most_pixels: int = MOST_PIXELS) -> EncodedFile:
     """Read the header of an encoded image; nothing is decoded.
-
-    Args:
-        payload: the encoded bytes.
-        name: how error messages call it.
-        most_pixels: an image that claims more is refused.
 
     Raises:
         ImageSizeError: it claims more pixels than that.

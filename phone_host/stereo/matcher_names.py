@@ -86,9 +86,6 @@ def usual_cost(matcher: AnyMatcher) -> UsualCost:
 def matcher_named(text: str) -> AnyMatcher:
     """Find the matcher that a user names, without loading it: ours, another package's, or a network's file.
 
-    Args:
-        text: the name.
-
     Raises:
         SettingsError: no matcher has that name, or an option of a network makes no sense.
     """

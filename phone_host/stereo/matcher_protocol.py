@@ -30,9 +30,6 @@ class ReportingMatcher(Matcher, Protocol):
     def matched(self, pair: RectifiedPair) -> Matched:
         """Match one pair as `match` does, and tell more of it.
 
-        Args:
-            pair: as for `match`.
-
         Returns:
             The same disparity as `match` gives, and what is known beside it.
 

@@ -134,10 +134,6 @@ def distance_between(one: MeasuredPoint, other: MeasuredPoint) -> Within:
     """Return the distance of two points of one pair of images, and its limits.
 
     The noise of both is independent; the rig's errors move both together.
-
-    Args:
-        one: a point.
-        other: another one.
     """
     apart = one.point_m - other.point_m
     length_m = float(np.linalg.norm(apart))

@@ -63,9 +63,6 @@ _Choice = TypeVar("_Choice", Levels, Sign, Check)
 def network_named(text: str) -> NetworkMatcher:
     """Read a name that begins with `onnx:`. Nothing is opened.
 
-    Args:
-        text: the name.
-
     Raises:
         SettingsError: there is no path, or an option is unknown or has a value that it cannot have.
     """

@@ -71,9 +71,6 @@ class _Ear:
 def overhear(work: Callable[[], object]) -> str:
     """Do some work, one thread at a time.
 
-    Args:
-        work: decodes something.
-
     Returns:
         What C libraries printed to their `stderr` meanwhile; empty where it cannot be captured.
 

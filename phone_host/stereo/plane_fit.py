@@ -97,10 +97,6 @@ def fit_plane(x_px: Floats, y_px: Floats, disparity_px: Floats, unit_px: float =
 def normal_over_distance(plane: DisparityPlane, geometry: StereoGeometry) -> Floats:
     """Return the plane in space, n / h: its unit normal over its distance from the left camera.
 
-    Args:
-        plane: in disparity.
-        geometry: of the rectified pair.
-
     Returns:
         (3,) 1/m, in the rectified left camera's axes. n / h . P = 1 on the plane; its length is 1 / h.
     """

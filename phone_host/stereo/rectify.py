@@ -59,9 +59,6 @@ _TO_RIGHT = {
 def rectify_rig(rig: Rig) -> Rectification:
     """Find the common rotation, focal length and window of a rig.
 
-    Args:
-        rig: two calibrated cameras.
-
     Returns:
         The rectification.
 

@@ -84,12 +84,7 @@ RigErrors = ZeroError | ParameterErrors
 
 
 def rig_errors(rig: Rig, rectification: Rectification) -> RigErrors:
-    """Return what is known of a rig's uncertainty: of all parameters, else of its zero.
-
-    Args:
-        rig: as it rectifies the images.
-        rectification: of that rig.
-    """
+    """Return what is known of a rig's uncertainty: of all parameters, else of its zero."""
     if np.isfinite(rig.covariance).all():
         return ParameterErrors(rig, rectification)
     return ZeroError(rig.zero_sigma_px, rectification.epipolar)

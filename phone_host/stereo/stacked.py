@@ -34,9 +34,6 @@ def lying(image: NDArray[Values], epipolar: Epipolar) -> NDArray[Values]:
 def lying_pair(pair: RectifiedPair) -> RectifiedPair:
     """Turn both images of a pair as `lying` does; its epipolar lines become rows.
 
-    Args:
-        pair: upright.
-
     Returns:
         The pair with points that move to the left; the pair itself if they do already.
     """

@@ -115,11 +115,7 @@ def await_board(
 
 
 def refusal_error(refusal: BoardRefusal) -> UnavailableError:
-    """Return a refusal as the error that ends a wait.
-
-    Args:
-        refusal: the board's refusal.
-    """
+    """Return a refusal as the error that ends a wait."""
     match refusal.reason:
         case RefusalReason.BUSY:
             return BusyBoardError(*refusal_text(refusal))

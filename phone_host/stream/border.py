@@ -110,9 +110,6 @@ class Border:
     def learn(self, echo: Echo) -> list[Admitted]:
         """Give an echo to the clock.
 
-        Args:
-            echo: the echo with its four stamps.
-
         Returns:
             The frames that it has proven.
         """
@@ -149,9 +146,6 @@ class Border:
 
     def admit(self, arrival: Arrival) -> BoardFrame | None:
         """Take a frame that has come.
-
-        Args:
-            arrival: what came.
 
         Returns:
             The frame with its marks on the host's clock, if it may pass now. None if it was dropped or must wait for

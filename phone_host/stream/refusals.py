@@ -58,30 +58,19 @@ class Refusals:
         self._last = None
 
     def is_news(self, link: int) -> bool:
-        """Return whether to report a refusal on a link. It is reported once, until the link comes up again.
-
-        Args:
-            link: number of the link.
-        """
+        """Return whether to report a refusal on a link. It is reported once, until the link comes up again."""
         if link in self._told:
             return False
         self._told.add(link)
         return True
 
     def link_up(self, link: int) -> None:
-        """Take note that a link came up: report its next refusal again.
-
-        Args:
-            link: number of the link.
-        """
+        """Take note that a link came up: report its next refusal again."""
         self._told.discard(link)
 
 
 def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
     """Describe a refusal and its remedy.
-
-    Args:
-        refusal: the board's refusal.
 
     Returns:
         Problem and remedy, in words for the user.

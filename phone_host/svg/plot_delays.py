@@ -65,11 +65,6 @@ def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
     A delay far beyond the rest is cut off and marked by a triangle at the top, so that the region of the line stays
     legible.
 
-    Args:
-        scatter: what to draw.
-        width_px: width of the picture.
-        height_px: height of the picture.
-
     Returns:
         An <svg> element.
     """
@@ -120,11 +115,6 @@ class Compared:
 
 def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) -> str:
     """Plot predicted against measured, both logarithmic; on the line they are equal.
-
-    Args:
-        points: at least one.
-        width_px: width of the picture.
-        height_px: height of the picture.
 
     Returns:
         An <svg> element.

@@ -47,15 +47,7 @@ class Curve:
 
 
 def over_distance(marks: Sequence[Mark], curves: Sequence[Curve], unit: str, label: str, width_px: int) -> str:
-    """Draw measurements over the distance; 0 is always shown.
-
-    Args:
-        marks: the measurements.
-        curves: lines beside them.
-        unit: of the values.
-        label: what it shows, for screen readers.
-        width_px: width of the picture.
-    """
+    """Draw measurements over the distance; 0 is always shown."""
     shown = [mark for mark in marks if np.isfinite([mark.distance_m, mark.value]).all()]
     if not shown:
         return empty(width_px, "nothing was measured")

@@ -133,14 +133,7 @@ def axes(x: Linear, y: Linear, size_px: tuple[int, int], name: str, unit: float 
 
 
 def svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> str:
-    """Make the picture: an <svg> element around its parts.
-
-    Args:
-        width_px: width of the picture.
-        height_px: height of the picture.
-        label: what it shows, for screen readers.
-        parts: SVG.
-    """
+    """Make the picture: an <svg> element around its parts."""
     return (
         f'<svg class="plot" role="img" aria-label="{escape(label)}" viewBox="0 0 {width_px} {height_px:.0f}">'
         f"{''.join(parts)}</svg>"

@@ -52,14 +52,7 @@ def seen_from(yaw_deg: float, pitch_deg: float) -> Floats:
 
 
 def in_space(shapes: Sequence[Shape], view: Floats, label: str, width_px: int) -> str:
-    """Draw shapes, the farther ones first, and a bar that shows the scale.
-
-    Args:
-        shapes: what to draw.
-        view: of `seen_from`.
-        label: what it shows, for screen readers.
-        width_px: width of the picture.
-    """
+    """Draw shapes, the farther ones first, and a bar that shows the scale."""
     flat = [[line @ view.T for line in shape.lines] for shape in shapes]
     every = np.concatenate([line for lines in flat for line in lines])
     low, high = every.min(axis=0), every.max(axis=0)

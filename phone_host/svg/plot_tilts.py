@@ -33,13 +33,7 @@ class TiltedBoard:
 
 
 def tilt_disc(tilts: Sequence[TiltedBoard], label: str, width_px: int) -> str:
-    """Draw the tilts, and rings at 20 and 45 degrees, between which views teach most.
-
-    Args:
-        tilts: of all boards.
-        label: what it shows, for screen readers.
-        width_px: width of the picture.
-    """
+    """Draw the tilts, and rings at 20 and 45 degrees, between which views teach most."""
     height_px = min(width_px, 260)
     x, y = width_px / 2, height_px / 2
     radius = height_px / 2 - _BELOW_PX

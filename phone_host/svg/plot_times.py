@@ -34,13 +34,7 @@ class Durations:
 
 
 def over_time(series: Sequence[Durations], label: str, width_px: int) -> str:
-    """Draw durations over time; 0 is always shown.
-
-    Args:
-        series: what to draw.
-        label: what it shows, for screen readers.
-        width_px: width of the picture.
-    """
+    """Draw durations over time; 0 is always shown."""
     drawn = [one for one in series if one.at_s.size]
     if not drawn:
         return empty(width_px, "nothing was measured")

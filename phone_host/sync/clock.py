@@ -339,9 +339,6 @@ class ClockEstimator:
     def add(self, echo: Echo) -> Heard:
         """Learn from one echo. An echo whose stamps run backwards is invalid and ignored.
 
-        Args:
-            echo: the echo with its four stamps.
-
         Returns:
             The echo's meaning.
         """

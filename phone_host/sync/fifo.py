@@ -72,9 +72,6 @@ class Fifo(Generic[T]):
     def put(self, item: T) -> list[T]:
         """Queue an item.
 
-        Args:
-            item: the newest one.
-
         Returns: The dropped items, perhaps including this one. With `block`, credit holds the source back, so a full
             queue means that the source sends without credit. Then the newest item is dropped, too.
         """

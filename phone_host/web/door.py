@@ -54,13 +54,7 @@ _OURS: Final = Diagnostic("the program itself failed", "see its log", Severity.F
 
 
 def problem(status: int, trouble: Diagnostic, headers: Mapping[str, str] | None = None) -> web.Response:
-    """Make an answer that says what is wrong and what to do.
-
-    Args:
-        status: of HTTP.
-        trouble: the words.
-        headers: further ones.
-    """
+    """Make an answer that says what is wrong and what to do."""
     return web.Response(
         status=status,
         text=json_text(problem_values(trouble)),
@@ -134,11 +128,7 @@ class Door:
 
 
 def asked_of(request: web.Request) -> Asked:
-    """Return what the gate looks at.
-
-    Args:
-        request: of aiohttp.
-    """
+    """Return what the gate looks at."""
     said = request.headers
     commands = request.method not in {"GET", "HEAD"}
     kind = Kind.COMMAND if commands else Kind.OPEN if request.path == "/" else Kind.READ

@@ -137,12 +137,7 @@ FILES: Final[dict[str, Callable[[Processed], bytes]]] = {
 
 
 def has_data(name: str, processed: Processed) -> bool:
-    """Whether a pair has what one of `FILES` is made of.
-
-    Args:
-        name: the file's name.
-        processed: the pair.
-    """
+    """Whether a pair has what one of `FILES` is made of."""
     if name == "cloud.ply":
         return processed.cloud is not None
     return name != "disparity.png" or processed.disparity is not None

@@ -52,11 +52,7 @@ class Part:
 
 
 def fitting_width(asked_px: int) -> int:
-    """Return the least width of `WIDTHS` that is not below the one asked for, or the greatest.
-
-    Args:
-        asked_px: px.
-    """
+    """Return the least width of `WIDTHS` that is not below the one asked for, or the greatest."""
     return next((width for width in WIDTHS if width >= asked_px), WIDTHS[-1])
 
 

@@ -104,11 +104,7 @@ class Gate:
         return f"{self.cookie_name}={self._cookie}; Path=/; HttpOnly; SameSite=Strict; Max-Age=34560000{secure}"
 
     def judge(self, asked: Asked) -> Passed | Refusal:
-        """Say whether a request may pass.
-
-        Args:
-            asked: the request.
-        """
+        """Say whether a request may pass."""
         host = _HOST.match(asked.host)
         if host is None or host["name"].lower() not in self._names:
             return Refusal.HOST

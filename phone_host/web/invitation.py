@@ -37,9 +37,6 @@ def own_names() -> tuple[str, ...]:
 def qr_code(text: str) -> str:
     """Draw a QR code for a terminal, two modules a character, dark on light.
 
-    Args:
-        text: what it says.
-
     Raises:
         UnavailableError: the package that draws it is missing.
     """
@@ -53,12 +50,7 @@ def qr_code(text: str) -> str:
 
 
 def invitation(urls: Iterable[str], credentials: Credentials) -> str:
-    """Say how other devices open the page: the code to scan, what the browser will ask, and what to compare.
-
-    Args:
-        urls: first addresses of the page, the likeliest first.
-        credentials: whose fingerprint is told.
-    """
+    """Say how other devices open the page: the code to scan, what the browser will ask, and what to compare."""
     first, *others = urls
     again = "" if not others else "\nIf that does not open: " + "  ".join(others)
     new = (
@@ -75,11 +67,7 @@ def invitation(urls: Iterable[str], credentials: Credentials) -> str:
 
 
 def by_cable(port: int) -> str:
-    """Say how a phone on a USB cable opens the page of this machine without any certificate.
-
-    Args:
-        port: of the page.
-    """
+    """Say how a phone on a USB cable opens the page of this machine without any certificate."""
     return (
         f"By USB cable instead, with the phone's developer mode on: adb reverse tcp:{port} tcp:{port}, then open the page's "
         "first address (127.0.0.1) on the phone. Again after each time the cable was out."

@@ -52,12 +52,7 @@ class Rates:
         self._of: OrderedDict[Hashable, Rate] = OrderedDict()
 
     def take(self, asker: Hashable, now_s: float) -> bool:
-        """Say whether an asker may ask now.
-
-        Args:
-            asker: who asks.
-            now_s: now, s.
-        """
+        """Say whether an asker may ask now."""
         rate = self._of.pop(asker, None) or Rate(self._per_s, self._burst, now_s)
         self._of[asker] = rate
         if len(self._of) > _MOST_ASKERS:

@@ -68,10 +68,6 @@ def kept_credentials(folder: Path, names: Iterable[str], now: dt.datetime) -> Cr
 def read_secret(opened: int, path: Path) -> bytes | None:
     """Read a file that its owner alone may read.
 
-    Args:
-        opened: descriptor of its folder.
-        path: the file.
-
     Returns:
         Its content; None: there is none.
 
@@ -92,11 +88,6 @@ def read_secret(opened: int, path: Path) -> bytes | None:
 def write_secret(opened: int, name: str, content: bytes) -> None:
     """Write a file that its owner alone may read.
 
-    Args:
-        opened: descriptor of its folder.
-        name: of the file.
-        content: its bytes.
-
     Raises:
         OSError: as the operating system raises it.
     """
@@ -105,12 +96,7 @@ def write_secret(opened: int, name: str, content: bytes) -> None:
 
 
 def unusable(folder: Path, error: OSError) -> UnavailableError:
-    """Say that a folder cannot be used.
-
-    Args:
-        folder: the folder.
-        error: why.
-    """
+    """Say that a folder cannot be used."""
     return UnavailableError(
         f"{folder} cannot be used ({error.strerror})", "make it readable and writable for you alone"
     )

@@ -346,10 +346,6 @@ class Feed(Protocol):
     def camera(self, line: Line, hello: str) -> Hearer | None:
         """Take a browser's first line, for frames.
 
-        Args:
-            line: the line.
-            hello: its first message, whose token is right.
-
         Returns:
             What hears the rest; None: it is refused, and was told so.
         """

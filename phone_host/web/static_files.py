@@ -61,10 +61,6 @@ def read_files(folder: Path) -> dict[str, StaticFile]:
 def chosen_encoding(accepted: str, file: StaticFile) -> str:
     """Choose the smallest form that a browser accepts.
 
-    Args:
-        accepted: header Accept-Encoding.
-        file: the file.
-
     Returns:
         br, gzip or identity.
     """
@@ -74,11 +70,7 @@ def chosen_encoding(accepted: str, file: StaticFile) -> str:
 
 
 def script_hashes(page: bytes) -> tuple[str, ...]:
-    """Return the SHA-256 of each inline script of a page, base64, as its Content-Security-Policy names them.
-
-    Args:
-        page: HTML.
-    """
+    """Return the SHA-256 of each inline script of a page, base64, as its Content-Security-Policy names them."""
     return tuple(base64.b64encode(hashlib.sha256(text).digest()).decode() for text in _INLINE_SCRIPT.findall(page))
 
 

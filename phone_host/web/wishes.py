@@ -64,9 +64,6 @@ class MeasureRequest:
 def read_wish(text: str) -> Ack | Want | None:
     """Read a viewer's message.
 
-    Args:
-        text: JSON.
-
     Returns:
         What it says; None: nothing that we know.
     """

@@ -134,14 +134,7 @@ def chessboard_sheet(board: Chessboard, paper: Paper) -> Sheet:
 
 
 def marked_sheet(board: MarkedBoard, paper: Paper, what: str, then: str) -> Sheet:
-    """Lay out a board of marks; see `_sheet`.
-
-    Args:
-        board: the board.
-        paper: the sheet.
-        what: what it is, in words.
-        then: the command that uses it.
-    """
+    """Lay out a board of marks; see `_sheet`."""
     return _sheet(board.squares, marked_rectangles(board), paper, what, then)
 
 

@@ -95,9 +95,6 @@ def may_tell(window: Window) -> bool:
 def look(window: Window) -> Reading:
     """Look at a window.
 
-    Args:
-        window: its frames.
-
     Returns:
         What it tells.
     """

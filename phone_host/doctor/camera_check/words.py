@@ -30,11 +30,7 @@ CHECK_AGAIN: Final = "phone-host doctor --capture with this --camera and --calib
 
 
 def findings_of(report: CaptureReport) -> list[Diagnostic]:
-    """Judge a report.
-
-    Args:
-        report: what was found.
-    """
+    """Judge a report."""
     pace = report.pace
     if not math.isfinite(pace.rate_hz):
         return [warn("rate", f"{counted(pace.frames, 'frame')} came: too few to judge", "check that the camera works")]

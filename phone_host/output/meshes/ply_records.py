@@ -96,11 +96,7 @@ def read_records(content: bytes) -> dict[str, Table]:
 
 
 def is_text(content: bytes) -> bool:
-    """Return whether the header says that numbers follow as text.
-
-    Args:
-        content: of the file.
-    """
+    """Return whether the header says that numbers follow as text."""
     return b"format ascii" in content[:_MAX_HEADER].lower()
 
 

@@ -192,11 +192,7 @@ def colours_of_points(corners: NDArray[np.integer[Any]], colours: NDArray[np.uin
 
 
 def welded(solid: Solid) -> Solid:
-    """Return a mesh in which points at one place are one, as in files that name each triangle's corners anew (STL).
-
-    Args:
-        solid: a mesh.
-    """
+    """Return a mesh in which points at one place are one, as in files that name each triangle's corners anew (STL)."""
     places = np.ascontiguousarray(solid.points_m + np.float32(0)).view(np.uint32)  # + 0: minus zero is zero
     _, first, number = np.unique(places, axis=0, return_index=True, return_inverse=True)
     triangles = number.ravel()[solid.triangles].astype(np.int32)

@@ -13,10 +13,6 @@ _MAX_BYTES: Final = 1 << 29
 def require_short(size_bytes: int, name: str) -> None:
     """Check the size of a text before it is read.
 
-    Args:
-        size_bytes: of the text.
-        name: of its file, for errors.
-
     Raises:
         DataError: it has more than 512 MB.
     """

@@ -21,11 +21,7 @@ _SHADES: Final = 6
 
 
 def three_ds_bytes(solid: Solid) -> bytes:
-    """Return a 3DS file in mm.
-
-    Args:
-        solid: the mesh.
-    """
+    """Return a 3DS file in mm."""
     numbers, shades = _materials(solid)
     materials = b"".join(_material(f"COLOUR{at}", shade) for at, shade in enumerate(shades))
     pieces = b"".join(_piece(f"PIECE{at}", solid, faces, numbers) for at, faces in enumerate(_pieces(solid)))

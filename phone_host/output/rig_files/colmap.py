@@ -77,12 +77,6 @@ def _lines(text: str) -> Iterator[str]:
 def read_colmap(cameras: str, cameras_file: str, images: str, images_file: str) -> StatedRig:
     """Read the cameras of two images.
 
-    Args:
-        cameras: content of cameras.txt.
-        cameras_file: its name, for errors.
-        images: content of images.txt.
-        images_file: its name, for errors.
-
     Raises:
         DataError: there are not exactly two images, or a value is not valid; names file and id.
     """

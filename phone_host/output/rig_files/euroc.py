@@ -22,10 +22,6 @@ def is_euroc(node: Node) -> bool:
 def read_euroc(left: Node, right: Node) -> StatedRig:
     """Read the sensor.yaml of two cameras of one body.
 
-    Args:
-        left: of the left camera.
-        right: of the right camera.
-
     Raises:
         DataError: a key is missing or not valid; names file and key.
     """

@@ -93,9 +93,6 @@ _BINARY_MODEL: Final = frozenset({_BINARY_CAMERAS, "images.bin"})
 def files_of(given: tuple[Path, ...]) -> tuple[Path, ...]:
     """Return the files of a calibration: a folder stands for those in it that have the usual names.
 
-    Args:
-        given: files, or one folder.
-
     Raises:
         SettingsError: there are more than two.
         DataError: a folder holds none of those names.
@@ -130,9 +127,6 @@ def _require_no_binary(given: tuple[Path, ...]) -> None:
 
 def read_own_rig(path: Path) -> Rig:
     """Read a rig.yaml; for the calibration of another program, say how to make one of it.
-
-    Args:
-        path: the file.
 
     Raises:
         DataError: as `read_rig`, or it is another program's.

@@ -125,11 +125,6 @@ def _size_px(node: Node, n: str, side: str) -> tuple[int, int]:
 def opencv_texts(rig: Rig, rectification: Rectification, *, as_xml: bool) -> tuple[RigText, ...]:
     """Write one FileStorage file with the keys of OpenCV's sample, and the sizes; T in metres.
 
-    Args:
-        rig: two cameras.
-        rectification: computed from the same rig.
-        as_xml: XML in place of YAML.
-
     Raises:
         DataError: one lens is a fisheye and the other is not: the file has one word for both.
     """

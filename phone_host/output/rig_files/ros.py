@@ -44,10 +44,6 @@ def is_ros(node: Node) -> bool:
 def read_ros(left: Node, right: Node) -> StatedRig:
     """Read two camera_info files.
 
-    Args:
-        left: of the left camera.
-        right: of the right camera.
-
     Raises:
         DataError: a key is missing or not valid; names file and key.
     """
@@ -184,10 +180,6 @@ def ros_texts(rig: Rig, rectification: Rectification) -> tuple[RigText, ...]:
 
     ROS rectifies to images of the cameras' own size, this program to the window that both cameras fill. So the
     principal point is moved until that window lies in the middle of the left camera's image.
-
-    Args:
-        rig: two cameras.
-        rectification: computed from the same rig.
 
     Raises:
         DataError: the cameras stand one above the other, which ROS has no message for.

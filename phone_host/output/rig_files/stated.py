@@ -159,12 +159,7 @@ def _model(camera: StatedCamera, given_px: tuple[int, int] | None) -> CameraMode
 
 
 def stated_of(rig: Rig, file: str) -> StatedRig:
-    """Return what a file would have to state for a rig.
-
-    Args:
-        rig: two cameras.
-        file: what errors call it.
-    """
+    """Return what a file would have to state for a rig."""
     left, right = (
         StatedCamera(
             name=f"the {side} camera of {file}",

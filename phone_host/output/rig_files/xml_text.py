@@ -17,10 +17,6 @@ _REMEDY: Final = "give it as cv2.FileStorage wrote it"
 def read_xml(text: str, file: str) -> Tree:
     """Read an XML text of FileStorage.
 
-    Args:
-        text: the whole file.
-        file: its name, for errors.
-
     Returns:
         Its values: maps, lists and words.
 

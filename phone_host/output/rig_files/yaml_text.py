@@ -34,10 +34,6 @@ def read_yaml(text: str, file: str) -> Tree:
     `ros2 topic echo` puts `---` behind every message, so a file may hold one message several times; they count as one
     if all but their headers agree.
 
-    Args:
-        text: the whole file.
-        file: its name, for errors.
-
     Returns:
         Its value: maps, lists and words.
 
