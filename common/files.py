@@ -123,9 +123,6 @@ def read_whole(path: Path, most_bytes: int) -> bytes:
         path: the file; links are followed.
         most_bytes: nothing is read from a longer file.
 
-    Returns:
-        Its content.
-
     Raises:
         DataError: it is not a plain file (a pipe or a device might never end), or it is too long.
         OSError: as the operating system raises it.

@@ -10,9 +10,6 @@ def counted(count: int, noun: str, plural: str = "") -> str:
         count: how many.
         noun: the noun for one; may be several words, of which the last one is counted.
         plural: the noun for several; empty: `noun` with an s.
-
-    Returns:
-        The number and the noun that fits it.
     """
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
 

@@ -73,9 +73,6 @@ def open_camera(uri: str, clock: str, now_ns: int, example: str = EXAMPLE) -> Ca
         now_ns: CLOCK_MONOTONIC now, ns.
         example: URIs that the program takes, for an error.
 
-    Returns:
-        The open camera.
-
     Raises:
         SettingsError: the URI makes no sense.
         UnavailableError: there is no such device or folder.

@@ -227,9 +227,6 @@ def layout(pointer_bits: int, time_bits: int) -> Layout:
     Args:
         pointer_bits: 32 or 64.
         time_bits: of time_t, 32 or 64 (not 32 on a 64-bit machine).
-
-    Returns:
-        The structures and their ioctl numbers.
     """
     word = c_uint64 if pointer_bits == 64 else c_uint32
     time = c_int64 if time_bits == 64 else c_int32

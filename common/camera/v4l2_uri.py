@@ -40,9 +40,6 @@ def v4l2_settings(uri: str, path: str, options: Mapping[str, str], clock: str) -
         options: the options after the question mark.
         clock: name of the clock of the stamps.
 
-    Returns:
-        The settings.
-
     Raises:
         SettingsError: an option is unknown or makes no sense.
     """

@@ -142,9 +142,6 @@ def address_of(name: str) -> str:
     Args:
         name: the device's own name or the user's name for it; case is ignored.
 
-    Returns:
-        Its address.
-
     Raises:
         UnavailableError: no device has this name, several have, or no daemon can be asked.
     """

@@ -256,9 +256,6 @@ def pairing_address(link: str) -> tuple[str, int]:
     Args:
         link: its address, `tcp://HOST:PORT`.
 
-    Returns:
-        Host and port.
-
     Raises:
         SettingsError: there is no such port.
     """

@@ -81,9 +81,6 @@ def parse_link(uri: str, *, listens_by_default: bool) -> LinkUri:
             address sees the camera. ipc takes `owner=USER`: that user's end is trusted like one's own.
         listens_by_default: true on the board, which binds; false on the host, which connects.
 
-    Returns:
-        The parsed link.
-
     Raises:
         SettingsError: the URI makes no sense.
     """

@@ -51,9 +51,6 @@ def resolve(
         options: options from the command line, by field name; None means not given.
         aside: names of tables in the file that others read.
 
-    Returns:
-        The settings with their origins.
-
     Raises:
         SettingsError: the file cannot be read, or a key or value makes no sense.
     """

@@ -25,9 +25,6 @@ def changed(text: str, keys: Mapping[str, Value | None], table: str, content: Ma
         table: name of the table.
         content: what it shall hold; nothing: the table is taken out.
 
-    Returns:
-        The new text.
-
     Raises:
         SettingsError: the file is written in a way that this cannot change.
     """

@@ -207,9 +207,6 @@ class BoardSession:
             message: what came.
             now_ns: its arrival on the board's clock, ns.
             counts: the current account of this session's frames.
-
-        Returns:
-            What to send.
         """
         self._notice_absence(now_ns)
         if isinstance(message, HostHello):

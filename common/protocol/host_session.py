@@ -119,9 +119,6 @@ class HostSession:
             connection: where it came from; its first byte is the link's number.
             message: what came.
             now_ns: arrival of its last byte on the host's clock, ns.
-
-        Returns:
-            What to send, and what happened.
         """
         self._notice_absence(now_ns)
         path = self._paths[connection[0]]

@@ -175,9 +175,6 @@ def decode(header: Buffer, payload: Buffer = b"") -> Message:
         header: the header's bytes; they may come from anybody.
         payload: the bytes that came with it; kept, not copied.
 
-    Returns:
-        The message.
-
     Raises:
         VersionError: the peer speaks another version.
         ProtocolError: these bytes are no message.

@@ -165,9 +165,6 @@ def predict(setting: Setting, frames: int, random: np.random.Generator) -> Predi
         setting: the setting.
         frames: how many the camera gives.
         random: for the draws.
-
-    Returns:
-        What happened to them.
     """
 
     def drawn(values: Values) -> Values:

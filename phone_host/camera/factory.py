@@ -34,9 +34,6 @@ def open_camera(
         most_pixels: largest accepted image size, pixels.
         feed: brings the browsers that open the page; None: there is no page.
 
-    Returns:
-        The open camera.
-
     Raises:
         SettingsError: the URI is invalid.
         UnavailableError: there is no such device, folder or server, or no browser comes.

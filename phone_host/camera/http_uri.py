@@ -95,9 +95,6 @@ def http_settings(uri: str, clock: str) -> HttpSettings:
         uri: see EXAMPLE.
         clock: name of the stamps' clock.
 
-    Returns:
-        The settings.
-
     Raises:
         SettingsError: the address or an option is invalid.
     """

@@ -54,9 +54,6 @@ def find_board(state: Path, now_s: Callable[[], float], wait_s: float | None) ->
         now_s: a steady clock, s.
         wait_s: how long to look; None: for ever.
 
-    Returns:
-        The board's link.
-
     Raises:
         UnavailableError: no board was found in time, or there are several.
     """

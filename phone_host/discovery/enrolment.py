@@ -90,9 +90,6 @@ class PairingCall:
             link: the board's address from now on.
             progress: called once a round.
 
-        Returns:
-            The board as a known peer.
-
         Raises:
             SettingsError: this code was typed before.
             DataError: one of the two does not know the code.

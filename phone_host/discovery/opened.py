@@ -16,9 +16,6 @@ def open_named(named: Sequence[str], keys: KeyFolder, wait_s: float | None) -> t
         keys: knows the boards that this machine may talk to.
         wait_s: how long to look for a board, s; None: for ever.
 
-    Returns:
-        The addresses, and their links, open.
-
     Raises:
         SettingsError: an address is none.
         UnavailableError: no board is found, or a link cannot be had.

@@ -42,9 +42,6 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
         wait_s: how long to wait for the board, s.
         keys: folder of this host's key and the boards that it knows.
 
-    Returns:
-        The board's answer.
-
     Raises:
         TandemError: the link cannot be opened, or it failed.
     """
@@ -87,9 +84,6 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
     Args:
         calibration: rig.yaml.
         camera: URI of the host camera; empty: none given.
-
-    Returns:
-        The rig's readings, or what is wrong with it.
 
     Raises:
         SettingsError: the URI is invalid.

@@ -144,9 +144,6 @@ def sources_digest() -> str:
 def find_compiler() -> tuple[str, ...]:
     """Find the C compiler.
 
-    Returns:
-        The command, with its arguments.
-
     Raises:
         BuildError: there is none.
     """
@@ -167,9 +164,6 @@ def build(folder: Path, extra: Sequence[str] = ()) -> Built:
     Args:
         folder: where it goes; it exists.
         extra: more flags, for compiling and linking (sanitizers, warnings as errors).
-
-    Returns:
-        What was built.
 
     Raises:
         BuildError: it cannot be built.
@@ -210,9 +204,6 @@ def build_or_explain(folder: Path) -> Built | str:
 
     Args:
         folder: where either goes; made if missing.
-
-    Returns:
-        What was built, or why nothing was.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name in (LIBRARY_FILE, REASON_FILE):

@@ -270,9 +270,6 @@ def load(folder: Path, wanted: str = "") -> Library | Missing:
         folder: where it lies.
         wanted: name of the instruction set to use; empty: the widest that this processor has.
 
-    Returns:
-        The library, or why there is none.
-
     Raises:
         SettingsError: no instruction set has that name, or it cannot be used here.
     """

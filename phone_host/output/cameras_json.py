@@ -35,9 +35,6 @@ def cameras_text(left: RememberedCamera, right: RememberedCamera) -> str:
 def read_cameras(path: Path) -> tuple[RememberedCamera, RememberedCamera]:
     """Read cameras.json and check it.
 
-    Returns:
-        The left and the right camera.
-
     Raises:
         DataError: the file is missing, of a newer format, or not valid; names file and key.
     """

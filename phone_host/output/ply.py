@@ -57,9 +57,6 @@ def write_ply(path: Path, cloud: CloudImage, colours: Image, axes: Axes = Axes.C
         colours: (H, W) grey or (H, W, 3) BGR, uint8: the rectified left image.
         axes: axes of the file's points.
 
-    Returns:
-        The number of points written.
-
     Raises:
         OSError: the file cannot be written.
         ValueError: the two sizes differ.
@@ -221,9 +218,6 @@ def _vertices(cloud: CloudImage, colours: Image, chosen: NDArray[np.bool_], axes
 
 def read_ply(path: Path) -> PointCloud:
     """Read a PLY file in the form that `write_ply` writes.
-
-    Returns:
-        Its points and colours.
 
     Raises:
         DataError: the file is missing, has another form, or its length does not match its header.

@@ -107,9 +107,6 @@ def read_rig(path: Path, content: bytes | None = None) -> Rig:
         path: a rig.yaml of this program, or any FileStorage file with the same keys.
         content: what is in it, if it lies in another file; then the path only names it in errors.
 
-    Returns:
-        The rig.
-
     Raises:
         DataError: the file is missing or not FileStorage YAML, or a key is missing or not valid; names file and key.
     """

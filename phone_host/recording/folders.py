@@ -42,9 +42,6 @@ def export_folders(recorded: Recorded, out: Path) -> dict[str, int]:
         recorded: the recording.
         out: the folder; it must not exist.
 
-    Returns:
-        How many images each side has.
-
     Raises:
         SpoiledImageError: every image of a side is spoiled.
         UnavailableError: the folder is there already, or cannot be written.

@@ -172,9 +172,6 @@ class Host:
             stop: called several times a second.
             watch: called as often, for a live view.
 
-        Returns:
-            Why the run ended.
-
         Raises:
             UnavailableError: no board came in time, or it does not talk to this host.
             DataError: the streams' images or the cameras do not fit the rig.
@@ -236,9 +233,6 @@ class Host:
             report: content of report.json.
             page: content of index.html; empty: none.
             replaces_earlier: whether the run is whole, so that an earlier run's results may be replaced by it.
-
-        Returns:
-            Whether all results of the run were written.
         """
         overlay = "" if self._keeper is None else self._keeper.overlay
         self._files.close(report, page, self._cameras.text(), overlay, replaces_earlier=replaces_earlier)

@@ -58,9 +58,6 @@ class Pipeline:
     def process(self, pair: FramePair) -> Processed:
         """Compute a pair's depth.
 
-        Returns:
-            Images, disparity, cloud and stage times.
-
         Raises:
             SpoiledImageError: a frame's bytes are not a whole image, or its size is not believed.
             DataError: the cameras' image sizes do not fit the rig.

@@ -69,9 +69,6 @@ class QualityJob:
 def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
     """Measure all pairs, and write report.json and index.html; after Ctrl-C those of the pairs so far.
 
-    Returns:
-        The report.
-
     Raises:
         DataError: the only pair, or all pairs, could not be computed.
         SettingsError: the core cannot be made so.

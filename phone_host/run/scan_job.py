@@ -30,9 +30,6 @@ def run_scan(
         axes: of model.ply and trajectory.txt.
         resumed: submaps of a scan that was killed, to go on from; their pairs are not computed again.
 
-    Returns:
-        The report.
-
     Raises:
         DataError: there are fewer than two pairs, none can be computed, or none has depth.
         SettingsError: the core cannot be made so.

@@ -32,11 +32,7 @@ _WORDS: Final = {
 
 
 def pair_page(report: PairReport, processed: Processed, commands: Sequence[NextCommand]) -> str:
-    """Make the page of one pair.
-
-    Returns:
-        An HTML document.
-    """
+    """Make the page of one pair."""
     verdict, sentence = pair_verdict(report)
     names = [PurePath(path).name for path in (report.left, report.right)]
     data = StereoPageData(
@@ -58,11 +54,7 @@ def pair_page(report: PairReport, processed: Processed, commands: Sequence[NextC
 
 
 def set_page(report: SetReport, thumbnails: Mapping[str, Picture], commands: Sequence[NextCommand]) -> str:
-    """Make the page that leads to the pairs.
-
-    Returns:
-        An HTML document.
-    """
+    """Make the page that leads to the pairs."""
     verdict, sentence = set_verdict(report)
     lefts, rights = (
         distinct_names(side) for side in zip(*((pair.left, pair.right) for pair in report.pairs), strict=True)

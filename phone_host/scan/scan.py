@@ -122,9 +122,6 @@ class Scan:
             processed: with disparity and cloud.
             skew_s: by how much its two images were not taken at the same moment, s; a moving camera's depths count for less then.
 
-        Returns:
-            What became of it.
-
         Raises:
             DataError: its size is not that of the pairs before it.
         """

@@ -253,9 +253,6 @@ class Volume:
         Args:
             camera: from where.
             seeds_m: (H, W) float32 depths near which the surface is looked for, m, NaN = nowhere; None: everywhere.
-
-        Returns:
-            The surface.
         """
         shape = camera.shape
         if seeds_m is not None and seeds_m.shape != shape:

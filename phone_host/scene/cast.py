@@ -217,9 +217,6 @@ def cast(bodies: tuple[Body, ...], origin: Floats, rays: Floats) -> Hits:
         bodies: the scene's bodies.
         origin: (3,) common start in the scene's axes.
         rays: (3, N) directions in the scene's axes.
-
-    Returns:
-        Depths and surfaces.
     """
     hits = Hits(np.full(rays.shape[1], np.inf, dtype=rays.dtype), np.full(rays.shape[1], NOTHING, dtype=np.int16))
     for index, body in enumerate(bodies):

@@ -72,9 +72,6 @@ def plane_scene(depth_m: float, tilt_rad: float = 0.0, seed: int = 0) -> Scene:
         depth_m: its distance along the left camera's axis.
         tilt_rad: 0 faces the camera.
         seed: selects the texture.
-
-    Returns:
-        A still scene.
     """
     turn = rotation((0.0, 1.0, 0.0), tilt_rad)
     return Scene((Body("plane", Plane(), (0.0, 0.0, depth_m), Texture(seed=seed), turn),))

@@ -71,9 +71,6 @@ def render_film(
         seconds: length.
         advance: called after each image, 2 * `frames` times in all.
 
-    Returns:
-        The film.
-
     Raises:
         OSError: the folder cannot be written to.
     """

@@ -72,9 +72,6 @@ def truth(scene: Scene, view: RectifiedView, sensors: tuple[tuple[CameraModel, P
         view: the rectified left camera.
         sensors: the real cameras and their poses. If given, a point counts as visible only if it also lies inside each
             of their images (a rectified image has corners that no sensor fills).
-
-    Returns:
-        The truth at each pixel centre.
     """
     (left, left_pose), (_, right_pose) = rectified_cameras(view)
     shape = (view.height_px, view.width_px)

@@ -65,9 +65,6 @@ def create_matcher(settings: MatchSettings) -> Matcher:
     Args:
         settings: the algorithm and its search range.
 
-    Returns:
-        The matcher.
-
     Raises:
         SettingsError: another package's matcher cannot be loaded or does not fit, or a network's file is not there.
         UnavailableError: onnxruntime, which a network needs, is not installed; or the native library, which tandem needs,
@@ -96,9 +93,6 @@ def make_matcher(name: str, disparities: int) -> Matcher:
     Args:
         name: one of ours, or one that an installed package registers.
         disparities: N >= 1, px: 0 <= d < N is searched.
-
-    Returns:
-        The matcher.
 
     Raises:
         SettingsError: no matcher has that name, or disparities is below 1.

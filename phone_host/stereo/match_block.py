@@ -59,9 +59,6 @@ def search(left: Image, right: Image, disparities: int) -> Winners:
         left: (H, W) uint8 grey.
         right: the same size.
         disparities: N >= 1, px.
-
-    Returns:
-        The winners of every pixel.
     """
     height, width = left.shape
     border = (BEFORE_PX, AFTER_PX, BEFORE_PX, AFTER_PX)

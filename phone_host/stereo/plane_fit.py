@@ -69,9 +69,6 @@ def fit_plane(x_px: Floats, y_px: Floats, disparity_px: Floats, unit_px: float =
         y_px: (N,) rows, px.
         disparity_px: (N,) finite, px.
         unit_px: size of a pixel of the matched images, px: at half the size, 2.
-
-    Returns:
-        The plane.
     """
     middle_x, middle_y = float(np.mean(x_px)), float(np.mean(y_px))
     size = max(float(np.ptp(x_px)), float(np.ptp(y_px)), 1.0)

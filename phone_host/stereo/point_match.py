@@ -91,9 +91,6 @@ def match_point(
         disparity: (H, W) float32 of the left one, px, as a matcher found it.
         at_px: x and y of the point in the left image, px; any fraction.
         step_px: px of the rectified images that one px of those was that were matched (1 / scale).
-
-    Returns:
-        The match, or why there is none.
     """
     height, width = disparity.shape
     x, y = at_px

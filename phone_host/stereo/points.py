@@ -41,9 +41,6 @@ def points_of(
         geometry: of the rectified pair.
         limits: of its depths; `disparity_error_px` tells a disparity from that of infinity.
         library: computes; None: that of this installation.
-
-    Returns:
-        The points.
     """
     library = native() if library is None else library
     if isinstance(library, Library) and matched.dtype == np.float32 and matched.ndim == 2:

@@ -59,9 +59,6 @@ _TO_RIGHT = {
 def rectify_rig(rig: Rig) -> Rectification:
     """Find the common rotation, focal length and window of a rig.
 
-    Returns:
-        The rectification.
-
     Raises:
         DataError: left and right are swapped, one camera stands in front of the other, their fields of view do not
             overlap, or a distortion model cannot be inverted.

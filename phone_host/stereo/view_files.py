@@ -55,9 +55,6 @@ def pair_files(left: str | Sequence[str], right: str | Sequence[str]) -> ViewFil
         left: an image file, a folder or a glob; or several, as a shell makes them of one glob.
         right: the same kind.
 
-    Returns:
-        The pairs.
-
     Raises:
         DataError: one of the two names no image.
         SettingsError: both name the same files, or one is a folder and the other a file.

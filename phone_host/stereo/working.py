@@ -182,9 +182,6 @@ def part_for(
         disparities: N, px; 0: not known, so the whole lines are matched.
         epipolar: which way the epipolar lines run.
         margin_px: added on each side, px.
-
-    Returns:
-        The part.
     """
     reach = disparities or max(size_px)
     towards = {

@@ -70,11 +70,7 @@ class Refusals:
 
 
 def refusal_text(refusal: BoardRefusal) -> tuple[str, str]:
-    """Describe a refusal and its remedy.
-
-    Returns:
-        Problem and remedy, in words for the user.
-    """
+    """Describe a refusal and its remedy."""
     match refusal.reason:
         case RefusalReason.BUSY:
             return (

@@ -337,11 +337,7 @@ class ClockEstimator:
         return old is not None and new is not None and may_harm(old, new)
 
     def add(self, echo: Echo) -> Heard:
-        """Learn from one echo. An echo whose stamps run backwards is invalid and ignored.
-
-        Returns:
-            The echo's meaning.
-        """
+        """Learn from one echo. An echo whose stamps run backwards is invalid and ignored."""
         if echo.t3_ns - echo.t0_ns < echo.t2_ns - echo.t1_ns or echo.t2_ns < echo.t1_ns:
             return Heard.NOTHING
         if self._learned is None:

@@ -50,9 +50,6 @@ class LinkClocks:
 
         Args:
             echo: the echo with its four stamps and its link.
-
-        Returns:
-            The echo's meaning.
         """
         estimator = self._estimators[echo.link]
         heard = estimator.add(echo)

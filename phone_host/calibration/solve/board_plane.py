@@ -51,9 +51,6 @@ class BoardPlane:
 def find_board_plane(pair: RectifiedPair, board: Board, geometry: StereoGeometry, name: str) -> BoardPlane:
     """Find a board and its plane.
 
-    Returns:
-        The board.
-
     Raises:
         DataError: it is not seen, or what is seen is no flat board with such squares.
     """

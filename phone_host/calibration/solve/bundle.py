@@ -259,9 +259,6 @@ def adjust(views: list[BundleView], points_m: Vector, start: BundleState, free: 
         points_m: (N, 3) corners in the board's axes.
         start: a state close enough: each camera calibrated alone, the relative pose of any one view.
         free: what is estimated; all else keeps its start value.
-
-    Returns:
-        The optimum.
     """
     flags, prior, state = free.flags(), _prior(start), start
     problem = _problem(views, points_m, state, prior)

@@ -121,9 +121,6 @@ def whole_size_seen(grey: Image) -> Inner | None:
 
     A board that reaches beyond the image, or that a hand covers, looks like a smaller one. On the side where it is cut there are more
     squares, a hand or nothing beside the outermost corners instead of a black-and-white row and then the margin.
-
-    Returns:
-        The two counts, the larger first.
     """
     small = small_for_sizes(grey)
     grid = _lattice(small)
@@ -257,9 +254,6 @@ def _area(size: Inner) -> int:
 
 def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Inner:
     """Find out which chessboard the images show.
-
-    Returns:
-        Its inner corners, the larger count first.
 
     Raises:
         DataError: the images show none, do not agree, or none of them is an image.

@@ -97,9 +97,6 @@ def look_for_boards(
         most_pixels: an image that claims more is refused.
         mounted: how the two cameras are mounted; applied after what the images' headers say.
 
-    Returns:
-        The corners, and the pairs rejected.
-
     Raises:
         DataError: no image could be read.
     """

@@ -124,9 +124,6 @@ def fit_corners(
         along: (N, 2) px from each corner to the next along one edge.
         down: (N, 2) px likewise along the other edge.
         most_share: of these steps, up to which small squares are looked at.
-
-    Returns:
-        The corners, in the same order.
     """
     lengths = np.stack([np.linalg.norm(along, axis=1), np.linalg.norm(down, axis=1)], axis=1)
     reach = np.maximum(_REACH_SHARE * lengths, np.minimum(most_share * lengths, _SMALL_REACH_PX))

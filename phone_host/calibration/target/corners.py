@@ -97,9 +97,6 @@ class Board:
 def parse_board(corners: str, square_mm: float) -> Board:
     """Read a board's size as people write it.
 
-    Returns:
-        The board.
-
     Raises:
         SettingsError: one of the two is not valid.
     """
@@ -131,9 +128,6 @@ def order_by_colour(corners: Corners, grey: Image, board: Board) -> Corners:
 
     Rows run so that the grid is not mirrored. If one count is even and the other odd, half a turn swaps black and
     white; then the square inside the first four corners is the white one. Other boards look the same after half a turn.
-
-    Returns:
-        The same corners, reordered.
     """
     grid = corners.reshape(board.rows, board.columns, 2)
     along, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
@@ -150,9 +144,6 @@ def agree(left: Corners, right: Corners, board: Board) -> Corners:
     The board looks the same after some turns (half a turn; quarter turns of a square board). Of these, take the one
     whose rows and columns point most nearly the same way in both images: neither camera is upside down relative to the
     other.
-
-    Returns:
-        The right corners, reordered.
     """
     if board.marks is not None or len(board.quarter_turns) == 1:
         return right  # the marks or the colours have determined the order

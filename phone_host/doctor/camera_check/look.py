@@ -93,11 +93,7 @@ def may_tell(window: Window) -> bool:
 
 
 def look(window: Window) -> Reading:
-    """Look at a window.
-
-    Returns:
-        What it tells.
-    """
+    """Look at a window."""
     height, width = window.frames[0].shape
     tracks = follow(window.frames)
     if tracks.points_px.shape[1] < _FEWEST_POINTS or filled_cells(tracks, (width, height)) < _FEWEST_CELLS:

@@ -145,9 +145,6 @@ def compare(tracks: Tracks, model: CameraModel, *, knows_lens: bool) -> Compared
         model: the lens, or a guess.
         knows_lens: whether it was calibrated.
 
-    Returns:
-        Both.
-
     Raises:
         np.linalg.LinAlgError: the points tell nothing.
     """
