@@ -12,7 +12,7 @@ from common.diagnostic import Diagnostic
 from common.doctor.finding import fail, ok, warn
 from common.doctor.package_probe import missing_package
 from common.errors import SettingsError
-from phone_host.native.library import VARIABLE, Library, Missing
+from phone_host.native.library import VARIABLE, Library
 
 OPENCV_WHEELS: Final = (
     "opencv-python-headless",
@@ -109,7 +109,7 @@ def check_package(package: Package) -> Diagnostic:
     return ok(package.name, text)
 
 
-def check_native(library: Library | Missing | SettingsError, wanted: str = "") -> Diagnostic:
+def check_native(library: Library | Diagnostic | SettingsError, wanted: str = "") -> Diagnostic:
     """Judge the native library: without it everything works, but slower.
 
     Args:
@@ -119,7 +119,7 @@ def check_native(library: Library | Missing | SettingsError, wanted: str = "") -
     match library:
         case Library():
             return ok("native", f"own matcher: {library.simd.text}")
-        case Missing(reason=reason, remedy=remedy):
+        case Diagnostic(message=reason, remedy=remedy):
             idle = f"; {VARIABLE}={wanted} has no effect" if wanted else ""
             return warn("native", f"own matcher {reason}; sgbm is used, {_COST_OF_SGBM}{idle}", remedy)
         case _:

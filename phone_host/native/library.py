@@ -13,6 +13,7 @@ from typing import Final
 
 from common.android import INSTALL as TERMUX_INSTALL
 from common.android import is_android
+from common.diagnostic import Diagnostic
 from common.errors import SettingsError, UnavailableError
 from phone_host.native.build_library import LIBRARY_FILE, REASON_FILE
 from phone_host.native.volume_jobs import AbsorbJob, CarveJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
@@ -134,19 +135,6 @@ class RemapJob(ctypes.Structure):
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Missing:
-    """There is no library to use.
-
-    Attributes:
-        reason: why, such as "not built: no C compiler".
-        remedy: what to do about it.
-    """
-
-    reason: str
-    remedy: str
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Library:
     """The loaded library, set to one instruction set. Its functions release the GIL and may run in several threads.
@@ -243,7 +231,7 @@ class Library:
 
 
 @cache
-def native() -> Library | Missing:
+def native() -> Library | Diagnostic:
     """Return the library of this installation, loaded once, or why there is none.
 
     Raises:
@@ -252,18 +240,18 @@ def native() -> Library | Missing:
     return load(_HERE, os.environ.get(VARIABLE, ""))
 
 
-def required(found: Library | Missing) -> Library:
+def required(found: Library | Diagnostic) -> Library:
     """Return the library that the matcher `tandem` needs.
 
     Raises:
         UnavailableError: there is none.
     """
-    if isinstance(found, Missing):
-        raise UnavailableError(f"matcher tandem is {found.reason}", f"{found.remedy}; or use --matcher sgbm")
+    if isinstance(found, Diagnostic):
+        raise UnavailableError(f"matcher tandem is {found.message}", f"{found.remedy}; or use --matcher sgbm")
     return found
 
 
-def load(folder: Path, wanted: str = "") -> Library | Missing:
+def load(folder: Path, wanted: str = "") -> Library | Diagnostic:
     """Load a library.
 
     Args:
@@ -282,9 +270,9 @@ def load(folder: Path, wanted: str = "") -> Library | Missing:
         _declare(handle)
     except AttributeError as error:  # a checkout went on, and its library did not
         lacking = str(error).rpartition(" ")[2]
-        return Missing(reason=f"of an older build, without {lacking}", remedy=_REINSTALL)
+        return _absent(f"of an older build, without {lacking}", _REINSTALL)
     if handle.tandem_abi() != _ABI:
-        return Missing(reason=f"of another version ({path})", remedy=_REINSTALL)
+        return _absent(f"of another version ({path})", _REINSTALL)
     best = next(simd for simd, number in _NUMBERS.items() if number == handle.tandem_isa_best())
     library = Library(handle=handle, simd=best, path=path)
     if not wanted:
@@ -297,30 +285,34 @@ def load(folder: Path, wanted: str = "") -> Library | Missing:
     return library.using(Simd(wanted))
 
 
-def fallback_note(found: Library | Missing) -> str:
+def fallback_note(found: Library | Diagnostic) -> str:
     """Return the sentence for a run's summary where the default matcher had to fall back; empty where the library is there."""
     if isinstance(found, Library):
         return ""
-    return f"own matcher {found.reason}; sgbm is used; {found.remedy}"
+    return f"own matcher {found.message}; sgbm is used; {found.remedy}"
 
 
-def model_note(found: Library | Missing) -> str:
+def model_note(found: Library | Diagnostic) -> str:
     """Return what a scan says where numpy has to make the model; empty where the library is there."""
     if isinstance(found, Library):
         return ""
-    return f"the model is made by numpy, which is slower: the native library is {found.reason}; {found.remedy}"
+    return f"the model is made by numpy, which is slower: the native library is {found.message}; {found.remedy}"
 
 
-def _missing(folder: Path, error: OSError) -> Missing:
+def _missing(folder: Path, error: OSError) -> Diagnostic:
     path = folder / LIBRARY_FILE
     if path.exists():
         detail = " ".join(str(error).split())
-        return Missing(reason=f"cannot be loaded ({detail})", remedy=_REINSTALL)
+        return _absent(f"cannot be loaded ({detail})", _REINSTALL)
     try:
         reason = (folder / REASON_FILE).read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
-        return Missing(reason="not built", remedy=_remedy())
-    return Missing(reason=f"not built: {reason}", remedy=_remedy())
+        return _absent("not built", _remedy())
+    return _absent(f"not built: {reason}", _remedy())
+
+
+def _absent(reason: str, remedy: str) -> Diagnostic:
+    return Diagnostic(reason, remedy, code="native")
 
 
 def _remedy() -> str:

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
 from phone_host.model import CloudImage, Image
-from phone_host.native.library import Library, Missing, PackJob, native
+from phone_host.native.library import Library, PackJob, native
 from phone_host.output.atomic import write_parts
 from phone_host.output.axes import Axes
 from phone_host.output.strips import strips
@@ -136,7 +137,7 @@ def _header(count: int, axes: Axes, further: str = "") -> bytes:
 
 
 def packed_points(
-    cloud: CloudImage, colours: Image, axes: Axes = Axes.CAMERA, library: Library | Missing | None = None
+    cloud: CloudImage, colours: Image, axes: Axes = Axes.CAMERA, library: Library | Diagnostic | None = None
 ) -> NDArray[np.void]:
     """Pack the finite points of a cloud image with their colours, as the vertices of a PLY file, row by row.
 

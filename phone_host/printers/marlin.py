@@ -14,6 +14,7 @@ print.md 6 of the project's studies (measured against OctoPrint's and Printrun's
 from collections.abc import Iterator
 from typing import Final, assert_never
 
+from common.diagnostic import Diagnostic
 from phone_host.printers import marlin_problems as problems
 from phone_host.printers.cooling import wake
 from phone_host.printers.gcode import Line, name_of
@@ -58,8 +59,7 @@ class MarlinSender:
         resent: lines that were sent again.
         heat: the last temperatures that were reported.
         message: what the printer shows or waits for; empty: nothing.
-        problem: why it failed, in words; empty: it did not.
-        remedy: what to do about it.
+        failure: why it failed; problems.NO_FAILURE: it did not.
         off: lines that switch off what the print heats.
         cooling: whether the printer has done them.
 
@@ -89,7 +89,7 @@ class MarlinSender:
         self.phase = Phase.OPENING
         self.done = self.resent = 0
         self.heat = Heat()
-        self.message = self.problem = self.remedy = ""
+        self.message, self.failure = "", problems.NO_FAILURE
 
     @property
     def may_pause(self) -> bool:
@@ -398,5 +398,5 @@ class MarlinSender:
         else:
             self.phase = phase
 
-    def _fail(self, problem: problems.Problem) -> None:
-        self.phase, self.problem, self.remedy = Phase.FAILED, problem.words, problem.remedy
+    def _fail(self, failure: Diagnostic) -> None:
+        self.phase, self.failure = Phase.FAILED, failure

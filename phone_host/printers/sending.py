@@ -97,8 +97,8 @@ def _ended(sender: MarlinSender, facts: GcodeFacts, commands: "_FileCommands") -
         phase=Phase.CANCELLED if is_left else sender.phase,
         share=done / facts.lines,
         resent=sender.resent,
-        problem=sender.problem,
-        remedy=sender.remedy + left if sender.phase is Phase.FAILED else "",
+        problem=sender.failure.message,
+        remedy=sender.failure.remedy + left if sender.phase is Phase.FAILED else "",
         notes=notes,
     )
 
@@ -219,7 +219,7 @@ def send(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[], No
         if sender.phase not in {Phase.DONE, Phase.CANCELLED} and not sender.cooling.is_confirmed:
             is_written = line.offer(last_lines(sender.off), _LAST_S)
     if not is_written:
-        problem = f"{sender.problem}, and " if sender.problem else ""
+        problem = f"{sender.failure.message}, and " if sender.failure.message else ""
         raise PrinterGoneError(
             f"{problem}the lines that switch the printer's heaters off could not be written",
             "go and look; switch it off if its display does not say that they are cold",
@@ -264,7 +264,7 @@ def _exchange(line: Line, sender: MarlinSender, wishes: Wishes, tell: Callable[[
             _obey(sender.heard(each.decode("ascii", "replace"), now.monotonic_ns()), wishes)
         rest = rest[-_MOST_LINE:]
     if failure is not None and sender.phase is Phase.FAILED:  # it may be hot, too
-        raise DataError(f"{failure.problem}; {sender.problem}", f"{failure.remedy}; {sender.remedy}")
+        raise DataError(f"{failure.problem}; {sender.failure.message}", f"{failure.remedy}; {sender.failure.remedy}")
     if failure is not None:
         raise failure
 

@@ -12,8 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.native.volume_jobs import CarveJob
 from phone_host.scan.box import Cells
 from phone_host.scan.view import View
@@ -53,7 +54,7 @@ class Carving:
         views: that were seen.
     """
 
-    def __init__(self, cells: Cells, threads: int = 1, library: Library | Missing | None = None) -> None:
+    def __init__(self, cells: Cells, threads: int = 1, library: Library | Diagnostic | None = None) -> None:
         found = native() if library is None else library
         self._library = found if isinstance(found, Library) else None
         self._threads, self.cells, self.views = threads, cells, 0

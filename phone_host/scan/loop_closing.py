@@ -14,9 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.native.library import Library, Missing
+from phone_host.native.library import Library
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.relocalisation import lies_alone, shown_place
 from phone_host.scan.stretches import ClosedLoop, Placed, Stretches, WayCertainty
@@ -161,7 +162,7 @@ class LoopCloser:
     """Knows the stretches of a model, and closes loops between them."""
 
     def __init__(
-        self, settings: LoopSettings, model: Piece, threads: int, gate: PoseGate, library: Library | Missing
+        self, settings: LoopSettings, model: Piece, threads: int, gate: PoseGate, library: Library | Diagnostic
     ) -> None:
         self._settings, self._model = settings, model
         self._threads, self._gate, self._library = threads, gate, library

@@ -14,8 +14,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.scan.box import Box
 from phone_host.scan.exact_depths import with_exact_depths, without_reflections
 from phone_host.scan.mat import ABOVE_M, Mat, mat_corners
@@ -88,7 +89,7 @@ class MatFinder:
 class MatPoses(PoseSource):
     """Poses from a mat, and the model of what stands on it."""
 
-    def __init__(self, wanted: ScanWanted, mat: Mat, library: Library | Missing | None = None) -> None:
+    def __init__(self, wanted: ScanWanted, mat: Mat, library: Library | Diagnostic | None = None) -> None:
         self._found = native() if library is None else library
         self._library = self._found if isinstance(self._found, Library) else None
         self._wanted, self._finder, self._box = wanted, MatFinder(mat), wanted.model_box or mat.room

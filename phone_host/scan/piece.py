@@ -9,8 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing
+from phone_host.native.library import Library
 from phone_host.scan.odometry import Moved
 from phone_host.scan.places import Places
 from phone_host.scan.registration import Registered, RegistrationSettings, registered
@@ -90,7 +91,7 @@ class Piece:
         usual_off_sigmas: usual distance of a view from the field, by the noise of its depths there; NaN: none was compared yet.
     """
 
-    def __init__(self, settings: VolumeSettings, threads: int, gate: PoseGate, library: Library | Missing) -> None:
+    def __init__(self, settings: VolumeSettings, threads: int, gate: PoseGate, library: Library | Diagnostic) -> None:
         self.volume, self.places, self.usual_off_sigmas = Volume(settings, threads, library), Places(), float("nan")
         self._library = library if isinstance(library, Library) else None
         self._threads, self._gate = threads, gate

@@ -9,8 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing
+from phone_host.native.library import Library
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.graph import Loop, chained, connected, without_outliers
 from phone_host.scan.motion_belief import Belief, UsualStep
@@ -73,7 +74,7 @@ class Pieces:
         settings: VolumeSettings,
         threads: int,
         gate: PoseGate,
-        library: Library | Missing,
+        library: Library | Diagnostic,
         *,
         coarsens: bool = False,
     ) -> None:

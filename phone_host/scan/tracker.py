@@ -14,8 +14,9 @@ from typing import Final
 
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.scan.loop_closing import LoopCloser, LoopSettings
 from phone_host.scan.odometry import Moved, Odometry, odometry_for
 from phone_host.scan.piece import Found, Joined, Joining, Piece, PoseGate, pose_gate_for
@@ -83,7 +84,7 @@ class Tracker:
         threads: int = 1,
         start: SE3 | None = None,
         gate: PoseGate | None = None,
-        library: Library | Missing | None = None,
+        library: Library | Diagnostic | None = None,
         *,
         loops: LoopSettings | None = None,
         coarsens: bool = False,

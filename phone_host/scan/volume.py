@@ -13,9 +13,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.native.volume_jobs import (
     AbsorbJob,
     CarveJob,
@@ -82,7 +83,7 @@ class Volume:
         left_out: blocks for which there was no memory.
     """
 
-    def __init__(self, settings: VolumeSettings, threads: int = 1, library: Library | Missing | None = None) -> None:
+    def __init__(self, settings: VolumeSettings, threads: int = 1, library: Library | Diagnostic | None = None) -> None:
         self.settings, self._threads = settings, threads
         found = native() if library is None else library
         self._library = found if isinstance(found, Library) else None

@@ -1,11 +1,12 @@
 """Which matcher a command uses when nobody names one: the preferred one where it works, else the one that works everywhere."""
 
+from common.diagnostic import Diagnostic
 from common.errors import SettingsError
-from phone_host.native.library import Library, Missing, fallback_note, native
+from phone_host.native.library import Library, fallback_note, native
 from phone_host.stereo.matcher_names import FALLBACK, PREFERRED, MatcherName
 
 
-def default_matcher(preferred: MatcherName = PREFERRED, library: Library | Missing | None = None) -> MatcherName:
+def default_matcher(preferred: MatcherName = PREFERRED, library: Library | Diagnostic | None = None) -> MatcherName:
     """Return the matcher of this machine.
 
     Args:
@@ -15,7 +16,7 @@ def default_matcher(preferred: MatcherName = PREFERRED, library: Library | Missi
     return preferred if _lacking(preferred, library) is None else FALLBACK
 
 
-def default_note(preferred: MatcherName = PREFERRED, library: Library | Missing | None = None) -> str:
+def default_note(preferred: MatcherName = PREFERRED, library: Library | Diagnostic | None = None) -> str:
     """Return what a summary says where the default is not the preferred matcher; empty where it is.
 
     Args:
@@ -26,7 +27,7 @@ def default_note(preferred: MatcherName = PREFERRED, library: Library | Missing 
     return "" if lacking is None else fallback_note(lacking)
 
 
-def _lacking(preferred: MatcherName, library: Library | Missing | None) -> Missing | None:
+def _lacking(preferred: MatcherName, library: Library | Diagnostic | None) -> Diagnostic | None:
     """Return why the preferred matcher does not work; None if it does."""
     if preferred is not MatcherName.TANDEM:
         return None
@@ -34,4 +35,4 @@ def _lacking(preferred: MatcherName, library: Library | Missing | None) -> Missi
         found = native() if library is None else library
     except SettingsError:  # the library is there; whoever computes with it says that TANDEMSCAN_SIMD is wrong
         return None
-    return found if isinstance(found, Missing) else None
+    return found if isinstance(found, Diagnostic) else None

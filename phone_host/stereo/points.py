@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from phone_host.model import CloudImage, CutCounts, DepthLimits, Disparity, StereoGeometry
-from phone_host.native.library import Library, Missing, ReprojectJob, native
+from phone_host.native.library import Library, ReprojectJob, native
 from phone_host.stereo.depth_limits import above_zero, cut_cloud, drop_zeros, float32_below, is_wide
 from phone_host.stereo.reproject import least_in_front_px, rays, reproject
 
@@ -32,7 +33,7 @@ def points_of(
     matched: Disparity,
     geometry: StereoGeometry,
     limits: DepthLimits,
-    library: Library | Missing | None = None,
+    library: Library | Diagnostic | None = None,
 ) -> Points:
     """Drop the disparities that are no measurement, compute the points of the others, cut and count them.
 

@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from phone_host.model import Image
-from phone_host.native.library import Library, Missing, RemapJob, Simd, native
+from phone_host.native.library import Library, RemapJob, Simd, native
 
 Maps = tuple["cv2.typing.MatLike", "cv2.typing.MatLike"]
 """(H, W, 2) int16 and (H, W) uint16, as `cv2.convertMaps` makes them for CV_16SC2. Only OpenCV's wheels have `cv2.typing`: Termux's and Debian's packages lack it."""
@@ -16,7 +17,7 @@ _FASTER = frozenset({Simd.AVX512, Simd.AVX2, Simd.SSE41})
 _MOST_SIDE_PX = 32767  # places are int16
 
 
-def remap(image: Image, maps: Maps, library: Library | Missing | None = None) -> Image:
+def remap(image: Image, maps: Maps, library: Library | Diagnostic | None = None) -> Image:
     """Interpolate an image where a map points, to 1/32 px; beyond its edge the edge goes on.
 
     Args:

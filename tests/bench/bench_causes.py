@@ -128,7 +128,9 @@ def _judge(case: _Case) -> _Judged:
         maker = MAKERS[case.made]
     made = maker(np.random.default_rng([case.seed, 0 if case.made is None else 1 + list(Mistake).index(case.made)]))
     found = finding_of(made)
-    return _Judged(case, None if found is None else found.mistake, made.truth, "" if found is None else found.sentence)
+    return _Judged(
+        case, None if found is None else Mistake(found.code), made.truth, "" if found is None else found.message
+    )
 
 
 def _matrix(judged: list[_Judged]) -> Table:

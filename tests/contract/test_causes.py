@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
 from phone_host.calibration.failure_modes.deviating import deviation
-from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, unturned
+from phone_host.calibration.failure_modes.mistakes import Course, Mistake, mistaken, unturned
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.failure_modes.partners import wrong_partners
 from phone_host.calibration.solve.calibrate import calibrate
@@ -36,7 +37,7 @@ def _random(seed: int) -> np.random.Generator:
 
 
 @cache
-def _unstiff(course: Course) -> tuple[Made, Finding]:
+def _unstiff(course: Course) -> tuple[Made, Diagnostic]:
     """The first small series whose cameras turn in a way, and what is named."""
     word = {Course.DRIFT: "drift", Course.KNOCK: "knock", Course.LOOSE: "loose"}[course]
     series = (unstiff(_random(seed)) for seed in range(99))
@@ -52,8 +53,8 @@ def test_each_mistake_is_named(mistake: Mistake) -> None:
     made = next(made for made in (MAKERS[mistake](_random(seed)) for seed in range(30)) if len(made.pairs) <= _FEW)
     found = finding_of(replace(made, images=made.images[:3]))
     assert found is not None
-    assert found.mistake is mistake
-    assert found.sentence
+    assert found.code is mistake
+    assert found.message
     assert found.remedy
 
 
@@ -73,13 +74,13 @@ def test_a_turn_is_measured_and_undone(course: Course) -> None:
     """The angle is that of the truth within three standard deviations and a tenth; without it the rig is that of the last view."""
     made, found = _unstiff(course)
     degrees = float(made.truth.split()[1])
-    assert found.mistake is Mistake.UNSTIFF
-    assert found.turned is not None
-    assert found.turned.course is course
-    angle = math.degrees(float(np.linalg.norm(found.turned.turn_rad)))
-    sigma = math.degrees(float(np.linalg.norm(found.turned.sigma_rad)))
+    assert found.code is Mistake.UNSTIFF
+    assert found.evidence.turned is not None
+    assert found.evidence.turned.course is course
+    angle = math.degrees(float(np.linalg.norm(found.evidence.turned.turn_rad)))
+    sigma = math.degrees(float(np.linalg.norm(found.evidence.turned.sigma_rad)))
     assert angle == pytest.approx(degrees, abs=3 * sigma + 0.1 * degrees)
-    stiff = calibrate(unturned(made.pairs, found.turned), made.board, made.sizes_px)
+    stiff = calibrate(unturned(made.pairs, found.evidence.turned), made.board, made.sizes_px)
     loose = calibrate(made.pairs, made.board, made.sizes_px)
     assert len(stiff.used) == len(made.pairs)
     off = [
@@ -99,18 +100,18 @@ def test_a_roll_costs_rows_at_the_edges() -> None:
         pairs += exact_pairs(turned, pose[np.newaxis], noise_px=0.03, seed=index)
     found = deviation(tuple(pairs), BOARD, ((320, 240), (400, 300)))
     assert found is not None
-    assert found.turned is not None
-    assert found.turned.rows_px == pytest.approx(roll * 200, rel=0.1)
-    assert "rows differ by up to 1." in found.sentence
+    assert found.evidence.turned is not None
+    assert found.evidence.turned.rows_px == pytest.approx(roll * 200, rel=0.1)
+    assert "rows differ by up to 1." in found.message
 
 
 def test_a_loose_rig_is_told_from_a_board_that_moved() -> None:
     """Cameras that wobble about the middle of their bar: the scatter is that of the truth."""
     made, found = _unstiff(Course.LOOSE)
-    assert found.turned is not None
-    assert found.turned.course is Course.LOOSE
+    assert found.evidence.turned is not None
+    assert found.evidence.turned.course is Course.LOOSE
     truth = math.radians(float(made.truth.split()[1]))
-    assert float(np.linalg.norm(found.turned.turn_rad)) == pytest.approx(truth * math.sqrt(3), rel=0.4)
+    assert float(np.linalg.norm(found.evidence.turned.turn_rad)) == pytest.approx(truth * math.sqrt(3), rel=0.4)
 
 
 def test_a_stretched_print_is_told_though_it_makes_a_view_look_wrong() -> None:
@@ -118,8 +119,8 @@ def test_a_stretched_print_is_told_though_it_makes_a_view_look_wrong() -> None:
     made = MAKERS[Mistake.SQUARE](np.random.default_rng([10, 1 + list(Mistake).index(Mistake.SQUARE)]))
     found = finding_of(made)
     assert found is not None
-    assert found.mistake is Mistake.SQUARE, found.sentence
-    assert "wider" in found.sentence
+    assert found.code is Mistake.SQUARE, found.message
+    assert "wider" in found.message
 
 
 def test_few_views_with_much_motion_do_not_hide_a_rolling_shutter() -> None:
@@ -127,7 +128,7 @@ def test_few_views_with_much_motion_do_not_hide_a_rolling_shutter() -> None:
     made = MAKERS[Mistake.ROWS](np.random.default_rng([12, 1 + list(Mistake).index(Mistake.ROWS)]))
     found = deviation(tuple(made.pairs), made.board, made.sizes_px)
     assert found is not None
-    assert found.mistake is Mistake.ROWS, found.sentence
+    assert found.code is Mistake.ROWS, found.message
 
 
 def test_the_true_partners_are_named() -> None:
@@ -143,11 +144,9 @@ def test_wrong_partners_are_told_also_where_no_rig_can_be_rectified() -> None:
     pairs = exact_pairs(small_rig(), poses(6, seed=8))
     found = calibrate(pairs, BOARD, ((640, 480), (640, 480)))
     broken = replace(found, rectification=None, obstacle=DataError("the cameras stand nowhere", "take other pictures"))
-    finding = Finding(
-        mistake=Mistake.PARTNERS, sentence="the numbers are shifted", remedy="rename them", most=Verdict.REJECT
-    )
+    finding = mistaken(Mistake.PARTNERS, "the numbers are shifted", "rename them", most=Verdict.REJECT)
     assert assessed(broken, (), finding, "") == Assessment(Verdict.REJECT, "the numbers are shifted: rename them")
-    other = replace(finding, mistake=Mistake.SQUARE)
+    other = replace(finding, code=Mistake.SQUARE)
     assert "shifted" not in assessed(broken, (), other, "").remedy
 
 
@@ -163,9 +162,9 @@ def test_shifted_numbers_are_told_as_such(shift: int) -> None:
     series = BoardSeries(pairs=tuple(pairs), board=made.board, sizes_px=made.sizes_px)
     found = name_mistake(series, DataError("no lens explains the views", ""))
     assert found is not None
-    assert found.mistake is Mistake.PARTNERS
+    assert found.code is Mistake.PARTNERS
     way = "1 lower" if shift > 0 else "1 higher"
-    assert found.sentence.endswith(f"each left picture belongs to the right one whose number is {way}")
+    assert found.message.endswith(f"each left picture belongs to the right one whose number is {way}")
 
 
 def test_a_blurred_edge_is_as_wide_as_its_blur() -> None:
@@ -185,7 +184,7 @@ def test_a_blurred_edge_is_as_wide_as_its_blur() -> None:
 
 def test_a_mistake_is_the_first_remedy_and_caps_the_verdict() -> None:
     """A rig whose bar is loose is at most usable; what was rejected stays so."""
-    finding = Finding(mistake=Mistake.UNSTIFF, sentence="they turned", remedy="tighten it", most=Verdict.USABLE)
+    finding = mistaken(Mistake.UNSTIFF, "they turned", "tighten it", most=Verdict.USABLE)
     assert with_cause(Assessment(Verdict.GOOD, ""), finding) == Assessment(Verdict.USABLE, "they turned: tighten it")
     assert with_cause(Assessment(Verdict.REJECT, "x"), finding).verdict is Verdict.REJECT
 
@@ -198,7 +197,7 @@ def test_a_real_series_and_the_mistakes_made_on_it() -> None:
     for what, mistake, made in variants("opencv_stereo_calib"):
         if not made.images:
             found = finding_of(made)
-            assert (what, None if found is None else found.mistake) == (what, mistake)
+            assert (what, None if found is None else found.code) == (what, mistake)
 
 
 @pytest.mark.slow
@@ -209,8 +208,8 @@ def test_a_real_rig_that_turned_is_told() -> None:
     pairs, board, sizes_px = real_pairs("simplestereo_rig1")
     found = deviation(pairs, board, sizes_px)
     assert found is not None
-    assert found.turned is not None
-    assert found.turned.course is Course.DRIFT
-    assert abs(found.turned.turn_rad[0]) > 5 * found.turned.sigma_rad[0]
+    assert found.evidence.turned is not None
+    assert found.evidence.turned.course is Course.DRIFT
+    assert abs(found.evidence.turned.turn_rad[0]) > 5 * found.evidence.turned.sigma_rad[0]
     before = calibrate(list(pairs), board, sizes_px).rig.rms_stereo_px
-    assert calibrate(unturned(list(pairs), found.turned), board, sizes_px).rig.rms_stereo_px < 0.97 * before
+    assert calibrate(unturned(list(pairs), found.evidence.turned), board, sizes_px).rig.rms_stereo_px < 0.97 * before

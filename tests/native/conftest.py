@@ -17,7 +17,7 @@ def native_library() -> Library:
     """The library under test, on the widest instruction set of this processor."""
     found = load(Path(os.environ.get(FOLDER, str(Path(product.__file__).parent))))
     if not isinstance(found, Library):
-        pytest.fail(f"no native library ({found.reason}): run make native")
+        pytest.fail(f"no native library ({found.message}): run make native")
     return found
 
 

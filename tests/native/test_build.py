@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from common.diagnostic import Diagnostic
 from common.errors import SettingsError
 from phone_host.doctor.host_checks import check_native
 from phone_host.native import build_library
@@ -21,7 +22,7 @@ from phone_host.native.build_library import (
     build_or_explain,
     sources_digest,
 )
-from phone_host.native.library import IsaState, Library, Missing, Simd, fallback_note, load, model_note
+from phone_host.native.library import IsaState, Library, Simd, fallback_note, load, model_note
 
 ROOT = Path(__file__).resolve().parents[2]
 NATIVE = "phone_host/native"
@@ -86,8 +87,8 @@ def test_a_build_that_fails_leaves_its_reason(
     monkeypatch.setenv("CC", compiler)
     assert build_or_explain(tmp_path) == reason
     found = load(tmp_path)
-    assert isinstance(found, Missing)
-    assert (found.reason, found.remedy[:23]) == (f"not built: {reason}", "install gcc or clang an")
+    assert isinstance(found, Diagnostic)
+    assert (found.message, found.remedy[:23]) == (f"not built: {reason}", "install gcc or clang an")
     assert fallback_note(found).startswith(f"own matcher not built: {reason}; sgbm is used; install gcc")
 
 
@@ -112,12 +113,12 @@ def test_a_library_that_cannot_be_loaded_or_is_of_another_version(tmp_path: Path
     """Damaged files and other libraries of that name are no crash, but a reason with a remedy."""
     (tmp_path / LIBRARY_FILE).write_bytes(b"\x7fELF damaged")
     found = load(tmp_path)
-    assert isinstance(found, Missing)
-    assert found.reason.startswith("cannot be loaded (")
+    assert isinstance(found, Diagnostic)
+    assert found.message.startswith("cannot be loaded (")
     source = tmp_path / "other.c"
     source.write_text("int tandem_abi(void) { return 0; }\n")
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / LIBRARY_FILE, source], check=True)
-    assert isinstance(load(tmp_path), Missing)
+    assert isinstance(load(tmp_path), Diagnostic)
 
 
 def test_a_library_of_an_older_build_is_told_and_not_used(native_library: Library, tmp_path: Path) -> None:
@@ -126,9 +127,9 @@ def test_a_library_of_an_older_build_is_told_and_not_used(native_library: Librar
     assert b"\0tandem_absorb\0" in content
     (tmp_path / LIBRARY_FILE).write_bytes(content.replace(b"\0tandem_absorb\0", b"\0tandem_abszzz\0"))
     found = load(tmp_path)
-    assert found == Missing(
-        reason="of an older build, without tandem_absorb", remedy="reinstall; in a checkout: make native"
-    )
+    assert isinstance(found, Diagnostic)
+    assert found.message == "of an older build, without tandem_absorb"
+    assert found.remedy == "reinstall; in a checkout: make native"
     assert "of an older build, without tandem_absorb" in check_native(found).message
     for note in (model_note(found), fallback_note(found)):
         assert "of an older build, without tandem_absorb; " in note

@@ -6,13 +6,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from common.diagnostic import Diagnostic
 from phone_host.model import DepthLimits, Disparity, StereoGeometry
-from phone_host.native.library import Library, Missing
+from phone_host.native.library import Library
 from phone_host.output.axes import Axes
 from phone_host.output.ply import packed_points
 from phone_host.stereo.points import Points, points_of
 
-NONE = Missing(reason="left out by this test", remedy="none")
+NONE = Diagnostic(message="left out by this test", remedy="none")
 VALUES = st.one_of(
     st.floats(-3, 130, width=32),
     st.sampled_from([np.nan, np.inf, -np.inf, 0.0, -0.0, 0.25, 1e-45, 1e-30, 3.4e38, -3.4e38]),

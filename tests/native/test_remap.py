@@ -6,11 +6,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from common.diagnostic import Diagnostic
 from phone_host.model import Image
-from phone_host.native.library import Library, Missing
+from phone_host.native.library import Library
 from phone_host.stereo.remap import Maps, remap, remap_by
 
-NONE = Missing(reason="left out by this test", remedy="none")
+NONE = Diagnostic(message="left out by this test", remedy="none")
 same_fixture = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80, deadline=None)
 
 

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.native.library import Library, Missing
+from phone_host.native.library import Library
 from phone_host.scan.box import Cells
 from phone_host.scan.carving import Carving
 from phone_host.scan.view import Depth, View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
 
-NONE = Missing(reason="left out by this test", remedy="none")
+NONE = Diagnostic(message="left out by this test", remedy="none")
 SETTINGS = VolumeSettings(voxel_m=0.02, far_m=3.0)
 SHAPES = [(1, 1), (29, 1), (17, 23)]
 POSES = [SE3.identity(), SE3.of(np.array([0.4, -0.3, 0.2, 0.1, -0.05, -0.3])), SE3.of(np.array([0, 3.0, 0, 0, 0, 1.0]))]
@@ -31,7 +32,7 @@ def odd_view(shape: tuple[int, int], seed: int = 1) -> View:
     return View(grey=grey, colours=np.dstack([grey] * 3), depth_m=depth, geometry=geometry, noise_px=0.2)
 
 
-def carved(cells: Cells, view: View, threads: int, library: Library | Missing) -> Carving:
+def carved(cells: Cells, view: View, threads: int, library: Library | Diagnostic) -> Carving:
     """Cells that a view has looked through from all places, the last one twice."""
     carving = Carving(cells, threads, library)
     for pose in (*POSES, POSES[-1]):

@@ -157,8 +157,8 @@ def test_a_printer_that_fails_is_told(said: str, words: str) -> None:
         sender = printed(there, cube(300))
         until(lambda: there.nozzle == there.bed == 0.0, "it was told to be cold, should it hear that")
     assert sender.phase is Phase.FAILED
-    assert words in sender.problem
-    assert sender.remedy
+    assert words in sender.failure.message
+    assert sender.failure.remedy
     assert len(there.done) < 60
 
 

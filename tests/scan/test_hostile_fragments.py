@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import Arrays, field_bytes, field_of, packed, unpacked
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
@@ -134,7 +135,7 @@ def test_sound_fields_are_far_from_the_limits() -> None:
 
 @pytest.mark.parametrize("library", _LIBRARIES, ids=["numpy", "native"][: len(_LIBRARIES)])
 @pytest.mark.parametrize("far_m", [1e3, 1e30, float("inf")])
-def test_rays_end_for_any_far_limit(library: Library | Missing, far_m: float) -> None:
+def test_rays_end_for_any_far_limit(library: Library | Diagnostic, far_m: float) -> None:
     """The surface is that of the usual limit, bit for bit, and a camera that looks away, or stands beyond all distances, sees nothing."""
     usual = filled(library)
     volume = Volume(replace(SETTINGS, far_m=far_m), 1, library)

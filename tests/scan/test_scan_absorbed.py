@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.mesh import mesh_of
 from phone_host.scan.view import Camera
@@ -17,7 +18,7 @@ THERE = SE3.of(np.array([0.05, 0.3, -0.1, 0.21, -0.07, 0.13]))
 VIEW = plane_view(SE3.identity(), texture(), CORNER)
 
 
-def field(library: Library | Missing | None = None, settings: VolumeSettings = SETTINGS) -> Volume:
+def field(library: Library | Diagnostic | None = None, settings: VolumeSettings = SETTINGS) -> Volume:
     """A corner, seen from its own origin."""
     volume = Volume(settings, 2, library)
     volume.fuse(VIEW, SE3.identity())

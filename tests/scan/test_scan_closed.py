@@ -8,8 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.ply import PointCloud, write_surface
@@ -28,7 +29,7 @@ from tests.support.solid_views import Thing, around, thing_view
 THING = Thing()
 BOX = Box((-0.1, -0.1, 0.0), (0.1, 0.1, 0.15))
 SETTINGS = VolumeSettings(voxel_m=0.003, far_m=1.0, truncation_voxels=6.0)
-NONE = Missing(reason="not built", remedy="")
+NONE = Diagnostic(message="not built", remedy="")
 with_library = pytest.mark.skipif(not isinstance(native(), Library), reason="the native library is not built")
 
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError, SettingsError
 from common.ledger import StageTimes
 from common.words import distance_text
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair
-from phone_host.native.library import Missing
 from phone_host.run.kept_submaps import KeptSubmaps, read_submaps
 from phone_host.run.scan_result import memory_remarks
 from phone_host.scan.box import Box
@@ -121,7 +121,7 @@ def test_a_damaged_submap_is_named(cut: int) -> None:
 def test_values_are_put_as_far_as_there_is_memory() -> None:
     """Without room for all blocks, the first ones have their values, the others are counted; the same with numpy alone."""
     view = plane_view(SE3.identity(), PICTURE, CORNER)
-    volume = Volume(VolumeSettings(voxel_m=0.02, far_m=3.0), library=Missing(reason="not built", remedy=""))
+    volume = Volume(VolumeSettings(voxel_m=0.02, far_m=3.0), library=Diagnostic(message="not built", remedy=""))
     volume.fuse(view, SE3.identity())
     values = volume.changed_blocks()
     assert len(volume.changed_blocks().places) == 0

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.tracked import Tracked
 from phone_host.scan.tracker import Tracker
@@ -37,8 +38,8 @@ def states(told: list[Tracked]) -> list[Tracking]:
     return [each.state for each in told]
 
 
-@pytest.mark.parametrize("library", [native(), Missing(reason="not built", remedy="")])
-def test_a_camera_is_tracked_against_the_model(library: Library | Missing) -> None:
+@pytest.mark.parametrize("library", [native(), Diagnostic(message="not built", remedy="")])
+def test_a_camera_is_tracked_against_the_model(library: Library | Diagnostic) -> None:
     """Every pose within 1 mm and 0.1 degrees of the truth, all fused, with the library and with numpy."""
     told = run(film(POSES[:4]), Tracker(SETTINGS, 2, library=library))
     assert states(told) == [Tracking.TRACKING] * 4

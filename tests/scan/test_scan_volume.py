@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
-from phone_host.native.library import Library, Missing, native
+from phone_host.native.library import Library, native
 from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
 from phone_host.scan.mesh import Mesh, cube_cases, mesh_of
 from phone_host.scan.registration import RegistrationSettings, Trial, registered, summed
@@ -17,7 +18,7 @@ from tests.support.plane_films import CORNER, GEOMETRY, WALL, distance, path, pl
 
 PICTURE = texture()
 POSES = path(3, np.array([0.01, 0.02, -0.01, 0.02, -0.01, 0.02]))
-NONE = Missing(reason="not built", remedy="")
+NONE = Diagnostic(message="not built", remedy="")
 SETTINGS = VolumeSettings(voxel_m=0.02, far_m=3.0)
 
 with_library = pytest.mark.skipif(not isinstance(native(), Library), reason="the native library is not built")
@@ -30,7 +31,7 @@ def views() -> list[View]:
     return made
 
 
-def filled(library: Library | Missing, threads: int = 1, settings: VolumeSettings = SETTINGS) -> Volume:
+def filled(library: Library | Diagnostic, threads: int = 1, settings: VolumeSettings = SETTINGS) -> Volume:
     """A volume with the three views."""
     volume = Volume(settings, threads, library)
     for view, pose in zip(views(), POSES, strict=True):
@@ -119,7 +120,7 @@ def test_far_depths_weigh_less_and_weights_end() -> None:
 
 
 @pytest.mark.parametrize("library", [native(), NONE])
-def test_memory_is_bounded(library: Library | Missing) -> None:
+def test_memory_is_bounded(library: Library | Diagnostic) -> None:
     """What finds no room is counted, and the rest is fused."""
     volume = Volume(replace(SETTINGS, most_bytes=300 * BLOCK_BYTES), 1, library)
     small = Volume(replace(SETTINGS, most_bytes=20 * BLOCK_BYTES), 1, library)

@@ -1,7 +1,7 @@
 """Names the mistake of a made series the way `phone-host calibrate` does, from corners or from images."""
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
-from phone_host.calibration.failure_modes.mistakes import Finding
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.result import Calibration
@@ -12,7 +12,7 @@ from phone_host.model import Side
 from tests.support.cause_series import Made
 
 
-def finding_of(made: Made) -> Finding | None:
+def finding_of(made: Made) -> Diagnostic | None:
     """What a series's views tell."""
     pairs, looks = list(made.pairs), list[SeenLook]()
     for index, images in enumerate(made.images):

@@ -200,5 +200,9 @@ def named_real_series() -> Iterator[RealNamed]:
         for what, mistake, made in variants(name):
             found = finding_of(made)
             yield RealNamed(
-                name, what, mistake, None if found is None else found.mistake, "" if found is None else found.sentence
+                name,
+                what,
+                mistake,
+                None if found is None else Mistake(found.code),
+                "" if found is None else found.message,
             )

@@ -11,6 +11,7 @@ from typing import Final
 import cv2
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from phone_host.calibration.failure_modes.lone import apart_px, both_alone
 from phone_host.calibration.failure_modes.loosened import (
     FOCUS_LEFT,
@@ -22,7 +23,7 @@ from phone_host.calibration.failure_modes.loosened import (
     camera_arrays,
     loosen,
 )
-from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, Turned
+from phone_host.calibration.failure_modes.mistakes import Course, Mistake, Turned, mistaken
 from phone_host.calibration.failure_modes.rules import Rule, Weighed, again, criterion, scatter, significance, weighed
 from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.solve.calibrate import Sizes
@@ -90,7 +91,7 @@ class _Fitted:
         return self.free(Rule.STIFF, 0)
 
 
-def deviation(pairs: tuple[BoardPair, ...], board: Board, sizes_px: Sizes) -> Finding | None:
+def deviation(pairs: tuple[BoardPair, ...], board: Board, sizes_px: Sizes) -> Diagnostic | None:
     """Name how the pairs, in the order in which they were taken, deviate from one stiff rig.
 
     Returns:
@@ -104,7 +105,7 @@ def deviation(pairs: tuple[BoardPair, ...], board: Board, sizes_px: Sizes) -> Fi
         found = _named(fitted, sizes_px)
         together = _together(fitted)  # a few pairs that fit nothing are not the series's mistake
         is_lone = together is not None and len(fitted.kept) - len(together) == 1
-        if found is not None and found.mistake in {Mistake.UNSTIFF, Mistake.FOCUS} and not is_lone:
+        if found is not None and found.code in {Mistake.UNSTIFF, Mistake.FOCUS} and not is_lone:
             return found  # many pairs lie apart for it; a single one may only look like it
         if together is None or len(together) == len(taken):
             return found
@@ -175,7 +176,7 @@ def _together(fitted: _Fitted) -> list[BoardPair] | None:
     return [pair for pair, good in zip(fitted.kept, inside, strict=True) if good]
 
 
-def _named(fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
+def _named(fitted: _Fitted, sizes_px: Sizes) -> Diagnostic | None:
     # Two rigs that have nothing in common but their lenses leave at least what each view leaves alone.
     least = criterion(max(fitted.lone_px2, 1e-12), 6 * fitted.loose.count, fitted.loose)
     courses = [
@@ -188,7 +189,7 @@ def _named(fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
             continue
         found = _believed(each, fitted, sizes_px)
         if found is not None:
-            return replace(found, explained_px=_explained_px(each, fitted))
+            return replace(found, evidence=replace(found.evidence, explained_px=_explained_px(each, fitted)))
     return None
 
 
@@ -196,7 +197,7 @@ def _explained_px(each: Weighed, fitted: _Fitted) -> float:
     return math.sqrt(max(0.0, 2 * (fitted.stiff.squares_px2 - each.squares_px2) / fitted.loose.numbers))
 
 
-def _believed(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
+def _believed(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Diagnostic | None:
     """Return what a rule other than STIFF says, if it says something that a good series would not."""
     match each.rule:
         case Rule.DRIFT | Rule.KNOCK:
@@ -208,7 +209,7 @@ def _believed(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None
             return _scattered(each, fitted, sizes_px)
 
 
-def _turned(each: Weighed, fitted: _Fitted, size_px: tuple[int, int]) -> Finding | None:
+def _turned(each: Weighed, fitted: _Fitted, size_px: tuple[int, int]) -> Diagnostic | None:
     loose, kept = fitted.loose, fitted.kept
     free = fitted.free(Rule.LOOSE, 3 * loose.count)
     sigmas = significance(each, free, loose)[TURN]
@@ -251,7 +252,7 @@ def _rows_px(turns: Vector, model: CameraModel) -> float:
     return float(np.sqrt(np.square(moved).mean(axis=0)).max())
 
 
-def _unstiff(turned: Turned, kept: list[BoardPair]) -> Finding:
+def _unstiff(turned: Turned, kept: list[BoardPair]) -> Diagnostic:
     degrees = math.degrees(float(np.linalg.norm(turned.turn_rad)))
     along = turned.turn_rad / np.linalg.norm(turned.turn_rad)
     sigma = math.degrees(float(np.linalg.norm(along * turned.sigma_rad)))
@@ -263,16 +264,16 @@ def _unstiff(turned: Turned, kept: list[BoardPair]) -> Finding:
     cost = (
         f"rows differ by up to {turned.rows_px:.2f} px and depth at 1 m by {turned.depth_at_1_m_m * 1e3:.1f} mm for it"
     )
-    return Finding(
-        mistake=Mistake.UNSTIFF,
-        sentence=f"the cameras turned against each other by {degrees:.3f} +- {sigma:.3f} degrees {how}: {cost}",
-        remedy="tighten the bar and calibrate again",
+    return mistaken(
+        Mistake.UNSTIFF,
+        f"the cameras turned against each other by {degrees:.3f} +- {sigma:.3f} degrees {how}: {cost}",
+        "tighten the bar and calibrate again",
         turned=turned,
         most=Verdict.USABLE,
     )
 
 
-def _focus(each: Weighed, fitted: _Fitted) -> Finding | None:
+def _focus(each: Weighed, fitted: _Fitted) -> Diagnostic | None:
     loose, kept = fitted.loose, fitted.kept
     free = fitted.free(each.rule, loose.count)
     which = FOCUS_LEFT if each.rule is Rule.FOCUS_LEFT else FOCUS_RIGHT
@@ -287,11 +288,11 @@ def _focus(each: Weighed, fitted: _Fitted) -> Finding | None:
     return _focus_found(side, f"changed by {change:+.1%} {when}")
 
 
-def _focus_found(side: Side, what: str) -> Finding:
-    return Finding(
-        mistake=Mistake.FOCUS,
-        sentence=f"the {side.value} camera's focal length {what}",
-        remedy="switch autofocus and zoom off in that camera, and take all views again",
+def _focus_found(side: Side, what: str) -> Diagnostic:
+    return mistaken(
+        Mistake.FOCUS,
+        f"the {side.value} camera's focal length {what}",
+        "switch autofocus and zoom off in that camera, and take all views again",
         most=Verdict.USABLE,
     )
 
@@ -304,7 +305,7 @@ def _explains_much(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> bool:
     return enough and _is_common(each, fitted.loose)
 
 
-def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | None:
+def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Diagnostic | None:
     loose = fitted.loose
     if each.rule is Rule.ROWS and each.squares_px2 > (1 - _EXPLAINED_SHARE) * fitted.lone_px2:
         return None  # each view alone is whole: its rows belong to one moment
@@ -325,24 +326,24 @@ def _scattered(each: Weighed, fitted: _Fitted, sizes_px: Sizes) -> Finding | Non
             depth_at_1_m_m=float(angles[:, 1].std() / np.linalg.norm(loose.state.translation_m)),
         )
         degrees = math.degrees(float(np.linalg.norm(turned.turn_rad)))
-        return Finding(
-            mistake=Mistake.UNSTIFF,
-            sentence=f"the cameras turned against each other by {degrees:.3f} degrees from view to view, this way and that",
-            remedy="tighten the bar, or put the rig down if you held it in your hands, because its cameras do not expose at the same moment",
+        return mistaken(
+            Mistake.UNSTIFF,
+            f"the cameras turned against each other by {degrees:.3f} degrees from view to view, this way and that",
+            "tighten the bar, or put the rig down if you held it in your hands, because its cameras do not expose at the same moment",
             turned=turned,
             most=Verdict.USABLE,
         )
     if each.rule is Rule.SKEW:
         moved_mm = float(np.linalg.norm(each.found[:, MOVE] - each.found[:, MOVE].mean(axis=0), axis=1).mean()) * 1e3
-        return Finding(
-            mistake=Mistake.SKEW,
-            sentence=f"the board moved by {moved_mm:.1f} mm between the left and the right exposure of a pair",
-            remedy="hold the board still, or put it down, until both cameras have their image",
+        return mistaken(
+            Mistake.SKEW,
+            f"the board moved by {moved_mm:.1f} mm between the left and the right exposure of a pair",
+            "hold the board still, or put it down, until both cameras have their image",
         )
-    return Finding(
-        mistake=Mistake.ROWS,
-        sentence=f"rows of an image show different moments, which explains {_explained_px(each, fitted):.2f} px: the board or the cameras moved under a rolling shutter",
-        remedy="hold board and cameras still in each view",
+    return mistaken(
+        Mistake.ROWS,
+        f"rows of an image show different moments, which explains {_explained_px(each, fitted):.2f} px: the board or the cameras moved under a rolling shutter",
+        "hold board and cameras still in each view",
     )
 
 

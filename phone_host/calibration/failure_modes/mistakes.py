@@ -1,11 +1,12 @@
 """The mistakes that are told apart in a series of board views, and what is said about one; a drift of the cameras is undone. Pure."""
 
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 
 import cv2
 import numpy as np
 
+from common.diagnostic import Diagnostic, Severity
 from phone_host.calibration.failure_modes.arrangement import Misplaced
 from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.target.pairs import BoardPair
@@ -13,7 +14,7 @@ from phone_host.geometry.lens import project, rays_through
 from phone_host.model import CameraModel, Verdict
 
 
-class Mistake(Enum):
+class Mistake(StrEnum):
     """What is wrong with a series.
 
     Attributes:
@@ -86,26 +87,34 @@ class Turned:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Finding:
-    """A mistake, and what names its place.
+class MistakeEvidence:
+    """What names a mistake's place, and how much it matters.
 
     Attributes:
-        mistake: which.
-        sentence: what is wrong, with its figures, in one sentence without a full stop.
-        remedy: what to do.
         misplaced: the side and the turn, for MIRRORED, TURNED and UPSIDE_DOWN.
         turned: for UNSTIFF.
         most: the best verdict that such a series may get.
         explained_px: how much of the views' contradiction it explains, root mean square, px; NaN: it was found otherwise.
     """
 
-    mistake: Mistake
-    sentence: str
-    remedy: str
     misplaced: Misplaced | None = None
     turned: Turned | None = None
     most: Verdict = Verdict.GOOD
     explained_px: float = float("nan")
+
+
+def mistaken(
+    mistake: Mistake,
+    message: str,
+    remedy: str,
+    *,
+    misplaced: Misplaced | None = None,
+    turned: Turned | None = None,
+    most: Verdict = Verdict.GOOD,
+) -> Diagnostic:
+    """Make a diagnostic of a mistake, whose evidence is a `MistakeEvidence`."""
+    evidence = MistakeEvidence(misplaced=misplaced, turned=turned, most=most)
+    return Diagnostic(message, remedy, Severity.FAIL if most is Verdict.REJECT else Severity.WARN, mistake, evidence)
 
 
 def unturned(pairs: list[BoardPair], turned: Turned) -> list[BoardPair]:

@@ -11,13 +11,14 @@ from typing import Final
 import cv2
 import numpy as np
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
 from common.orientation import Flip, Orientation
 from common.words import counted
 from phone_host.calibration.failure_modes.arrangement import Misplaced, misplaced
 from phone_host.calibration.failure_modes.deviating import deviation
 from phone_host.calibration.failure_modes.lone import both_alone, is_plain, with_plain_lenses
-from phone_host.calibration.failure_modes.mistakes import Finding, Mistake
+from phone_host.calibration.failure_modes.mistakes import Mistake, mistaken
 from phone_host.calibration.failure_modes.partners import wrong_partners
 from phone_host.calibration.solve.board_in_space import BENT_SIGMAS, common_bows_m
 from phone_host.calibration.solve.calibrate import Sizes
@@ -72,7 +73,7 @@ _EXPLAINED_SHARE: Final = 0.35
 """Of the squares of each view alone: a good series's cannot be explained so."""
 
 
-def bent(found: Calibration, board: Board) -> Finding | None:
+def bent(found: Calibration, board: Board) -> Diagnostic | None:
     """Name a board that is bent in all views alike, as noise and what contradicts a stiff rig are not.
 
     The rig was calibrated with that bend (`solve.board_in_space`): what is told is what a flat board would spare.
@@ -85,10 +86,10 @@ def bent(found: Calibration, board: Board) -> Finding | None:
         return None
     along = ("rows", "columns")[axis]
     bow = f"{abs(bows[axis]) * 1e3:.2f} +- {sigmas[axis] * 1e3:.2f} mm over {sides[axis] * 1e3:.0f} mm"
-    return Finding(
-        mistake=Mistake.BENT,
-        sentence=f"the board is not flat: along its {along} it is bent by {bow}",
-        remedy="glue it to glass or another flat plate, and take all views again",
+    return mistaken(
+        Mistake.BENT,
+        f"the board is not flat: along its {along} it is bent by {bow}",
+        "glue it to glass or another flat plate, and take all views again",
     )
 
 
@@ -111,7 +112,7 @@ class BoardSeries:
     baseline_m: float = math.nan
 
 
-def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Diagnostic | None:
     """Name what is wrong with a series.
 
     Returns:
@@ -133,21 +134,21 @@ def name_mistake(series: BoardSeries, found: Calibration | DataError) -> Finding
     )
 
 
-def _in_a_mirror(series: BoardSeries) -> Finding | None:
+def _in_a_mirror(series: BoardSeries) -> Diagnostic | None:
     """Name a side whose coded marks are seen in the mirror only."""
     for side in Side:
         own = [each for each in series.looks if each.side is side]
         if own and 2 * sum(each.look.is_mirrored for each in own) > len(own):
-            return Finding(
-                mistake=Mistake.MIRRORED,
-                sentence=f"the marks in the {side.value} images are mirrored",
-                remedy="switch mirroring off in that camera",
+            return mistaken(
+                Mistake.MIRRORED,
+                f"the marks in the {side.value} images are mirrored",
+                "switch mirroring off in that camera",
                 misplaced=Misplaced(side=side, turn=Orientation(0, Flip.H)),
             )
     return None
 
 
-def _spoiled(series: BoardSeries) -> Finding | None:
+def _spoiled(series: BoardSeries) -> Diagnostic | None:
     """Name blur or glare, if many images have it."""
     looks = series.looks
     blurred, glaring = list[str](), list[str]()
@@ -173,11 +174,11 @@ def _spoiled(series: BoardSeries) -> Finding | None:
     ):
         if len(names) >= max(2, _SPOILED_SHARE * len(looks)):
             number = f"{len(names)} of {counted(len(looks), 'image')}"
-            return Finding(mistake=mistake, sentence=f"{what} in {number}, such as {names[0]}", remedy=remedy)
+            return mistaken(mistake, f"{what} in {number}, such as {names[0]}", remedy)
     return None
 
 
-def _exchanged(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+def _exchanged(series: BoardSeries, found: Calibration | DataError) -> Diagnostic | None:
     """Name pictures that belong to another pair's partner."""
     misfits = (Reason.MOVED, Reason.CORNERS_LEFT, Reason.CORNERS_RIGHT)
     if (
@@ -192,16 +193,16 @@ def _exchanged(series: BoardSeries, found: Calibration | DataError) -> Finding |
     shift = _numbers_apart(wrong)
     if shift:
         which = f"{abs(shift)} {'higher' if shift > 0 else 'lower'}"
-        return Finding(
-            mistake=Mistake.PARTNERS,
-            sentence=f"the folders' numbers are shifted: each left picture belongs to the right one whose number is {which}",
-            remedy="give both images of a pair the same number",
+        return mistaken(
+            Mistake.PARTNERS,
+            f"the folders' numbers are shifted: each left picture belongs to the right one whose number is {which}",
+            "give both images of a pair the same number",
         )
     shown = ", ".join(f"left {left} with right {right}" for left, right in wrong[:4]) + (", ..." if wrong[4:] else "")
-    return Finding(
-        mistake=Mistake.PARTNERS,
-        sentence=f"{counted(len(wrong), 'left picture has', 'left pictures have')} the wrong partner: {shown} belong together",
-        remedy="give both images of a pair the same number",
+    return mistaken(
+        Mistake.PARTNERS,
+        f"{counted(len(wrong), 'left picture has', 'left pictures have')} the wrong partner: {shown} belong together",
+        "give both images of a pair the same number",
     )
 
 
@@ -214,7 +215,7 @@ def _numbers_apart(wrong: list[tuple[str, str]]) -> int:
     return usual if apart.count(usual) >= _SHIFTED_SHARE * len(wrong) else 0
 
 
-def placed(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+def placed(series: BoardSeries, found: Calibration | DataError) -> Diagnostic | None:
     """Name a turned or mirrored side; who knows the options given writes the sentence. Arguments as those of `name_mistake`."""
     wrong = misplaced(list(series.pairs), series.board, series.sizes_px, found)
     if wrong is None:
@@ -225,50 +226,51 @@ def placed(series: BoardSeries, found: Calibration | DataError) -> Finding | Non
         mistake, state = Mistake.UPSIDE_DOWN, "upside down"
     else:
         mistake, state = Mistake.TURNED, "turned by a quarter"
-    return Finding(
-        mistake=mistake,
-        sentence=f"the {wrong.side.value} images are {state} against the others",
-        remedy="turn them back",
+    return mistaken(
+        mistake,
+        f"the {wrong.side.value} images are {state} against the others",
+        "turn them back",
         misplaced=wrong,
     )
 
 
-def _swapped(found: Calibration | DataError) -> Finding | None:
+def _swapped(found: Calibration | DataError) -> Diagnostic | None:
     if isinstance(found, DataError) or found.obstacle is None:
         return None
     x, y, z = -found.rig.R_right_left.T @ found.rig.t_right_left_m
     if x < 0 and abs(x) > max(abs(y), abs(z)):
-        return Finding(mistake=Mistake.SWAPPED, sentence=found.obstacle.problem, remedy=found.obstacle.remedy)
+        return mistaken(Mistake.SWAPPED, found.obstacle.problem, found.obstacle.remedy)
     return None
 
 
-def _deviating(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+def _deviating(series: BoardSeries, found: Calibration | DataError) -> Diagnostic | None:
     """Name how the pairs deviate from one stiff rig; what only a bent lens makes them do is none."""
     finding = deviation(series.pairs, series.board, series.sizes_px)
     if finding is None or isinstance(found, DataError) or (is_plain(found.rig.left) and is_plain(found.rig.right)):
         return finding
     plain = with_plain_lenses(list(series.pairs), found.rig)
     finding = deviation(tuple(plain), series.board, series.sizes_px)
-    if finding is None or finding.turned is None:
+    if finding is None or finding.evidence.turned is None:
         return finding
-    return replace(finding, turned=replace(finding.turned, lens=found.rig.right))
+    seen = finding.evidence
+    return replace(finding, evidence=replace(seen, turned=replace(seen.turned, lens=found.rig.right)))
 
 
-def _absurd_square(series: BoardSeries) -> Finding | None:
+def _absurd_square(series: BoardSeries) -> Diagnostic | None:
     """Name a square that no board has: it is told first, because nothing else depends on the scale."""
     board = series.board
     longest_m = max(board.columns, board.rows) * board.square_m
     if _SMALLEST_BOARD_M <= longest_m <= _LARGEST_BOARD_M:
         return None
-    return Finding(
-        mistake=Mistake.SQUARE,
-        sentence=f"with squares of {board.square_m * 1e3:g} mm the board would be {longest_m:.2g} m long",
-        remedy="check the unit of --square",
+    return mistaken(
+        Mistake.SQUARE,
+        f"with squares of {board.square_m * 1e3:g} mm the board would be {longest_m:.2g} m long",
+        "check the unit of --square",
         most=Verdict.REJECT,
     )
 
 
-def _other_baseline(series: BoardSeries, found: Calibration | DataError, off_share: float) -> Finding | None:
+def _other_baseline(series: BoardSeries, found: Calibration | DataError, off_share: float) -> Diagnostic | None:
     """Name a square that cannot be as long as --square says, because the user measured a distance of the cameras that is off by such a share."""
     board = series.board
     if isinstance(found, DataError):
@@ -278,18 +280,18 @@ def _other_baseline(series: BoardSeries, found: Calibration | DataError, off_sha
     sigma = 3 * found.baseline_sigma_m / baseline_m if math.isfinite(found.baseline_sigma_m) else 0.0
     if not math.isfinite(factor) or abs(factor - 1) <= off_share + sigma:
         return None
-    return Finding(
-        mistake=Mistake.SQUARE,
-        sentence=(
+    return mistaken(
+        Mistake.SQUARE,
+        (
             f"the cameras would be {baseline_m * 1e3:.1f} mm apart, and you measured {series.baseline_m * 1e3:.1f} mm:"
             f" squares of {board.square_m * factor * 1e3:.2f} mm would fit, --square says {board.square_m * 1e3:g} mm"
         ),
-        remedy="measure ten squares together with a ruler",
+        "measure ten squares together with a ruler",
         most=Verdict.REJECT,
     )
 
 
-def _upright_stretch(series: BoardSeries, found: Calibration | DataError) -> Finding | None:
+def _upright_stretch(series: BoardSeries, found: Calibration | DataError) -> Diagnostic | None:
     """Name squares that are no squares of boards that were all held upright: the lenses take the stretch, both the same."""
     if isinstance(found, DataError):
         return None
@@ -299,7 +301,7 @@ def _upright_stretch(series: BoardSeries, found: Calibration | DataError) -> Fin
     return _no_squares(stretch, series) if is_stretched else None
 
 
-def _stretched(series: BoardSeries) -> Finding | None:
+def _stretched(series: BoardSeries) -> Diagnostic | None:
     """Name squares that are no squares: a board that is longer explains more, however each is turned."""
     try:
         squares = _squares_by_stretch(list(series.pairs), series)
@@ -336,22 +338,22 @@ def _squares_by_stretch(pairs: list[BoardPair], series: BoardSeries) -> tuple[fl
     return squares[0], squares[1], squares[2]
 
 
-def _no_squares(stretch: float, series: BoardSeries) -> Finding:
+def _no_squares(stretch: float, series: BoardSeries) -> Diagnostic:
     """Name resized pictures where both have a camera's shape without the stretch, else the print."""
     amount = f"{abs(stretch):.1%} {'wider' if stretch > 0 else 'narrower'}"
     shapes = [_usual_shape(width / height / (1 + stretch)) for width, height in series.sizes_px]
     if all(shapes):
         width, height = series.sizes_px[0]
-        return Finding(
-            mistake=Mistake.RESIZED,
-            sentence=f"the pictures were resized: {width}x{height} px show the squares {amount} than they are, as pictures of {shapes[0]} would",
-            remedy="give the pictures as the camera took them, or resize width and height by the same factor",
+        return mistaken(
+            Mistake.RESIZED,
+            f"the pictures were resized: {width}x{height} px show the squares {amount} than they are, as pictures of {shapes[0]} would",
+            "give the pictures as the camera took them, or resize width and height by the same factor",
             most=Verdict.USABLE,
         )
-    return Finding(
-        mistake=Mistake.SQUARE,
-        sentence=f"the squares look stretched: they are {amount} than they are high",
-        remedy='print the board without "fit to page", and measure a square both ways',
+    return mistaken(
+        Mistake.SQUARE,
+        f"the squares look stretched: they are {amount} than they are high",
+        'print the board without "fit to page", and measure a square both ways',
         most=Verdict.REJECT,
     )
 

@@ -184,10 +184,10 @@ def _judged(
 ) -> Judged | DataError:
     """Judge a rig; or say why there is none, and what to do."""
     views, found, finding = solved.views, solved.found, solved.finding
-    wrong = None if finding is None else finding.misplaced
+    wrong = None if finding is None else finding.evidence.misplaced
     hint = "" if wrong is None else arrangement_hint(views, mounted, wrong, is_live=options.live)
     if isinstance(found, DataError):
-        remedy = hint or ("" if finding is None else f"{finding.sentence}: {finding.remedy}") or found.remedy
+        remedy = hint or ("" if finding is None else finding.text) or found.remedy
         if 2 * sum(each.reason in _NOT_FOUND for each in views.rejected) > len(files.pairs):
             remedy = unseen_remedy(files, series.board, _limit(options))
         return DataError(found.problem, remedy)

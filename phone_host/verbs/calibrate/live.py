@@ -265,12 +265,12 @@ def grown(views: tuple[View, ...], series: Series, sizes_px: tuple[Size, Size], 
     board = series.board
     shown = BoardSeries(pairs=tuple(pairs), board=board, sizes_px=sizes_px, looks=looks, baseline_m=baseline_m)
     finding = name_mistake(shown, found)
-    wrong = None if finding is None else finding.misplaced
+    wrong = None if finding is None else finding.evidence.misplaced
     seen = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=sizes_px, looks=looks)
     hint = "" if wrong is None else arrangement_hint(seen, (UPRIGHT, UPRIGHT), wrong, is_live=True)
-    hopeless = wrong is not None or (finding is not None and finding.mistake in {Mistake.SWAPPED, Mistake.MIRRORED})
+    hopeless = wrong is not None or (finding is not None and finding.code in {Mistake.SWAPPED, Mistake.MIRRORED})
     if isinstance(found, DataError):
-        remedy = hint or (f"{finding.sentence}: {finding.remedy}" if finding is not None else str(found))
+        remedy = hint or (finding.text if finding is not None else str(found))
         return Progress(views=len(views), calibration=None, verdict=Verdict.REJECT, remedy=remedy, is_hopeless=hopeless)
     judgement = assessed(found, found.rejected, finding, hint)
     return Progress(

@@ -40,7 +40,7 @@ def series_of_rig(taken: Taken, result: Judged, rig: Rig, rejected: tuple[Reject
     return CalibrationSeries(
         verdict=judgement.verdict,
         remedy=judgement.remedy,
-        cause="" if result.finding is None else result.finding.mistake.value,
+        cause="" if result.finding is None else result.finding.code,
         cause_words=result.cause_words,
         board=_board_words(taken.board),
         sizes_px=taken.views.sizes_px,

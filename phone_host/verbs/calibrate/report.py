@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
-from phone_host.calibration.failure_modes.mistakes import Finding
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.solve.verdict import Assessment
@@ -43,14 +43,14 @@ class Judged:
 
     found: Calibration
     judgement: Assessment
-    finding: Finding | None = None
+    finding: Diagnostic | None = None
     hint: str = ""
     measured_m: float = math.nan
 
     @property
     def cause_words(self) -> str:
         """What is wrong with the series, in one sentence; empty: nothing."""
-        return "" if self.finding is None else self.hint or self.finding.sentence
+        return "" if self.finding is None else self.hint or self.finding.message
 
     @property
     def depth_limit_m(self) -> float:

@@ -107,13 +107,13 @@ def _judged(result: Judged) -> dict[str, Any]:
     if finding is None:
         return {"depth_limit_m": json_number(result.depth_limit_m, 3), "cause": None}
     cause: dict[str, Any] = {
-        "name": finding.mistake.value,
+        "name": finding.code,
         "sentence": result.cause_words,
         "remedy": finding.remedy,
-        "explained_px": json_number(finding.explained_px, 4),
+        "explained_px": json_number(finding.evidence.explained_px, 4),
     }
-    if finding.turned is not None:
-        cause["turned"] = _turn(finding.turned)
+    if finding.evidence.turned is not None:
+        cause["turned"] = _turn(finding.evidence.turned)
     return {"depth_limit_m": json_number(result.depth_limit_m, 3), "cause": cause}
 
 

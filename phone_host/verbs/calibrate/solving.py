@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
-from phone_host.calibration.failure_modes.mistakes import Course, Finding, unturned
+from phone_host.calibration.failure_modes.mistakes import Course, unturned
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake, placed
 from phone_host.calibration.failure_modes.out_of_step import out_of_step
 from phone_host.calibration.solve.calibrate import calibrate
@@ -31,7 +32,7 @@ class Solved:
     seen: list[BoardPair]
     pairs: list[BoardPair]
     found: Calibration | DataError
-    finding: Finding | None = None
+    finding: Diagnostic | None = None
 
 
 def solve_series(series: Series, views: BoardViews, baseline_m: float, say: Callable[[str], None]) -> Solved:
@@ -75,7 +76,7 @@ def solve_series(series: Series, views: BoardViews, baseline_m: float, say: Call
     return Solved(views=views, seen=seen, pairs=pairs, found=without, finding=finding)
 
 
-def _of_the_new(taken: BoardSeries, later: list[BoardPair], found: Calibration | DataError) -> Finding | None:
+def _of_the_new(taken: BoardSeries, later: list[BoardPair], found: Calibration | DataError) -> Diagnostic | None:
     """Name how the new pictures hang, if most of them do not fit those of an earlier calibration: together, they only look as if of two moments."""
     names = {pair.name for pair in later}
     fit = 0 if isinstance(found, DataError) else sum(used.name in names for used in found.used)
@@ -89,7 +90,7 @@ def _of_the_new(taken: BoardSeries, later: list[BoardPair], found: Calibration |
     return placed(replace(taken, pairs=tuple(later)), alone)
 
 
-def _straightened(pairs: list[BoardPair], finding: Finding | None) -> list[BoardPair]:
+def _straightened(pairs: list[BoardPair], finding: Diagnostic | None) -> list[BoardPair]:
     """Return the pairs as the cameras would have seen them had they stood as they do in the last; the same if they did not turn, or this way and that."""
-    turned = None if finding is None else finding.turned
+    turned = None if finding is None else finding.evidence.turned
     return pairs if turned is None or turned.course is Course.LOOSE else unturned(pairs, turned)

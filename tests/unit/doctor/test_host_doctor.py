@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from common.diagnostic import Severity
+from common.diagnostic import Diagnostic, Severity
 from common.errors import SettingsError
 from phone_host.cli import main
 from phone_host.doctor.host_checks import (
@@ -23,7 +23,7 @@ from phone_host.doctor.host_checks import (
 from phone_host.doctor.rig_checks import RigReadings, check_rig
 from phone_host.doctor.vision_checks import read_rig_readings
 from phone_host.model import Verdict
-from phone_host.native.library import Missing, native
+from phone_host.native.library import native
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
@@ -138,10 +138,10 @@ def test_a_rig_files_verdict_reaches_the_doctor(tmp_path: Path) -> None:
 
 def test_a_missing_native_library_is_a_warning_with_its_reason() -> None:
     """Everything works without it; a wrong TANDEMSCAN_SIMD stops every command, so that fails; the library's instructions are named."""
-    missing = check_native(Missing(reason="not built: no C compiler", remedy="install gcc"))
+    missing = check_native(Diagnostic(message="not built: no C compiler", remedy="install gcc"))
     assert (missing.severity, missing.remedy) == (WARN, "install gcc")
     assert missing.message == "own matcher not built: no C compiler; sgbm is used, six times the work for each pair"
-    idle = check_native(Missing(reason="not built", remedy="install gcc"), "avx2")
+    idle = check_native(Diagnostic(message="not built", remedy="install gcc"), "avx2")
     assert (
         idle.message
         == "own matcher not built; sgbm is used, six times the work for each pair; TANDEMSCAN_SIMD=avx2 has no effect"

@@ -108,7 +108,7 @@ def test_an_older_line_is_sent_again_with_all_that_followed() -> None:
     other.hear("Resend: 3")
     assert other.sent(S) == framed(251, "G1 X1")  # the cable may have spoiled the number
     other.hear("Resend: 3")
-    assert "long after" in other.sender.problem
+    assert "long after" in other.sender.failure.message
 
 
 def test_silence_ends_it() -> None:
@@ -120,7 +120,7 @@ def test_silence_ends_it() -> None:
     quiet.sent()
     sent = [quiet.sent(5 * S) for _ in range(5)]
     assert [bool(each) for each in sent] == [True, True, True, False, False]
-    assert "does not answer" in quiet.sender.problem
+    assert "does not answer" in quiet.sender.failure.message
 
 
 def test_a_pause_sends_nothing_and_a_print_that_is_over_is_not_cancelled() -> None:
@@ -186,7 +186,7 @@ def test_what_a_printer_says_ends_a_print(said: str, problem: str) -> None:
     talk.sent()
     talk.hear(said)
     assert talk.sender.phase is Phase.FAILED
-    assert problem in talk.sender.problem
+    assert problem in talk.sender.failure.message
     talk.hear("ok")
     assert talk.sent(S) == b""
 

@@ -58,7 +58,7 @@ def test_a_printer_that_answers_and_heats_all_the_same_is_told(options: SenderOp
     bench = Bench(DRAWN, options)
     bench.run(lambda text: ["ok", "//action:cancel"] if "G1 X10*" in text else [HOT] if "M105" in text else ["ok"], 60)
     assert bench.sender.phase is Phase.FAILED
-    assert "but still heats (nozzle 210 C)" in bench.sender.problem
+    assert "but still heats (nozzle 210 C)" in bench.sender.failure.message
     assert not bench.sender.cooling.is_confirmed
     assert bench.texts.count("M104 S0") == bench.texts.count("M107") == 2
     assert "M85 S0" not in bench.texts
@@ -68,7 +68,7 @@ def test_a_second_telling_is_enough() -> None:
     """The first M104 S0 is answered and lost in the firmware: after the second all goals are zero, and it is cold."""
     answers = iter([HOT, COLD])
     bench = cancelling(lambda text: [next(answers)] if "M105" in text else ["ok"])
-    assert "ended at the printer" in bench.sender.problem
+    assert "ended at the printer" in bench.sender.failure.message
     assert bench.sender.cooling.is_confirmed
     assert bench.texts.count("M140 S0") == 2
 

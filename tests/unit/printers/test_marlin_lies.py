@@ -48,7 +48,7 @@ def test_a_printer_that_has_restarted_without_a_word_does_not_begin_again(line: 
 
     bench.run(answered, 120)
     assert bench.sender.phase is Phase.FAILED
-    assert re.search("has restarted|long after", bench.sender.problem)
+    assert re.search("has restarted|long after", bench.sender.failure.message)
     assert printer.done == DRAWN[: line - 1]
     assert len(bench.sent) <= line + 2
 
@@ -77,7 +77,7 @@ def test_requests_that_never_end_end_the_print_though_each_is_acknowledged() -> 
     printer, bench = CountingPrinter(lambda came: came > 10), Bench(DRAWN)
     bench.run(lambda sent: [each for each in printer.answer(sent) for _ in range(2)], 120)
     assert bench.sender.phase is Phase.FAILED
-    assert "does not take line" in bench.sender.problem
+    assert "does not take line" in bench.sender.failure.message
     assert len(bench.sent) < 80
 
 
@@ -91,8 +91,8 @@ def test_a_printer_whose_answers_are_all_lost_is_given_up() -> None:
             return [] if said == ["ok"] and lost(printer.came) else said
 
         bench.run(answered, 600, "wait")
-        assert bench.sender.phase is phase, bench.sender.problem
+        assert bench.sender.phase is phase, bench.sender.failure.message
         assert printer.done == DRAWN[: len(printer.done)]
         if phase is Phase.FAILED:
-            assert "answers in a row were lost" in bench.sender.problem
+            assert "answers in a row were lost" in bench.sender.failure.message
             assert bench.now_ns < 120 * S

@@ -91,8 +91,8 @@ def test_a_line_that_makes_no_progress_ends_the_print(answer: Callable[[str], li
 
     bench.run(answered, 120)
     assert bench.sender.phase is Phase.FAILED
-    assert words in bench.sender.problem
-    assert bench.sender.remedy
+    assert words in bench.sender.failure.message
+    assert bench.sender.failure.remedy
     assert sum("G1 X2" in text for text in bench.texts) <= 30
     assert bench.now_ns < 61 * S
 
@@ -157,8 +157,8 @@ def test_endless_busy_is_bounded_and_told() -> None:
     assert bench.sender.message == "busy: processing (G28, 28 min)"
     bench.run(lambda _: [], 200, "echo:busy: processing")
     assert bench.sender.phase is Phase.FAILED
-    assert bench.sender.problem == "the printer has not finished G28 within 30 min"
-    assert "max_busy_minutes" in bench.sender.remedy
+    assert bench.sender.failure.message == "the printer has not finished G28 within 30 min"
+    assert "max_busy_minutes" in bench.sender.failure.remedy
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_a_print_that_is_ended_at_the_display_ends(said: str) -> None:
     bench = Bench(DRAWN)
     bench.run(lambda text: ["ok", said] if text.startswith("N10 ") else ["ok"], 60)
     assert bench.sender.phase is Phase.FAILED
-    assert "ended at the printer" in bench.sender.problem
+    assert "ended at the printer" in bench.sender.failure.message
     assert bench.sender.cooling.is_confirmed
     assert bench.texts[-9:] == ["G1 X10", "M108", "M104 S0", "M140 S0", "M107", "M105", "M105", "M105", "M84"]
 
@@ -343,7 +343,7 @@ def test_a_board_that_starts_late_is_begun_with_again() -> None:
     again = Bench(DRAWN)
     again.run(lambda _: ["start"], 60)
     assert again.sender.phase is Phase.FAILED
-    assert "restarted" in again.sender.problem
+    assert "restarted" in again.sender.failure.message
     assert len(again.sent) == 4
 
 
@@ -357,4 +357,4 @@ def test_what_cools_counts_and_not_what_follows() -> None:
     assert bench.sender.cooling.is_confirmed
     bench.sender.finish_cancelling()
     assert bench.sender.phase is Phase.FAILED
-    assert "ended at the printer" in bench.sender.problem
+    assert "ended at the printer" in bench.sender.failure.message

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from common.diagnostic import Diagnostic
 from common.errors import SettingsError, UnavailableError
 from common.program.settings import resolve
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.native.library import Library, Missing, load, native, required
+from phone_host.native.library import Library, load, native, required
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.settings import matcher_is_given, resolve_settings
@@ -17,7 +18,7 @@ from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import BEST_FIRST, FALLBACK, PREFERRED, MatcherName, default_words
 from tests.support import run_snapshots
 
-NOT_BUILT = Missing(reason="not built: no C compiler", remedy="install gcc")
+NOT_BUILT = Diagnostic(message="not built: no C compiler", remedy="install gcc")
 
 
 def test_the_preferred_matcher_gives_way_where_the_library_is_missing() -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
-from phone_host.calibration.failure_modes.mistakes import Course, Finding, Mistake, Turned
+from phone_host.calibration.failure_modes.mistakes import Course, Mistake, Turned, mistaken
 from phone_host.calibration.guide.snapshot import before_board
 from phone_host.calibration.solve.verdict import Assessment
 from phone_host.model import Verdict
@@ -24,7 +25,7 @@ _USABLE = Assessment(Verdict.USABLE, "take more")
 _DOCS = Path(__file__).resolve().parents[3] / "docs" / "files.md"
 
 
-def _turned() -> Finding:
+def _turned() -> Diagnostic:
     turned = Turned(
         course=Course.KNOCK,
         turn_rad=np.array([0.001, 0.0, 0.0]),
@@ -36,7 +37,7 @@ def _turned() -> Finding:
         rows_px=0.7,
         depth_at_1_m_m=0.012,
     )
-    return Finding(mistake=Mistake.UNSTIFF, sentence="they turned", remedy="tighten it", turned=turned)
+    return mistaken(Mistake.UNSTIFF, "they turned", "tighten it", turned=turned)
 
 
 def test_every_key_is_documented() -> None:

@@ -16,7 +16,7 @@ from common.frame import PixelFormat
 from common.recording.layout import ABOUT, About, image_topic
 from common.recording.recording_file import written
 from common.recording.ros_messages import COMPRESSED_IMAGE, RecordedImage, image_message
-from phone_host.calibration.failure_modes.mistakes import Finding, Mistake
+from phone_host.calibration.failure_modes.mistakes import Mistake, mistaken
 from phone_host.calibration.solve.verdict import Assessment
 from phone_host.model import Image, Side, Verdict
 from phone_host.output.rig_yaml import read_rig
@@ -202,7 +202,7 @@ def test_marks_that_are_not_there_are_not_called_a_chessboard(
 )
 def test_a_good_rig_has_no_remedy_though_a_mistake_was_found(verdict: Verdict, remedy: str) -> None:
     """The mistake is told all the same, as a note; a rig that is not good has its remedy in place of the other."""
-    finding = Finding(mistake=Mistake.BLUR, sentence="the board is blurred; the light is poor", remedy="hold it still")
+    finding = mistaken(Mistake.BLUR, "the board is blurred; the light is poor", "hold it still")
     before = Assessment(verdict, "" if verdict is Verdict.GOOD else "take more")
     judgement = with_cause(before, finding)
     assert judgement == Assessment(verdict, remedy)

@@ -29,8 +29,8 @@ def test_a_bend_of_all_views_is_named_with_its_figures() -> None:
     """3 mm over rows of 200 mm, known to 0.1 mm in each of 8 views: to 0.04 mm in all."""
     found = bent(_with_bows([3.0] * 8), BOARD)
     assert found is not None
-    assert found.mistake is Mistake.BENT
-    assert "along its rows it is bent by 3.00 +- 0.04 mm over 200 mm" in found.sentence
+    assert found.code is Mistake.BENT
+    assert "along its rows it is bent by 3.00 +- 0.04 mm over 200 mm" in found.message
 
 
 @pytest.mark.parametrize(

@@ -104,9 +104,9 @@ def test_a_board_longer_than_a_room_is_a_wrong_unit() -> None:
     ):
         found = name_mistake(_series(board=Board(9, 6, square_m)), DataError("nothing", "nothing"))
         assert found is not None
-        assert found.mistake is Mistake.SQUARE
-        assert said in found.sentence
-        assert found.most is Verdict.REJECT
+        assert found.code is Mistake.SQUARE
+        assert said in found.message
+        assert found.evidence.most is Verdict.REJECT
     assert name_mistake(_series(), DataError("nothing", "nothing")) is None
 
 
@@ -115,11 +115,11 @@ def test_a_measured_baseline_tells_the_square() -> None:
     rig = unlike_rig(right_centre_m=(0.1, 0.0, 0.0))
     found = name_mistake(_series(baseline_m=0.09), _calibration(rig))
     assert found is not None
-    assert found.mistake is Mistake.SQUARE
+    assert found.code is Mistake.SQUARE
     assert (
-        "100.0 mm apart, and you measured 90.0 mm: squares of 22.50 mm would fit, --square says 25 mm" in found.sentence
+        "100.0 mm apart, and you measured 90.0 mm: squares of 22.50 mm would fit, --square says 25 mm" in found.message
     )
-    assert found.most is Verdict.REJECT
+    assert found.evidence.most is Verdict.REJECT
     assert name_mistake(_series(baseline_m=0.098), _calibration(rig)) is None
 
 
@@ -129,8 +129,8 @@ def test_lenses_that_are_stretched_alike_tell_a_stretched_print() -> None:
     both = replace(rig, left=_stretched(rig.left, 1.03), right=_stretched(rig.right, 1.03))
     found = name_mistake(_series(), _calibration(both))
     assert found is not None
-    assert found.mistake is Mistake.SQUARE
-    assert "3.0% wider" in found.sentence
+    assert found.code is Mistake.SQUARE
+    assert "3.0% wider" in found.message
     one = replace(rig, left=_stretched(rig.left, 1.03), right=_stretched(rig.right, 1.0))
     assert name_mistake(_series(), _calibration(one)) is None
 
@@ -154,8 +154,8 @@ def test_a_pictures_shape_tells_whether_it_was_resized(size_px: tuple[int, int],
     both = replace(rig, left=_stretched(rig.left, stretch), right=_stretched(rig.right, stretch))
     found = name_mistake(replace(_series(), sizes_px=(size_px, size_px)), _calibration(both))
     assert found is not None
-    assert said in found.sentence
-    assert found.mistake is (Mistake.RESIZED if "resized" in found.sentence else Mistake.SQUARE)
+    assert said in found.message
+    assert found.code is (Mistake.RESIZED if "resized" in found.message else Mistake.SQUARE)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_a_pictures_shape_tells_whether_it_was_resized(size_px: tuple[int, int],
 def test_only_cameras_beside_each_other_are_swapped(centre: tuple[float, float, float], named: Mistake | None) -> None:
     """A rig that cannot be rectified is swapped if the right camera stands on the left, not if it stands ahead or below."""
     found = name_mistake(_series(), _calibration(unlike_rig(centre), DataError("it cannot be", "exchange them")))
-    assert (found.mistake if found else None) is named
+    assert (found.code if found else None) is named
     assert found is None or found.remedy == "exchange them"
 
 
@@ -207,8 +207,8 @@ def test_another_focus_in_each_view_is_told_as_that() -> None:
     zoom = dict(enumerate(1 + 0.02 * np.random.default_rng(1).normal(size=8)))
     found = deviation(tuple(_views(8, zoom=zoom)), BOARD, _SIZES)
     assert found is not None
-    assert found.mistake is Mistake.FOCUS
-    assert re.search(r"the right camera's focal length changes by [12]\.\d% from view to view", found.sentence)
+    assert found.code is Mistake.FOCUS
+    assert re.search(r"the right camera's focal length changes by [12]\.\d% from view to view", found.message)
 
 
 def test_a_focus_that_breathes_accuses_nobody() -> None:
@@ -234,11 +234,13 @@ def test_of_many_pairs_the_first_and_the_last_are_kept() -> None:
         pairs.append(BoardPair(str(index), view.left_px, view.right_px))
     found = deviation(tuple(pairs), BOARD, _SIZES)
     assert found is not None
-    assert found.turned is not None
-    assert found.turned.course is Course.KNOCK
-    assert found.turned.names == tuple(str(index) for index in sorted(seen_at))
-    assert "at once before pair 40" in found.sentence
-    assert math.degrees(float(np.linalg.norm(found.turned.turn_rad))) == pytest.approx(math.degrees(0.01), rel=0.1)
+    assert found.evidence.turned is not None
+    assert found.evidence.turned.course is Course.KNOCK
+    assert found.evidence.turned.names == tuple(str(index) for index in sorted(seen_at))
+    assert "at once before pair 40" in found.message
+    assert math.degrees(float(np.linalg.norm(found.evidence.turned.turn_rad))) == pytest.approx(
+        math.degrees(0.01), rel=0.1
+    )
 
 
 def test_a_look_needs_corners_beside_each_other() -> None:
@@ -366,7 +368,7 @@ def test_a_fisheye_is_no_mistake_and_hides_none(turn_deg: float, named: Mistake 
     series = BoardSeries(pairs=_fisheye_views(turn_deg), board=BOARD, sizes_px=((1280, 960), (1280, 960)))
     assert deviation(series.pairs, BOARD, series.sizes_px) is not None
     finding = name_mistake(series, _calibration(rig))
-    assert (None if finding is None else finding.mistake) is named
-    if finding is not None and finding.turned is not None:
-        assert np.degrees(np.linalg.norm(finding.turned.turn_rad)) == pytest.approx(turn_deg, rel=0.1)
-        assert finding.turned.lens is _FISHEYE
+    assert (None if finding is None else finding.code) is named
+    if finding is not None and finding.evidence.turned is not None:
+        assert np.degrees(np.linalg.norm(finding.evidence.turned.turn_rad)) == pytest.approx(turn_deg, rel=0.1)
+        assert finding.evidence.turned.lens is _FISHEYE

@@ -80,8 +80,8 @@ def test_a_drift_is_taken_out_of_earlier_and_new_pictures_together(tmp_path: Pat
     first = _solved(Series(board=BOARD, side=Side.LEFT, path=Path()), _pairs()[:_FIRST])
     solved = _solved(_from_file(first, tmp_path), _pairs()[_FIRST:])
     assert solved.finding is not None
-    assert solved.finding.turned is not None
-    assert solved.finding.turned.course is Course.DRIFT
+    assert solved.finding.evidence.turned is not None
+    assert solved.finding.evidence.turned.course is Course.DRIFT
     assert len(solved.pairs) == len(solved.seen) == 2 * _FIRST
     assert solved.pairs is not solved.seen
     assert abs(_roll_off_deg(solved)) < 0.03
@@ -138,7 +138,7 @@ def test_mirrored_new_pictures_are_named_so_beside_earlier_ones(tmp_path: Path) 
     ]
     finding = _solved(earlier, mirrored).finding
     assert finding is not None
-    assert finding.mistake is Mistake.MIRRORED
-    assert finding.misplaced is not None
-    assert finding.misplaced.side is Side.RIGHT
-    assert finding.misplaced.is_mirrored
+    assert finding.code is Mistake.MIRRORED
+    assert finding.evidence.misplaced is not None
+    assert finding.evidence.misplaced.side is Side.RIGHT
+    assert finding.evidence.misplaced.is_mirrored

@@ -148,9 +148,9 @@ def test_a_mirror_is_told_by_the_marks() -> None:
     series = BoardSeries(pairs=(), board=_CHARUCO, sizes_px=((960, 720), (960, 720)), looks=looks)
     found = name_mistake(series, DataError("nothing", "nothing"))
     assert found is not None
-    assert found.mistake is Mistake.MIRRORED
-    assert found.misplaced is not None
-    assert found.misplaced.side is Side.RIGHT
+    assert found.code is Mistake.MIRRORED
+    assert found.evidence.misplaced is not None
+    assert found.evidence.misplaced.side is Side.RIGHT
 
 
 @pytest.mark.parametrize(
